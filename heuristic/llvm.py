@@ -43,8 +43,6 @@ _TOO_EARLY = (
     f"import heuristic first, or set {VARIABLE} before Python starts."
 )
 
-_imported_too_early = False
-
 
 @dataclass(frozen=True)
 class LLVM:
@@ -52,13 +50,11 @@ class LLVM:
 
     ``version`` is such as ``(22, 1, 8)``, None if Dr.Jit found none; ``path`` is None if unknown.
     ``source`` is its origin: the user's variable, ``wheel``, or ``system``, Dr.Jit's own search.
-    ``note`` is what a person should know about it; it may be empty.
     """
 
     version: tuple[int, int, int] | None
     path: Path | None
     source: str
-    note: str = ""
 
 
 def configure() -> None:
@@ -67,16 +63,12 @@ def configure() -> None:
     Call it before anything imports Dr.Jit or Mitsuba. If Dr.Jit is already imported it is too late;
     it warns if that leaves no usable LLVM.
     """
-    global _imported_too_early
     library = None if os.environ.get(VARIABLE) else find_wheel()
     if library is None:
         return
     if "drjit" not in sys.modules:
         os.environ[VARIABLE] = str(library)
-        return
-    # Setting the variable now would change nothing, and the report would be wrong.
-    _imported_too_early = True
-    if not _is_usable(_version()):
+    elif not _is_usable(_version()):
         warnings.warn(f"The first kernel will fail. {_TOO_EARLY}", RuntimeWarning, stacklevel=2)
 
 
@@ -120,29 +112,23 @@ def require_libraries() -> None:
 
 def check() -> LLVM:
     """Return the LLVM that Dr.Jit uses; raise `InstallationError` unless it works."""
-    llvm = inspect()
-    if _is_usable(llvm.version):
-        return llvm
-    lines = [
-        "Dr.Jit cannot find an LLVM to compile kernels with.",
-        f"Found: {_description(llvm)}.",
-        _HOW_TO_GET_IT,
-    ]
-    if llvm.source == VARIABLE:
-        lines.append(f"Or unset {VARIABLE}, and fotismos searches by itself.")
-    raise InstallationError("\n".join([*lines, llvm.note]).rstrip())
-
-
-def inspect() -> LLVM:
-    """Return the LLVM that Dr.Jit uses, usable or not."""
     value = os.environ.get(VARIABLE)
     path = Path(value) if value else None
     # A child process inherits what `configure` set.
     source = "system" if path is None else "wheel" if path == find_wheel() else VARIABLE
     # Dr.Jit would print its own lines about a path that does not exist.
     version = None if _is_missing(path) else _version()
-    note = _TOO_EARLY if _imported_too_early else ""
-    return LLVM(version, path or (_loaded_library() if version else None), source, note)
+    llvm = LLVM(version, path or (_loaded_library() if version else None), source)
+    if _is_usable(version):
+        return llvm
+    lines = [
+        "Dr.Jit cannot find an LLVM to compile kernels with.",
+        f"Found: {_description(llvm)}.",
+        _HOW_TO_GET_IT,
+    ]
+    if source == VARIABLE:
+        lines.append(f"Or unset {VARIABLE}, and fotismos searches by itself.")
+    raise InstallationError("\n".join(lines))
 
 
 def use_threads(count: int | None = None) -> None:

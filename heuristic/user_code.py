@@ -69,8 +69,6 @@ def _left_out() -> tuple[str, ...]:
 
 def error_text(error: BaseException) -> str:
     """Return what went wrong, after the user's file and line if known."""
-    place = _place(error)
-    where = f"{place[0]}, line {place[1]}: " if place else ""
     message = error.msg if isinstance(error, SyntaxError) else str(first_error(error))
     first = first_error(error)
     if isinstance(first, AttributeError) and first.name:
@@ -78,7 +76,7 @@ def error_text(error: BaseException) -> str:
         if kind := CALLED.get(type(first.obj).__name__):
             message = f"a {kind} has no {first.name!r}, but {', '.join(names)}"
         message += suggestion(first.name, names)
-    return f"{where}{type(first).__name__}: {message}".strip().rstrip(":.")
+    return f"{_place(error)}{type(first).__name__}: {message}".strip().rstrip(":.")
 
 
 def place_of(function: Callable[..., Any]) -> str:
@@ -89,15 +87,15 @@ def place_of(function: Callable[..., Any]) -> str:
     return f"{_shown(code.co_filename)}, line {code.co_firstlineno}"
 
 
-def _place(error: BaseException) -> tuple[str, int] | None:
-    """Return the innermost line of a user's code that led to an error."""
+def _place(error: BaseException) -> str:
+    """Return the innermost line of a user's code that led to an error; empty if there is none."""
     if isinstance(error, SyntaxError) and error.filename:
-        return _shown(error.filename), error.lineno or 1
+        return f"{_shown(error.filename)}, line {error.lineno or 1}: "
     for each in (first_error(error), error):
         for frame in reversed(traceback.extract_tb(each.__traceback__)):
             if not frame.filename.startswith("<") and is_users(Path(frame.filename)):
-                return _shown(frame.filename), frame.lineno or 1
-    return None
+                return f"{_shown(frame.filename)}, line {frame.lineno or 1}: "
+    return ""
 
 
 def first_error(error: BaseException) -> BaseException:

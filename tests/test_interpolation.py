@@ -15,9 +15,7 @@ from heuristic.plugins.interpolated import (
     Interpolation,
     MeshCorners,
     barycentric_coordinates,
-    edge_intensity,
-    edge_normal,
-    scan_line_intensity,
+    between,
     scan_line_normal,
     shade_mesh,
     shading_points,
@@ -67,11 +65,11 @@ def inside(s, t):
 def test_scan_lines_of_any_direction_give_the_barycentric_mean(s, t, turn):
     weights, point = inside(s, t)
     intensities = [Float64(value) for value in (0.2, 0.9, 0.5)]
-    found = scan(intensities, point, turn, edge_intensity, scan_line_intensity)
+    found = scan(intensities, point, turn, between, between)
     assert float(found[0]) == pytest.approx(weights @ [0.2, 0.9, 0.5], rel=1e-9)
     vectors = np.array([(0.6, 0, 0.8), (0, -0.6, 0.8), (0, 0, 1)])
     found = scan(
-        [Array3f64(*v) for v in vectors.tolist()], point, turn, edge_normal, scan_line_normal
+        [Array3f64(*v) for v in vectors.tolist()], point, turn, between, scan_line_normal
     )
     mean = weights @ vectors
     np.testing.assert_allclose(rows(found)[0], mean / np.linalg.norm(mean), atol=1e-9)

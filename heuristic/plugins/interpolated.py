@@ -33,7 +33,6 @@ from heuristic.convention import (
     Number,
     Position,
     Scene,
-    Vector,
 )
 from heuristic.errors import InputError
 from heuristic.heuristics import Interpolation
@@ -42,36 +41,18 @@ from heuristic.lights import Light
 from heuristic.materials import Material
 
 
-def edge_intensity(
-    intensity_a: Colour, intensity_b: Colour, y_a: Number, y_b: Number, y: Number
-) -> Colour:
-    """Equation 6.35: ``I_D = [I_A (y_D - y_B) + I_B (y_A - y_D)] / (y_A - y_B)``.
+def between(value_a: Any, value_b: Any, place_a: Number, place_b: Number, place: Number) -> Any:
+    """Equations 6.35-6.37: ``I_D = [I_A (y_D - y_B) + I_B (y_A - y_D)] / (y_A - y_B)``.
 
-    The intensity where the scan line at the height ``y`` meets the edge from A to B; ``I_E``
-    likewise on the other edge. A scan line never crosses an edge parallel to it; there the result
-    is ``I_A``.
+    The intensity (6.35) or normal (6.37) where the scan line at the height ``y_D`` meets the edge
+    from A to B; E likewise on the other edge. Between them, 6.36 is the same along x: the chapter's
+    text says I_D and I_C, which can only mean I_D and I_E. A scan line never crosses an edge
+    parallel to it; there the result is the value at A. Normals stay as they are here: normalised,
+    the result at P would depend on the scan line's direction.
     """
-    return _between(intensity_a, intensity_b, y_a, y_b, y)
-
-
-def scan_line_intensity(
-    intensity_d: Colour, intensity_e: Colour, x_d: Number, x_e: Number, x: Number
-) -> Colour:
-    """Equation 6.36: ``I_P = [I_D (x_E - x_P) + I_E (x_P - x_D)] / (x_E - x_D)``.
-
-    The chapter's text says I_D and I_C, which can only mean I_D and I_E.
-    """
-    return _between(intensity_d, intensity_e, x_d, x_e, x)
-
-
-def edge_normal(
-    normal_a: Direction, normal_b: Direction, y_a: Number, y_b: Number, y: Number
-) -> Vector:
-    """Equation 6.37: ``n_D = [n_A (y_D - y_B) + n_B (y_A - y_D)] / (y_A - y_B)``.
-
-    It is not normalised: otherwise the result at P would depend on the scan line's direction.
-    """
-    return _between(normal_a, normal_b, y_a, y_b, y)
+    length = place_b - place_a
+    fraction = dr.select(length != 0, (place - place_a) / dr.select(length != 0, length, 1), 0)
+    return value_a * (1 - fraction) + value_b * fraction
 
 
 def scan_line_normal(
@@ -81,13 +62,7 @@ def scan_line_normal(
 
     It is zero where opposite normals cancel, and such a point receives no light.
     """
-    return vectors.normalise(_between(normal_d, normal_e, x_d, x_e, x))
-
-
-def _between(value_a, value_b, place_a, place_b, place):
-    length = place_b - place_a
-    fraction = dr.select(length != 0, (place - place_a) / dr.select(length != 0, length, 1), 0)
-    return value_a * (1 - fraction) + value_b * fraction
+    return vectors.normalise(between(normal_d, normal_e, x_d, x_e, x))
 
 
 def barycentric_coordinates(

@@ -53,8 +53,6 @@ def examine(variants: Iterable[str]) -> Iterator[str]:
     info = llvm.check()
     version = ".".join(map(str, info.version or ()))
     yield f"LLVM            {version}, from {info.source}: {info.path or 'path unknown'}"
-    if info.note:
-        yield f"                {info.note}"
     with jobs.pool(TIMEOUT_S) as pool:
         for variant in variants:
             yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
