@@ -15,35 +15,24 @@ if TYPE_CHECKING:
 llvm.configure()  # Dr.Jit looks for LLVM once, at its first import
 
 HOMES = {
-    "DirectionalLight": "heuristic.lights",
-    "Heuristic": "heuristic.heuristics",
-    "Material": "heuristic.materials",
-    "Parameter": "heuristic.heuristics",
-    "PointLight": "heuristic.lights",
-    "SpotLight": "heuristic.lights",
-    "Range": "heuristic.heuristics",
-    "shade": "heuristic.kernel",
+    "heuristics": ("Heuristic", "Parameter", "Range"),
+    "kernel": ("shade",),
+    "lights": ("DirectionalLight", "PointLight", "SpotLight"),
+    "materials": ("Material",),
 }
 """Where names come from when they are asked for: errors and options need no Dr.Jit."""
 
 __all__ = [
-    "DirectionalLight",
-    "Heuristic",
-    "Material",
-    "Parameter",
-    "PointLight",
-    "Range",
-    "SpotLight",
-    "__version__",
-    "register",
-    "shade",
-]
+    "DirectionalLight", "Heuristic", "Material", "Parameter", "PointLight", "Range", "SpotLight",
+    "__version__", "register", "shade",
+]  # fmt: skip
 
 
 def __getattr__(name: str) -> object:
-    if name not in HOMES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(HOMES[name]), name)
+    for home, names in HOMES.items():
+        if name in names:
+            return getattr(import_module(f"heuristic.{home}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def register() -> None:

@@ -25,38 +25,15 @@ IRRADIANCE_PER_INTENSITY = pi
 RADIANCE_PER_IRRADIANCE = 1.0 / pi
 """Radiance of a white diffuse surface under unit irradiance; the inverse of the factor above."""
 
-Array: TypeAlias = Any
-"""Numbers of any shape; the docstring gives it."""
-
-Number: TypeAlias = Any
-"""One number per point, or one for all, which may be a plain number."""
-
-Cosines: TypeAlias = Any
-"""A :class:`heuristic.numerics.Cosine`, or the cosine alone, -1..1."""
-
-Mask: TypeAlias = Any
-"""One truth value per point."""
-
-Position: TypeAlias = Any
-"""Three components per point, in world units."""
-
-Direction: TypeAlias = Any
-"""Three components per point, of length 1, away from the surface."""
-
-Vector: TypeAlias = Any
-"""Three components per point, of any length."""
-
-Colour: TypeAlias = Any
-"""A number, RGB, or one value per wavelength; coefficients 0..1, intensities display-linear."""
-
-Scene: TypeAlias = Any
-"""A ``mitsuba.Scene``; Mitsuba's classes depend on the current variant."""
-
-Mesh: TypeAlias = Any
-"""A ``mitsuba.Mesh``."""
-
-Shape: TypeAlias = Any
-"""A ``mitsuba.Shape``."""
-
-Interaction: TypeAlias = Any
-"""A ``mitsuba.SurfaceInteraction3f``."""
+Array: TypeAlias = Any  # numbers of any shape; the docstring gives it
+Number: TypeAlias = Any  # one number per point, or one for all, which may be a plain number
+Cosines: TypeAlias = Any  # a heuristic.numerics.Cosine, or the cosine alone, -1..1
+Mask: TypeAlias = Any  # one truth value per point
+Position: TypeAlias = Any  # three components per point, in world units
+Direction: TypeAlias = Any  # three components per point, of length 1, away from the surface
+Vector: TypeAlias = Any  # three components per point, of any length
+Colour: TypeAlias = Any  # a number, RGB, or one value per wavelength; see above for the units
+Scene: TypeAlias = Any  # a mitsuba.Scene; Mitsuba's classes depend on the current variant
+Mesh: TypeAlias = Any  # a mitsuba.Mesh
+Shape: TypeAlias = Any  # a mitsuba.Shape
+Interaction: TypeAlias = Any  # a mitsuba.SurfaceInteraction3f

@@ -21,7 +21,6 @@ the same points, which keeps the image's mean.
 own ``I_a``, it stays, and the light reflected by surfaces is added.
 """
 
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import drjit as dr
@@ -48,31 +47,12 @@ KNOTS = 16
 """Wavelengths of a tabulated spectrum, in steps of 31 nm: a multiple of a ray's number."""
 
 
-@dataclass(frozen=True)
-class GatheredLight:
-    """Light at points that the camera sees, for each of K channels or wavelengths.
+def gather(scene: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the light at points that the camera sees, in K channels or wavelengths.
 
     ``normal`` (N, 3), ``arriving`` (N, K): ``E / pi``, the value of a white surface, and ``k_d``
     (N, K): the weight of each in the image.
     """
-
-    normal: np.ndarray
-    arriving: np.ndarray
-    k_d: np.ndarray
-
-    def mean(self) -> np.ndarray:
-        """Return the mean (K,) of the arriving light over the image.
-
-        The weight of a point is its ``k_d``: ``k_d`` times the mean then has the same mean over the
-        image as ``k_d`` times the arriving light.
-        """
-        weight = self.k_d.sum(axis=0)
-        total = (self.arriving * self.k_d).sum(axis=0)
-        return np.divide(total, weight, out=np.zeros_like(total), where=weight > 0)
-
-
-def gather(scene: Any) -> GatheredLight:
-    """Gather light at the points of the grid, in the current variant."""
     arriving, weights = [], []
     for wavelengths in _batches():
         si, normal, k_d = _seen(scene, wavelengths)
@@ -81,7 +61,16 @@ def gather(scene: Any) -> GatheredLight:
         arriving.append(_by_point(light))
         weights.append(_by_point(k_d))
     normals = np.array(normal, float).T[:: STRATA**2]
-    return GatheredLight(normals, np.hstack(arriving), np.hstack(weights))
+    return normals, np.hstack(arriving), np.hstack(weights)
+
+
+def weighted_mean(arriving: np.ndarray, k_d: np.ndarray) -> np.ndarray:
+    """Return the mean (K,) of the arriving light over the image, weighted by ``k_d``.
+
+    ``k_d`` times it has the same mean over the image as ``k_d`` times the arriving light.
+    """
+    weight, total = k_d.sum(axis=0), (arriving * k_d).sum(axis=0)
+    return np.divide(total, weight, out=np.zeros_like(total), where=weight > 0)
 
 
 class Table:
@@ -189,18 +178,20 @@ def upward(scene: Any) -> np.ndarray:
     return np.sign(column[axis]) * np.eye(3)[axis]
 
 
-def fit(gathered: GatheredLight, up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def fit(
+    normal: np.ndarray, arriving: np.ndarray, k_d: np.ndarray, up: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return sky and ground, (K,) each and not negative, by weighted least squares.
 
     A channel is ``A + B c`` with ``A`` through the mean, and ``|B| <= A``: if sky or ground would
     be negative it is 0, and the other alone keeps the mean.
     """
-    cosine = (gathered.normal @ up)[:, None]
-    weight, total = gathered.k_d, gathered.k_d.sum(axis=0)
-    share = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
-    middle, mean = (share * cosine).sum(axis=0), gathered.mean()
+    cosine = (normal @ up)[:, None]
+    total, mean = k_d.sum(axis=0), weighted_mean(arriving, k_d)
+    share = np.divide(k_d, total, out=np.zeros_like(k_d), where=total > 0)
+    middle = (share * cosine).sum(axis=0)
     spread = (share * (cosine - middle) ** 2).sum(axis=0) + EVENNESS
-    slope = (share * (cosine - middle) * (gathered.arriving - mean)).sum(axis=0) / spread
+    slope = (share * (cosine - middle) * (arriving - mean)).sum(axis=0) / spread
     # sky = A + B and ground = A - B are not negative, with A + B middle = mean.
     slope = np.clip(slope, -mean / (1 - middle + 1e-9), mean / (1 + middle + 1e-9))
     level = mean - slope * middle
@@ -209,14 +200,15 @@ def fit(gathered: GatheredLight, up: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def prepare_mean(scene: Any) -> tuple[Table, Table, list[float], bool]:
     """Return the same sky and ground: the mean of the indirect light of a scene."""
-    mean = Table(gather(scene).mean())
+    _, arriving, k_d = gather(scene)
+    mean = Table(weighted_mean(arriving, k_d))
     return mean, mean, [0.0, 0.0, 1.0], scene.environment() is not None
 
 
 def prepare(scene: Any) -> tuple[Table, Table, list[float], bool]:
     """Return sky, ground, the upward direction, and whether they replace ``I_a``."""
     up = upward(scene)
-    sky, ground = fit(gather(scene), up)
+    sky, ground = fit(*gather(scene), up)
     return Table(sky), Table(ground), up.tolist(), scene.environment() is not None
 
 

@@ -1,7 +1,5 @@
 """Approximations of light transport: closed forms, Mitsuba's path, and the kernel's shadow rays."""
 
-import dataclasses
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -56,10 +54,11 @@ def integrating_sphere(k_d):
 def test_an_integrating_sphere_has_the_light_of_its_closed_form(variant):
     """It is lit alike everywhere, so ``I = rho (I_p + I)`` and ``I = I_p rho / (1 - rho)``."""
     scene = mi.load_dict(integrating_sphere(0.5))
-    found, again = indirect_light.gather(scene), indirect_light.gather(scene)
-    np.testing.assert_allclose(found.mean(), 3 / 4 * 0.5 / (1 - 0.5), rtol=0.01)
-    np.testing.assert_allclose(found.k_d, 0.5, rtol=0.02)
-    np.testing.assert_array_equal(found.arriving, again.arriving)
+    (_, arriving, k_d), (_, again, _) = (indirect_light.gather(scene) for _ in range(2))
+    mean = indirect_light.weighted_mean(arriving, k_d)
+    np.testing.assert_allclose(mean, 3 / 4 * 0.5 / (1 - 0.5), rtol=0.01)
+    np.testing.assert_allclose(k_d, 0.5, rtol=0.02)
+    np.testing.assert_array_equal(arriving, again)
 
 
 def test_the_mean_is_the_indirect_light_of_the_cornell_box(rgb):
@@ -81,7 +80,8 @@ def test_the_mean_is_the_indirect_light_of_the_cornell_box(rgb):
 def test_an_environment_replaces_ambient_light_and_is_gathered_where_nothing_hides_it(rgb):
     """A sphere under an even sky receives it everywhere, whatever ``I_a`` says."""
     scene = mi.load_dict(sky_above(lambda toward: np.full((len(toward), 3), 0.25)))
-    assert indirect_light.gather(scene).mean() == pytest.approx(0.25, rel=0.005)
+    mean = indirect_light.weighted_mean(*indirect_light.gather(scene)[1:])
+    assert mean == pytest.approx(0.25, rel=0.005)
     for model in AMBIENT:
         shown = image(scene, model, ambient=9.0)[16, 16]
         assert shown == pytest.approx(0.25 * 0.8, rel=0.01), model
@@ -126,24 +126,10 @@ def test_light_from_surfaces_and_from_around_add_up(rgb):
         np.testing.assert_allclose(found, expected, rtol=0.02, err_msg=model)
 
 
-def test_a_sun_is_gathered_without_noise(rgb):
-    """One texel of the sky holds all light: paths alone would meet it once in ten thousand."""
-
-    def sun(toward):
-        nearest = np.argmax(toward @ np.array((0.2, -0.5, 0.9)))
-        return 500.0 * (np.arange(len(toward)) == nearest)[:, None] * np.ones(3)
-
-    means = [
-        indirect_light.gather(mi.load_dict(sky_above(sun, height=height))).mean() * height**2
-        for height in (32, 64)
-    ]
-    np.testing.assert_allclose(*means, rtol=0.15)
-
-
 def test_sky_and_ground_are_found_again(rgb):
     prepared = indirect_light.prepare(mi.load_dict(sky_above(two_colours)))
-    assert list(prepared.up) == [0, 0, 1]
-    for table, end in ((prepared.sky, 1), (prepared.ground, -1)):
+    assert list(prepared[2]) == [0, 0, 1]
+    for table, end in zip(prepared, (1, -1), strict=False):
         (expected,) = two_colours(np.array([(0, 0, end)]))
         np.testing.assert_allclose(np.ravel(table.at(())), expected, rtol=0.08, atol=0.01)
 
@@ -155,14 +141,12 @@ def test_a_fit_keeps_the_mean_and_is_not_negative():
         normal = random.normal(size=(count, 3)) if case % 3 else np.ones((count, 3))
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         arriving, k_d = random.random((2, count, 3)) ** 4
-        found = indirect_light.GatheredLight(
-            normal, arriving, k_d * (random.random((count, 3)) < 0.8)
-        )
-        sky, ground = indirect_light.fit(found, np.array((0.0, 0.0, 1.0)))
+        k_d *= random.random((count, 3)) < 0.8
+        sky, ground = indirect_light.fit(normal, arriving, k_d, np.array((0.0, 0.0, 1.0)))
         assert min(sky.min(), ground.min()) >= 0
         fitted = sky * (1 + normal[:, 2:]) / 2 + ground * (1 - normal[:, 2:]) / 2
-        mean = dataclasses.replace(found, arriving=fitted).mean()
-        np.testing.assert_allclose(mean, found.mean(), rtol=1e-6, atol=1e-9)
+        means = [indirect_light.weighted_mean(light, k_d) for light in (fitted, arriving)]
+        np.testing.assert_allclose(*means, rtol=1e-6, atol=1e-9)
 
 
 # --- Shadow maps ----------------------------------------------------------------------------------
@@ -291,13 +275,6 @@ def test_an_edge_is_a_ramp_as_wide_as_the_filter(rgb):
     assert abs(np.mean(reached, axis=0) - expected).max() <= 1 / taps + 1e-6
 
 
-@pytest.mark.parametrize("variant", ["llvm_ad_mono", "llvm_ad_spectral"], indirect=True)
-def test_other_variants_have_the_same_shadows(variant):
-    scene = still_life("point", "directional")
-    rays, found = image(scene, "phong", 4, occlusion=True), image(scene, "shadow-map", 4)
-    assert np.mean(np.any(abs(found - rays) > 1e-3, axis=2)) < 0.05
-
-
 # --- All of them ----------------------------------------------------------------------------------
 
 
@@ -337,63 +314,6 @@ def test_random_scenes_are_finite_and_not_negative(variant, seeds, tmp_path):
                 other.props(integrator)["model"] = model
                 renderer = Renderer(scene, other.instantiate().integrator(), 4, model)
                 assert is_sound(np.array(renderer.render(seed))), (seed, model)
-
-
-LONE_BALLS = {
-    "an exponent of 1e7": {"n": 1e7, "k_s": 0.9},
-    "a lamp 1e5 away": {"lamp": (4e4, -6e4, 6e4), "intensity": 1e10},
-    "a lamp next to the surface": {"lamp": (0.0, -1.001, 0.0), "intensity": 1e-4},
-    "lengths of 1e-4": {"scale": 1e-4},
-    "lengths of 1e5": {"scale": 1e5},
-    "a white surface": {"k_d": 1.0, "k_s": 0.0},
-    "a black surface": {"k_d": 0.0, "k_s": 0.0},
-    "no light": {"intensity": 0.0},
-}
-
-
-def lone_ball(scale=1.0, lamp=(2.0, -3.0, 3.0), intensity=10.0, **material):
-    """A ball under a lamp, with lengths in units of ``scale``."""
-    lens = {"size": 16, "fov": 35.0, "near_clip": 0.01 * scale, "far_clip": 100 * scale}
-    return {
-        "type": "scene",
-        "integrator": {"type": "heuristic"},
-        "sensor": looking((0, -4 * scale, 0), (0, 0, 0), **lens),
-        "ball": {
-            "type": "sphere",
-            "radius": scale,
-            "bsdf": {"type": "phong", "k_d": 0.5, "k_s": 0.4, "n": 9.0} | material,
-        },
-        "lamp": {
-            "type": "heuristic_point",
-            "position": [scale * place for place in lamp],
-            "intensity": intensity,
-            "k0": 0.0,
-            "k2": 1 / scale**2,
-        },
-    }
-
-
-@pytest.mark.parametrize(
-    "variant",
-    [
-        "llvm_ad_rgb",
-        pytest.param("llvm_ad_mono", marks=pytest.mark.slow),
-        pytest.param("llvm_ad_spectral", marks=pytest.mark.slow),
-    ],
-    indirect=True,
-)
-def test_nothing_is_added_to_a_lone_ball(variant):
-    """Nothing hides light from a convex body, and none of it comes back."""
-    for case, change in LONE_BALLS.items():
-        scene = mi.load_dict(lone_ball(**change))
-        plain = image(scene, "phong")
-        assert (plain.max() > 0) == (case not in ("a black surface", "no light"))
-        for model in MODELS:
-            found = image(scene, model)
-            assert is_sound(found), (case, model)
-            # Maps have texels: at the terminator, where next to no light arrives, they may err.
-            atol = 2e-3 * max(plain.max(), 1e-6)
-            np.testing.assert_allclose(found, plain, atol=atol, err_msg=f"{case}, {model}")
 
 
 def test_vertices_and_faces_are_shaded_too_and_later_passes_replay_the_first(rgb):

@@ -22,7 +22,7 @@ from comparisons.check.measurement import measurement
 from comparisons.check.moved import differences
 from comparisons.cost import methods
 from comparisons.cost.cost_record import Method
-from comparisons.departure.colour import DEFAULT_VIEWING, Viewing
+from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.departure.metrics import METRICS, Metric, declare
 from comparisons.fit.fit import departures
 from comparisons.study import dataset
@@ -166,41 +166,11 @@ def test_a_metric_from_outside_is_in_fits_and_studies(metric):
     assert dataset.results()["blurred"][1] == "Blurred <difference>, mean"
 
 
-def test_a_metric_of_neighbourhoods_sees_the_whole_image(metric):
-    """Its values at some pixels are those of its map, not of an image of these pixels alone."""
-    test, reference = np.random.default_rng(1).random((2, 6, 7, 3))
-    where = np.zeros((6, 7), bool)
-    where[2, 3:5] = True
-    viewing = Viewing(exposure=0.5)
-    expected = blurred(test, reference, viewing)
-    np.testing.assert_array_equal(metric(test, reference, viewing), expected)
-    np.testing.assert_array_equal(metric.against(reference, where, viewing)(test), expected[where])
-
-
 @pytest.mark.parametrize("name", ["dE2000", "heuristic", "no name", "a.b", ""])
 def test_a_name_that_is_taken_or_unfit_is_refused(name):
     with pytest.raises(InputError, match="name"):
         declare(replace(BLURRED, name=name))
     assert list(METRICS) == list(METRICS.built_in)
-
-
-def test_a_metric_without_a_function_says_so_when_it_is_used():
-    with pytest.raises(InputError, match="'blurred' has no function: give it one"):
-        replace(BLURRED, function=None)(np.zeros((1, 1, 3)), np.zeros((1, 1, 3)))
-
-
-def test_metrics_of_installed_packages_are_declared(monkeypatch):
-    class Point:
-        def load(self):
-            return BLURRED
-
-    monkeypatch.setattr(
-        "heuristic.declared.entry_points", lambda group: [Point()] * (group == METRICS.group)
-    )
-    monkeypatch.setattr(METRICS, "added", {})
-    monkeypatch.setattr(METRICS, "is_loaded", False)
-    assert METRICS["blurred"] is BLURRED
-    assert list(METRICS) == [*METRICS.built_in, "blurred"]
 
 
 # -- A metric, a method and a heuristic in one run ----------------------------------------------

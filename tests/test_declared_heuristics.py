@@ -8,13 +8,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.cost.methods import FULL_PLAN, KERNELS, shaded_by
 from comparisons.gallery.builtin import SCENES
 from heuristic import kernel, tessellation
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.heuristics import (
-    BLINN,
     HEURISTICS,
     PHONG,
     Heuristic,
@@ -36,18 +34,6 @@ def toon(point):
         cosine = dr.maximum(dr.dot(point.normal, light.toward), 0)
         value += point.material.k_d * light.intensity * dr.ceil(cosine * steps) / steps
     return dr.select(dr.dot(point.normal, point.view) < point.parameters.outline, 0, value)
-
-
-def wrapped(point):
-    """Lambert's law, and the first light reaches beyond its horizon."""
-    key, *others = point.lights
-    wrap = point.parameters.wrap
-    cosine = dr.maximum((dr.dot(point.normal, key.toward) + wrap) / (1 + wrap), 0)
-    value = point.material.k_d * key.intensity * cosine
-    for light in others:
-        cosine = dr.maximum(dr.dot(point.normal, light.toward), 0)
-        value += point.material.k_d * light.intensity * cosine
-    return value
 
 
 def shadowed(point):
@@ -75,7 +61,6 @@ DECLARED = {
         "Toon",
         parameters=(Parameter("steps", 3, 1, 8), Parameter("outline", 0.25, 0, 1)),
     ),
-    "wrapped": Heuristic("wrapped", wrapped, parameters=(Parameter("wrap", 0.5, 0, 1),)),
     "shadowed": Heuristic("shadowed", shadowed, needs={"lights", "visible"}),
     "scaled": Heuristic("scaled", scaled, prepare=prepare),
 }
@@ -130,21 +115,9 @@ def toon_expected(p, n, v, material, lights, ambient, steps=3.0, outline=0.25):
     return value, edge
 
 
-def wrapped_expected(p, n, v, material, lights, ambient, wrap=0.5):
-    value = np.zeros((len(p), 3))
-    for light, wraps in zip(lights, (wrap, 0.0), strict=True):
-        toward, factor, _ = light.arriving(p)
-        cosine = np.maximum((np.sum(n * toward, axis=1) + wraps) / (1 + wraps), 0)
-        value += np.array(material.k_d) * light.intensity * (cosine * factor)[:, None]
-    return value, np.zeros(len(p), bool)
-
-
-EXPECTED = {"toon": toon_expected, "wrapped": wrapped_expected}
-
-
-def check(name, **parameters):
-    """Compare a toy, rendered by Mitsuba, with NumPy at the positions that it shaded."""
-    given = checks.with_film(scene(name, **parameters), 64, 1)
+def check(**parameters):
+    """Compare the toy, rendered by Mitsuba, with NumPy at the positions that it shaded."""
+    given = checks.with_film(scene("toon", **parameters), 64, 1)
     aovs = {"type": "aov", "aovs": "P:position,N:sh_normal", "image": given["integrator"]}
     channels = checks.render(given, 1, 5, aovs)
     colour, p, n = np.split(channels.reshape(-1, 9), 3, axis=1)
@@ -153,25 +126,22 @@ def check(name, **parameters):
     assert not colour[~hit].any()
     material, lights, ambient, viewer = checks.described(given)
     v = oracle.unit(viewer - p[hit])
-    expected, edge = EXPECTED[name](
-        p[hit], oracle.unit(n[hit]), v, material, lights, ambient, **parameters
-    )
+    arguments = p[hit], oracle.unit(n[hit]), v, material, lights, ambient
+    expected, edge = toon_expected(*arguments, **parameters)
     assert edge.mean() < 0.01
     assert expected.std() > 0.03
     oracle.require_close(colour[hit], expected, absolute=3e-6, where=~edge)
 
 
 def test_a_heuristic_from_outside_is_rendered_as_it_says(rgb, declared):
-    for name in ("toon", "wrapped"):
-        check(name)
-    check("toon", steps=5.0, outline=0.0)
-    check("wrapped", wrap=1.0)
+    check()
+    check(steps=5.0, outline=0.0)
     for value in (1.5, -0.1, float("nan")):
-        with pytest.raises(Exception, match=r"wrap = .* is not allowed: give a value from 0 to 1"):
-            mi.load_dict({"type": "heuristic", "model": "wrapped", "wrap": value})
+        with pytest.raises(Exception, match=r"outline = .* not allowed: give a value from 0 to 1"):
+            mi.load_dict({"type": "heuristic", "model": "toon", "outline": value})
 
 
-def test_a_wrong_order_of_lights_or_intensities_is_found_out(rgb, declared, monkeypatch):
+def test_wrong_intensities_are_found_out(rgb, declared, monkeypatch):
     right = Point.lights.func
 
     def swapped(point):
@@ -181,14 +151,9 @@ def test_a_wrong_order_of_lights_or_intensities_is_found_out(rgb, declared, monk
             for place, light in enumerate(lights)
         )
 
-    for name, wrong in (
-        ("wrapped", lambda point: right(point)[::-1]),
-        ("wrapped", swapped),
-        ("toon", swapped),
-    ):
-        monkeypatch.setattr(Point, "lights", property(wrong))
-        with pytest.raises(AssertionError, match="values are off"):
-            check(name)
+    monkeypatch.setattr(Point, "lights", property(swapped))
+    with pytest.raises(AssertionError, match="values are off"):
+        check()
 
 
 # --- The built-in ones ---------------------------------------------------------------------------
@@ -280,7 +245,7 @@ def test_shadow_rays_are_cast_where_they_are_needed(rgb, declared):
     image = np.array(mi.render(mi.load_dict(given), spp=1))
     assert sorted(set(np.unique(image))) == [0.125, 0.75]
     # One that casts none itself is hidden by the integrator, where that is asked for.
-    given["integrator"] = {"type": "heuristic", "model": "wrapped", "occlusion": True, "wrap": 0.0}
+    given["integrator"] = {"type": "heuristic", "model": "toon", "occlusion": True}
     image = np.array(mi.render(mi.load_dict(given), spp=1))
     assert sorted(set(np.unique(image))) == [0.0, 0.375]
 
@@ -297,11 +262,11 @@ def test_what_is_not_declared_to_be_needed_cannot_be_read(rgb, declared):
 
 
 def test_parameters_can_be_edited_without_a_new_kernel(rgb, declared):
-    loaded = mi.load_dict(checks.with_film(scene("wrapped"), 8, 1), optimize=False)
+    loaded = mi.load_dict(checks.with_film(scene("toon"), 8, 1), optimize=False)
     parameters = mi.traverse(loaded)
     images, hashes = [], []
     for value in (0.25, 0.75):
-        parameters["integrator.wrap"] = value
+        parameters["integrator.outline"] = value
         parameters.update()
         image, found = kernels(loaded)
         images.append(image)
@@ -339,9 +304,8 @@ def test_packages_declare_by_entry_points_that_are_loaded_once(monkeypatch):
     mine = registry.declare(Heuristic("mine", toon))
     assert list(registry) == ["phong", "mine", "late"]
     assert (len(registry), "none" in registry, loads) == (3, False, [1])
-    assert registry.built_in == ("phong",)
     assert (registry.is_own(PHONG), registry.is_own(mine)) == (True, False)
-    again = registry.declare(Heuristic("mine", wrapped))
+    again = registry.declare(Heuristic("mine", shadowed))
     assert registry["mine"] is again
     entry.load = lambda: 1 / 0
     with pytest.raises(InputError, match=r"late: the entry point package:LATE .*division by zero"):
@@ -349,13 +313,6 @@ def test_packages_declare_by_entry_points_that_are_loaded_once(monkeypatch):
 
 
 # --- Along the way to the page --------------------------------------------------------------------
-
-
-def test_methods_of_the_kernel_say_its_label(declared):
-    kernel = KERNELS[2]
-    assert shaded_by(PHONG, kernel) is kernel
-    assert shaded_by(BLINN, kernel).name == "Phong kernel: Blinn"
-    assert shaded_by(DECLARED["toon"], FULL_PLAN) is FULL_PLAN
 
 
 def test_a_pair_says_what_its_heuristic_shades_with(rgb, declared):

@@ -12,7 +12,6 @@ import pytest
 
 from comparisons.case import open_case
 from comparisons.compare import compare
-from comparisons.fit.fit import fit
 from comparisons.options import Options
 from comparisons.prepared import prepare
 from heuristic import glsl, program, user_shaders
@@ -249,13 +248,6 @@ def test_a_symbolic_loop_is_refused(rgb):
         dr.while_loop((mi.UInt32([0, 1]), mi.Spectrum(0)), lambda i, _: i < 2,
                       lambda i, _: (i + 1, shader(point)), mode="symbolic")  # fmt: skip
     assert "Dr.Jit cannot record" in str(caught.value.__cause__)
-
-
-@opengl
-def test_a_fit_is_refused(rgb):
-    case = open_case("fig-8-9", Options(heuristic=PHONG, **SMALL))
-    with pytest.raises(InputError, match="has no derivatives, which a fit needs"):
-        fit(case.source, case.options)
 
 
 LOGS = {

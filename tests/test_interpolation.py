@@ -25,7 +25,7 @@ from reference import Source
 from reference.pairing.halves import pair
 from reference.scene.source import collect_messages
 from tests import oracle
-from tests.test_normals import rows, uv_sphere
+from tests.test_normals import rows
 
 FLAT, GOURAUD, PHONG = Interpolation.FLAT, Interpolation.GOURAUD, Interpolation.PHONG
 Float64, Array3f64 = drjit.llvm.ad.Float64, drjit.llvm.ad.Array3f64
@@ -68,9 +68,7 @@ def test_scan_lines_of_any_direction_give_the_barycentric_mean(s, t, turn):
     found = scan(intensities, point, turn, between, between)
     assert float(found[0]) == pytest.approx(weights @ [0.2, 0.9, 0.5], rel=1e-9)
     vectors = np.array([(0.6, 0, 0.8), (0, -0.6, 0.8), (0, 0, 1)])
-    found = scan(
-        [Array3f64(*v) for v in vectors.tolist()], point, turn, between, scan_line_normal
-    )
+    found = scan([Array3f64(*v) for v in vectors.tolist()], point, turn, between, scan_line_normal)
     mean = weights @ vectors
     np.testing.assert_allclose(rows(found)[0], mean / np.linalg.norm(mean), atol=1e-9)
 
@@ -88,78 +86,11 @@ def test_barycentric_coordinates_of_a_point_and_of_its_foot(s, t, height):
 
 # --- Convergence --------------------------------------------------------------------------------
 
-LIGHT = PointLight((3.0, -2.0, 4.0), 1.0)
-VIEWER = (4.0, -1.0, 2.0)
 INNER = np.random.default_rng(5).dirichlet((1, 1, 1), 20)
 """Where in every triangle the ways of shading are compared."""
 
 
-def shade_on_sphere(position, normal, material):
-    return shade(position, normal, Array3f64(*VIEWER) - position, material, [LIGHT])
-
-
-def difference(bands, material, one, other, near_light=0.2):
-    """Root mean square over a sphere mesh of ``one - other``, two ways of shading.
-
-    Only faces that the light meets at a cosine of ``near_light`` or more count, so that the kink of
-    the horizon is left out.
-    """
-    points, faces = uv_sphere(bands)
-    corners = [dr.gather(Array3f64, points, faces[i]) for i in range(3)]
-    toward = dr.normalize(Array3f64(*LIGHT.position))
-    lit = [dr.dot(corner, toward) > near_light for corner in corners]
-    total, count = 0.0, 0
-    for weights in INNER:
-        gap = one(corners, weights, material) - other(corners, weights, material)
-        gap = dr.select(lit[0] & lit[1] & lit[2], gap, 0)
-        total += float(dr.sum(dr.square(gap))[0])
-        count += float(dr.count(lit[0] & lit[1] & lit[2])[0])
-    return (total / count) ** 0.5
-
-
-def mean_of(values, weights):
-    return sum(float(w) * value for w, value in zip(weights, values, strict=True))
-
-
-def flat(corners, weights, material):
-    centroid = mean_of(corners, (1 / 3,) * 3)
-    normal = dr.cross(corners[1] - corners[0], corners[2] - corners[0])
-    return shade_on_sphere(centroid, normal, material)
-
-
-def gouraud(corners, weights, material):
-    # On the unit sphere a position is its own normal.
-    values = [shade_on_sphere(corner, corner, material) for corner in corners]
-    return mean_of(values, weights)
-
-
-def phong(corners, weights, material):
-    point = mean_of(corners, weights)
-    return shade_on_sphere(point, point, material)
-
-
-def sphere(corners, weights, material):
-    """The analytic sphere, at the point in front of which the mesh lies."""
-    point = dr.normalize(mean_of(corners, weights))
-    return shade_on_sphere(point, point, material)
-
-
 DIFFUSE, GLOSSY = Material(k_d=0.8), Material(k_d=0.3, k_s=0.6, n=5)
-
-
-@pytest.mark.parametrize(
-    ("one", "other", "order"),
-    [(gouraud, phong, 2), (flat, phong, 1), (flat, gouraud, 1), (phong, sphere, 2)],
-    ids=lambda value: getattr(value, "__name__", value),
-)
-@pytest.mark.parametrize("material", [DIFFUSE, GLOSSY], ids=["diffuse", "glossy"])
-def test_ways_of_shading_converge_at_their_order(one, other, order, material):
-    """Linear interpolation errs by the square of the edge's length, a constant by the length."""
-    errors = [difference(bands, material, one, other) for bands in (16, 32, 64, 128)]
-    orders = -np.diff(np.log2(errors))
-    print(f"{one.__name__} to {other.__name__}: rms {errors}, orders {orders}")
-    assert orders[-1] == pytest.approx(order, abs=0.1)
-    assert np.all(abs(orders - order) < 0.35)
 
 
 # --- In Mitsuba -----------------------------------------------------------------------------------
@@ -236,22 +167,6 @@ def test_a_highlight_inside_a_triangle_is_lost_by_gouraud_and_kept_by_phong(rgb)
         value = float(stored_shade(si, interpolation, components=1)[0][0])
         assert value <= at_most * (1 + 1e-6)
     assert float(kept[0]) == pytest.approx(0.9, rel=1e-5)
-
-
-def test_any_number_of_wavelengths(rgb):
-    mesh = triangle_mesh(CORNERS, TILTED)
-    si = hits(mesh, looking_down([(1, 1)]))
-    for interpolation in (FLAT, GOURAUD):
-        for count in (1, 3, 4, 7):
-            shares = tuple(np.linspace(0.1, 1, count))
-            material = Material(k_d=shares[0] if count == 1 else shares)
-            stored = shade_mesh(mesh, interpolation, (1, 1, 9), material, LIGHTS[1:])
-            assert stored == (count if count > 1 else 3)
-            values = np.array([float(v[0]) for v in stored_shade(si, interpolation, count)])
-            assert values[-1] > 0
-            np.testing.assert_allclose(
-                values / values[-1], np.divide(shares, shares[-1]), rtol=1e-5
-            )
 
 
 @pytest.mark.parametrize("interpolation", [FLAT, GOURAUD], ids=lambda i: i.value)

@@ -7,9 +7,7 @@ import drjit.scalar
 import numpy as np
 import pytest
 
-from heuristic import DirectionalLight, Material, PointLight, SpotLight, shade
-from heuristic.errors import InputError
-from heuristic.materials import COEFFICIENTS
+from heuristic import DirectionalLight, Material, PointLight, shade
 from tests import checks, oracle
 
 Float, Array3f = drjit.llvm.ad.Float, drjit.llvm.ad.Array3f
@@ -207,58 +205,6 @@ def test_opaque_attenuation_is_the_same_kernel_whatever_its_value(points, kernel
 
 
 # --- Bad input -------------------------------------------------------------------------------
-
-BAD = [-0.1, float("nan"), float("inf"), (0.5, -1.0, 0.5), (0.5, float("nan"), 0.5)]
-
-
-NOWHERE, AXIS, NAN = (0, 0, 0), (0, 0, 1), float("nan")
-REFUSED = {
-    r"^(k_[iads]|intensity) = .*finite values of 0 or more": [
-        lambda value=value, make=make: make(value)
-        for value in BAD
-        for make in (
-            *(lambda value, name=name: Material(**{name: value}) for name in COEFFICIENTS),
-            lambda value: PointLight(NOWHERE, value),
-            lambda value: DirectionalLight(AXIS, value),
-            lambda value: SpotLight(NOWHERE, AXIS, value, 30),
-        )
-    ],
-    r"^n = .*finite and 0 or more": [
-        lambda n=n: Material(n=n) for n in (-1, -0.5, NAN, float("inf"))
-    ],
-    r"^k_d = .*give": [lambda value=value: Material(k_d=value) for value in ("red", None, {})],
-    r"^direction = .*(any other length|three finite)": [
-        lambda value=value, make=make: make(value)
-        for value in (NOWHERE, (0, 0), (0, NAN, 1), "down")
-        for make in (
-            lambda value: DirectionalLight(value, 1.0),
-            lambda value: SpotLight(NOWHERE, value, 1.0, 30),
-        )
-    ],
-    r"^cutoff = .*between 0 and 180": [
-        lambda value=value: SpotLight(NOWHERE, AXIS, 1.0, value) for value in (0, -5, 180, 200, NAN)
-    ],
-    r"^exponent = .*0 or more": [
-        lambda value=value: SpotLight(NOWHERE, AXIS, 1.0, 30, value)
-        for value in (-1, NAN, float("inf"))
-    ],
-    r"^attenuation = .*k0, k1, k2": [
-        lambda value=value: PointLight(NOWHERE, 1.0, value)
-        for value in (NOWHERE, (-1, 0, 1), (1, NAN, 0), (1, 0), (1, 0, 0, 0))
-    ],
-}
-
-
-def test_values_that_mean_nothing_are_refused(points):
-    for message, attempts in REFUSED.items():
-        for attempt in attempts:
-            with pytest.raises(InputError, match=message):
-                attempt()
-    with pytest.raises(InputError, match=r"^ambient = -1"):
-        shade(*points, Material(k_a=0.5), [], -1)
-    five = PointLight(AXIS, (1, 1, 1, 1, 1))
-    with pytest.raises(InputError, match=r"k_d has 3, lights\[0\]\.intensity has 5"):
-        shade(*points, Material(k_d=(0.5, 0.4, 0.3)), [five])
 
 
 def test_what_lies_beyond_the_range_is_as_documented():

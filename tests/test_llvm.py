@@ -179,26 +179,6 @@ def test_the_library_in_a_wheel(tmp_path):
             assert llvm.find_wheel() == expected
 
 
-IMAGES = """
-import os, sys
-os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
-import heuristic
-import mitsuba as mi
-from reference.scene.graph import set_variant
-
-set_variant("llvm_ad_rgb")
-mi.Bitmap(mi.TensorXf([0.5] * 64 * 64 * 3, (64, 64, 3))).write(sys.argv[1])
-print(mi.Bitmap(sys.argv[1]).size())
-"""
-
-
-@pytest.mark.thorough
-@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="no way to have a single core")
-def test_images_are_written_and_read_on_a_machine_of_one_core(tmp_path):
-    done = python("-c", IMAGES, tmp_path / "image.exr")
-    assert "64, 64" in done.stdout, done.stderr
-
-
 def pins(name):
     """Name, version and marker of every package of a requirements file."""
     lines = (ROOT / name).read_text().splitlines()
@@ -239,12 +219,6 @@ def test_every_dependency_is_pinned():
     assert extras["test"][0] == f"fotismos[{','.join(name for name in extras if name != 'test')}]"
     wanted = set().union(*map(names, extras.values())) - {"fotismos"}
     assert wanted <= test
-
-
-@pytest.mark.parametrize("script", ["run", ".ci/run"])
-def test_scripts_are_executable_and_parse(script):
-    assert os.access(ROOT / script, os.X_OK)
-    subprocess.run(["bash", "-n", ROOT / script], check=True, timeout=60)
 
 
 def test_run_names_a_python_that_it_cannot_use(tmp_path):

@@ -70,29 +70,6 @@ def test_collinear_vertices_have_no_normal(point, direction, s, t):
         require_units(found, (0, 0, 0), 0)
 
 
-def test_nearly_collinear_vertices_have_no_normal():
-    """0.1, 0.2, 0.3 and three times that are no multiples of each other as floats."""
-    found = normals.triangle_normal(SINGLE(0), SINGLE(0.1, 0.2, 0.3), SINGLE(0.3, 0.6, 0.9))
-    require_units(found, (0, 0, 0), 0)
-
-
-@settings(max_examples=50, deadline=None)
-@given(a=vectors, b=vectors)
-def test_two_opposing_faces_cancel_exactly(a, b):
-    p0, p1, p2 = SINGLE(0.1, 0.2, 0.3), SINGLE(*a) * 0.37, SINGLE(*b) * 0.73
-    forth, back = normals.cross(p1 - p0, p2 - p0), normals.cross(p2 - p0, p1 - p0)
-    require_units(forth + back, (0, 0, 0), 0)
-
-
-@EVERY_TYPE
-@pytest.mark.parametrize("scale", [1e-30, 1e-18, 1.0, 1e18, 1e37])
-def test_the_size_of_a_triangle_does_not_matter(vector_type, scale):
-    found = normals.triangle_normal(
-        vector_type(0), vector_type(scale, 0, scale), vector_type(0, scale, 0)
-    )
-    require_units(found, (-(0.5**0.5), 0, 0.5**0.5), rounding(vector_type))
-
-
 @pytest.mark.parametrize(
     "order", [(0, 1, 2), (1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0), (1, 0, 2)]
 )
@@ -130,14 +107,6 @@ def test_both_ways_to_an_ellipsoids_normal_agree_and_point_outwards(vector_type,
     require_units(implicit, rows(parametric), 8 * rounding(vector_type))
     assert dr.all(dr.dot(implicit, point) > 0)
     np.testing.assert_allclose(dr.norm(implicit), 1, atol=2 * rounding(vector_type))
-
-
-@EVERY_TYPE
-def test_points_of_6_24_satisfy_6_21(vector_type):
-    u, v = longitude_latitude(vector_type)
-    value = normals.ellipsoid(normals.ellipsoid_point(u, v, 3, 2, 1), 3, 2, 1)
-    assert float(dr.max(abs(value))[0]) < 8 * rounding(vector_type)
-    assert float(normals.ellipsoid(vector_type(0), 3, 2, 1)[0]) == -1
 
 
 def test_gradient_and_tangents_are_the_derivatives():
@@ -275,18 +244,6 @@ def test_opposing_faces_leave_no_normal(vector_type, weighting, thickness):
     corners[2] = corners[0] + 0.4 * (corners[1] - corners[0]) + thickness * corners[2]
     found = vertex_normals(vector_type(corners.T), Array3u([0, 1], [1, 0], [2, 2]), weighting)
     require_units(found, np.zeros((3, 3)), 0)
-
-
-@EVERY_TYPE
-def test_two_sides_of_a_sheet_cut_along_other_diagonals_leave_no_normal(vector_type):
-    """Their normals are not exact opposites, and their angles are not exactly equal."""
-    rng = np.random.default_rng(6)
-    for _ in range(20):
-        origin, right, up = rng.normal(size=(3, 3))
-        square = np.array([origin, origin + right, origin + right + up, origin + up])
-        faces = Array3u([0, 0, 1, 1], [1, 2, 0, 3], [2, 3, 3, 2])
-        found = vertex_normals(vector_type(square.T), faces, "angle")
-        require_units(found, np.zeros((4, 3)), 0)
 
 
 def test_angles_of_slivers_keep_their_digits():

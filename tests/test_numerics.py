@@ -10,8 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import heuristic
-from heuristic import kernel, numerics, terms, vectors
-from tests import checks, oracle
+from heuristic import numerics, terms, vectors
 
 Single, Double = drjit.llvm.ad.Float, drjit.llvm.ad.Float64
 Array3f, Array3f64 = drjit.llvm.ad.Array3f, drjit.llvm.ad.Array3f64
@@ -80,17 +79,6 @@ def test_unit_vectors_have_unit_length_or_none(components):
 
 
 @bounded
-@given(vectors_of_any_size, vectors_of_any_size)
-def test_directions_are_opposite_from_the_other_end(a, b):
-    toward, there = vectors.light_vector(Array3f(*a), Array3f(*b))
-    back, again = vectors.light_vector(Array3f(*b), Array3f(*a))
-    np.testing.assert_array_equal(np.array(toward), -np.array(back))
-    np.testing.assert_array_equal(np.array(there), np.array(again))
-    assert np.isfinite(np.array(toward)).all()
-    assert np.isfinite(np.array(there)).all()
-
-
-@bounded
 @given(st.lists(st.floats(-(2.0**90), 2.0**90, width=32), min_size=1, max_size=60))
 def test_sums_lose_next_to_nothing(values):
     total, lost = Single(0), Single(0)
@@ -106,32 +94,6 @@ def test_a_sum_beyond_the_range_is_infinite_and_no_nan():
     total, lost = Single(3e38), Single(0)
     total, lost = numerics.add(total, lost, Single(3e38))
     assert numerics.summed(total, lost)[0] == np.inf
-
-
-@pytest.mark.parametrize("count", [3 * kernel.BLOCK + 5, 3000])
-@pytest.mark.parametrize("spread", [0, 4, 30])
-def test_many_lights_of_mixed_magnitude_add_up_to_a_millionth(count, spread):
-    """Terms of up to 60 decades, in blocks as they are summed."""
-    rng = np.random.default_rng(count + spread)
-    points = checks.random_points(100, seed=4)
-    lights = [
-        oracle.Light(
-            "point",
-            float(np.float32(10.0 ** rng.uniform(-spread, spread))),
-            tuple(map(float, np.float32(rng.normal(size=3) * 4))),
-        )
-        for _ in range(count)
-    ]
-    arrays = (points.position, points.normal, points.view)
-    arrays = tuple(a.astype(float) for a in arrays)
-    expected = oracle.shade(*arrays, oracle.Material(k_d=0.5), lights)
-    found = heuristic.shade(
-        *(Array3f(a.T) for a in arrays),
-        heuristic.Material(k_d=0.5),
-        list(map(checks.kernel_light, lights)),
-    )
-    largest = max(light.intensity for light in lights)
-    oracle.require_close(checks.as_rows(found), expected, relative=1e-6, absolute=2e-7 * largest)
 
 
 @bounded

@@ -151,23 +151,3 @@ def test_a_lamp_that_is_not_flat_keeps_its_flux_and_its_intensity_ahead(rgb, tmp
     ahead, m = np.pi * spot["scale"], spot["exponent"]
     assert ahead == pytest.approx(2 / np.sqrt(2), rel=1e-3)
     assert 2 * np.pi * ahead / (m + 1) == pytest.approx(np.pi * 2, rel=1e-3)
-
-
-def test_a_lights_plugin_answers_at_any_distance(rgb):
-    """``pi I / d²`` wherever single precision has it, and nothing on the light itself."""
-    for distance in (0.0, 1e-38, 1e-20, 1e-3, 1.0, 1e20, 1e37):
-        for kind in ("heuristic_point", "heuristic_spot"):
-            intensity = min(max(distance**2, 1e-30), 1e30)
-            given = {"position": (0, 0, distance), "intensity": intensity, "k0": 0.0, "k2": 1.0}
-            if kind == "heuristic_spot":
-                given["direction"] = (0, 0, -1)
-            light = mi.load_dict({"type": kind} | given)
-            ds, weight = light.sample_direction(dr.zeros(mi.Interaction3f), mi.Point2f(0.5))
-            assert dr.all(dr.isfinite(weight) & dr.isfinite(ds.dist) & dr.all(dr.isfinite(ds.d)))
-            if distance in (0.0, 1e-38):
-                assert dr.all(ds.d == 0)
-                continue
-            np.testing.assert_allclose(np.array(ds.d).ravel(), (0, 0, 1), atol=1e-6)
-            np.testing.assert_allclose(np.array(ds.dist), distance, rtol=1e-6)
-            expected = np.pi * (intensity / distance / distance)
-            np.testing.assert_allclose(np.array(weight).ravel(), expected, rtol=1e-5, atol=1e-37)

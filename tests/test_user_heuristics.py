@@ -336,15 +336,6 @@ def test_values_that_only_a_scene_shows_name_pixel_and_file(rgb, written):
             image(scene, name)
 
 
-@pytest.mark.thorough
-def test_a_function_that_never_ends_is_ended(run, apart, written):
-    name = written("def shade(point):\n    while True:\n        pass\n")
-    words = ("compare", "fig-8-9", "--heuristic", name, "--resolution", "8x8", "--timeout", 6)
-    code, _, said = run(*words)
-    assert code == 1
-    assert "it made no progress for 6 s" in " ".join(said.split())
-
-
 # --- The same everywhere --------------------------------------------------------------------------
 
 
@@ -371,15 +362,6 @@ def test_a_process_apart_reads_the_file_and_a_changed_one_again(run, apart, writ
         stamps.append(path.stat().st_mtime_ns)
     assert means[0] == means[1] != means[2]
     assert stamps[0] == stamps[1] != stamps[2]
-
-
-def test_the_file_counts_in_the_digest(written):
-    text = "def one(point): return 0.5\n"
-    digests = []
-    for content in (text, text, text + "# more\n"):
-        written(content)
-        digests.append(named("mine.py:one").digest())
-    assert digests[0] == digests[1] != digests[2]
 
 
 def test_what_a_file_does_to_its_process_is_undone(rgb, written, tmp_path):

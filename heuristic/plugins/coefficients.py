@@ -169,16 +169,4 @@ def _bsdfs(scene):
     shapes = scene.shapes()
     if not any(shape.class_name() == "Instance" for shape in shapes):
         return [shape.bsdf() for shape in shapes]
-    bsdfs = {}
-
-    class Below(mi.TraversalCallback):
-        """Collects the outermost BSDFs below an object."""
-
-        def put(self, name, value, *details):
-            if isinstance(value, mi.BSDF):
-                bsdfs.setdefault(value)
-            elif isinstance(value, mi.Object):
-                value.traverse(Below())
-
-    scene.traverse(Below())
-    return list(bsdfs)
+    return [node for node in mi.traverse(scene).hierarchy if isinstance(node, mi.BSDF)]
