@@ -24,13 +24,21 @@ Student's, by the jackknife over the groups. With too few groups, or for a metri
 the triangle inequality gives a wider one: the error of a mean distance is at most the distance of
 the reference from the truth, the noise floor.
 
+**Shares above a threshold.** Differences of colour are shrunk (:func:`_draws`) towards their
+block's mean, as far as noise explains their spread, and given noise of the remaining size. So each
+pixel has a chance p of being above. The share is the mean of p; pixels with p between 0 and 1 are
+undecided, and the mean of ``p (1 − p)``, twice, widens the interval. It would include the truth if
+all pixels of equal p were above, or none. Half of the noise's own part is added, as uncertainty of
+the shrinkage. In tests with normal, skewed and rare noise, intervals hold the truth in 97 % of the
+cases; they fail where all pixels lie just at a threshold, or noise is larger than it.
+
 All of it is computed on sampled blocks (`reference.rendering.sums.sample`), at most 16,384
 pixels; the bias found there is applied to the whole image.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,7 +47,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure.blocks import ratio
 from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import Metric, Pixelwise
+from comparisons.departure.metrics import Distances, Metric, Pixelwise
 from comparisons.intervals import jackknife_error, student
 from reference.records import Positive, Record, Share
 from reference.rendering.sums import Grouped
@@ -116,23 +124,10 @@ def _fields(metric: Metric, value: float, low: float, high: float, shares: Array
     return {"debiased": value, "low": low, "high": high, "visible": visible}
 
 
-def counts_above(
-    distances: NDArray, thresholds: Sequence[float], blocks: NDArray, number: int
-) -> Array:
-    """Return how many distances (N,) of each block are above each threshold, (number, T).
-
-    ``blocks`` (N,) are the blocks of the distances. Thresholds rise.
-    """
-    width = len(thresholds) + 1
-    passed = np.searchsorted(thresholds, distances)  # thresholds below each distance
-    counts = np.bincount(blocks * width + passed, minlength=number * width).reshape(number, width)
-    return counts[:, :0:-1].cumsum(axis=1)[:, ::-1].astype(float)
-
-
 def shares_above(distances: NDArray, thresholds: Sequence[float]) -> Array:
-    """Return the share of distances (N,) above each threshold, (T,); 0 of none."""
-    counts = counts_above(distances, thresholds, np.zeros(len(distances), int), 1)[0]
-    return counts / max(len(distances), 1)
+    """Return the share of distances (N,) above each threshold, (T,), which rise; 0 of none."""
+    counts = np.bincount(np.searchsorted(thresholds, distances), minlength=len(thresholds) + 1)
+    return counts[:0:-1].cumsum()[::-1] / max(len(distances), 1)
 
 
 def debiased(
@@ -158,51 +153,84 @@ def debiased(
         _Extrapolated.of(metric, distances, grouped, [k for k in range(count) if k != out]).clean
         for out in range(count)
     ]
-    error = np.hypot(jackknife_error(left_out), whole.sampling_error(grouped))
+    error = float(np.hypot(jackknife_error(left_out), sampling_error(whole.added, grouped)))
     # The bias comes from the sample, the value that it is subtracted from is over all pixels.
-    measured, added = _numbers(metric, raw), whole.raw - whole.clean
-    half = np.array([student(0.0, float(each), count).high for each in error])
-    middle = max(measured[0] - added[0], 0.0)
-    half[0] += whole.gap / 2.0 + np.sqrt(middle**2 + CURVATURE * whole.noise**2) - middle
-    value, low, high = np.maximum(measured[0] - added[0] + half[0] * np.array([0, -1, 1]), 0.0)
+    measured, added = _mean(metric, raw), whole.raw - whole.clean
+    middle = max(measured - added, 0.0)
+    half = student(0.0, error, count).high
+    half += whole.gap / 2.0 + np.sqrt(middle**2 + CURVATURE * whole.noise**2) - middle
+    value, low, high = np.maximum(measured - added + half * np.array([0, -1, 1]), 0.0)
     if metric.linear:
         value, low, high = np.sqrt([value, low, high])
-    shares = _shares(measured[1:] - added[1:], half[1:], np.abs(added[1:]))
+    shares = _shares(metric.visible, distances, grouped, raw)
     return _fields(metric, float(value), float(low), float(high), shares)
 
 
-def _shares(found: Array, half: Array, added: Array) -> Array:
-    """Join the intervals of two estimates of shares (2 n,), since neither is always right.
+def _shares(
+    thresholds: Sequence[float], distances: Distances, grouped: Grouped, raw: NDArray
+) -> Array:
+    """Return shares (3, T) above thresholds, without noise: values, low and high ends."""
+    if not thresholds:
+        return np.zeros((3, 0))
+    mean = np.average(grouped.means, axis=0, weights=grouped.sizes)
+    noise = np.tensordot(contrasts(grouped.sizes), grouped.means, 1)
+    plain, *drawn = distances(np.concatenate([mean[None], _draws(mean, noise, grouped)]))
+    steps = np.arange(len(thresholds))
+    before = np.searchsorted(thresholds, plain)[:, None] > steps
+    chance = np.mean([np.searchsorted(thresholds, each)[:, None] > steps for each in drawn], axis=0)
+    added = before.mean(axis=0) - chance.mean(axis=0)
+    undecided = (chance * (1.0 - chance)).mean(axis=0) * len(drawn) / (len(drawn) - 1)
+    # The noise's part comes from the sample, the value that it is subtracted from is of all pixels.
+    value = shares_above(raw, thresholds) - added
+    error = np.hypot(
+        np.sqrt(undecided / len(mean)), sampling_error(grouped.by_block(before - chance), grouped)
+    )
+    half = 2.0 * (undecided + error) + np.abs(added) / 2.0
+    return np.array([value, value - half, value + half])
 
-    Half of the noise's part in the first is added, as uncertainty of the extrapolation.
+
+def _draws(mean: Array, noise: Array, grouped: Grouped) -> Array:
+    """Return differences (J, P, 3) that may be true, given their mean (P, 3) and noise (J, P, 3).
+
+    Within a block, the spread is noise and truth. Pixels are moved towards the block's mean by the
+    noise's share of the variance (James and Stein), by at most one standard deviation of the noise:
+    single pixels may depart (Efron and Morris, J. Am. Stat. Assoc. 67, 1972). The block's mean is
+    moved towards 0 likewise. Noise is added by the variance that is left.
     """
-    count = len(found) // 2
-    half = half + np.concatenate([added[:count] / 2.0, np.zeros(count)])
-    low = (found - half).reshape(2, count).min(axis=0)
-    high = (found + half).reshape(2, count).max(axis=0)
-    return np.array([found.reshape(2, count).mean(axis=0), low, high])
+    pixels = grouped.by_block(np.ones(len(mean)))[:, None]
+
+    def split(image: Array) -> tuple[Array, Array]:
+        middle = grouped.by_block(image) / pixels
+        return middle, image - middle[grouped.blocks]
+
+    middle, off = split(mean)
+    noise_middle, noise_off = map(np.array, zip(*map(split, noise), strict=True))
+    spread = grouped.by_block(np.mean(noise_off**2, axis=0)) / pixels
+    true = 1.0 - ratio(spread, grouped.by_block(off**2) / pixels)[grouped.blocks]
+    most = ratio(np.sqrt(spread)[grouped.blocks], np.abs(off))
+    true = np.clip(np.maximum(true, 1.0 - most), 0.0, 1.0)
+    sizes = np.mean(noise_middle**2, axis=0), middle**2
+    level = np.clip(1.0 - ratio(*(size.sum(axis=1) for size in sizes)), 0.0, 1.0)
+    level = level[grouped.blocks, None]
+    kept = level * middle[grouped.blocks] + true * off
+    return kept + np.sqrt(level) * noise_middle[:, grouped.blocks] + np.sqrt(true) * noise_off
 
 
-def _numbers(metric: Metric, distances: NDArray) -> Array:
-    """Return the mean (of a linear metric the mean square), and shares above thresholds, twice."""
-    first = np.mean(distances**2) if metric.linear else distances.mean()
-    shares = shares_above(distances, metric.visible)
-    return np.array([first, *shares, *shares])
+def _mean(metric: Metric, distances: NDArray) -> float:
+    """Return the mean of distances, of a linear metric the mean square."""
+    return float(np.mean(distances**2) if metric.linear else distances.mean())
 
 
 @dataclass(frozen=True)
 class _Extrapolated:
-    """`_numbers` as measured and without noise, and what noise adds to the sum of each block.
+    """The mean as measured and without noise, and what noise adds to the sum of each block.
 
     ``gap`` is the difference of the two estimates of the mean, ``noise`` the root of what noise
     adds to the mean square of blocks.
-
-    The share above a threshold is extrapolated in two ways: linearly, from the change when noise is
-    added once more, and from a block's distances, scaled to its mean without noise.
     """
 
-    raw: Array
-    clean: Array
+    raw: float
+    clean: float
     added: Array
     gap: float
     noise: float
@@ -211,7 +239,7 @@ class _Extrapolated:
     def of(
         cls,
         metric: Metric,
-        distances: Callable[[Array], Array],
+        distances: Distances,
         grouped: Grouped,
         chosen: Sequence[int],
     ) -> _Extrapolated:
@@ -232,24 +260,17 @@ class _Extrapolated:
             added = before - (lower + upper) / 2.0
             gap = max(float((upper - lower).sum() / pixels.sum()), 0.0)
             noise = np.sqrt(np.average((after**2 - before**2) / pixels**2, weights=pixels).clip(0))
+        raw = _mean(metric, plain)
+        return cls(raw, raw - added.sum() / pixels.sum(), added, gap, float(noise))
 
-        def above(distances: Array) -> Array:
-            return counts_above(distances, metric.visible, grouped.blocks, grouped.sampled)
 
-        kept = ratio(np.maximum(before - added, 0.0), before)[grouped.blocks]
-        once = above(plain)
-        more = np.mean([above(each) for each in noisy], axis=0) - once
-        added = np.column_stack([added, more, once - above(plain * kept)])
-        raw = _numbers(metric, plain)
-        return cls(raw, raw - added.sum(axis=0) / pixels.sum(), added, gap, float(noise))
-
-    def sampling_error(self, grouped: Grouped) -> Array:
-        """Return the standard error of what noise adds, due to sampling blocks."""
-        pixels = grouped.by_block(np.ones(len(grouped.places)))
-        left = self.added - np.outer(pixels, self.added.sum(axis=0) / pixels.sum())
-        share = 1.0 - grouped.sampled / grouped.total
-        spread = np.sqrt((left**2).sum(axis=0) / max(len(left) - 1, 1))
-        return np.sqrt(share * len(left)) * spread / pixels.sum()
+def sampling_error(added: Array, grouped: Grouped) -> Array:
+    """Return the standard error of what noise adds to sums of blocks (B, ...), due to sampling."""
+    pixels = grouped.by_block(np.ones(len(grouped.places)))
+    left = added - np.multiply.outer(pixels, added.sum(axis=0) / pixels.sum())
+    share = 1.0 - grouped.sampled / grouped.total
+    spread = np.sqrt((left**2).sum(axis=0) / max(len(left) - 1, 1))
+    return np.sqrt(share * len(left)) * spread / pixels.sum()
 
 
 def contrasts(sizes: Array) -> Array:
