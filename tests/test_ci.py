@@ -1,8 +1,10 @@
 """Checks, gates and what CI reads of them: exit codes, JUnit, Markdown, and what they replace."""
 
 import json
+import os
 import re
 import shutil
+import subprocess
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
@@ -11,6 +13,7 @@ import jsonschema
 import numpy as np
 import OpenEXR
 import pytest
+import yaml
 from msgspec import structs
 
 from comparisons.check.measurement import HALVES, MeasuredScene, measurement
@@ -22,10 +25,10 @@ from reference.rendering.gbuffer import ObjectIds
 from reports import jobs
 from reports.ci import checks, summary
 from tests import records
-from tests.programs import command_line
+from tests.programs import ROOT, command_line
 from tests.schemas import schema
 from tests.small_baselines import FAST, change
-from tests.small_scene import SCENE
+from tests.small_scene import PLAIN, SCENE
 
 SMALL = ("--spp", 4, "--resolution", "12x8")
 
@@ -371,3 +374,43 @@ def test_hostile_names_are_printed_as_text(run, tmp_path, monkeypatch):
     csv = (tmp_path / "out/tables/carriers.csv").read_text()
     assert "=1+1" in csv
     assert ",=1+1" not in csv
+
+
+# --- Workflows to copy -----------------------------------------------------------------------
+
+
+def steps(service):
+    """The steps of a workflow of the documentation that run commands of fotismos."""
+    text = (ROOT / "docs/checks.md").read_text(encoding="utf-8")
+    workflow = next(
+        yaml.safe_load(block)
+        for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+        if service in block
+    )
+    if service == "script:":
+        return workflow["shading"]["script"]
+    return [step["run"] for step in workflow["jobs"]["check"]["steps"] if "run" in step]
+
+
+@pytest.mark.thorough
+def test_the_workflows_of_the_documentation_pass_until_a_scene_fails(made_baselines, tmp_path):
+    (tmp_path / "fotismos").symlink_to(ROOT)
+    shutil.copytree(made_baselines, tmp_path / "baselines")
+    (tmp_path / "scenes").mkdir()
+    scene = tmp_path / "scenes/ball.xml"
+    scene.write_text(re.sub('(?s)<shape type="rect.*?</shape>', "", PLAIN), encoding="utf-8")
+
+    def codes(words):
+        environment = os.environ | {"DRJIT_CACHE_DIR": str(tmp_path / ".drjit")}
+        return [
+            subprocess.run(["bash", "-ec", each], cwd=tmp_path, env=environment).returncode
+            for each in words
+        ]
+
+    on_github = steps("runs-on:")
+    assert set(steps("script:")) < set(on_github)
+    assert codes(on_github) == [0, 0, 0]
+    assert ElementTree.parse(tmp_path / "gates.xml").getroot().get("failures") == "0"
+    scene.write_text(SCENE, encoding="utf-8")
+    change(tmp_path / "baselines/fig-8-6b.json")
+    assert codes(on_github[1:]) == [1, 1]
