@@ -107,9 +107,7 @@ def test_black_pictures_never_pass_in_silence(rgb, tmp_path):
     record = compare(case.source, case.options).record
     assert record.caution == said
     assert measure_scene(case.source, case.options).caution == said
-    finding = verdict.finding(record)
-    assert verdict.sentences([finding])[0].startswith(f"{record.scene}: {said}")
-    assert verdict.about(finding) == said
+    assert said in verdict.sentence(record)
 
 
 def test_doubts_about_pictures_are_told_from_their_values():
@@ -145,15 +143,6 @@ def ply(points=POINTS, corners=CORNERS, vertices=None):
     return "\n".join(head).encode() + points.tobytes() + faces
 
 
-def ply_in_words(vertices=4, faces=4):
-    head = ["ply", "format ascii 1.0", "comment - 1 - 2", f"element vertex {vertices}"]
-    head += [f"property float {axis}" for axis in "xyz"] + [f"element face {faces}"]
-    head += ["property list uchar int vertex_indices", "end_header"]
-    lines = [" ".join(map(str, point)) for point in POINTS.tolist()]
-    lines += [" ".join(map(str, (3, *face))) for face in CORNERS.tolist()]
-    return "\n".join([*head, *lines, ""]).encode()
-
-
 def with_index(index):
     corners = CORNERS.copy()
     corners[1, 1] = index
@@ -164,8 +153,6 @@ MESHES = (
     (ply(corners=with_index(9)), "names vertex 9, and there are 4"),
     (ply(corners=with_index(10**8)), "names vertex 100000000"),
     (ply(np.where(POINTS > 0, POINTS, np.nan)), "invalid vertex"),
-    (ply_in_words(vertices=10**12), "mesh.ply"),
-    (ply_in_words(faces=10**12), "mesh.ply"),
     (ply()[:-9], "read"),
     (b"", "mesh.ply"),
     (np.random.default_rng(0).bytes(500), "mesh.ply"),
@@ -180,19 +167,8 @@ def test_a_damaged_mesh_is_named_and_a_sound_one_compared(rgb, tmp_path):
         with pytest.raises(InputError, match=message) as refusal:
             compared(tmp_path, text)
         assert "mesh.ply" in str(refusal.value)
-    for content in (ply(), ply_in_words()):
-        (tmp_path / "mesh.ply").write_bytes(content)
-        assert compared(tmp_path, text).record.pixels.counted
-
-
-def test_only_the_file_that_cannot_be_read_is_named(rgb, tmp_path):
-    (tmp_path / "sound.ply").write_bytes(ply())
-    (tmp_path / "torn.serialized").write_bytes(b"torn")
-    torn = PLY.replace("ply", "serialized").format("torn.serialized")
-    with pytest.raises(InputError) as refusal:
-        compared(tmp_path, SCENE.replace(END, PLY.format("sound.ply") + torn + END))
-    assert "torn.serialized" in str(refusal.value)
-    assert "sound.ply" not in str(refusal.value)
+    (tmp_path / "mesh.ply").write_bytes(ply())
+    assert compared(tmp_path, text).record.pixels.counted
 
 
 def test_a_measured_material_is_refused_wherever_it_is_cut(rgb, corpus):
@@ -302,18 +278,6 @@ def test_text_without_end_is_refused(rgb, tmp_path, monkeypatch):
         compared(tmp_path, SCENE.replace(END, '<include filename="part.xml"/>' + END))
 
 
-def test_a_chain_of_includes_ends(rgb, tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "DEEPEST", 5)
-    for place in range(6):
-        inner = f'<include filename="{place + 1}.xml"/>'
-        (tmp_path / f"{place}.xml").write_text(f'<scene version="3.0.0">{inner}</scene>')
-    (tmp_path / "6.xml").write_text('<scene version="3.0.0"/>')
-    with pytest.raises(InputError, match=r"4.xml: more than 5 files include each other"):
-        compared(tmp_path, SCENE.replace(END, '<include filename="0.xml"/>' + END))
-    included = files.included(tmp_path / "4.xml")
-    assert [path.name for path in included.paths] == ["4.xml", "5.xml", "6.xml"]
-
-
 def test_names_that_no_file_has_are_refused(rgb, tmp_path):
     """Too long, or with a NUL, which a placeholder's value can hold; or a folder as the scene."""
     for reader in READERS:
@@ -419,11 +383,3 @@ def test_a_scene_broken_at_random_is_rendered_or_refused(rgb, corpus):
 @pytest.mark.slow
 def test_any_scene_broken_at_random_is(rgb, corpus):
     assert {outcome(seed, corpus) for seed in range(20, 400)} == {"rendered", "refused"}
-
-
-def test_an_error_of_another_kind_is_found_out(rgb, corpus, monkeypatch):
-    def fails(*_):
-        raise ZeroDivisionError("float division by zero")
-
-    monkeypatch.setattr(f"{__name__}.compare", fails)
-    assert any("ZeroDivisionError" in outcome(seed, corpus) for seed in range(4))

@@ -4,8 +4,6 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.cost.cost import cost
-from comparisons.cost.measure import COARSE
 from comparisons.options import Options
 from reference.scene.source import Source
 
@@ -55,14 +53,3 @@ def test_a_lamp_casts_no_shadow_on_what_it_lights(rgb, kind):
     # The ball's shadow, and the part of the ball that it shades itself.
     assert min(kept) > 0.85
     assert max(kept) < 1
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("kind", ["ball", "box"])
-def test_shadows_are_not_blamed_for_the_lamp(rgb, kind):
-    found = cost(Source("lamp", room(kind)), Options(resolution=(48, 36)), COARSE).record
-    errors = {point.method: point.error.mean for point in found.points}
-    assert errors["kernel with shadows"] < 1.5 * errors["Phong kernel"]
-    removed = {one.effect: one.removes.value for one in found.attribution.effects}
-    assert removed["occlusion"] > -1
-    assert abs(removed["extended lights"]) < 3

@@ -18,26 +18,6 @@ from reports.charts.theme import EFFECT_COLOURS
 TERMS = {EMISSION, AMBIENT, DIFFUSE, SPECULAR}
 
 
-def test_effects_keep_their_order():
-    assert [effect.label for effect in EFFECTS] == [
-        "emission",
-        "ambient",
-        "diffuse",
-        "specular",
-        "distance attenuation",
-        "spot cone",
-        "polygon interpolation",
-        "occlusion",
-        "microfacets and Fresnel",
-        "extended lights",
-        "environment",
-        "interreflection",
-        "transmission",
-        "spectral",
-    ]
-    assert len(set(EFFECTS)) == len(EFFECTS)
-
-
 def test_an_effect_stays_the_same_through_copies_and_processes():
     for effect in EFFECTS:
         assert labelled(effect.label) is effect

@@ -9,7 +9,6 @@ import pytest
 
 from comparisons.options import Options
 from comparisons.prepared import prepare
-from comparisons.verification import verify
 from heuristic.errors import InputError
 from reference import Convention, Source
 from reference.pairing import albedo, halves, nearest, partners, probe
@@ -75,14 +74,6 @@ def waves(size=32):
 def normal_map():
     x, y = (0.4 * wave for wave in waves())
     return raw((np.stack([x, y, np.sqrt(1 - x**2 - y**2)], axis=2) + 1) / 2)
-
-
-def test_only_what_has_no_plugin_in_python_is_made_in_parallel(rgb):
-    """Two threads would wait for each other: one for Python, one for what Python evaluates."""
-    pair = halves.pair(Source("a test", scene({"ball": {"type": "sphere", "bsdf": DIFFUSE}})))
-    for graph, expected in ((pair.heuristic, False), (pair.physical, True)):
-        graph.instantiate()
-        assert graph.config.parallel is expected
 
 
 def test_a_part_of_a_scene_is_a_node_and_what_it_refers_to(rgb):
@@ -155,15 +146,6 @@ def test_a_colour_as_roughness_is_taken_for_its_mean(rgb):
         for alpha in ({"type": "rgb", "value": [0.1, 0.2, 0.3]}, 0.2)
     )
     np.testing.assert_allclose(of_colour, of_mean, rtol=1e-5)
-
-
-def test_the_back_of_a_twosided_has_its_own_material(rgb):
-    flip = mi.ScalarTransform4f().rotate([1, 0, 0], 180)
-    shape = {"type": "rectangle", "to_world": flip, "b": EXACT["front"]}
-    heuristic, _ = images(scene({"s": shape}))
-    cosine = 1 / np.sqrt(0.4**2 + 0.2**2 + 1)
-    expected = np.array([0.2, 0.3, 0.8]) * 2.0 / pi * cosine
-    np.testing.assert_allclose(heuristic.max(axis=(0, 1)), expected, rtol=1e-5)
 
 
 # --- Transparency ----------------------------------------------------------------------------
@@ -245,21 +227,6 @@ def test_a_textured_plastic_is_at_each_point_what_its_colour_alone_is(rgb, nonli
     for image, other in (plain, plain[::-1]):
         assert (np.abs(textured - image).max(axis=2) < 2e-5).sum() > 20
         assert np.abs(image - other).max() > 0.1
-
-
-def test_the_base_of_a_plastic_follows_from_two_albedos(rgb):
-    tint = {"type": "checkerboard", "color0": 0.65, "color1": 0.65}
-    ior, air = (
-        float(mi.lookup_ior(mi.Properties("x"), "ior", name)) for name in ("polypropylene", "air")
-    )
-    for nonlinear in (False, True):
-        plastic = {"type": "roughplastic", "alpha": 0.3, "nonlinear": nonlinear}
-        graph, index = ball(plastic | {"diffuse_reflectance": tint})
-        found = at(
-            graph, Context(graph, Convention.MATCHED, rule_of).nearest(index).k_d, (0.1, 0.1)
-        )
-        known = RoughPlastic((0.65,) * 3, 0.3, ior, air, nonlinear=nonlinear)
-        assert found == pytest.approx(albedo.of_roughplastic(known).diffuse[0], rel=1e-4)
 
 
 def at(graph, value, uv):
@@ -445,17 +412,3 @@ def test_a_beam_keeps_the_flux_of_a_spot_that_falls_off(rgb):
 
 
 # --- Planning --------------------------------------------------------------------------------
-
-
-def test_metals_are_opaque_and_pruning_is_right_about_them(rgb):
-    ball = {"s": {"type": "sphere", "b": {"type": "roughconductor", "alpha": 0.3}}}
-    description = scene(ball, {"type": "constant"}, integrator="path")
-    result = verify(Source("a test", description), Options(spp=64))
-    assert "direct_all" in result.planned
-    assert result.significant == 0
-
-
-def test_nothing_is_pruned_for_a_material_that_lets_light_through(rgb):
-    ball = {"s": {"type": "sphere", "b": {"type": "dielectric"}}}
-    ready = prepare(Source("a test", scene(ball, integrator="path")), Options(spp=4))
-    assert (ready.plan.integrator, ready.plan.max_depth) == ("path", -1)

@@ -30,22 +30,6 @@ def test_a_baseline_names_the_file_from_its_own_folder(run, written, tmp_path):
     assert (code, "mine.py: there is no such file" in said) == (2, True)
 
 
-@pytest.mark.thorough
-def test_a_test_suite_measures_a_shader(written, tmp_path, rgb):
-    from reports.ci.testing import Fotismos
-
-    name = written((SHADERS / "phong.py").read_text(encoding="utf-8"))
-    fotismos = Fotismos(tmp_path / "baselines", lambda: tmp_path, update=True)
-    mine, ours = (
-        fotismos.departure("fig-8-9", resolution=(16, 16), spp=32, **more)
-        for more in ({"heuristic": name}, {})
-    )
-    assert mine.value == pytest.approx(ours.value, abs=1e-3)
-    assert fotismos.unchanged("fig-8-9", heuristic=name, resolution=(12, 12), spp=32)
-    again = Fotismos(tmp_path / "baselines", lambda: tmp_path)
-    assert again.unchanged("fig-8-9", heuristic=name, resolution=(12, 12), spp=32)
-
-
 def test_departure_of_a_comparison_is_that_of_its_shader(rgb, written):
     """A shader that returns the reference's own closed form leaves nothing."""
     name = written(

@@ -107,17 +107,6 @@ def test_a_matched_roughplastic_has_the_albedos_that_it_was_matched_to(rgb):
         np.testing.assert_array_less(np.abs(mean - wanted), 5 * error + 2e-5 * wanted)
 
 
-def test_the_albedo_of_a_roughplastic(rgb):
-    for distribution, nonlinear, alpha in (("beckmann", True, 0.1), ("ggx", False, 0.5)):
-        plastic = albedo.RoughPlastic(
-            (0.2, 0.5, 0.8), alpha, 1.49, 1.0, (1.0, 0.5, 0.25), distribution, nonlinear
-        )
-        mean, error = monte_carlo_albedo(plastic)
-        found = albedo.of_roughplastic(plastic)
-        np.testing.assert_array_less(np.abs(found.diffuse - mean[0]), 5 * error[0] + 1e-4)
-        np.testing.assert_array_less(np.abs(found.specular - mean[1]), 5 * error[1] + 1e-4)
-
-
 def test_the_albedo_of_the_lobe():
     """``2 pi`` times the integral of ``(k_s / pi) cos^n``, leaving through the cosine.
 

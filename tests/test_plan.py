@@ -1,22 +1,19 @@
 """Planning: what is left out is not there. Scenes on which a careless rule would prune wrongly."""
 
-import drjit as dr
 import mitsuba as mi
-import numpy as np
 import pytest
 
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.prepared import prepare
 from comparisons.verification import verify
-from reference.pairing.probe import AlbedoTable
 from reference.planning.effects import EFFECTS, INTERREFLECTION, OCCLUSION, TRANSMISSION
 from reference.planning.facts import Facts
 from reference.planning.plan import wants_spectra
 from reference.planning.rules import Boxes
 from reference.scene.source import Source
 from tests import misplanned
-from tests.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron, prune_blindly
+from tests.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron
 
 WHITE = DIFFUSE
 VIEWER = (0, -6, 3)
@@ -126,13 +123,6 @@ def test_every_built_in_scene_is_the_same_with_and_without_pruning(rgb, name):
     assert result.heuristic_largest < 1e-6
 
 
-def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
-    """The verification can fail: with shadows left out it marks the shadow."""
-    prune_blindly(monkeypatch)
-    parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
-    assert verify(Source("wrong", scene(**parts)), Options(spp=512)).significant > 0
-
-
 def facts(parts):
     ready = prepare(Source("facts", scene(**parts, light=lamp((0, 0, 5)))))
     return Facts.of(ready.pair, ready.scene).by_name
@@ -215,21 +205,6 @@ def test_the_scenes_own_depth_is_kept(rgb):
         assert plan.max_depth == 3
     direct = description | {"integrator": {"type": "path", "max_depth": 2}}
     assert prepare(Source("depth", direct)).plan.integrator == "direct_all"
-
-
-def test_the_table_of_the_environment_agrees_with_sampling(rgb):
-    """The albedo over view angles against plain Monte Carlo of another size and generator."""
-    bsdf = mi.load_dict({"type": "roughplastic", "alpha": 0.3, "int_ior": 2.0})
-    table = AlbedoTable(bsdf)
-    for mu in (1.0, 0.6, 0.2, 0.05):
-        count = 1_000_000
-        si = dr.zeros(mi.SurfaceInteraction3f, count)
-        si.wi = mi.Vector3f((1 - mu**2) ** 0.5, 0, mu)
-        rng = mi.PCG32(count)
-        point = mi.Point2f(rng.next_float32(), rng.next_float32())
-        weight = np.array(bsdf.sample(mi.BSDFContext(), si, rng.next_float32(), point)[1][0], float)
-        error = weight.std() / count**0.5
-        assert abs(np.array(table.at(mi.Float(mu)))[0, 0] - weight.mean()) < 5 * error + 2e-4
 
 
 def test_a_plan_simulates_what_is_asked_for_and_nothing_else(rgb):

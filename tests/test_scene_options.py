@@ -54,17 +54,6 @@ def test_a_value_and_a_sensor_are_used_and_recorded(run, scene, tmp_path):
     assert records["0.6", 1]["resolution"] == [40, 20]
 
 
-def test_other_commands_take_them_as_well(run, scene, tmp_path):
-    words = ("-D", "grey=0.5", "--sensor", 1, "--json", *SMALL)
-    assert run("plan", scene, *words)[0] == 0
-    code, printed, messages = run("fit", scene, *words, "-o", tmp_path)
-    assert (code, messages) == (0, "")
-    record = json.loads(printed)
-    record = record[0] if isinstance(record, list) else record
-    assert "-D grey=0.5" in record["command"]
-    assert "--sensor 1" in record["command"]
-
-
 def test_a_baseline_keeps_them(run, scene, tmp_path):
     baseline = tmp_path / "grey.json"
     words = ("--update", "--scene", scene, "-D", "grey=0.5", "--sensor", 1, "--spp", 64)

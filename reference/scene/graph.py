@@ -100,8 +100,7 @@ class Graph:
         try:
             made = self._made()
         except Exception as error:  # plugins may raise anything, in Python or in Mitsuba
-            message = plain_message(error) + self._culprits(error)
-            raise InputError(f"{self.name}: {message}") from error
+            raise InputError(f"{self.name}: {plain_message(error)}") from error
         if isinstance(made, mi.Scene):
             self._require_extents(made)
         return made
@@ -120,18 +119,6 @@ class Graph:
         with resolving(self.resolver):
             made = Parser.instantiate(self.config, state)
         return made[0] if isinstance(made, list) else made
-
-    def _culprits(self, error: Exception) -> str:
-        files = {index: path for index in self.nodes_in_use() if (path := self.file(index))}
-        if any(path.name in str(error).rpartition("plugin of type")[2] for path in files.values()):
-            return ""
-        broken = []
-        for index, path in files.items():
-            try:
-                self.part(index)._made()
-            except Exception:
-                broken.append(str(path))
-        return f" (the file {', '.join(broken)})" if broken else ""
 
     def _require_extents(self, scene):
         for shape in scene.shapes():
