@@ -23,7 +23,6 @@ from heuristic.heuristics import HEURISTICS
 from heuristic.user_shaders import of_function
 from reference.pairing import albedo, factors
 from reports.run import audit_files
-from reports.terminal import audit_lines
 from tests import test_engine_lobes as engine_lobes
 from tests.schemas import schema
 from tests.test_glsl import opengl
@@ -278,12 +277,12 @@ def test_lamberts_lobe_is_a_half_circle_of_k_d(grey):
 
 
 def test_the_headline_and_the_page_name_every_failure(grey):
-    assert audit_lines.headline(grey) == "diffuse, reflectance 0.5: white furnace does not hold"
+    assert audit_files.headline(grey) == "diffuse, reflectance 0.5: white furnace does not hold"
     failed = [structs.replace(check, verdict="does not hold", value=2.0) for check in grey.checks]
     wrong = structs.replace(grey, checks=tuple(failed), faults=("nan (<i>)", "nan (there)"))
     html = audit_files.render(wrong)
     for check in grey.checks:
-        assert check.name in audit_lines.headline(wrong)
+        assert check.name in audit_files.headline(wrong)
         assert f"{check.name.capitalize()}</th>" in html
     assert "nan (&lt;i&gt;)" in html
     assert "<i>" not in html

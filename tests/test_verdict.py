@@ -166,3 +166,13 @@ def test_verbose_lines_name_losses_and_settings_that_are_not_used():
     lines = "\n".join(tables.details(records.record()))
     assert "  lost: pane (dielectric): refraction; seen straight through" in lines
     assert "  not used: sampler independent, but multijitter" in lines
+
+
+def test_a_chosen_threshold_decides_on_the_terminal_and_where_the_page_begins(run, tmp_path):
+    words = ("compare", "fig-8-9", "--spp", 4, "--resolution", "12x8", "-o", tmp_path)
+    code, printed, _ = run(*words, "--within", 10)
+    assert code == 0
+    assert "differ: above ΔE2000 10" in printed
+    assert "Textbook shading looks right in fig-8-9." in printed
+    assert 'value="10.0"' in (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert run(*words, "--within", 2.1)[0] == 2

@@ -66,8 +66,8 @@ def audit(
     with jobs.pool(timeout) as pool:
         pool.start()
         from reference.records import to_json
+        from reports.run import audit_files
         from reports.run.results import PAGE, assigned, hold, own
-        from reports.terminal import audit_lines
 
         command = jobs.command_line()
         with hold(output, command) as top:
@@ -78,7 +78,7 @@ def audit(
     if as_json:
         click.echo(to_json(record), nl=False)
     else:
-        tell(audit_lines.lines(record))
+        tell(audit_files.lines(record))
         tell_where(folder / place / PAGE)
     if record.faults:
         click.get_current_context().exit(1)

@@ -76,14 +76,15 @@ def render(
     title: str = TITLE,
     failures: Sequence[Failure] = (),
     making: Making | None = None,
+    threshold: float = TOLERANCE,
 ) -> str:
-    """One HTML page of all scenes, worst first.
+    """One HTML page of all scenes, worst first, that begins at a threshold.
 
     `failures` are the scenes that could not be compared, and `making` says how far an unfinished
     run is.
     """
     taken: set[str] = set()
-    usual = THRESHOLDS.index(TOLERANCE)
+    usual = THRESHOLDS.index(threshold)
     studied = [(view.record, _cost(view)) for view in views]
     scenes = [_scene(view, taken) for view in views]
     scenes.sort(key=lambda scene: -scene.shares[usual])
@@ -97,7 +98,7 @@ def render(
             *({"id": failure.id, "name": failure.scene, "failed": True} for failure in failed),
         ],
         "thresholds": THRESHOLDS,
-        "usual": TOLERANCE,
+        "usual": threshold,
         "headlines": _runs(lambda t: verdict.headline([record for record, _ in studied], t)),
         "missing": _runs(lambda t: verdict.most_missing(studied, t)),
         "terms": glossary.meanings(),

@@ -1,19 +1,22 @@
-"""The files of an audit: its record, its page, and a chart of the lobes in polar form."""
+"""The files of an audit: its record, its page with a chart of the lobes; and its lines."""
 
+from collections.abc import Iterator
 from math import cos, radians, sin
 from pathlib import Path
 from typing import Any
 
 import altair as alt
 
-from comparisons.audit.checks import Audit
+from comparisons.audit.checks import Audit, Checked
+from heuristic.heuristics import in_file
 from reference import records
 from reports.charts import vega
 from reports.charts.theme import FAINT, Spec
 from reports.page.templating import templates
 from reports.run import results
 from reports.run.results import PAGE
-from reports.terminal import audit_lines
+from reports.terminal import tables
+from reports.terminal.words import number
 
 WIDTH = 270
 """Pixels of a plot: with its axis it fits a phone."""
@@ -74,9 +77,44 @@ def write(place: Path, record: Audit) -> None:
 def render(record: Audit) -> str:
     """Return the page of an audit: one file, without scripts."""
     environment = templates()
-    environment.filters["found"] = audit_lines.value_of
+    environment.filters["found"] = value_of
     return environment.get_template("audit.html.j2").render(
         record=record,
-        headline=audit_lines.headline(record),
+        headline=headline(record),
         lobes=vega.figure("Lobes", lobes(record)),
     )
+
+
+# --- On a terminal ---------------------------------------------------------------------------
+
+
+def headline(record: Audit) -> str:
+    """Return the subject with its parameters, and which checks failed."""
+    name = record.subject
+    if place := in_file(name):
+        file = Path(place[0]).name
+        name = f"{place[1]} ({file})" if place[1] else file
+    title = ", ".join([name, *(f"{key} {value}" for key, value in record.parameters.items())])
+    failed = [check.name for check in record.checks if check.verdict == "does not hold"]
+    if not failed:
+        return f"{title}: all that was asked holds"
+    return f"{title}: {', '.join(failed)} {'does' if len(failed) == 1 else 'do'} not hold"
+
+
+def value_of(check: Checked) -> str:
+    """Return the value of a check; a count has no decimals."""
+    value = check.value
+    return f"{value:g}" if value is not None and value == int(value) else number(value)
+
+
+def lines(record: Audit) -> Iterator[str]:
+    """Yield the lines of an audit."""
+    yield headline(record)
+    yield ""
+    rows = [
+        (check.name, check.verdict, value_of(check), check.expected, check.worst)
+        for check in record.checks
+    ]
+    yield from tables.printed([("check", "verdict", "found", "expected", "worst case"), *rows])
+    if record.mistakes:
+        yield from ("", *record.mistakes)

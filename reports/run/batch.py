@@ -56,6 +56,7 @@ class Batch:
     places: Mapping[str, str]
     on_page: Callable[[Path], object] | None
     command: str
+    within: float
     stages: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     views: dict[str, SceneView] = field(default_factory=dict)
     errors: dict[str, FotismosError] = field(default_factory=dict)
@@ -103,7 +104,10 @@ class Batch:
         if is_interrupted or self.done < len(self.places):
             making = Making(self.done, len(self.places), is_interrupted)
         results.write(self.folder / page.DETAILS, page.details(len(self.ordered), **content))
-        results.write(path, page.render(self.ordered, failures=self.failures(), making=making))
+        html = page.render(
+            self.ordered, failures=self.failures(), making=making, threshold=self.within
+        )
+        results.write(path, html)
         end = perf_counter()
         self.stages["page"] += end - begin
         self.next_page = end + (end - begin) / SHARE
@@ -148,7 +152,7 @@ def run(
             places = results.places(folder, scenes)
             for name in (TABLES, FIGURES) if job.figures else (TABLES,):
                 results.own(folder / name)
-            batch = Batch(folder, places, on_page, command)
+            batch = Batch(folder, places, on_page, command, job.within)
             batch.stages["start-up"] = perf_counter() - START
             calls = {
                 place: (scene, folder, place, replace(job, request=requests[scene]))
