@@ -181,24 +181,6 @@ def test_the_reference_rises_towards_grazing_and_peaks_off_the_mirror_direction(
         assert row["peak_heuristic"] == pytest.approx(angle, abs=0.11)
 
 
-def test_a_patch_is_the_lobe_in_one_direction():
-    profile = rows("alpha = 0.3\nlight_angle = 50\nview_angle = {from=0, to=80, steps=81}", "patch")
-    views = np.array([row["view_angle"] for row in profile])
-    specular = np.array([row["specular_reference"] for row in profile])
-    assert specular == pytest.approx(torrance_sparrow(50, views, 0.3, 1.5), rel=0.02, abs=1e-3)
-    k_d, k_s, n = (profile[0][name] for name in ("k_d", "k_s", "n"))
-    lobe = np.maximum(np.cos(np.deg2rad(views - 50)), 0) ** n
-    expected = k_d * np.cos(np.deg2rad(50)) + k_s * lobe
-    assert [row["heuristic"] for row in profile] == pytest.approx(expected, rel=1e-4)
-    # The azimuth turns the viewer away from the mirror image.
-    parameters = "n = 20\nlight_angle = 40\nview_angle = 40\nazimuth = [0, 90, 180]"
-    found = rows(parameters, "patch", "pairing = 'literal'")
-    cosines = [np.sin(np.deg2rad(40)) ** 2 * np.cos(np.deg2rad(a)) for a in (0, 90, 180)]
-    expected = [0.5 * (c + np.cos(np.deg2rad(40)) ** 2) ** 20 for c in cosines]
-    specular = [row["specular_heuristic"] for row in found]
-    assert specular == pytest.approx(expected, rel=1e-4, abs=1e-7)
-
-
 def test_views_see_equal_shares_of_the_surface():
     cosine = surface.views()[2]
     # Over projected solid angle, cos^2 is uniform in [0, 1].
@@ -554,7 +536,7 @@ def test_the_shipped_dataset_is_that_of_its_study(shipped, rgb):
     for row, (name, values) in zip(table.to_pylist(), everywhere, strict=True):
         assert row["part"] == name
         assert {key: row[key] for key in values} == pytest.approx(values, rel=1e-9)
-    every = {"incidence": 80, "by name": 160, "profile": 29, "lamp": 28}
+    every = {"incidence": 80, "by name": 160, "lamp": 28}
     points = running.all_points(study)
     for name, step in every.items():
         known = {row["point"]: row for row in dataset.rows(table, name)}

@@ -22,8 +22,6 @@ from comparisons.departure.metrics import (
     LEADING,
     METRICS,
     RATIO,
-    Pixelwise,
-    log2_luminance_ratio,
 )
 from comparisons.record import versions
 from comparisons.study.design import OWN, StudyFile
@@ -108,7 +106,7 @@ def measure(
     counted: np.ndarray,
     noise: np.ndarray | None = None,
 ) -> Row:
-    """Return the columns that all images have.
+    """Return the columns of images.
 
     The images (H, W, 3) are linear; ``noise`` is that of their difference, ``counted`` (H, W).
     """
@@ -119,6 +117,12 @@ def measure(
         name: metric.mean(metric.against(reference, counted, DEFAULT_VIEWING)(heuristic))
         for name, metric in METRICS.items()
     }
+    # Both models are linear in the light: less of it is a lower exposure of both images.
+    levels = {part: replace(DEFAULT_VIEWING, exposure=factor) for part, factor in DIMMED.items()}
+    dimmed = {
+        f"{LEADING.name}_{part}": float(LEADING(test, truth, viewing).mean())
+        for part, viewing in levels.items()
+    }
     return {
         "heuristic": float(test.mean()),
         "reference": float(truth.mean()),
@@ -126,37 +130,9 @@ def measure(
         f"{LEADING.name}_p95": summary.p95,
         f"{LEADING.name}_noise": summary.noise_floor,
         f"{LEADING.name}_shape": summary.after_exposure.mean,
-        **_dimmed(test, truth),
+        **dimmed,
         "exposure": summary.after_exposure.exposure,
         RATIO.name: ratio.mean,
-    }
-
-
-def measure_value(heuristic: float, reference: float) -> Row:
-    """Return the columns of a single grey value.
-
-    The shape column is missing: the best exposure would remove all of its departure.
-    """
-    test, truth = np.full((1, 3), heuristic), np.full((1, 3), reference)
-    pixelwise = {n: metric for n, metric in METRICS.items() if isinstance(metric, Pixelwise)}
-    return {
-        "heuristic": heuristic,
-        "reference": reference,
-        **{name: float(metric(test, truth)[0]) for name, metric in pixelwise.items()},
-        **_dimmed(test, truth),
-        RATIO.name: float(log2_luminance_ratio(test, truth)[0]),
-    }
-
-
-def _dimmed(test: np.ndarray, truth: np.ndarray) -> Row:
-    """Return the leading metric's mean over pixels (N, 3) under the light levels :data:`DIMMED`.
-
-    Both models are linear in the light: less light is a lower exposure on both images.
-    """
-    levels = {part: replace(DEFAULT_VIEWING, exposure=factor) for part, factor in DIMMED.items()}
-    return {
-        f"{LEADING.name}_{part}": float(LEADING(test, truth, viewing).mean())
-        for part, viewing in levels.items()
     }
 
 

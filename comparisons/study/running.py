@@ -156,12 +156,9 @@ def row(point: StudyPoint) -> Row:
     The row of a point that fails has its parameters and, in the column ``error``, the reason.
     """
     _prepare()
-    convention = point.part.options.convention
     try:
-        if point.part.scene == "patch":
-            columns = surface.patch(point.values, convention)
-        elif point.part.scene == "lobe":
-            columns = surface.lobe(point.values, convention)
+        if point.part.scene == "lobe":
+            columns = surface.lobe(point.values, point.part.options.convention)
         else:
             columns = _rendered(point)
     # A failing point must not end a study of thousands.

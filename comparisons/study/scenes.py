@@ -1,7 +1,8 @@
 """The built-in study scenes, and their parameters.
 
-Two need no image: a flat surface under parallel light has one radiance per direction, which the
-kernel and Mitsuba's BSDF give directly (:mod:`comparisons.study.surface`). The others are rendered.
+``lobe`` needs no image: a flat surface under parallel light has one radiance per direction, which
+the kernel and Mitsuba's BSDF give directly (:mod:`comparisons.study.surface`). The others are
+rendered.
 All materials are grey. Lights give the irradiance ``pi`` where the surface (the centre of the
 sphere) faces them: a white diffuse surface has the value 1 there.
 """
@@ -50,8 +51,6 @@ PHONG = {
     "k_s": StudyParameter("1", 0, 1e4, 0.5, "specular coefficient of Phong's model"),
 }
 LIGHT_ANGLE = StudyParameter("deg", 0, 89, 45, "angle of the light to the normal")
-VIEW_ANGLE = StudyParameter("deg", 0, 89, 45, "angle between the viewer and the normal")
-AZIMUTH = StudyParameter("deg", 0, 180, 0, "azimuth of the viewer; 0 is the mirror image's")
 PHASE_ANGLE = StudyParameter(
     "deg", 0, 90, 45, "angle between the light and the viewer at the centre"
 )
@@ -138,8 +137,7 @@ def _camera(place: Vector, target: Vector, up: Vector, field_of_view: float) -> 
 
 
 SCENES = {
-    # A flat surface under parallel light, from one direction, and from all.
-    "patch": StudyScene({"light_angle": LIGHT_ANGLE, "view_angle": VIEW_ANGLE, "azimuth": AZIMUTH}),
+    # A flat surface under parallel light, seen from all directions.
     "lobe": StudyScene({"light_angle": LIGHT_ANGLE}),
     # A sphere under a round lamp far away.
     "sphere": StudyScene({"light_angle": PHASE_ANGLE, "light_size": LIGHT_SIZE}, _sphere),

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import heuristic
-from comparisons.study.dataset import Row, largest_miss, measure, measure_value
+from comparisons.study.dataset import Row, largest_miss, measure
 from comparisons.study.scenes import Point
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.numerics import is_moderate
@@ -174,21 +174,6 @@ def albedo(radiance: np.ndarray, light_angle: float) -> float:
     irradiance.
     """
     return float(hemisphere()[1] @ radiance / np.cos(np.deg2rad(light_angle)))
-
-
-# --- Rows -----------------------------------------------------------------------------------------
-
-
-def patch(point: Point, convention: Convention) -> Row:
-    """Return the columns of a surface seen from one direction."""
-    made = material(point, convention)
-    light = direction(point["light_angle"], 180.0)
-    view = direction(point["view_angle"], point["azimuth"])
-    heuristic, specular = heuristic_radiance(made.phong, light, view)
-    reference, lobe = reference_radiance(made.plastic, light, view)
-    columns = measure_value(float(heuristic[0]), float(reference[0]))
-    parts = {"specular_heuristic": float(specular[0]), "specular_reference": float(lobe[0])}
-    return columns | parts | made.columns()
 
 
 def lobe(point: Point, convention: Convention) -> Row:
