@@ -235,16 +235,6 @@ def test_every_heuristic_goes_through_the_hard_cases(rgb):
         assert (found.verdict, found.worst) == ("holds", "none"), name
 
 
-def test_a_hard_case_counts_what_is_wrong(rgb):
-    subject = shaded(lambert)
-    bad = np.array([[0.5, np.nan, -0.25, 2.0]] * 3)
-    cases = [("bad", bad, None), ("good", np.ones((3, 4)), None)]
-    subject.hard_cases = lambda: iter(cases)
-    found = checks.values(subject)
-    assert (found.value, found.worst) == (1, "nan (bad)")
-    assert subject.faults == ["nan (bad)"]
-
-
 @pytest.mark.thorough
 @opengl
 def test_a_shader_in_glsl_is_audited_without_derivatives(rgb):
@@ -267,13 +257,6 @@ def grey():
     """The audit of a grey diffuse BSDF."""
     mi.set_variant("llvm_ad_rgb")
     return checks.audit("bsdf", "diffuse", {"reflectance": 0.5})
-
-
-def test_lamberts_lobe_is_a_half_circle_of_k_d(grey):
-    (chart,) = audit_files.lobes(grey)["vconcat"]
-    rows = [row for layer in chart["layer"] for row in layer["data"]["values"] if "of" in row]
-    assert len(rows) == len(checks.LIGHTS) * len(checks.VIEWS)
-    np.testing.assert_allclose([np.hypot(row["x"], row["y"]) for row in rows], 0.5, rtol=1e-5)
 
 
 def test_the_headline_and_the_page_name_every_failure(grey):

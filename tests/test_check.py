@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from comparisons.case import open_case
-from comparisons.check.measurement import baseline_of, made_small, measure_scene, read_baseline
+from comparisons.check.measurement import baseline_of, measure_scene, read_baseline
 from comparisons.check.moved import check, differences, moved
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
@@ -118,11 +117,6 @@ def check_alarms(make, resolution, count, levels):
     assert 0.02 < small / noisy < 0.08
 
 
-@pytest.mark.thorough
-def test_an_unchanged_scene_alarms_no_more_than_stated(rgb):
-    check_alarms(SCENES["plastic-spheres"].make, (16, 16), 4, (0.05,))
-
-
 @pytest.mark.guarantee(
     "checks",
     "Checks of an unchanged scene raise alarms no more often than stated.",
@@ -210,10 +204,3 @@ def test_other_blocks_are_refused(rgb):
     before = measured(SCENES["fig-8-9"].make, 0, (3, 3), 32)
     with pytest.raises(InputError, match="3 by 3 blocks, but the scene 4 by 4"):
         check(SCENES["fig-8-9"].source(), options.changed(resolution=(8, 8)), before)
-
-
-def test_a_small_film_keeps_its_size_and_a_large_one_its_proportions(rgb):
-    assert made_small(open_case("narrow-band-lamp")).options.resolution == (64, 20)
-    film = {"type": "hdrfilm", "width": 30, "height": 50}
-    scene = {"type": "scene", "sensor": {"type": "perspective", "film": film}}
-    assert made_small(open_case(scene, name="small")).options.resolution == (30, 50)

@@ -117,10 +117,8 @@ def test_the_geometry_is_the_scenes_own(rgb):
         faces = array_of(file, primitive["indices"]).reshape(-1, 3)
         made = meshes.new_mesh(mesh["name"], mi.Point3f(positions.T), mi.Vector3u(faces.T))
         shapes[mesh["name"]] = made
-    seen, same = (
-        gbuffer(mi.load_dict({"type": "scene", **shapes}), *SIZE),
-        found.layers["shape"] > 0,
-    )
+    seen = gbuffer(mi.load_dict({"type": "scene", **shapes}), *SIZE)
+    same = found.layers["shape"] > 0
     assert (seen.hit == same).mean() > 0.99  # rays along the open edge of the box
     for layer, own in (("P", seen.position), ("N", seen.normal)):
         off = np.linalg.norm(own - found.layers[layer], axis=-1)[same & seen.hit]

@@ -8,7 +8,6 @@ from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 
-import drjit as dr
 import jsonschema
 import mitsuba as mi
 import msgspec
@@ -151,16 +150,6 @@ def test_the_derivatives_are_those_of_central_differences_in_double_precision(fo
     linear = np.ix_(model.linear, model.linear)
     found = objective.quadratic(x)[1]
     np.testing.assert_allclose(found[linear], expected[linear], atol=1e-6 * np.abs(found).max())
-
-
-def test_one_kernel_serves_all_exponents(rgb, kernel_history):
-    model = objective_of(*surface_of(spheres())).model
-    low, high = (start(model.parameters) for _ in range(2))
-    high[model.place_of_exponent(0)] = np.log(700)
-    model.columns(low)
-    kernels = kernel_history(lambda: model.columns(high).sum())
-    assert all(kernel["cache_hit"] for kernel in kernels)
-    dr.sync_thread()
 
 
 # --- The search -----------------------------------------------------------------------------------
@@ -461,17 +450,3 @@ def test_what_cannot_be_fitted_is_refused(run, rgb, written, tmp_path):
         code, _, messages = run("fit", *words, "-o", tmp_path, *SMALL)
         assert code == 2
         assert re.search(f"(?s){expected}", " ".join(messages.split())), messages
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", ["film-crop", "sensor-several", "shape-instance"])
-def test_a_fit_is_of_the_film_as_it_is_and_names_materials_of_groups(name, run, tmp_path):
-    text = (CORPUS / f"{name}.xml").read_text(encoding="utf-8")
-    mask = '<bsdf type="mask"><float name="opacity" value="0.6"/><bsdf type="diffuse"/></bsdf>'
-    (tmp_path / "one.xml").write_text(text.replace(mask, '<bsdf type="diffuse"/>'))
-    words = ("--form", "phong", "--spp", 8, "--resolution", "48x36")
-    code, _, messages = run("fit", tmp_path / "one.xml", "-o", tmp_path, *words)
-    assert (code, messages) == (0, "")
-    record = json.loads((tmp_path / "fit/one/fit.json").read_text(encoding="utf-8"))
-    names = [material["name"] for material in record["fits"][0]["materials"]]
-    assert ("material 3" in names) == (name == "shape-instance")

@@ -137,13 +137,6 @@ def test_shifts_are_measured_to_a_fraction_of_a_pixel(cornell):
         assert shift == pytest.approx((part, 0), abs=0.2)
 
 
-def test_encoding_and_exposure_do_not_move_it(cornell):
-    reference, _, expected, _ = cornell
-    plain, _ = picture_warnings.measure(reference, expected)
-    for other in (5 * reference, to_srgb(reference), reference[..., ::-1]):
-        assert picture_warnings.measure(other, expected)[0] == pytest.approx(plain, abs=0.2)
-
-
 def test_edges_that_tell_nothing_are_said_to(cornell):
     even = np.full((SIDE, SIDE, 3), 0.5)
     assert picture_warnings.measure(even, cornell[2])[0] is None
@@ -263,13 +256,6 @@ def test_what_is_no_picture_is_refused(rgb, tmp_path):
         picture_files.read(str(path))
     with pytest.raises(InputError, match="64 of 64 pixels have an alpha below 1"):
         picture_files.read(str(path), "srgb")
-
-
-def test_a_layer_is_read_by_its_name(rgb, tmp_path):
-    names = [f"{layer}.{c}" for layer in ("a", "beauty") for c in "RGB"]
-    path = layered(tmp_path / "x.exr", *names)
-    expected = np.broadcast_to([3.0, 4.0, 5.0], (8, 8, 3))
-    np.testing.assert_array_equal(picture_files.read(f"{path}:beauty"), expected)
 
 
 def test_sizes_and_repeats_must_fit(rgb, tmp_path):

@@ -181,21 +181,6 @@ def test_the_reference_rises_towards_grazing_and_peaks_off_the_mirror_direction(
         assert row["peak_heuristic"] == pytest.approx(angle, abs=0.11)
 
 
-def test_views_see_equal_shares_of_the_surface():
-    cosine = surface.views()[2]
-    # Over projected solid angle, cos^2 is uniform in [0, 1].
-    assert np.mean(cosine**2) == pytest.approx(1 / 2, rel=1e-6)
-    assert np.mean(cosine) == pytest.approx(2 / 3, rel=1e-3)
-    assert surface.hemisphere()[1] @ surface.hemisphere()[0][2] == pytest.approx(2 / 3)
-
-
-def test_a_material_out_of_reach_says_by_how_much():
-    found = rows("n = 1\nk_d = 0.3\nk_s = [0.05, 2]\nlight_angle = 0")
-    assert found[0]["miss"] < 1e-4
-    # Phong's lobe alone wants the albedo 4/3; no surface reflects more than 1.
-    assert found[1]["miss"] > 0.25
-
-
 # --- Renderings -----------------------------------------------------------------------------------
 
 SMALL = "spp = 16\nresolution = [12, 12]"
@@ -581,12 +566,3 @@ def test_every_figure_has_its_points_and_says_what_it_averages(shipped):
     for cell in spec["data"]["values"][::9]:
         found = dataset.rows(table, "energy", {"k_s": cell["x"], "n": cell["y"]})
         assert cell["value"] == pytest.approx(np.mean([row["dE2000"] for row in found]))
-
-
-def test_rows_are_found_by_what_there_is(shipped):
-    with pytest.raises(InputError, match="column 'dE1976' is not known"):
-        dataset.rows(shipped[1], "incidence", {"dE1976": 1})
-    with pytest.raises(InputError, match="no point of part 'x'"):
-        dataset.rows(shipped[1], "x")
-    with pytest.raises(InputError, match="no point"):
-        dataset.rows(shipped[1], "incidence", {"alpha": 0.33})
