@@ -87,7 +87,7 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
     """Pair and plan a scene in the current variant, and make both halves ready to render."""
     options = options or Options()
     if options.image:
-        from comparisons.pictures import picture_files
+        from comparisons.pictures import picture_files  # loaded late: few comparisons have any
 
         options = picture_files.at_size_of_pictures(source, options)
     pair = options.pair(source)

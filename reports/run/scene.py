@@ -117,13 +117,16 @@ def key_of(case: Case, job: Job) -> str | None:
     place, options, versions, and the sources of fotismos where it runs from a checkout. What a
     script reads is not known.
     """
-    from comparisons.pictures.picture_files import path_of
     from comparisons.record import versions
     from reference.scene.source import digest
 
     if Path(case.word).suffix == ".py":
         return None
-    files = [path_of(word) for word in case.options.image]
+    files = []
+    if case.options.image:
+        from comparisons.pictures.picture_files import path_of  # loaded late: few have pictures
+
+        files = [path_of(word) for word in case.options.image]
     parts: dict[str, Any] = {
         "record": VERSION,
         "metrics": list(METRICS),
