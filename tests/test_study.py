@@ -2,8 +2,6 @@
 
 import importlib
 import json
-import multiprocessing
-import os
 import re
 import signal
 
@@ -388,29 +386,6 @@ def test_a_point_that_fails_is_a_row_that_says_why(rgb, tmp_path, monkeypatch):
     assert table["alpha"].to_pylist() == [0.1, 0.2, 0.3]
     table, done = running.run(study, tmp_path)
     assert (done, failed(table)) == (1, [])
-
-
-def end_the_first(_):
-    """Let the first process of a pool die while it works, and no other."""
-    for child in multiprocessing.active_children():
-        os.kill(child.pid, signal.SIGABRT)
-    return True
-
-
-@pytest.mark.thorough
-def test_processes_give_the_same_and_a_dead_one_fails_its_points_alone(rgb, tmp_path):
-    study = design.parse(part("alpha = [0.1, 0.3]\nlight_angle = {from=0, to=85, steps=7}"))
-    alone, _ = running.run(study, tmp_path / "a")
-    ends = iter([False, False, True])
-    with Pool(2) as pool:
-        table, _ = running.run(
-            study, tmp_path / "b", pool, lambda *_: next(ends, False) and end_the_first(_)
-        )
-    assert 1 <= len(failed(table)) <= 2
-    assert set(failed(table)) == {"points of lobe: its process died of SIGABRT in native code."}
-    table, done = running.run(study, tmp_path / "b")
-    assert done <= 2
-    assert table.equals(alone)
 
 
 @pytest.mark.thorough

@@ -9,10 +9,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any, TypeAlias
 
 import altair as alt
-import numpy as np
 import pyarrow as pa
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 
 from comparisons.study import dataset
 from comparisons.study.dataset import Row
@@ -99,11 +96,11 @@ def _map(
         x = x.type("ordinal").sort("ascending").axis(labelOverlap="greedy", labelAngle=0)
         y = y.type("ordinal").sort("descending").axis(labelOverlap="greedy")
     else:
+        logs = [part.levels[name].is_log for name in names]
         x, y = (
-            place.scale(type="log" if part.levels[name].is_log else "linear",
-                        nice=not part.levels[name].is_log)
-            for place, name in zip((x, y), names, strict=True)
-        )  # fmt: skip
+            place.scale(type="log" if is_log else "linear", nice=not is_log)
+            for place, is_log in zip((x, y), logs, strict=True)
+        )
     chart = alt.Chart(alt.Data(values=cells)).encode(x=x, y=y)
     marks = chart.mark_rect() if is_grid else chart.mark_circle(size=60, opacity=1)
     layers = [marks.encode(color=colour)]
@@ -134,8 +131,7 @@ def _lines(
     chart = alt.Chart().mark_line(strokeWidth=2).encode(x=x, y=y)
     if series:
         # Viridis without its light end, which is invisible on white.
-        shades = colormaps["viridis"](np.linspace(0, 0.8, len({cell["y"] for cell in values})))
-        inks = alt.Scale(range=[to_hex(shade) for shade in shades])
+        inks = alt.Scale(scheme=alt.SchemeParams("viridis", extent=[0, 0.8]))
         title = _with_unit(_label(series), table, series)
         chart = chart.encode(color=alt.Color("y:O", title=title, scale=inks))
     if len(columns) > 1:
