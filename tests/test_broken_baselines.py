@@ -185,7 +185,8 @@ def test_a_number_that_is_not_one_is_never_a_pass(folder, tmp_path, monkeypatch)
     from comparisons.check import moved
 
     monkeypatch.setattr(moved, "sidak", lambda p, tests: np.full(len(p), np.nan))
-    made, _ = checks.examine_one(folder / "fig-8-6a.json", 0.01, None, tmp_path / "out")
+    words = (folder / "fig-8-6a.json", 0.01, None, tmp_path / "out")
+    made, _ = checks.judged(checks.examine_one, *words)
     assert made.status != "passed"
 
 

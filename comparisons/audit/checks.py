@@ -272,17 +272,13 @@ def _largest(
 STEP = 0.02
 """Step of a finite difference, relative to the number."""
 
-QUANTILE = 0.9
-"""Quantile over the points: the rest may lie at kinks, where the two rightly differ."""
+QUANTILE, AGREES = 0.9, 0.05
+"""Largest relative difference at this quantile of the points: others may lie at kinks, where the
+two rightly differ."""
 
-AGREES = 0.05
-"""Largest relative difference at that quantile."""
-
-FAINT = 1e-3
-"""Derivatives below this share of the largest are judged by their absolute difference."""
-
-NOTHING = 1e-5
-"""A derivative that is below this everywhere is rounding error."""
+FAINT, NOTHING = 1e-3, 1e-5
+"""Derivatives below the former share of the largest are judged by their absolute difference; if all
+are below the latter, they are rounding errors."""
 
 OPPOSITE = 2.0
 """The largest possible relative difference; it also stands for derivatives that are not finite."""

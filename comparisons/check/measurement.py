@@ -36,11 +36,9 @@ from reference.records import VERSION, Amount, Record, Versions, laid_out
 from reference.rendering.renderer import Progress, passes
 from reference.scene.source import Source
 
-PASSES = 16
-"""Enough for a t-test, corrected for a hundred quantities, to detect five standard errors."""
-
-MOST_PASSES = 1024
-"""Far more than a t-test needs; all their images are in memory at once."""
+PASSES, MOST_PASSES = 16, 1024
+"""The former are enough for a t-test, corrected for a hundred quantities, to detect five standard
+errors; images of the latter are in memory at once."""
 
 GRID = 4
 """Blocks along each side of the image: few enough to read, small enough to locate a change."""
@@ -250,29 +248,21 @@ FORMAT_0_1 = '"format": "fotismos baseline 1"'
 
 
 class Baseline(Record, kw_only=True, omit_defaults=True):
-    """Measurements of one scene, from independent passes of both halves.
-
-    Attributes
-    ----------
-    scene
-        A built-in name, or the path of a Mitsuba or Python file, relative to the baseline's folder.
-    options
-        Rendering options, named as on the command line; defaults are left out.
-    versions
-        Versions of the software that measured it.
-    images
-        Name of an EXR file next to the baseline with both halves, for people to look at; None if
-        there is none.
-    metrics, heuristic, reference
-        Departure metrics, and colours of both halves.
-    """
+    """Measurements of one scene, from independent passes of both halves."""
 
     record_version: int
-    scene: str
-    options: dict[str, Any]
+    scene: Annotated[
+        str,
+        Meta(description="A built-in name, or a file's path from the baseline's folder."),
+    ]
+    options: Annotated[
+        dict[str, Any], Meta(description="As on the command line; defaults are left out.")
+    ]
     passes: Annotated[int, Meta(ge=2, le=MOST_PASSES)]
-    versions: Versions
-    images: str | None = None
+    versions: Annotated[Versions, Meta(description="Of the software that measured it.")]
+    images: Annotated[
+        str | None, Meta(description="An EXR beside it with both halves, for people to look at.")
+    ] = None
     metrics: dict[str, MetricAmount]
     heuristic: Half
     reference: Half
