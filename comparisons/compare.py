@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from msgspec import structs
 
-from comparisons import pixel_terms, record
+from comparisons import record
 from comparisons.comparison import (
     Comparison,
     ComparisonRecord,
@@ -42,8 +42,14 @@ from reference.rendering.sums import (
 )
 from reference.scene.source import Source, collect_messages, count_messages
 
+if TYPE_CHECKING:
+    from comparisons.pixel_terms import TermGrid
+
 PERCENTILE = 95
 """A noise target is for this percentile of the noise over the counted pixels."""
+
+Terms: TypeAlias = "tuple[TermGrid | None, str]"
+"""The terms of a comparison, or why there are none."""
 
 Sums: TypeAlias = tuple[Accumulator, Accumulator, DifferenceSums]
 """Sums of the heuristic half, of the reference, and of their difference."""
@@ -70,29 +76,25 @@ def compare(
     options: Options | None = None,
     progress: Progress | None = None,
     command: str = "",
+    terms: bool = True,
 ) -> Comparison:
     """Compare the heuristic half of a scene with the physical one, in the current variant.
 
     ``command`` repeats the comparison, for the record. ``progress(stage, done, total)`` is called
-    after each pass; with a noise target, ``total`` is the limit.
-
-    Raises
-    ------
-    InputError
-        When the scene cannot be read or paired, no pixel sees a surface, or both halves are black.
-    NonFiniteError
-        When a rendering holds a NaN or an infinity.
+    after each pass; with a noise target, ``total`` is the limit. ``terms`` traces equation 8.10 at
+    pixels. Raises `InputError` if the scene cannot be read or paired, no pixel sees a surface, or
+    both halves are black; `NonFiniteError` for a NaN or an infinity in a rendering.
     """
     printed: list[str] = []
     with collect_messages(printed):
-        comparison = _compare(source, options or Options(), progress, command)
+        comparison = _compare(source, options or Options(), progress, command, terms)
     lines = count_messages([*source.messages, *printed])
     made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *lines))
     return replace(comparison, record=made)
 
 
 def _compare(
-    source: Source, options: Options, progress: Progress | None, command: str
+    source: Source, options: Options, progress: Progress | None, command: str, terms: bool
 ) -> Comparison:
     stages: dict[str, float] = {}
     begin = perf_counter()
@@ -122,8 +124,12 @@ def _compare(
     caution = require_light(*shown, source.name, options)
     picture = picture_warnings.picture_record(place, options, images) if options.image else None
     done("metrics")
-    terms, no_terms = pixel_terms.trace(ready.heuristic, options)
-    done("terms")
+    traced: Terms = None, "Terms are traced with --why."
+    if terms:
+        from comparisons import pixel_terms  # loaded late: --no-why traces none
+
+        traced = pixel_terms.trace(ready.heuristic, options)
+        done("terms")
     made = ComparisonRecord(
         scene=source.name,
         variant=reference.variant,
@@ -157,7 +163,7 @@ def _compare(
         mistakes=_mistakes(options),
         **numbers,
     )
-    return Comparison(made, images, terms, no_terms)
+    return Comparison(made, images, *traced)
 
 
 def render(

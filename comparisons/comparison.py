@@ -1,7 +1,7 @@
 """What a comparison returns: its record, ``comparison.json``, and its images."""
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from msgspec import Meta
@@ -9,7 +9,6 @@ from msgspec import Meta
 from comparisons.departure.colour import Viewing
 from comparisons.departure.regions import ObjectShare, Region
 from comparisons.departure.statistics import Histogram, RatioSummary, Summary
-from comparisons.pixel_terms import TermGrid
 from reference.pairing.factors import Unrepresentable
 from reference.pairing.halves import Pairing
 from reference.pairing.prepare import Override
@@ -27,6 +26,9 @@ from reference.records import (
     Versions,
 )
 from reference.rendering.renderer import Times
+
+if TYPE_CHECKING:
+    from comparisons.pixel_terms import TermGrid
 
 
 class Significant(Record):
@@ -164,6 +166,23 @@ class ComparisonRecord(Record, kw_only=True):
     record_version: int = VERSION
 
 
+Colour = tuple[float, float, float]
+"""Linear RGB."""
+
+
+class TermMaterial(Record):
+    """The kernel's material at some points; a lobe's normalisation is part of ``k_s``."""
+
+    name: str
+    k_i: Colour
+    k_a: Colour
+    k_d: Colour
+    k_s: Colour
+    n: float
+    form: str
+    ambient: Colour
+
+
 @dataclass(frozen=True)
 class Images:
     """The images of a comparison; (H, W, 3) linear, or (H, W) for maps.
@@ -193,5 +212,5 @@ class Comparison:
 
     record: ComparisonRecord
     images: Images
-    terms: TermGrid | None = None
+    terms: "TermGrid | None" = None
     no_terms: str = ""

@@ -12,13 +12,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.comparison import Colour, TermMaterial
 from comparisons.options import Options
 from heuristic import kernel, materials, terms, vectors
 from heuristic.convention import Scene
 from heuristic.errors import InputError
 from heuristic.heuristics import Interpolation
 from heuristic.materials import COEFFICIENTS, FORMS, Material
-from reference.records import Record
 from reference.rendering.gbuffer import image_size, pixel_rays
 from reference.rendering.renderer import Renderer, variant
 
@@ -36,21 +36,6 @@ MOST_LIGHTS = 64
 
 MATERIALS = 256
 """Different sets of coefficients, at most: textures have more."""
-
-Colour = tuple[float, float, float]
-
-
-class TermMaterial(Record):
-    """The kernel's material at some points; a lobe's normalisation is part of ``k_s``."""
-
-    name: str
-    k_i: Colour
-    k_a: Colour
-    k_d: Colour
-    k_s: Colour
-    n: float
-    form: str
-    ambient: Colour
 
 
 @dataclass(frozen=True)

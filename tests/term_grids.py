@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from comparisons.pixel_terms import GridLight, TermGrid, TermMaterial
+from comparisons.comparison import TermMaterial
+from comparisons.pixel_terms import GridLight, TermGrid
 
 CELL = 4
 """Pixels along the sides of a cell."""

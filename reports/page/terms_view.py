@@ -8,16 +8,19 @@ images (:mod:`reports.page.embedding`). ``templates/viewer/terms.js`` reads them
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import field
 from numpy.typing import NDArray
 
+from comparisons.comparison import TermMaterial
 from comparisons.departure.regions import Region
-from comparisons.pixel_terms import TermGrid, TermMaterial
 from reference.records import Record, plain
 from reports.page.embedding import Embedded, packed
+
+if TYPE_CHECKING:
+    from comparisons.pixel_terms import TermGrid
 
 LARGEST = 65535
 

@@ -60,7 +60,7 @@ def compare(
     if view is not None:
         return view, spent
     begin = perf_counter()
-    comparison = compare(case.source, case.options, progress, case.command())
+    comparison = compare(case.source, case.options, progress, case.command(), job.with_cost)
     spent |= _stages(comparison.record, perf_counter() - begin)
     study, begin = None, perf_counter()
     if job.with_cost and not case.options.image:  # no effect can be added to a picture
