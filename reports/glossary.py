@@ -41,9 +41,12 @@ RESULTS: Terms = {
         " a pixel it is the mean over a square of 2 by 2."
     ),
     ("RMS", "root mean square"): "The square root of the mean of the squares.",
-    ("of the departure",): "Its part of the sum of ΔE2000 over all pixels.",
-    ("mostly", "effect", "worth most", "cause", "causes"): (
+    ("of the departure", "of the error"): "Its part of the sum of ΔE2000 over all pixels.",
+    ("mostly", "mostly missing", "effect", "worth most", "cause", "causes"): (
         "The difference between the two halves that adds most to the departure there."
+    ),
+    ("differ visibly", "pixels that differ visibly"): (
+        "The share of the pixels whose ΔE2000 is above the threshold."
     ),
     ("region", "regions"): "The rectangles of the image that hold most of the departure.",
 }

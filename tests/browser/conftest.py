@@ -13,7 +13,7 @@ from playwright.sync_api import sync_playwright
 from comparisons.comparison import Comparison
 from comparisons.cost.cost import Study
 from comparisons.departure import regions
-from comparisons.departure.metrics import drawn, log2_luminance_ratio
+from comparisons.departure.metrics import THRESHOLDS, drawn, log2_luminance_ratio
 from comparisons.departure.regions import Region
 from comparisons.departure.statistics import histogram
 from reference.records import Machine, Pixels, plain
@@ -59,8 +59,8 @@ def report(tmp_path_factory):
     failures = [Failure(scene=FAILED, error="lost.xml: there is no such file")]
     machine = Machine(processor="any", cores=2, system="Linux")
     run = RunRecord(command="", stages={"page": 1.0}, failures=(), machine=machine, versions={})
-    text = page.render(views, failures=failures, run=run)
-    (folder / "index.html").write_text(text, encoding="utf-8")
+    (folder / "index.html").write_text(page.render(views, failures=failures), encoding="utf-8")
+    (folder / page.DETAILS).write_text(page.details(2, run=run), encoding="utf-8")
     return found
 
 
@@ -80,7 +80,7 @@ def noisy():
     }
     marks = rng.choice([0.0, 0.5, 1.0], (HEIGHT, WIDTH))
     found = comparison(NOISY, heuristic, reference, maps, marks)
-    beyond = records.visible({1.0: 0.6, 2.0: 0.3, 5.0: 0.04})
+    beyond = records.visible({t: 0.6 / t**1.7 for t in THRESHOLDS})
     metrics = found.record.metrics
     metrics = metrics | {"dE2000": structs.replace(metrics["dE2000"], visible=beyond)}
     record = structs.replace(found.record, metrics=metrics)
@@ -196,14 +196,15 @@ class Visitor:
         return dict(part.split("=") for part in text.split("&") if part)
 
     def canvas(self):
-        return self.page.locator("#viewer canvas")
+        return self.page.locator("#viewer > canvas")
 
-    def place_of(self, x, y, zoom=None, centre=(WIDTH / 2, HEIGHT / 2)):
-        """Where on the canvas the middle of a pixel is, in CSS pixels."""
+    def place_of(self, x, y, zoom=None, centre=(WIDTH / 2, HEIGHT / 2), pane=None):
+        """Where on the canvas the middle of a pixel is, in CSS pixels; ``pane`` is one of three."""
         box = self.canvas().bounding_box()
-        zoom = zoom or min(box["width"] / WIDTH, box["height"] / HEIGHT)
+        width = box["width"] if pane is None else (box["width"] - 8) / 3
+        zoom = zoom or min(width / WIDTH, box["height"] / HEIGHT)
         return (
-            box["width"] / 2 + (x + 0.5 - centre[0]) * zoom,
+            (pane or 0) * (width + 4) + width / 2 + (x + 0.5 - centre[0]) * zoom,
             box["height"] / 2 + (y + 0.5 - centre[1]) * zoom,
         )
 
@@ -215,7 +216,7 @@ class Visitor:
                   const copy = document.createElement("canvas");
                   copy.width = copy.height = 1;
                   const context = copy.getContext("2d", { willReadFrequently: true });
-                  context.drawImage(document.querySelector("#viewer canvas"), -x, -y);
+                  context.drawImage(document.querySelector("#viewer > canvas"), -x, -y);
                   return [...context.getImageData(0, 0, 1, 1).data.slice(0, 3)];
                 }""",
                 [int(left), int(top)],

@@ -35,7 +35,7 @@ def test_the_page_begins_with_the_scene_and_leads_to_the_overview(tab, alone, tm
     assert tab.evaluate(SEEN) == "scene"
     tab.get_by_role("link", name="all scenes").click()
     tab.wait_for_function(f"() => {SEEN} === 'overview'")
-    assert tab.locator(".card:visible").count() == 1
+    assert tab.locator(".bars li:visible").count() == 1
     tab.get_by_role("link", name=EXACT).first.click()
     tab.wait_for_function(f"() => {SEEN} === 'scene'")
 
@@ -47,11 +47,11 @@ def test_in_a_frame_all_works_and_the_address_of_the_notebook_stays(tab, alone, 
     frame = tab.frames[1]
     frame.wait_for_function("() => document.querySelector('#viewer').dataset.ready")
     assert frame.evaluate(SEEN) == "scene"
-    button = frame.get_by_role("button", name="Flicker")
+    button = frame.get_by_role("button", name="Split")
     button.click()
     assert button.get_attribute("aria-pressed") == "true"
     frame.locator(".scene.open .regions a").first.click()
-    assert frame.get_by_role("button", name="Error").get_attribute("aria-pressed") == "true"
+    assert "selection" in frame.locator("#distribution h3").text_content()
     frame.get_by_role("link", name="all scenes").click()
     assert frame.evaluate(SEEN) == "overview"
     frame.get_by_role("link", name=EXACT).first.click()
@@ -67,5 +67,5 @@ def test_the_viewer_with_its_controls_fits_a_frame(tab, alone, tmp_path):
     frame = tab.frames[1]
     frame.wait_for_function("() => document.querySelector('#viewer').dataset.ready")
     place = "(name) => document.querySelector(name).getBoundingClientRect()"
-    assert frame.evaluate(f"() => ({place})('#viewer canvas').width") > 800
-    assert frame.evaluate(f"() => ({place})('#viewer .more').bottom") <= HEIGHT
+    assert frame.evaluate(f"() => ({place})('#viewer > canvas').width") > 800
+    assert frame.evaluate(f"() => ({place})('#viewer .numbers').bottom") <= HEIGHT

@@ -1,72 +1,138 @@
-"""The first screen: the verdict, its bars, and the tolerance."""
+"""The first screen: the verdict at a threshold, its pictures, and its bars."""
+
+import copy
 
 import pytest
 
-from tests.browser.conftest import EXACT, NOISY, NOISY_ID
+from comparisons.departure.metrics import THRESHOLDS
+from reports.page import page as pages
+from tests import records
+from tests.browser.conftest import EXACT, FAILED, NOISY, NOISY_ID, Report, Visitor
+from tests.browser.test_page_at_large import PHONE
+
+DESK = {"viewport": {"width": 1440, "height": 900}}
+PLACE = "document.querySelector('.worst li img').getBoundingClientRect().bottom"
 
 
-def rows(page):
-    return page.locator(".bars li").all()
+def names(page):
+    return [row.locator("a").text_content() for row in page.locator(".bars li:has(.bar)").all()]
 
 
-def test_the_first_heading_of_the_page_is_the_verdict(visitor):
+@pytest.mark.parametrize("visitor", [DESK, PHONE], indirect=True)
+def test_verdict_and_first_pictures_stand_on_the_first_screen(visitor):
     page = visitor.open()
-    heading = page.get_by_role("heading", level=2).first
+    heading = page.get_by_role("heading", level=1)
     assert heading.text_content() == "Textbook shading looks right in 1 of 2 scenes."
-    assert heading.bounding_box()["y"] < 300
+    assert page.evaluate(PLACE) < page.evaluate("innerHeight")
+    pictures = page.locator(".worst img:visible")
+    assert pictures.count() == 6
+    assert all(picture.evaluate("image => image.naturalWidth > 0") for picture in pictures.all())
+    assert FAILED in page.locator(".bars .failure").text_content()
 
 
-def test_bars_stand_worst_first_and_are_as_long_as_the_departure(visitor, report):
+@pytest.mark.parametrize("by", ["keyboard", "mouse"])
+def test_the_slider_drives_headline_bars_map_and_address_together(visitor, report, by):
     page = visitor.open()
-    assert [row.locator("a").text_content() for row in rows(page)] == [NOISY, EXACT]
-    pieces = rows(page)[0].locator(".bar i").all()
-    assert len(pieces) == 2  # interreflection and occlusion; one effect makes it worse
-    widths = [piece.bounding_box()["width"] for piece in pieces]
-    whole = rows(page)[0].locator(".bar").bounding_box()["width"]
-    assert sum(widths) / whole == pytest.approx(1 / 1.04, abs=0.01)
-    assert widths[0] / widths[1] == pytest.approx(5.895 / 3.141, rel=0.03)
-
-
-@pytest.mark.parametrize("by_keyboard", [False, True])
-def test_a_tolerance_says_which_scenes_pass_and_what_would_do(visitor, by_keyboard):
-    page = visitor.open()
-    remedy = rows(page)[0].locator(".remedy span:visible")
-    assert page.locator("[data-count]").text_content() == "1 of 2 scenes pass."
-    assert remedy.text_content() == "full plan, 56.7 ms"
-    button = page.get_by_role("button", name="ΔE 5")
-    if by_keyboard:
-        button.focus()
-        page.keyboard.press("Enter")
+    slider = page.locator("#overview [data-threshold]")
+    if by == "keyboard":
+        slider.focus()
+        for _ in range(12):
+            page.keyboard.press("ArrowRight")
     else:
-        button.click()
-    assert button.get_attribute("aria-pressed") == "true"
-    assert page.locator("[data-count]").text_content() == "2 of 2 scenes pass."
-    assert remedy.text_content() == "good enough"
-
-
-def test_the_line_stands_at_the_tolerance(visitor):
-    page = visitor.open()
-    for tolerance in (1, 2, 5):
-        page.get_by_role("button", name=f"ΔE {tolerance}").click()
-        at, top = page.evaluate(
-            """() => {
-              const bars = getComputedStyle(document.querySelector(".bars"));
-              return [bars.getPropertyValue("--at"), bars.getPropertyValue("--top")].map(Number);
-            }"""
-        )
-        assert at == tolerance
-        assert top > 0
-
-
-def test_a_bar_leads_to_its_scene(visitor):
-    page = visitor.open()
-    page.locator(f".bars li[data-scene='{NOISY_ID}'] a").click()
+        box = slider.bounding_box()
+        page.mouse.click(box["x"] + 8 + (box["width"] - 16) * 4 / 9, box["y"] + box["height"] / 2)
+    assert visitor.state() == {"t": "5"}
+    assert page.locator("#headline").text_content() == (
+        "Textbook shading looks right in 2 of 2 scenes."
+    )
+    row = page.locator(f".bars [data-scene='{NOISY_ID}']")
+    shares = {each["threshold"]: each["value"] for each in visible(report)}
+    assert row.locator("[data-show=share]").text_content() == f"{100 * shares[5]:.1f} %"
+    whole, bar = (row.locator(part).bounding_box()["width"] for part in (".bar", ".bar > span"))
+    assert bar / whole == pytest.approx(shares[5], abs=0.005)
+    assert row.locator("[data-show=advice]").text_content() == "Nothing to do."
+    row.locator("a").click()
     visitor.wait_for_viewer()
-    assert not page.locator(".verdict").is_visible()
+    assert visitor.state() == {"scene": NOISY_ID, "t": "5"}
+    assert page.locator("#viewer [data-threshold]").input_value() == "5"
+    assert "grey up to 5" in page.locator(".legend").text_content()
+    assert "ΔE2000 above 5" in page.locator("[data-part=numbers]").text_content()
 
 
-@pytest.mark.parametrize("visitor", [{"viewport": {"width": 380, "height": 800}}], indirect=True)
-def test_a_phone_shows_the_verdict_without_scrolling_sideways(visitor):
+def visible(report):
+    return report.records[NOISY]["metrics"]["dE2000"]["visible"]
+
+
+def test_bars_are_divided_by_what_is_missing_and_stand_worst_first(visitor):
     page = visitor.open()
-    assert page.get_by_role("heading", level=2).first.bounding_box()["y"] < 800 * 0.6
-    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert names(page) == [NOISY, EXACT]
+    pieces = page.locator(f".bars [data-scene='{NOISY_ID}'] .bar i").all()
+    assert [piece.text_content() for piece in pieces] == ["interreflection", "occlusion"]
+    widths = [piece.bounding_box()["width"] for piece in pieces]
+    assert widths[0] / widths[1] == pytest.approx(5.895 / 3.141, rel=0.05)
+
+
+def test_a_threshold_may_turn_the_order(chromium, tmp_path):
+    """One scene has few large errors, the other many small ones."""
+    views = []
+    for name, shares in (("few", {1: 0.3, 5: 0.2}), ("many", {1: 0.9, 5: 0.01})):
+        record = records.data() | {"scene": name}
+        metric = record["metrics"]["dE2000"] = copy.deepcopy(record["metrics"]["dE2000"])
+        for each in metric["visible"]:
+            value = shares[1] if each["threshold"] < 5 else shares[5]
+            each |= dict.fromkeys(("value", "low", "high"), value)
+        views.append(records.view(record))
+    path = tmp_path / "index.html"
+    path.write_text(pages.render(views), encoding="utf-8")
+    visitor = Visitor(chromium.new_page(), Report(path.as_uri()))
+    assert names(visitor.open()) == ["many", "few"]
+    assert names(visitor.open("#t=5")) == ["few", "many"]
+    assert names(visitor.open("#t=4.75")) == ["many", "few"]
+    visitor.page.close()
+    assert not visitor.complaints
+
+
+@pytest.mark.parametrize(("visitor", "most"), [(DESK, 6000), (PHONE, 9000)], indirect=["visitor"])
+def test_24_scenes_take_little_height(visitor, tmp_path, most):
+    views = [records.view(records.data() | {"scene": f"scene-{n}"}) for n in range(24)]
+    path = tmp_path / "index.html"
+    path.write_text(pages.render(views), encoding="utf-8")
+    visitor.page.goto(path.as_uri())
+    assert visitor.page.locator(".bars li").count() == 24
+    assert visitor.page.evaluate("document.documentElement.scrollHeight") <= most
+    assert visitor.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    visitor.requests.clear()
+
+
+@pytest.mark.parametrize("visitor", [{"viewport": {"width": 1200, "height": 300}}], indirect=True)
+def test_back_leads_to_the_place_that_was_left(visitor):
+    page = visitor.open("#t=3")
+    page.evaluate("window.scrollTo(0, 250)")
+    page.locator(f".bars [data-scene='{EXACT}'] a").click()
+    visitor.wait_for_viewer(EXACT)
+    assert page.evaluate("scrollY") == 0
+    assert page.locator(".scene:visible h1").count() == 1
+    assert not page.locator("#overview").is_visible()
+    page.go_back()
+    page.wait_for_function("() => document.documentElement.dataset.view === 'overview'")
+    assert page.evaluate("scrollY") == 250
+    assert visitor.state() == {"t": "3"}
+
+
+def test_the_navigation_stays_and_leads_to_scenes_and_details(visitor):
+    page = visitor.open(f"#scene={NOISY_ID}&t=4")
+    page.evaluate("window.scrollTo(0, 600)")
+    assert page.locator("nav.top").bounding_box()["y"] == 0
+    page.get_by_role("link", name="Scenes", exact=True).click()
+    page.wait_for_function("() => document.documentElement.dataset.view === 'overview'")
+    assert visitor.state() == {"t": "4"}
+    page.get_by_role("link", name="Details").click()
+    assert page.get_by_role("heading", level=1).text_content() == "Details"
+    assert page.locator("#glossary").count() == 1
+
+
+def test_every_threshold_of_the_slider_is_one_of_the_record(visitor):
+    slider = visitor.open().locator("#overview [data-threshold]")
+    low, high, step = (float(slider.get_attribute(name)) for name in ("min", "max", "step"))
+    count = round((high - low) / step) + 1
+    assert tuple(low + step * place for place in range(count)) == THRESHOLDS

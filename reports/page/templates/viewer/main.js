@@ -27,7 +27,7 @@ function follow() {
   show();
   if (view.scene === before.scene) return;
   window.scrollTo(0, view.scene ? 0 : left);
-  if (view.scene) /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h2"))?.focus({ preventScroll: true });
+  if (view.scene) /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h1"))?.focus({ preventScroll: true });
 }
 
 function show() {
