@@ -150,8 +150,13 @@ def test_files_of_others_stay_and_ours_are_replaced(tmp_path):
 @pytest.mark.guarantee(
     "runs", "Nothing that fotismos did not make is overwritten or deleted in an output folder."
 )
-@pytest.mark.parametrize("name", ["index.html", "run.json", "tables", "my-scene", "figures"])
-@pytest.mark.parametrize("make", ["file", "folder", "pipe", "link"])
+@pytest.mark.parametrize(
+    ("name", "make"),
+    [
+        ("index.html", "link"), ("run.json", "pipe"), ("tables", "folder"), ("figures", "link"),
+        ("my-scene", "file"), ("my-scene", "folder"),
+    ],
+)  # fmt: skip
 def test_what_others_made_is_one_message_and_stays(run, scene_file, tmp_path, name, make):
     place, other = tmp_path / "out" / name, tmp_path / "other"
     place.parent.mkdir()
