@@ -69,3 +69,12 @@ def suggestion(given: object, allowed: Iterable[str]) -> str:
     """Return a question that suggests the nearest allowed word; empty if none is near."""
     near = get_close_matches(str(given), list(allowed), n=1)
     return f" (did you mean {near[0]}?)" if near else ""
+
+
+def type_of(value: object) -> str:
+    """Return the words for a value of a wrong type, such as ``of type tuple of 2``."""
+    shape = f" of shape {value.shape}" if hasattr(value, "shape") else ""
+    if isinstance(value, (list, tuple)):
+        shape = f" of {len(value)}"
+    kind = f"{type(value).__module__}.{type(value).__qualname__}{shape}"
+    return f"of type {kind}".replace("builtins.", "")

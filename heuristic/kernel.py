@@ -10,7 +10,7 @@ import numpy as np
 
 from heuristic import materials, numerics, terms, vectors
 from heuristic.convention import Array, Colour, Mask, Position, Vector
-from heuristic.errors import InputError
+from heuristic.errors import InputError, type_of
 from heuristic.lights import Light
 from heuristic.materials import COEFFICIENTS, Material
 
@@ -58,7 +58,7 @@ def shade(
     position, normal, view = checked_vectors(position, normal, view)
     lights = _checked_lights(lights)
     if not isinstance(material, Material):
-        raise InputError(f"material is {_kind(material)}: give a heuristic.Material.")
+        raise InputError(f"material is {type_of(material)}: give a heuristic.Material.")
     ambient = materials.checked_colour("ambient", ambient)
     _check_sizes((position, normal, view), material, lights, ambient)
     values = {name: getattr(material, name) for name in COEFFICIENTS} | {"ambient": ambient}
@@ -191,14 +191,14 @@ def checked_vectors(position: Any, normal: Any, view: Any) -> tuple[Any, ...]:
 def _checked_lights(lights: Any) -> Sequence[Light]:
     if isinstance(lights, (str, bytes, Mapping)) or not isinstance(lights, Iterable):
         raise InputError(
-            f"lights is {_kind(lights)}: give a list of PointLight, DirectionalLight or SpotLight,"
-            " empty for none."
+            f"lights is {type_of(lights)}: give a list of PointLight, DirectionalLight or"
+            " SpotLight, empty for none."
         )
     lights = lights if isinstance(lights, Sequence) else list(lights)
     for number, light in enumerate(lights):
         if not isinstance(light, Light):
             raise InputError(
-                f"lights[{number}] is {_kind(light)}: give a PointLight, DirectionalLight or"
+                f"lights[{number}] is {type_of(light)}: give a PointLight, DirectionalLight or"
                 " SpotLight."
             )
     return lights
@@ -224,7 +224,7 @@ def _check_sizes(point: tuple, material: Material, lights: Sequence[Light], ambi
 def _array(name: str, value: Any) -> Any:
     is_vector = dr.depth_v(value) == 1 + dr.is_jit_v(value) and dr.size_v(value) == 3
     if not is_vector or dr.is_mask_v(value) or dr.is_complex_v(value):
-        raise InputError(f"{name} is {_kind(value)}: {HOW}.")
+        raise InputError(f"{name} is {type_of(value)}: {HOW}.")
     if not dr.is_float_v(value) or dr.itemsize_v(value) < 4:
         return dr.float32_array_t(type(value))(value)
     return value
@@ -234,13 +234,5 @@ def _plain(name: str, value: Any) -> tuple[float, ...]:
     is_sequence = isinstance(value, (list, tuple, np.ndarray))
     numbers = list(value) if is_sequence and np.ndim(np.asarray(value, object)) == 1 else []
     if len(numbers) != 3 or not all(isinstance(number, Real) for number in numbers):
-        raise InputError(f"{name} is {_kind(value)}: {HOW}, or three numbers.")
+        raise InputError(f"{name} is {type_of(value)}: {HOW}, or three numbers.")
     return tuple(map(float, numbers))
-
-
-def _kind(value: Any) -> str:
-    shape = f" of shape {value.shape}" if isinstance(value, np.ndarray) else ""
-    if isinstance(value, (list, tuple)):
-        shape = f" of {len(value)}"
-    kind = f"{type(value).__module__}.{type(value).__qualname__}{shape}"
-    return f"of type {kind}".replace("builtins.", "")

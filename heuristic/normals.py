@@ -29,7 +29,7 @@ from drjit import scalar
 
 from heuristic import vectors
 from heuristic.convention import Array, Direction, Number, Position, Vector
-from heuristic.errors import InputError, unknown
+from heuristic.errors import unknown
 
 PARALLEL_STEPS = 4
 """Edges and tangents are off by half a rounding step per component, products by as much again."""
@@ -212,7 +212,6 @@ def vertex_normals(positions: Position, faces: Array, weighting: str = "angle") 
     Weighting by angle is the default because only it does not depend on how a flat part of the
     surface is divided into triangles.
     """
-    _check_faces(positions, faces)
     if weighting not in WEIGHTINGS:
         raise unknown("weighting", weighting, WEIGHTINGS)
     return WEIGHTINGS[weighting](positions, faces)
@@ -270,18 +269,6 @@ def _weighted(positions, faces, weights):
         dr.scatter_add(weight_sum, type(positions.x)(weight), faces[corner], has_area)
     limit = CANCELLATION_STEPS * dr.epsilon(positions) * weight_sum
     return dr.select(dr.norm(total) > limit, unit(total), 0)
-
-
-def _check_faces(positions, faces):
-    count = dr.width(positions)
-    if dr.width(faces) == 0:
-        return
-    largest = max(int(dr.max(faces[corner])[0]) for corner in range(3))
-    if largest >= count:
-        raise InputError(
-            f"faces: vertex number {largest} does not exist: there are {count} vertices, numbered"
-            " from 0. Correct the mesh's list of faces."
-        )
 
 
 WEIGHTINGS = {

@@ -34,7 +34,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.random import default_rng
 
-from heuristic.errors import FotismosError, InputError, suggestion
+from heuristic.errors import FotismosError, InputError, suggestion, type_of
 from heuristic.heuristics import (
     INPUTS,
     Heuristic,
@@ -195,21 +195,12 @@ def shaded(name: str, shade: Callable[[Point], Any], point: Point) -> Any:
     is_array = dr.is_array_v(value) and dr.is_jit_v(value) and dr.is_float_v(value)
     depth = dr.depth_v(value) if is_array else 0
     if not (depth == 1 or (depth == 2 and dr.size_v(value) == components)):
-        raise InputError(f"{returned} {_kind(value)}; {expected}.")
+        raise InputError(f"{returned} a value {type_of(value)}; {expected}.")
     if not dr.flag(dr.JitFlag.SymbolicScope):
         width, points = dr.width(value), dr.width(point.arguments.position)
         if width not in (1, points):
             raise InputError(f"{returned} {width} values for {points} points; {expected}.")
     return mi.Spectrum(value)
-
-
-def _kind(value: Any) -> str:
-    kind = f"{type(value).__module__}.{type(value).__qualname__}".replace("builtins.", "")
-    if isinstance(value, (list, tuple)):
-        return f"a {kind} of {len(value)}"
-    if isinstance(value, np.ndarray):
-        return f"a {kind} of shape {value.shape}"
-    return "None" if value is None else f"a {kind}"
 
 
 def _advice(error: BaseException) -> str:
@@ -239,8 +230,8 @@ def examine(heuristic: Heuristic) -> tuple[str, ...]:
     value = shaded(heuristic.name, heuristic.shade, point)
     colours = np.array(value, float).reshape(dr.size_v(mi.Spectrum), -1)
     colours = np.broadcast_to(colours, (len(colours), POINTS))
-    _require(heuristic, point, np.isfinite(colours), colours, "finite")
-    _require(heuristic, point, colours >= -ROUNDING, colours, "0 or more")
+    _require(heuristic, np.isfinite(colours), colours, "finite")
+    _require(heuristic, colours >= -ROUNDING, colours, "0 or more")
     return tuple(sorted(point.prepared))
 
 
@@ -315,7 +306,7 @@ def trial_points(heuristic: Heuristic) -> Point:
 
 
 def _require(
-    heuristic: Heuristic, point: Point, is_right: np.ndarray, colours: np.ndarray, expected: str
+    heuristic: Heuristic, is_right: np.ndarray, colours: np.ndarray, expected: str
 ) -> None:
     """Reject wrong colours (components, points) on trial, naming one of them."""
     wrong = np.flatnonzero(~is_right.all(axis=0))
@@ -328,20 +319,5 @@ def _require(
         cure = f"Keep divisors, roots and logarithms above 0, as by {maximum}(x, 1e-6)."
     raise InputError(
         f"{place_of(heuristic.shade)}: heuristic {heuristic.name} returned ({shown}) on trial, and"
-        f" wrong values at {wrong.size} of {POINTS} points; components"
-        f" must be {expected}. One of the points: {_described(point.arguments, wrong[0])}. {cure}"
-    )
-
-
-def _described(at: ShadingArguments, number: int) -> str:
-    """Return the situation of one point of a trial."""
-    cosines = [
-        f"N.L = {np.array(dr.dot(at.normal, light.illuminate(at.position).toward))[number]:.3g}"
-        for light in at.lights
-    ]
-    material: Any = at.material
-    return (
-        f"N.V = {np.array(dr.dot(at.normal, at.view))[number]:.3g}, {' and '.join(cosines)} for"
-        f" its two lights, alpha = {np.array(material.alpha)[number]:.3g},"
-        f" n = {np.array(material.n)[number]:.3g}"
+        f" wrong values at {wrong.size} of {POINTS} points; components must be {expected}. {cure}"
     )

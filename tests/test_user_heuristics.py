@@ -224,11 +224,6 @@ MISTAKES = {
         "def shade(point): return point.ambient / 0\n",
         r"^mine.py, line 1: .* returned \(inf, inf, inf\) on trial, .*components must be finite",
     ),
-    "root of what is negative": (
-        "import drjit as dr\n\n"
-        "def shade(point): return dr.sqrt(dr.dot(point.normal, point.lights[1].toward))\n",
-        r"^mine.py, line 3: .* returned \(nan, nan, nan\).*N.L = -",
-    ),
     "negative": (
         "import drjit as dr\n"
         "def shade(point): return dr.dot(point.normal, point.lights[1].toward)\n",
@@ -236,13 +231,8 @@ MISTAKES = {
     ),
     "shape": (
         "def shade(point): return (1, 2, 3)\n",
-        r"^mine.py, line 1: .* returned a tuple of 3; return one colour per point",
+        r"^mine.py, line 1: .* returned a value of type tuple of 3; return one colour per point",
     ),
-    "NumPy": (
-        "import numpy as np\ndef shade(point): return np.ones((4, 3))\n",
-        r"^mine.py, line 2: .*numpy.ndarray of shape \(4, 3\)",
-    ),
-    "nothing": ("def shade(point): pass\n", r"^mine.py, line 1: .* returned None"),
     "too few points": (
         "import mitsuba as mi\ndef shade(point): return mi.Float([1, 2, 3])\n",
         r"^mine.py, line 2: .* returned 3 values for 256 points",
@@ -257,21 +247,14 @@ MISTAKES = {
         r"^mine.py, line 6: ValueError: no idea",
     ),
     "syntax": ("def shade(point)\n    return 1\n", r"^mine.py, line 1: SyntaxError: expected ':'"),
-    "import": ("\nimport nowhere\n", r"^mine.py, line 2: ModuleNotFoundError"),
     "exit": ("import sys\nsys.exit(3)\n", r"^mine.py, line 2: SystemExit: 3"),
     "no function": (
         "def shadow(point): return 1\n",
         r"no function `shade` \(did you mean shadow\?\)\. It has shadow: give mine.py:shadow",
     ),
-    "a number": ("shade = 3\n", r"mine.py is of type int: give a function of a point"),
-    "no point": ("def shade(): return 1\n", r"^mine.py, line 1: it does not take a point"),
     "a name in a signature": (
         "def shade(point, gloss: 'Gloss' = 1.0): return gloss\n",
         r"^mine.py, line 1: its signature cannot be read: name 'Gloss' is not defined",
-    ),
-    "any number of arguments": (
-        "def shade(point, *rest): return 1\n",
-        r"^mine.py, line 1: \*rest is not a number",
     ),
     "no default": (
         "def shade(point, gloss): return gloss\n",
@@ -285,11 +268,6 @@ MISTAKES = {
     "writes to the material": (
         "def shade(point):\n    point.material.k_d = 3\n    return 1\n",
         r"^mine.py, line 2: FrozenInstanceError: cannot assign to field 'k_d'",
-    ),
-    "undeclared": (
-        "from heuristic import Heuristic\n"
-        "shade = Heuristic('x', lambda point: point.uv.x, needs={'normal'})\n",
-        r"^mine.py, line 2: 'uv' is read, but not declared",
     ),
 }  # fmt: skip
 

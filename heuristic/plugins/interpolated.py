@@ -10,7 +10,7 @@ where perspective would need a correction.
 values as attributes of a mesh. :func:`stored_shade` reads them where a ray hits, interpolated by
 Mitsuba. Stored values hold for one viewer, one set of lights and one of wavelengths.
 
-:class:`MeshCorners` is Gouraud shading without storage: three evaluations per ray, at the vertices
+:func:`face_corners` is Gouraud shading without storage: three evaluations per ray, at the vertices
 of the face that it hits. It is for spectral variants, whose wavelengths change from ray to ray.
 
 Phong shading does not need either: Mitsuba interpolates and normalises the vertex normals.
@@ -32,7 +32,6 @@ from heuristic.convention import (
     Mesh,
     Number,
     Position,
-    Scene,
 )
 from heuristic.errors import InputError
 from heuristic.heuristics import Interpolation
@@ -85,10 +84,6 @@ def barycentric_coordinates(
     return 1 - b1 - b2, b1, b2
 
 
-BLOCK = 3
-"""Components of one attribute: Mitsuba 3.9.1 reads 1 or 3, and any other number as zero."""
-
-
 def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
     """Return the points of a mesh at which flat or Gouraud shading evaluates the model.
 
@@ -132,138 +127,90 @@ def shade_mesh(
     lights: Sequence[Light],
     ambient: Colour = 0,
     visible: Callable[..., Mask] | None = None,
-    twosided: bool | Mask = False,
+    twosided: bool = False,
     model: Callable[..., Colour] = shade,
-) -> int:
+) -> None:
     """Evaluate the model (8.10) at a mesh's vertices or faces, and store the values in the mesh.
 
     The values are as seen by a ``viewer`` ``P_V``: three numbers, or a Dr.Jit point. ``twosided``
     also stores those of the back, with reversed normals. ``model`` has the arguments of
-    :func:`heuristic.shade`; Dr.Jit values hold one entry, or one per vertex or face. Returns the
-    number of components stored, which :func:`stored_shade` needs: 3 for single numbers.
+    :func:`heuristic.shade`; Dr.Jit values hold one entry, or one per vertex or face. Colours are
+    RGB or single numbers: Mitsuba 3.9.1 reads attributes of 1 or 3 components.
     """
     si = shading_points(mesh, interpolation)
     position, normal = mi.Vector3f(si.p), mi.Vector3f(si.n)
     view = mi.Vector3f(viewer) - position
+    # Terms that do not depend on the position are a single number until spread out.
     everywhere = dr.zeros(mi.Float, dr.width(position))
     attributes = {}
-    components = BLOCK
     for back in (False, True)[: 1 + twosided]:
         facing = -normal if back else normal
         colour = model(position, facing, view, material, lights, ambient, visible)
-        is_colour = dr.depth_v(colour) > 1
-        values = [mi.Float(part) for part in (colour if is_colour else [colour] * BLOCK)]
-        components = len(values)
-        values += [mi.Float(0)] * (-components % BLOCK)
-        for block in range(len(values) // BLOCK):
-            # Terms that do not depend on the position are a single number until spread out.
-            value = mi.Color3f(values[BLOCK * block : BLOCK * (block + 1)]) + everywhere
-            attributes[_name(interpolation, back, block)] = value
+        if dr.depth_v(colour) > 1 and len(colour) == 1:  # of llvm_ad_mono
+            colour = colour[0]
+        attributes[_name(interpolation, back)] = mi.Color3f(colour) + everywhere
     meshes.store(mesh, attributes)
-    return components
 
 
 def stored_shade(
-    si: Interaction,
-    interpolation: Interpolation,
-    components: int = BLOCK,
-    twosided: bool | Mask = False,
-    active: Mask = True,
+    si: Interaction, interpolation: Interpolation, twosided: bool = False, active: Mask = True
 ) -> Colour:
-    """Read what :func:`shade_mesh` stored, at the surface interactions of rays, by component.
+    """Read what :func:`shade_mesh` stored, at the surface interactions of rays.
 
     A face shows its front if the ray hits the side from which its vertices are anticlockwise,
     whatever its vertex normals say. Its back is black, or with ``twosided`` has its stored value.
     Shapes without stored values read as black.
     """
     is_front = dr.dot(si.n, si.to_world(si.wi)) > 0
-    values = []
-    for block in range(-(-components // BLOCK)):
-        front = _name(interpolation, False, block)
-        value = si.shape.eval_attribute_3(front, si, active & is_front)
-        if twosided:
-            back = _name(interpolation, True, block)
-            reverse = si.shape.eval_attribute_3(back, si, active & ~is_front)
-            value = dr.select(is_front, value, reverse)
-        values += list(dr.select(is_front | twosided, value, 0))
-    return values[:components]
+    value = si.shape.eval_attribute_3(_name(interpolation, False), si, active & is_front)
+    back: Any = 0
+    if twosided:
+        back = si.shape.eval_attribute_3(_name(interpolation, True), si, active & ~is_front)
+    return dr.select(is_front, value, back)
 
 
 def _mean(values, corners):
     return sum(dr.gather(type(values), values, corners[i]) for i in range(3)) / 3
 
 
-def _name(interpolation, back, block):
-    """Return the name of an attribute: ``vertex_heuristic`` or ``face_heuristic``, and suffixes."""
+def _name(interpolation, back):
+    """Return the name of an attribute: ``vertex_heuristic`` or ``face_heuristic``, and a suffix."""
     element = "face" if interpolation is Interpolation.FLAT else "vertex"
-    return f"{element}_heuristic" + ("_back" if back else "") + (f"_{block}" if block else "")
+    return f"{element}_heuristic" + ("_back" if back else "")
 
 
-class MeshCorners:
-    """The vertices of all faces of a scene's meshes, to shade at those of the face hit.
+def face_corners(si: Interaction, active: Mask = True) -> list[tuple[Number, Interaction]]:
+    """Return three pairs of a weight and an interaction, one per vertex of the face hit.
 
-    Meshes are treated as in :func:`shading_points`, except that with ``face_normals`` each face has
-    its own normal at its vertices.
+    The Gouraud-shaded value (see 6.36) is ``sum(weight * value)``, where each value is that of
+    :func:`heuristic.shade` at ``p`` with the normal ``sh_frame.n``: the vertex's own, or the face's
+    if the mesh has no others. On shapes that are not meshes all weights are zero.
     """
-
-    def __init__(self, scene: Scene):
-        nothing = dr.zeros(mi.Vector3f, 3)  # the first face belongs to no mesh
-        parts, starts, count = [(nothing, nothing, dr.zeros(mi.Point2f, 3))], {}, 1
-        for shape in scene.shapes():
-            if shape.is_mesh():
-                starts[int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])] = count
-                parts.append(_corner_arrays(shape))
-                count += shape.face_count()
-        largest = max(starts, default=0)
-        self.starts = mi.UInt32([starts.get(index, 0) for index in range(largest + 1)])
-        self.positions, self.normals, self.uv = (
-            _joined(arrays) for arrays in zip(*parts, strict=True)
-        )
-
-    def at(self, si: Interaction, active: Mask = True) -> list[tuple[Number, Interaction]]:
-        """Return three pairs of a weight and an interaction, one per vertex of the face hit.
-
-        The Gouraud-shaded value (see 6.36) is ``sum(weight * value)``, where each value is that of
-        :func:`heuristic.shade` at ``p`` with the normal ``sh_frame.n``. On shapes that are not
-        meshes all weights are zero.
-        """
-        index = dr.reinterpret_array(mi.UInt32, si.shape)
-        is_known = active & (index < dr.width(self.starts))
-        start = dr.gather(mi.UInt32, self.starts, index, is_known)
-        is_mesh = is_known & (start > 0)
-        place = 3 * (start + si.prim_index)
-        points = [dr.gather(mi.Vector3f, self.positions, place + i, is_mesh) for i in range(3)]
-        weights = barycentric_coordinates(mi.Vector3f(si.p), *points)
-        corners = []
-        for i, (weight, point) in enumerate(zip(weights, points, strict=True)):
-            corner = mi.SurfaceInteraction3f(si)
-            corner.p = mi.Point3f(point)
-            normal = dr.gather(mi.Vector3f, self.normals, place + i, is_mesh)
-            corner.n = corner.sh_frame.n = mi.Normal3f(normal)
-            corner.uv = dr.gather(mi.Point2f, self.uv, place + i, is_mesh)
-            corners.append((dr.select(is_mesh, weight, 0), corner))
-        return corners
+    rows, is_mesh = dr.dispatch(si.shape, _corners, si.prim_index, si.n, active)
+    weights = barycentric_coordinates(mi.Vector3f(si.p), *(mi.Vector3f(row[0]) for row in rows))
+    corners = []
+    for weight, (point, normal, uv) in zip(weights, rows, strict=True):
+        corner = mi.SurfaceInteraction3f(si)
+        corner.p, corner.uv = point, uv
+        corner.n = corner.sh_frame.n = normal
+        corners.append((dr.select(active & is_mesh, weight, 0), corner))
+    return corners
 
 
-def _corner_arrays(mesh):
-    """Return positions, normals and texture coordinates, three entries per face."""
-    if mesh.has_face_normals():
-        mesh = tessellation.split_faces(mesh)
-    corners = dr.ravel(meshes.faces(mesh))
-    uv = meshes.texture_coordinates(mesh)
-    return (
-        dr.gather(mi.Vector3f, meshes.positions(mesh), corners),
-        dr.gather(mi.Vector3f, tessellation.normals(mesh), corners),
-        dr.zeros(mi.Point2f, dr.width(corners))
-        if uv is None
-        else dr.gather(mi.Point2f, uv, corners),
-    )
-
-
-def _joined(arrays):
-    """Join vectors end to end; Dr.Jit's function takes only arrays of one component."""
-    components = range(len(arrays[0]))
-    return type(arrays[0])(*(dr.concat([array[i] for array in arrays]) for i in components))
+def _corners(mesh, face, flat, active):
+    """Return positions, normals and texture coordinates of a shape's face; whether it is a mesh."""
+    if not mesh.is_mesh():
+        return [(mi.Point3f(0), mi.Normal3f(0), mi.Point2f(0))] * 3, mi.Bool(False)
+    vertices, rows = mesh.face_indices(face, active), []
+    for i in range(3):
+        normal, uv = flat, mi.Point2f(0)
+        if mesh.has_vertex_normals() and not mesh.has_face_normals():
+            own = mesh.vertex_normal(vertices[i], active)
+            normal = -own if mesh.has_flipped_normals() else own
+        if mesh.has_vertex_texcoords():
+            uv = mesh.vertex_texcoord(vertices[i], active)
+        rows.append((mesh.vertex_position(vertices[i], active), mi.Normal3f(normal), uv))
+    return rows, mi.Bool(True)
 
 
 @cache
@@ -287,8 +234,8 @@ def derived(base: type) -> type:
             if mi.is_spectral:
                 return self._at_corners(scene, si, view, active)
             twosided = any(shape.bsdf().twosided for shape in scene.shapes())
-            values = stored_shade(si, self.interpolation, twosided=twosided, active=active)
-            return mi.Color3f(values) if mi.is_rgb else mi.Spectrum(values[0])
+            value = stored_shade(si, self.interpolation, twosided, active)
+            return value if mi.is_rgb else mi.Spectrum(value.x)
 
         def _store(self, scene, sensor):
             viewer = viewpoint(sensor)
@@ -311,7 +258,7 @@ def derived(base: type) -> type:
 
         def _at_corners(self, scene, si, view, active):
             _meshes(scene)
-            corners = MeshCorners(scene).at(si, active)
+            corners = face_corners(si, active)
             viewer = si.p + view * si.t
             front = dr.dot(si.n, view) > 0
             if self.interpolation is Interpolation.FLAT:
