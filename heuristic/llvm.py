@@ -75,8 +75,7 @@ def configure() -> None:
 def find_wheel() -> Path | None:
     """Find the libLLVM of the installed LLVM wheel; None if there is none.
 
-    It is the library with the shortest name: libLLVM.so before libLLVM.so.22.1. The link without a
-    version is made after the installation, and may not be there.
+    It is the library with the shortest name: libLLVM.so, or libLLVM.so.22.1 without that link.
     """
     try:
         wheel = importlib.metadata.distribution(WHEEL)

@@ -1,27 +1,16 @@
 """Normals of planes, triangles, surfaces, and vertices of meshes (chapter 6, 6.5 and 6.6.2).
 
-Each function takes Dr.Jit arrays of three components, or their floats, of any float type, and
-returns unit vectors of the same type. A surface has no normal where its gradient vanishes or its
-tangents are parallel; the functions return the zero vector there, which receives no light, and
-never NaN. Two vectors count as parallel where the sine of the angle between them is at most
+Arrays have three components, of any float type. A surface has no normal where its gradient vanishes
+or its tangents are parallel; it is the zero vector there, which receives no light, and never NaN.
+Two vectors count as parallel where the sine of the angle between them is at most
 :data:`PARALLEL_STEPS` rounding steps, because their own rounding can turn them by as much.
 
-Gradients and tangents are arguments, not derived by automatic differentiation: that needs a
-differentiable float type and a separate graph inside the caller's kernel. Closed forms serve every
-float type at a known cost.
-
 A vertex gets the mean normal of the faces around it, in one of three weightings: ``positions`` has
-three floats per vertex, ``faces`` three vertex numbers per face, of a type such as ``Array3u``.
-
-- A face without area contributes nothing.
-- A vertex with no face, or only such faces, has the zero vector.
-- So has one whose faces oppose each other, like the two sides of a sheet: the rest of the sum is
-  rounding, up to :data:`CANCELLATION_STEPS` rounding steps of the weights' sum.
-- Slivers have exact normals, areas and angles like other faces, until their edges are parallel to
-  within rounding.
-
-Sums run in parallel over the faces; in meshes of tens of thousands of faces or more the last bit
-may depend on their order.
+three floats per vertex, ``faces`` three vertex numbers per face. A face without area contributes
+nothing. A vertex with no face, or only such faces, has the zero vector. So has one whose faces
+oppose each other, like the two sides of a sheet: the rest of the sum is rounding, up to
+:data:`CANCELLATION_STEPS` rounding steps of the weights' sum. The last bit of a sum over tens of
+thousands of faces may depend on their order.
 """
 
 import drjit as dr
@@ -46,8 +35,7 @@ def plane_coefficients(normal: Vector, point: Position) -> tuple[Number, Number,
 def plane_normal(a: Number, b: Number, c: Number) -> Direction:
     """Equations 6.16, 6.18: ``n = (a, b, c) / |(a, b, c)|`` of the plane ``ax + by + cz + d = 0``.
 
-    ``a``, ``b`` and ``c`` are Dr.Jit floats. It points to the side where ``ax + by + cz + d > 0``.
-    Where all three are zero there is no plane, and ``n`` is zero.
+    It points to the side where ``ax + by + cz + d > 0``.
     """
     return unit(_vector_type(a)(a, b, c))
 
@@ -55,9 +43,7 @@ def plane_normal(a: Number, b: Number, c: Number) -> Direction:
 def triangle_normal(p0: Position, p1: Position, p2: Position) -> Direction:
     """Equation 6.19: ``n = (p1 - p0) x (p2 - p0) / |(p1 - p0) x (p2 - p0)|``.
 
-    It points to the side from which the vertices are seen in anticlockwise order. The reverse order
-    gives the opposite normal, exactly unless two edges are equally long. Collinear vertices give
-    the zero vector.
+    It points to the side from which the vertices are seen in anticlockwise order.
     """
     edges, _ = scaled_edges(p0, p1, p2)
     return unit_cross(*shorter_edges(*edges))
@@ -66,8 +52,7 @@ def triangle_normal(p0: Position, p1: Position, p2: Position) -> Direction:
 def implicit_normal(gradient: Vector) -> Direction:
     """Equation 6.20: ``n = grad f / |grad f|`` of the surface ``f(x, y, z) = 0``.
 
-    It points to where ``f`` grows: outwards, where ``f`` is negative inside. At a point without a
-    gradient, such as the tip of a cone, it is zero.
+    It points to where ``f`` grows: outwards, where ``f`` is negative inside.
     """
     return unit(gradient)
 
@@ -90,8 +75,8 @@ def ellipsoid_gradient(position: Position, a: Number, b: Number, c: Number) -> V
 def parametric_normal(tangent_u: Vector, tangent_v: Vector) -> Direction:
     """Equations 6.23, 6.25: ``n = p_u x p_v / |p_u x p_v|`` of the surface ``p = p(u, v)``.
 
-    ``p_u`` and ``p_v`` are the derivatives of ``p`` by ``u`` and ``v``. Where they are parallel, or
-    one of them vanishes (as at the poles of 6.24), the normal is zero.
+    ``p_u`` and ``p_v`` are the derivatives of ``p`` by ``u`` and ``v``; at the poles of 6.24 one of
+    them vanishes.
     """
     return unit_cross(tangent_u, tangent_v)
 

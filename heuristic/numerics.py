@@ -88,10 +88,9 @@ def power(cosine: Cosines, n: Number) -> Number:
 def log2_of(value: Any, complement: Number) -> Number:
     """Return ``log2(c)`` of a cosine in (0, 1] from ``c`` and ``1 - c``, each accurate in itself.
 
-    Within two rounding steps relative to the result, also where ``c`` rounds to 1. In single
-    precision: ``c = 2^e m`` with ``m`` between the roots of 1/2 and 2, and a polynomial in
-    ``m - 1``, which is ``-(1 - c)`` itself where ``e = 0``. Otherwise ``log1p`` after Kahan:
-    ``log(w) x / (w - 1)`` with ``w`` the rounded ``1 + x``, in which the rounding cancels.
+    Within two rounding steps of the result. In single precision: ``c = 2^e m`` with ``m`` between
+    the roots of 1/2 and 2, and a polynomial in ``m - 1``, which is ``-(1 - c)`` itself where ``e =
+    0``. Otherwise ``log1p`` after Kahan: ``log(w) x / (w - 1)`` with ``w`` the rounded ``1 + x``.
     """
     if _is_single(value):
         bits = dr.reinterpret_array(dr.int32_array_t(type(value)), dr.detach(value))
@@ -124,8 +123,7 @@ def exp2(x: Number) -> Number:
 def one_less_exp2(x: Number) -> Number:
     """Return ``1 - 2^-x`` for ``x >= 0``, accurate relative to the result where ``x`` is small.
 
-    Below ``x = 1/2`` it is the series of the exponential function, whose next term is under 1e-9 of
-    it.
+    Below ``x = 1/2`` it is the series of the exponential function, within 1e-9.
     """
     y = x * _LN_2
     series = y * _polynomial(-y, [1 / factorial(k) for k in range(1, 9)])
@@ -152,8 +150,8 @@ def inverse_root(square: Number) -> Number:
 def inverse_length(square: Number) -> Number:
     """Return ``1 / sqrt(square)``, and 0 where ``square`` is 0.
 
-    A vector times that is a unit vector or zero, and so is its derivative at the zero vector. The
-    derivative of a large number times zero would overflow once light is added to it.
+    The derivative at the zero vector is zero, too; that of a large number times zero would overflow
+    once light is added to it.
     """
     return dr.select(square >= smallest(square), inverse_root(square), 0)
 
@@ -247,8 +245,7 @@ def _is_single(value):
 def _inverse_root_power(square):
     """Return a power of two near ``1 / sqrt(square)``, by halving the bits of the exponent.
 
-    Any power of two will do, so an overflowed or vanished square is not a special case: the result
-    is then 2^-65 or 2^63 in single precision.
+    Any power of two will do, so an overflowed or vanished square is no special case.
     """
     if not dr.is_jit_v(square):
         usable = 0 < square < inf

@@ -1,10 +1,9 @@
 """The illumination model, term by term: one function per equation.
 
 Equation numbers 8.x are of the chapter *Illumination* (sections 8.2.1-8.2.5), 6.x of the chapter
-*Lighting models*. Intensities and coefficients are display-linear (see
-:mod:`heuristic.convention`); they are numbers, Dr.Jit floats, or colours with one component per
-wavelength (8.11, 8.12). Cosines are scalar products of unit vectors. The same functions serve the
-kernel (:mod:`heuristic.kernel`) and the Mitsuba plugins (:mod:`heuristic.plugins`).
+*Lighting models*. Intensities and coefficients are display-linear (:mod:`heuristic.convention`):
+numbers, Dr.Jit floats, or colours with one component per wavelength (8.11, 8.12). The same
+functions serve the kernel (:mod:`heuristic.kernel`) and the plugins (:mod:`heuristic.plugins`).
 """
 
 from numbers import Real
@@ -31,8 +30,6 @@ def diffuse(intensity: Colour, k_d: Colour, cos_incidence: Number) -> Colour:
 
     8.6 and 6.7 are the same for an ``intensity`` that is already attenuated, ``I_p0 f_att``.
     Lambert's law (8.3, 8.4) is why no view angle appears.
-
-    A surface that faces the light at 60 degrees, and one that is turned away:
 
     >>> diffuse(intensity=1.0, k_d=0.5, cos_incidence=0.5)
     0.25
@@ -85,13 +82,10 @@ def attenuation(
     """Equation 6.1: ``I = I_0 / (k0 + k1 d + k2 d^2)``: constant, linear and quadratic parts.
 
     Without an ``intensity`` it is ``f_att``; ``inverse`` is ``1 / d`` if the caller has it already.
-    ``(0, 0, 1)`` is chapter 8's inverse square (text at 8.6), ``(1, 0, 0)`` no attenuation. Where
-    the denominator is 0 (on a light of inverse-square type) the result is 0: no direction exists
-    there, so nothing is lit.
-
-    ``d^2`` and ``f_att`` may leave the type's range as long as the result does not: see
-    :func:`attenuation_root`. A result beyond the range is the largest float, since an infinite one
-    would become NaN at the horizon.
+    ``(0, 0, 1)`` is chapter 8's inverse square (text at 8.6), ``(1, 0, 0)`` no attenuation. On a
+    light of inverse-square type the result is 0: no direction exists there, so nothing is lit. A
+    result beyond the type's range is the largest float: an infinite one would become NaN at the
+    horizon.
 
     >>> attenuation(distance=2.0, k0=0, k1=0, k2=1)
     0.25

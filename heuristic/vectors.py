@@ -69,9 +69,8 @@ def mirror_vector(normal: Vector, direction: Direction, cosine: Cosines) -> Dire
     """Equations 6.28-6.31: ``R = 2 (L.N) N - L``, the mirror image of ``L`` about ``N``.
 
     It follows from three conditions on ``R``: equal angles (6.28, 6.29), one plane with ``L`` and
-    ``N`` (6.30) and unit length. ``cosine`` is ``N.L``, which callers have already. Mirroring
-    either of two directions gives the same angle between them: ``R.V`` is the scalar product of
-    ``L`` with the mirror image of ``V``.
+    ``N`` (6.30) and unit length. ``cosine`` is ``N.L``. Mirroring ``V`` instead gives the same
+    ``R.V``.
     """
     return dr.fma(2 * cosine, normal, -direction)
 

@@ -7,13 +7,10 @@ line. Renderers use the latter, on the surface itself; the chapter's scan lines 
 where perspective would need a correction.
 
 :func:`shade_mesh` evaluates the model once per vertex (Gouraud) or face (flat), and stores the
-values as attributes of a mesh. :func:`stored_shade` reads them where a ray hits, interpolated by
-Mitsuba. Stored values hold for one viewer, one set of lights and one of wavelengths.
-
-:func:`face_corners` is Gouraud shading without storage: three evaluations per ray, at the vertices
-of the face that it hits. It is for spectral variants, whose wavelengths change from ray to ray.
-
-Phong shading does not need either: Mitsuba interpolates and normalises the vertex normals.
+values in the mesh. :func:`stored_shade` reads them where a ray hits, interpolated by Mitsuba. They
+hold for one viewer and one set of lights and wavelengths. :func:`face_corners` serves spectral
+variants, whose wavelengths change from ray to ray: three evaluations per ray, at the vertices of
+the face that it hits. Phong shading needs neither: Mitsuba interpolates the vertex normals.
 """
 
 from collections.abc import Callable, Sequence

@@ -188,9 +188,8 @@ def define() -> dict[str, Any]:
         def parameters_changed(self, keys=()):
             """Note which coefficients can be non-zero, and make the exponent opaque.
 
-            An opaque exponent can change without a new compilation, as fits and sweeps need, unless
-            it crosses the bounds of :data:`heuristic.numerics.MODERATE_EXPONENTS`. Values below 0,
-            which would make samples NaN, raise InputError.
+            An opaque exponent can change without a new compilation, unless it crosses the bounds of
+            :data:`heuristic.numerics.MODERATE_EXPONENTS`. Values below 0 raise InputError.
             """
             for name in (*COEFFICIENTS, "transmittance"):
                 require_positive(f"phong: {name}", getattr(self, name))
@@ -233,10 +232,7 @@ def define() -> dict[str, Any]:
             return tuple(dr.mulsign(direction, wi.z) for direction in (wi, *directions))
 
         def _specular_probability(self, ctx, si, active):
-            """Share of samples for the lobe: its part of the albedo at normal incidence.
-
-            The diffuse part reflects ``k_d``, the lobe ``k_s`` over its normalisation.
-            """
+            """Share of samples for the lobe: its part of the albedo at normal incidence."""
             if not ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 1) or "k_d" not in self.present:
                 return mi.Float(1)
             if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0) or "k_s" not in self.present:
