@@ -3,7 +3,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.pairing import emitters
+from reference.pairing import lamps
 from reference.pairing.halves import pair
 from reference.scene.source import Source
 
@@ -23,12 +23,12 @@ def solid_angle_error(cutoff, exponent, beam_width, edge=None):
 
 def test_no_other_exponent_or_cone_fits_better():
     for cutoff, beam_width in ((20, 15), (20, 1), (45, 30), (80, 10)):
-        m = emitters.exponent_for(cutoff, beam_width)
+        m = lamps.exponent_for(cutoff, beam_width)
         best = solid_angle_error(cutoff, m, beam_width)
         for other in m * np.array([0.5, 0.9, 1.1, 2.0]):
             assert solid_angle_error(cutoff, other, beam_width) > best
     for cutoff, exponent in ((20, 10), (30, 3), (60, 40), (85, 2)):
-        edge, beam_width = emitters.cone_for(cutoff, exponent)
+        edge, beam_width = lamps.cone_for(cutoff, exponent)
         best = solid_angle_error(cutoff, exponent, beam_width, edge)
         for other_edge in np.linspace(0.1, 1, 12) * cutoff:
             for other in np.linspace(0, 0.999, 12) * other_edge:
@@ -37,8 +37,8 @@ def test_no_other_exponent_or_cone_fits_better():
 
 
 def test_an_even_cone_is_a_beam_as_wide_as_the_cone():
-    assert emitters.cone_for(30, 0) == pytest.approx((30, 30), rel=1e-3)
-    assert emitters.exponent_for(30, 29.999) == pytest.approx(0, abs=1e-2)
+    assert lamps.cone_for(30, 0) == pytest.approx((30, 30), rel=1e-3)
+    assert lamps.exponent_for(30, 29.999) == pytest.approx(0, abs=1e-2)
 
 
 def test_mitsubas_spot_falls_off_as_the_fit_believes(rgb):
@@ -48,7 +48,7 @@ def test_mitsubas_spot_falls_off_as_the_fit_believes(rgb):
     angle = mi.Float(np.radians(theta))
     it.p = mi.Point3f(dr.sin(angle), 0, dr.cos(angle))
     _, weight = light.sample_direction(it, mi.Point2f(0.5))
-    assert np.array(weight)[0] == pytest.approx(emitters.linear_falloff(theta, 40, 10), abs=1e-5)
+    assert np.array(weight)[0] == pytest.approx(lamps.linear_falloff(theta, 40, 10), abs=1e-5)
 
 
 def flux_of(emitter, widest):

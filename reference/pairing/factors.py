@@ -11,7 +11,7 @@ Physical (Mitsuba)                             Heuristic
 ``spot``, intensity ``I``                      ``I_p0 = s I / pi``, ``f_att = 1 / d^2``, the same
                                                cone, ``m`` fitted, ``s`` that of equal flux; the
                                                other way cone and beam width are fitted
-                                               (:mod:`reference.pairing.emitters`)
+                                               (:mod:`reference.pairing.lamps`)
 small flat ``area`` light, ``L`` and ``A``     spot at its centroid: ``I_p0 = L A / pi``, ``m = 1``,
                                                cone 90 degrees, ``f_att = 1 / d^2``
 closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L A / (4 pi)``

@@ -8,6 +8,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from heuristic.lights import INVERSE_SQUARE, PLUGINS, DirectionalLight, Light, PointLight, SpotLight
 from reference.pairing.factors import INTENSITY_FACTOR, Replacements
 from reference.scene import values
@@ -180,3 +181,30 @@ def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: Any) -> mi
     """Return the properties of a heuristic light with the fall-off of Mitsuba's."""
     falloff = FALLOFF_OF_MITSUBA if of(plugin).has("attenuation") else {}
     return properties(plugin, scale=scale, **values, **falloff)
+
+
+def level(
+    light: LightNode, cone: Callable, derived_cone: Callable, flux_ratio: float
+) -> tuple[float, str]:
+    """Return the factor from ``I_p0`` of a point or spot to Mitsuba's intensity, and its rule.
+
+    The cones are factors of the light and of Mitsuba's in directions of travel (N, 3),
+    ``flux_ratio`` is the light's flux over Mitsuba's, for the same intensity on the axis.
+    """
+    defaults = (("k0", 1.0), ("k1", 0.0), ("k2", 0.0))
+    k0, k1, k2 = (light.number(key, default) for key, default in defaults)
+    if (k0, k1, k2) == INVERSE_SQUARE:
+        return IRRADIANCE_PER_INTENSITY * flux_ratio, ""
+    clamped = light.value("clamped", False)
+
+    def chapters(distance, travel):
+        factor = 1 / np.maximum(k0 + k1 * distance + k2 * distance**2, np.finfo(float).tiny)
+        return (np.minimum(factor, 1) if clamped else factor) * cone(travel)
+
+    def physical(distance, travel):
+        return derived_cone(travel) / distance**2
+
+    place = light.position()
+    here, there = (light.surface().mean_irradiance(place, f) for f in (chapters, physical))
+    note = "same mean irradiance over the visible surface; only the fall-off's shape differs"
+    return IRRADIANCE_PER_INTENSITY * (here / there if there > 0 else 1.0), note

@@ -1,24 +1,27 @@
-"""The phong material that is nearest to a BSDF with a lobe, or that lets light through.
+"""The phong material that is nearest to a BSDF with a lobe, around others, or transparent.
 
 One function per plugin; any other BSDF, including a user's, is measured (:func:`unknown`).
 Transparent BSDFs are seen through without refraction: light that passes at normal incidence,
 straight or refracted, becomes the transmittance, reflected light a lobe. A closed body has two such
-surfaces on each path. The rules of diffuse and nested BSDFs are in :mod:`reference.pairing.bsdfs`.
+surfaces on each path.
 """
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 
-from heuristic.materials import SMALLEST_ALPHA
+from heuristic.errors import InputError
+from heuristic.materials import COEFFICIENTS, SMALLEST_ALPHA
 from heuristic.terms import normalisation
 from reference.pairing import albedo, probe
 from reference.pairing.albedo import RoughPlastic
-from reference.pairing.bsdfs import Context, NearestPhong, Rule
+from reference.pairing.bsdfs import TEXTURE, Context, NearestPhong, Rule
 from reference.pairing.factors import Convention, exponent_of
 from reference.scene import values
-from reference.scene.graph import Graph
+from reference.scene.graph import Graph, Reference
 
 SMOOTH_ALPHA = 0.05
 """Replaces a smaller roughness: a mirror's lobe has no width, and the model's light no extent. The
@@ -230,6 +233,138 @@ def _tinted(context: Context, index: int, reflected: Any, key: str) -> Any:
     return values.product(context.graph, reflected, context.value(index, key, 1.0))
 
 
+def null(context: Context, index: int) -> NearestPhong:
+    """``null``: transmittance 1 (exact)."""
+    return NearestPhong(transmittance=1.0, twosided=True)
+
+
+def alike(
+    graph: Graph, first: NearestPhong, second: NearestPhong
+) -> tuple[NearestPhong, NearestPhong]:
+    """Return two materials with their lobes scaled in the same way, so ``k_s`` can be mixed."""
+    if first.normalised == second.normalised:
+        return first, second
+    return _normalised(graph, first), _normalised(graph, second)
+
+
+def _normalised(graph: Graph, material: NearestPhong) -> NearestPhong:
+    if material.normalised or values.is_zero(material.k_s):
+        return replace(material, normalised=True)
+    n = values.plain(material.n)
+    if n is None:
+        raise InputError(
+            f"{graph.name}: a phong whose n is a texture is mixed with a BSDF whose alpha is one:"
+            " give the phong a single n, or make it normalised."
+        )
+    scale = 1 / float(normalisation(material.form, n))
+    return replace(material, normalised=True, k_s=values.product(graph, material.k_s, scale))
+
+
+def twosided(context: Context, index: int) -> NearestPhong:
+    """``twosided``: the phong's own parameter; of two BSDFs, each on its side."""
+    graph, inner = context.graph, context.inner(index)
+    if len(inner) == 1:
+        return replace(inner[0], twosided=True)
+    front, back = alike(graph, *inner[:2])
+    sided = {
+        name: values.sides(graph, getattr(front, name), getattr(back, name))
+        for name in (*COEFFICIENTS, "n", "transmittance")
+    }
+    return replace(front, **sided, twosided=True, lost=front.lost + back.lost)
+
+
+def mask(context: Context, index: int) -> NearestPhong:
+    """``mask``: coefficients times the opacity, the rest passes straight through (exact)."""
+    graph, (inner,) = context.graph, context.inner(index)
+    opacity = context.value(index, "opacity", 0.5)
+    reflected = {
+        name: values.share(graph, getattr(inner, name), opacity) for name in ("k_a", "k_d", "k_s")
+    }
+    passed = values.total(
+        graph, values.rest(graph, 1.0, opacity), values.share(graph, inner.transmittance, opacity)
+    )
+    return replace(inner, **reflected, transmittance=passed)
+
+
+def blend(context: Context, index: int) -> NearestPhong:
+    """``blendbsdf``: each coefficient, and the exponent, blended by the weight.
+
+    Exact if only one of the two has a lobe, or if the weight is 0 or 1.
+    """
+    graph, inner = context.graph, context.inner(index)
+    first, second = alike(graph, *inner[:2])
+    weight = context.value(index, "weight", 0.5)
+    mixed = {
+        name: values.blend(graph, getattr(first, name), getattr(second, name), weight)
+        for name in (*COEFFICIENTS, "transmittance")
+    }
+    lost: tuple[tuple[str, str], ...] = ()
+    lobes = [material for material in (first, second) if not values.is_zero(material.k_s)]
+    if len(lobes) == 2:
+        mixed["n"] = values.blend(graph, first.n, second.n, weight)
+        lost = (("two lobes", "one, of the blended exponent and coefficient"),)
+        form = first.form
+    else:
+        mixed["n"], form = (lobes[0].n, lobes[0].form) if lobes else (1.0, "phong")
+    return NearestPhong(
+        **mixed,
+        form=form,
+        normalised=first.normalised,
+        twosided=first.twosided or second.twosided,
+        tilt=first.tilt or second.tilt,
+        lost=first.lost + second.lost + lost,
+    )
+
+
+def normal_map(context: Context, index: int) -> NearestPhong:
+    """``normalmap``: the nested material, with the mapped normal (exact without shadowing)."""
+    normals = context.graph.props(index)["normalmap"]
+    _require(context, index, normals, "eval_3", "normal")
+    return _tilted(context, index, normals=normals)
+
+
+def bump_map(context: Context, index: int) -> NearestPhong:
+    """``bumpmap``: the nested material, with the displaced surface's normal (exact likewise)."""
+    ((key, _),) = context.graph.children(index, TEXTURE)
+    scale, heights = float(context.value(index, "scale", 1.0)), context.graph.props(index)[key]
+    _require(context, index, heights, "eval_1_grad", "slope")
+    return _tilted(context, index, heights=heights, scale=scale)
+
+
+def _require(context: Context, index: int, texture: Any, ability: str, what: str) -> None:
+    """Reject a texture that lacks what its map evaluates; otherwise only shading would find out.
+
+    Mitsuba accepts such a texture only with integrators that do not evaluate materials.
+    """
+    graph = context.graph
+    if not isinstance(texture, Reference):
+        return
+    si = dr.zeros(mi.SurfaceInteraction3f, 1)
+    si.shape = mi.ShapePtr(mi.load_dict({"type": "rectangle"}))
+    made = graph.instantiate(texture.index())
+    try:
+        dr.eval(getattr(made, ability)(si))
+    except RuntimeError as error:
+        if f"{ability}()" in str(error):
+            raise InputError(
+                f"{graph.name}: {graph.label(index)}: a texture {graph.plugin(texture.index())}"
+                f" gives {context.plugin(index)} no {what} (Mitsuba cannot {ability} it). Give a"
+                " bitmap of three channels."
+            ) from error
+
+
+def _tilted(context: Context, index: int, **parameters: Any) -> NearestPhong:
+    (inner,) = context.inner(index)
+    lost = inner.lost
+    if context.value(index, "use_shadowing_function", True):
+        lost += (("shadows that mapped bumps cast on each other", "none"),)
+    parameters["flip"] = context.value(index, "flip_invalid_normals", True)
+    if inner.tilt is not None:
+        lost += (("nested normal maps", "only the outer one"),)
+    tilt = values.node(context.graph, "heuristic_tilt", **parameters)
+    return replace(inner, tilt=tilt, lost=lost)
+
+
 RULES: dict[str, Rule] = {
     "roughplastic": roughplastic,
     "plastic": plastic,
@@ -237,6 +372,12 @@ RULES: dict[str, Rule] = {
     "principled": principled,
     **dict.fromkeys(("dielectric", "roughdielectric"), dielectric),
     "thindielectric": sheet,
+    "null": null,
+    "twosided": twosided,
+    "mask": mask,
+    "blendbsdf": blend,
+    "normalmap": normal_map,
+    "bumpmap": bump_map,
 }
 
 

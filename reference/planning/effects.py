@@ -89,8 +89,7 @@ class Effect:
 class PrunedEffect(Effect):
     """An effect that the integrator simulates, unless its rule of pruning applies.
 
-    ``is_alike(facts)`` returns whether both halves treat it alike, though it is present;
-    ``without`` are the parameters of ``direct_all`` that leave it out.
+    ``is_alike(facts)``: both halves treat it alike. ``without``: what leaves it out (`direct_all`).
     """
 
     pruning: PruningRule

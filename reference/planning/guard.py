@@ -5,16 +5,13 @@ rays are drawn at random and followed twice: by the plan's integrator, and by Mi
 both with independent samples. Pixels and edges of equal rays cancel, so the difference ``d`` of a
 ray has only the noise of the light.
 
-*The test.* After ``n``, ``2 n``, ``4 n``, … rays, up to the budget, the mean of ``d`` is tested by
-Student's t over :data:`BATCHES` batches, beyond a tolerance of :data:`TOLERANCE` of the mean
-radiance; the level :data:`LOOKING` is divided equally among the looks. A look that shows agreement
-ends the test. A look that finds a departure is not trusted: :data:`MOST` new rays decide, which
-must find one of the same sign at the level :data:`DECIDING`.
+After ``n``, ``2 n``, ``4 n``, … rays, up to the budget, the mean of ``d`` is tested by Student's t
+over :data:`BATCHES` batches, beyond :data:`TOLERANCE` of the mean radiance; the level
+:data:`LOOKING` is divided equally among the looks. Agreement ends the test. A departure is not
+trusted: :data:`MOST` new rays must find one of the same sign at the level :data:`DECIDING`.
 
-*False alarms.* For nearly normal means a right plan is rejected with a chance of at most ``LOOKING
-x DECIDING``, one in a million. The rest up to the stated one in a thousand is reserved for heavy
-tails: a mean without its rarest paths looks too dark, with too small an error. A million rays must
-miss them for an alarm.
+For nearly normal means a right plan is rejected with a chance of at most ``LOOKING x DECIDING``,
+one in a million. The rest up to the stated one in a thousand is reserved for heavy tails.
 """
 
 from collections.abc import Iterator, Sequence

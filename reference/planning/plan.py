@@ -18,11 +18,9 @@ participating media                     ``volpath``, or ``volpathmis`` where the
                                         or its extinction is coloured
 ======================================  ===========================================================
 
-All take the sampler of :mod:`reference.rendering.sampler`: stratified, with the right mean at any
-number of samples. Samples are stratified within a pass, so few passes of many samples are better
-than many of few; eight passes are enough for standard errors. If neither lights nor lens need
-random numbers, only the pixel filter is sampled, and four passes are enough to see the remaining
-noise.
+All take the sampler of :mod:`reference.rendering.sampler`, stratified within a pass: few passes of
+many samples are better than many of few, and eight are enough for standard errors. If only the
+pixel filter is sampled, four show the remaining noise.
 """
 
 from collections.abc import Collection
@@ -152,11 +150,9 @@ class Plan(Record):
         return next(d.called_for for d in self.effects if d.name == effect.label)
 
     def simulating(self, effects: Collection[Effect], max_depth: int | None = None) -> "Plan":
-        """Return this plan with only some of its effects.
+        """Return this plan with only some of its effects, those of the integrator.
 
-        A plan covers only the integrator's part: other effects change the scene. Leaving out an
-        effect that is not needed changes nothing. ``max_depth`` takes the place of the plan's own;
-        at 2 interreflection is left out.
+        ``max_depth`` takes the place of the plan's own; at 2 interreflection is left out.
         """
         if max_depth == 2:
             effects = set(effects) - {INTERREFLECTION}
@@ -301,8 +297,7 @@ def _stock(facts: Facts) -> str:
 def wants_spectra(graph: Graph) -> bool:
     """Return whether a scene holds spectra that three numbers cannot represent.
 
-    These are tabulated spectra, black bodies and spectral films; not uniform values, RGB and
-    Mitsuba's daylight (``d65``), to which RGB values are relative.
+    Tabulated spectra, black bodies and spectral films; not Mitsuba's daylight (``d65``).
     """
     if any(graph.plugin(i) == "specfilm" for i in graph.nodes(mi.ObjectType.Film)):
         return True

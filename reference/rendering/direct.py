@@ -3,13 +3,11 @@
 Indirect light is added if requested.
 
 Mitsuba's ``direct`` picks one emitter at random for each sample, so even two point lights make
-noise. This one evaluates each emitter in turn: point, spot and directional lights, which need no
-random number, are then exact at each camera ray, and only lights with an extent are sampled, by
-emitter and by BSDF, with the balance heuristic. BSDFs, emitters and visibility are Mitsuba's.
+noise. This one evaluates each in turn: lights at a point or in a direction are exact at each camera
+ray, and only lights with an extent are sampled, by emitter and by BSDF, with the balance heuristic.
 
-Up to :data:`UNROLLED` lights are unrolled: each has its own code in the kernel. For more, LLVM's
-time would grow faster than their number, so they become the targets of one call in a loop. Dr.Jit
-merges targets with the same code: the kernel grows with the kinds of lights, not with their number.
+More than :data:`UNROLLED` lights become the targets of one call in a loop. Dr.Jit merges targets
+with the same code: the kernel grows with the kinds of lights, not with their number.
 
 ==================  ==================  ===========================================================
 Parameter           Type (default)      Meaning

@@ -1,9 +1,8 @@
 """Rendering in independent passes, with mean, standard error and times.
 
-Both halves of a pair are rendered pass by pass with the same sampler and seed. So the camera rays
-of a pass are the same in both, and pixel filter and edges cancel in the difference. Passes differ
-only in seed and are independent; samples within a pass are stratified and are not. So every
-standard error here comes from the spread of passes.
+Both halves of a pair are rendered pass by pass, in turn, with the same sampler and seed: their
+camera rays, pixel filter and edges cancel in the difference, and a drift of the machine affects
+both. Samples within a pass are stratified; passes are independent, and give the standard errors.
 """
 
 import gc

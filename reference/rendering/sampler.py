@@ -11,14 +11,7 @@ albedo 0.9 with 16 samples per pixel. Here a random number rotates the strata ::
 
 which is uniform and independent for any permutation p. Pairs of dimensions are stratified in each
 axis and in cells, like correlated multi-jittered samples; the place within a cell is rotated in the
-same way.
-
-=================  ==============  ==============================================================
-Parameter          Type (default)  Meaning
-=================  ==============  ==============================================================
-``sample_count``   integer (4)     samples per pixel: any number. Two dimensions are stratified
-                                   best where it has two nearly equal factors
-=================  ==============  ==============================================================
+same way. Any ``sample_count`` will do; best are two nearly equal factors.
 
 Sources: A. Kensler, *Correlated multi-jittered sampling*, 2013, for p and the cells; R. Cranley and
 T. N. L. Patterson, *Randomization of number theoretic methods for multiple integration*, 1976, for
