@@ -77,25 +77,32 @@ def compare(
     progress: Progress | None = None,
     command: str = "",
     terms: bool = True,
+    why: bool = False,
 ) -> Comparison:
     """Compare the heuristic half of a scene with the physical one, in the current variant.
 
     ``command`` repeats the comparison, for the record. ``progress(stage, done, total)`` is called
     after each pass; with a noise target, ``total`` is the limit. ``terms`` traces equation 8.10 at
-    pixels. Raises `InputError` if the scene cannot be read or paired, no pixel sees a surface, or
-    both halves are black; `NonFiniteError` for a NaN or an infinity in a rendering.
+    pixels, and ``why`` finds causes. Raises `InputError` if the scene cannot be read or paired, no
+    pixel sees a surface, or both halves are black; `NonFiniteError` for a NaN or an infinity in a
+    rendering.
     """
     printed: list[str] = []
     with collect_messages(printed):
-        comparison = _compare(source, options or Options(), progress, command, terms)
+        comparison, ready = _compare(source, options or Options(), progress, command, terms)
     lines = count_messages([*source.messages, *printed])
     made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *lines))
-    return replace(comparison, record=made)
+    comparison = replace(comparison, record=made)
+    if not why or (options and options.image):  # no effect can be added to a picture
+        return comparison
+    from comparisons.hybrids import attribution  # loaded late: --no-why needs none of it
+
+    return attribution.explained(comparison, ready, source, options or Options(), progress)
 
 
 def _compare(
     source: Source, options: Options, progress: Progress | None, command: str, terms: bool
-) -> Comparison:
+) -> tuple[Comparison, Prepared]:
     stages: dict[str, float] = {}
     begin = perf_counter()
 
@@ -163,7 +170,7 @@ def _compare(
         mistakes=_mistakes(options),
         **numbers,
     )
-    return Comparison(made, images, *traced)
+    return Comparison(made, images, *traced), ready
 
 
 def render(

@@ -1,5 +1,7 @@
 """What a comparison returns: its record, ``comparison.json``, and its images."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -9,6 +11,7 @@ from msgspec import Meta
 from comparisons.departure.colour import Viewing
 from comparisons.departure.regions import ObjectShare, Region
 from comparisons.departure.statistics import Histogram, RatioSummary, Summary
+from comparisons.hybrids.why import Attribution
 from reference.pairing.factors import Unrepresentable
 from reference.pairing.halves import Pairing
 from reference.pairing.prepare import Override
@@ -28,6 +31,7 @@ from reference.records import (
 from reference.rendering.renderer import Times
 
 if TYPE_CHECKING:
+    from comparisons.hybrids.attribution import Causes
     from comparisons.pixel_terms import TermGrid
 
 
@@ -160,6 +164,10 @@ class ComparisonRecord(Record, kw_only=True):
     ] = ""
     noise_target: NoiseTarget | None = None
     picture: PictureRecord | None = None
+    why: Annotated[
+        Attribution | None,
+        Meta(description="What the effects remove; null with --no-why, and of pictures."),
+    ] = None
     mistakes: Annotated[
         tuple[str, ...], Meta(description="Mistakes that the heuristic seems to make, in words.")
     ] = ()
@@ -207,10 +215,12 @@ class Images:
 class Comparison:
     """What a comparison returns: the content of ``comparison.json``, the images, and the terms.
 
-    ``no_terms`` gives the reason if there are no terms.
+    ``no_terms`` gives the reason if there are no terms. ``causes`` are those of ``record.why``, by
+    pixel.
     """
 
     record: ComparisonRecord
     images: Images
-    terms: "TermGrid | None" = None
+    terms: TermGrid | None = None
     no_terms: str = ""
+    causes: Causes | None = None

@@ -114,22 +114,20 @@ def methods(records: Sequence[Cost]) -> Iterator[str]:
 
 def attribution(records: Sequence[Cost]) -> Iterator[str]:
     """Yield what each effect removes and adds: the scenes where it matters, and medians there."""
-    worth: dict[str, list[tuple[float, float]]] = {}
+    worth: dict[str, list[float]] = {}
     for record in records:
         for one in record.attribution.effects:
             if one.removes.low > 0:
-                removed = one.removes.value, one.adds_s.value / record.attribution.reference_s
-                worth.setdefault(one.effect, []).append(removed)
+                worth.setdefault(one.effect, []).append(one.removes.value)
     rows = [
         (
             effect,
             f"{len(found)}",
-            number(median(removed for removed, _ in found)),
-            f"{median(share for _, share in found):.0%}",
+            number(median(found)),
         )
         for effect, found in sorted(worth.items(), key=lambda row: -len(row[1]))
     ]
-    head = "Effect", "scenes", "removes, mean ΔE2000", "adds, of the reference's time"
+    head = "Effect", "scenes", "removes, mean ΔE2000"
     yield from markdown([head, *rows], right=1)
 
 

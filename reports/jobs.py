@@ -394,15 +394,14 @@ class Ready:
 class Job:
     """What a command does with each of its scenes.
 
-    ``request`` says how to render; ``fresh`` renders finished scenes again; ``coarse`` finds causes
-    with less effort; pixels differ visibly above the ΔE2000 ``within``.
+    ``request`` says how to render; ``fresh`` renders finished scenes again; pixels differ
+    visibly above the ΔE2000 ``within``.
     """
 
     request: Options
     figures: bool = False
     with_cost: bool = False
     fresh: bool = False
-    coarse: bool = False
     within: float = 2.0
 
 

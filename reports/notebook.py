@@ -128,15 +128,17 @@ def _rows(point: PixelTerms) -> Iterator[tuple[str, tuple[float, ...]]]:
     yield "textbook, the sum", point.total
 
 
-def compare(scene: Scene, name: str | None = None, **options: Any) -> Shown:
+def compare(scene: Scene, name: str | None = None, why: bool = True, **options: Any) -> Shown:
     """Compare a scene as ``fotismos compare`` does.
 
     A scene is a built-in name, the path of one, a dictionary for ``mitsuba.load_dict``, or a
     function that returns one; ``name`` replaces its name. ``options`` are those of the command
-    line, such as ``spp=64`` or ``resolution=(128, 128)``.
+    line, such as ``spp=64`` or ``resolution=(128, 128)``; ``why`` finds causes.
     """
     case = open_case(scene, Options.of(options), name)
-    comparison = comparisons.compare.compare(case.source, case.options, command=case.command())
+    comparison = comparisons.compare.compare(
+        case.source, case.options, command=case.command(), why=why
+    )
     return Shown(comparison, page.render([view_of(comparison)]))
 
 

@@ -83,17 +83,17 @@ def decision(record: ComparisonRecord, threshold: float = TOLERANCE) -> Verdict:
     return decide(record.metrics[LEADING.name].visible, threshold)
 
 
-def missing(record: ComparisonRecord, cost: Cost | None = None) -> dict[str, float]:
+def missing(record: ComparisonRecord) -> dict[str, float]:
     """Return ``{effect: its share of what all surely remove}``, the largest first."""
-    effects = cost.attribution.effects if cost else ()
+    effects = record.why.effects if record.why else ()
     sure = {one.effect: one.removes.value for one in effects if one.removes.low > 0}
     total = sum(sure.values())
     return {effect: sure[effect] / total for effect in sorted(sure, key=lambda name: -sure[name])}
 
 
-def cause(record: ComparisonRecord, cost: Cost | None = None) -> str:
+def cause(record: ComparisonRecord) -> str:
     """Return what is mostly missing in a scene, as a sentence; empty if that is unknown."""
-    effects = missing(record, cost)
+    effects = missing(record)
     return f"Mostly missing: {_noun(next(iter(effects)))}." if effects else ""
 
 
@@ -179,7 +179,7 @@ def about(record: ComparisonRecord, cost: Cost | None = None, threshold: float =
     """Return a scene's verdict, what is mostly missing, and what to do, in a few sentences."""
     parts = [headline([record], threshold)]
     if decision(record, threshold) != "pass":
-        parts += [cause(record, cost), sentence(record, cost, threshold)]
+        parts += [cause(record), sentence(record, cost, threshold)]
     return " ".join(dict.fromkeys(filter(None, parts)))
 
 
@@ -218,13 +218,13 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
     return f"{subject} is visibly wrong in {wrong} of the pixels of {record.scene}."
 
 
-def most_missing(scenes: Sequence[Studied], threshold: float = TOLERANCE) -> str:
+def most_missing(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> str:
     """Return what the scenes that fail lack most, by pixels; empty if that is unknown."""
     pixels: Counter[str] = Counter()
-    for record, cost in scenes:
+    for record in records:
         if decision(record, threshold) == "fail":
             wrong = share(record, threshold).value
-            pixels.update({effect: wrong * part for effect, part in missing(record, cost).items()})
+            pixels.update({effect: wrong * part for effect, part in missing(record).items()})
     named = [_noun(effect) for effect, _ in pixels.most_common(NAMED)]
     return f"Mostly missing: {', '.join(named)}." if named else ""
 
@@ -236,6 +236,6 @@ def advice(scenes: Sequence[Studied], threshold: float = TOLERANCE) -> Iterator[
             yield " ".join(
                 filter(
                     None,
-                    (f"{record.scene}:", cause(record, cost), sentence(record, cost, threshold)),
+                    (f"{record.scene}:", cause(record), sentence(record, cost, threshold)),
                 )
             )

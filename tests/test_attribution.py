@@ -8,8 +8,15 @@ import pytest
 from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.regions import Region
-from comparisons.hybrids.attribution import ErrorMeter, shares
-from comparisons.hybrids.dominance import LEAST, NONE, UNCOUNTED, dominating, in_region
+from comparisons.hybrids.attribution import (
+    LEAST,
+    NONE,
+    UNCOUNTED,
+    ErrorMeter,
+    dominating,
+    in_region,
+    shares,
+)
 from comparisons.hybrids.hybrids import subsets
 from reference.rendering.sums import Estimate
 

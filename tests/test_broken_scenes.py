@@ -14,7 +14,7 @@ import pytest
 from comparisons.case import open_case
 from comparisons.check.measurement import measure_scene
 from comparisons.compare import compare
-from comparisons.cost.cost import quick
+from comparisons.cost.cost import cost
 from comparisons.fit.fit import fit
 from comparisons.options import LARGEST_SPP, Options
 from comparisons.prepared import require_light
@@ -78,7 +78,7 @@ AWAY = SCENE.replace('target="0, 0, 0"', 'target="0, -9, 3"')
 
 def test_every_command_refuses_an_empty_picture_unless_it_is_allowed(rgb, tmp_path):
     case = case_of(tmp_path, AWAY)
-    for work in (compare, measure_scene, quick, fit):
+    for work in (compare, measure_scene, cost, fit):
         with pytest.raises(InputError, match=r"no pixel sees a surface.*--allow-empty"):
             work(case.source, case.options)
     case = case_of(tmp_path, AWAY, allow_empty=True)

@@ -4,6 +4,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from comparisons.compare import compare
 from comparisons.options import Options
 from reference.scene.source import Source
 
@@ -53,3 +54,15 @@ def test_a_lamp_casts_no_shadow_on_what_it_lights(rgb, kind):
     # The ball's shadow, and the part of the ball that it shades itself.
     assert min(kept) > 0.85
     assert max(kept) < 1
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("kind", ["ball", "box"])
+def test_shadows_are_not_blamed_for_the_lamp(rgb, kind):
+    small = Options(resolution=(48, 36), spp=16)
+    found = compare(Source("lamp", room(kind)), small, why=True).record.why
+    errors = {each.effects: each.error for each in found.hybrids}
+    assert errors["occlusion",] < 1.5 * errors[()]
+    removed = {one.effect: one.removes.value for one in found.effects}
+    assert removed["occlusion"] > -1
+    assert abs(removed["extended lights"]) < 3

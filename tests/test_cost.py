@@ -11,8 +11,9 @@ import pytest
 from msgspec import structs
 
 from comparisons.case import open_case
+from comparisons.compare import compare
 from comparisons.cost import front, methods
-from comparisons.cost.cost import cost, quick
+from comparisons.cost.cost import cost
 from comparisons.cost.cost_record import Method
 from comparisons.cost.measure import WIDTH, Effort, measure_ladder, reduced
 from comparisons.cost.methods import Ladder, declare, distinct
@@ -41,19 +42,14 @@ SHARP = {"reference_spp": 64, "replicates": 8, "replicate_spp": 64}
 TINY = Effort(rounds=2, largest=4, depths=(3,), reference_spp=4, replicates=3, replicate_spp=4)
 CORPUS = Path(__file__).parent / "corpus"
 
-ALWAYS = {"implementation", "BSDF form", "transport"}
 MADE_OF = {
-    "cornell-box": (
-        {"occlusion", "extended lights", "interreflection"},
-        ALWAYS | {"visibility", "light form"},
-    ),
-    "fig-6-10": (
-        {"distance attenuation", "polygon interpolation", "microfacets and Fresnel", "environment"},
-        ALWAYS | {"interpolation", "light form"},
-    ),
-    "narrow-band-lamp": ({"occlusion", "spectral"}, ALWAYS | {"visibility", "spectral"}),
-}
-"""Effects and parts of scenes that between them have all that the built-in ones have."""
+    "cornell-box": {"occlusion", "extended lights", "interreflection"},
+    "fig-6-10": {
+        "distance attenuation", "polygon interpolation", "microfacets and Fresnel", "environment",
+    },
+    "narrow-band-lamp": {"occlusion", "spectral"},
+}  # fmt: skip
+"""Effects of scenes that between them have all that the built-in ones have."""
 
 
 @pytest.fixture(
@@ -94,19 +90,8 @@ def test_attributions_add_up_to_the_departure_in_the_mean_and_in_every_pixel(stu
     np.testing.assert_allclose(total, causes.departure, atol=1e-9)
     assert causes.departure.max() > 1
     assert (causes.departure[~study.counted] == 0).all()
-    added = [one.adds_s.value for one in whole.effects]
-    assert sum(added) == pytest.approx(whole.reference_s - whole.kernel_s, abs=1e-9)
-
-
-@pytest.mark.guarantee("attribution", "The parts add up to the departure in every pixel.")
-def test_parts_add_up_and_kernel_and_plugin_are_one(study):
-    split = study.record.split
-    total = sum(part.mean for part in split.parts)
-    assert total == pytest.approx(split.departure.mean, abs=1e-12)
-    np.testing.assert_allclose(sum(study.parts.values()), study.difference, atol=1e-12)
-    assert split.departure.dE2000 > 0.1
     # Single precision: a few units in the last place of values around 1.
-    assert np.abs(study.parts["implementation"]).max() < 2e-5
+    assert whole.implementation < 1e-3
 
 
 def test_the_departure_is_that_of_the_kernel_rendered_anew(study):
@@ -114,22 +99,18 @@ def test_the_departure_is_that_of_the_kernel_rendered_anew(study):
     names = {"flat": "flat kernel", "gouraud": "Gouraud kernel", "phong": "Phong kernel"}
     kernel = study.methods[names[study.record.interpolation.value]]
     error = delta_e_2000(kernel, study.reference, Options().viewing)[study.counted].mean()
-    noise = study.record.attribution.floor + study.record.reference.noise_floor
+    noise = 2 * study.record.reference.noise_floor
     found = study.causes.departure[study.counted].mean()
     assert found == pytest.approx(error, abs=0.05 * error + noise)
     first, *_, last = study.record.attribution.hybrids
     assert (first.effects, first.error) == ((), pytest.approx(found))
     assert set(last.effects) == set(study.causes.maps)
     assert set(study.causes.previews) == {each.effects for each in study.record.attribution.hybrids}
-    rendered = study.reference - kernel
-    assert study.difference.mean() == pytest.approx(
-        rendered.mean(), abs=0.02 * np.abs(rendered).max()
-    )
 
 
-def test_a_study_has_its_effects_parts_files_and_tables(study):
+def test_a_study_has_its_effects_files_and_tables(study):
     record = study.record
-    assert (set(study.causes.maps), set(study.parts)) == MADE_OF[record.scene]
+    assert set(study.causes.maps) == MADE_OF[record.scene]
     made = cost_files.documents(study)
     jsonschema.Draft202012Validator(SCHEMA).validate(json.loads(made["cost.json"]))
     assert made["cost.svg"].startswith(b"<svg")
@@ -162,13 +143,15 @@ def test_with_all_effects_nothing_is_left(rgb):
 
 @pytest.mark.slow
 @pytest.mark.guarantee(
-    "attribution", "A quick report's closure is unbiased: below 1 % of the Cornell box's departure."
+    "attribution",
+    "The closure of a comparison is unbiased: below 1 % of the Cornell box's departure.",
 )
 def test_a_quick_closure_is_not_biased(rgb):
     source = SCENES["cornell-box"].source()
-    found = [quick(source, Options(seed=seed)).record for seed in range(5)]
-    mean = np.mean([record.closure.mean for record in found])
-    assert abs(mean) < 0.01 * found[0].attribution.departure
+    small = Options(resolution=(48, 48), spp=16)
+    found = [compare(source, small.changed(seed=seed), why=True).record.why for seed in range(5)]
+    mean = np.mean([why.closure.mean for why in found])
+    assert abs(mean) < 0.01 * found[0].departure
 
 
 @pytest.mark.guarantee(
@@ -418,7 +401,7 @@ def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
     case = open_case(scene, Options.of({"resolution": (24, 24)}), "shadowed")
     found = Ladder(case.source, case.options, guarded(case.source, case.options))
     for spp, finer in ((1, 1), (8, 1), (64, 4), (4096, 4), (16, 2)):
-        hybrids = HybridImages(found.pairs, found.scenes, 3, spp, 0)
+        hybrids = HybridImages(found.pairs, found.scenes, 3, spp, 0, (24, 24))
         assert hybrids.finer == finer
         assert finer * 24 <= PREVIEW
         assert finer == 1 or spp / finer**2 >= LEAST_SPP

@@ -14,7 +14,6 @@ from comparisons.cost.cost_record import Measured, Prediction
 from reports.charts import cost_charts, vega
 from reports.page import page
 from reports.page.scene_view import SceneView
-from reports.page.why_view import why_view
 from reports.run import cost_files, scene
 from tests import cost_records, records
 from tests.browser.conftest import noisy
@@ -50,10 +49,7 @@ def test_the_figures_on_the_page_are_those_of_the_json(study):
     reached = [row.seconds for row in data.equal_error if row.seconds is not None]
     wanted += [each for row in reached for each in structs.astuple(row)]
     for one in data.attribution.effects:
-        wanted += [*structs.astuple(one.removes), *structs.astuple(one.adds_s)]
-        wanted += [one.alone, one.last]
-    for part in (*data.split.parts, data.split.departure):
-        wanted += [part.mean, part.mean_stderr, part.rms, part.dE2000]
+        wanted += [*structs.astuple(one.removes), one.alone, one.last]
     assert not [number for number in wanted if number not in values]
 
 
@@ -69,10 +65,8 @@ def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_c
         assert text not in bare
 
 
-def test_the_map_of_effects_tells_halves_none_and_what_does_not_count(study):
-    previews = [study.causes.previews[each.effects] for each in study.causes.attribution.hybrids]
-    causes, viewing = study.causes, study.record.viewing
-    found = why_view(causes.maps, study.counted, previews, viewing).effects
+def test_the_map_of_effects_tells_halves_none_and_what_does_not_count():
+    found = scene.view_of(cost_records.explained(noisy())).why.effects
     assert found.names == cost_records.EFFECTS
     assert len(set(found.colours)) == 3
     rows = [found.map[start : start + 12] for start in range(0, 96, 12)]
@@ -85,12 +79,12 @@ def test_a_comparison_with_its_study_replaces_an_earlier_one_as_a_whole(tmp_path
     comparison = noisy()
     scene.write(tmp_path, "scene", comparison, study)
     files = {path.name for path in (tmp_path / "scene").glob("cost*")}
-    assert {"cost.json", "cost.svg", "cost-part-visibility.png"} <= files
-    other = replace(study, record=structs.replace(study.record, seed=8), parts=dict(study.parts))
-    del other.parts["visibility"]
+    assert {"cost.json", "cost.svg", "cost-method-full-plan.png"} <= files
+    methods = {name: study.methods[name] for name in ("Phong kernel",)}
+    other = replace(study, record=structs.replace(study.record, seed=8), methods=methods)
     scene.write(tmp_path, "scene", comparison, other)
     assert json.loads((tmp_path / "scene" / "cost.json").read_text("utf-8"))["seed"] == 8
-    assert not (tmp_path / "scene" / "cost-part-visibility.png").exists()
+    assert not (tmp_path / "scene" / "cost-method-full-plan.png").exists()
     scene.write(tmp_path, "scene", comparison)
     assert not list((tmp_path / "scene").glob("cost*"))
 

@@ -14,7 +14,7 @@ from PIL import Image
 
 from comparisons.cost.cost_record import Seconds
 from comparisons.departure.metrics import METRICS, RATIO, drawn
-from comparisons.hybrids.attribution import Contribution, MeanError, ObjectContribution
+from comparisons.hybrids.why import Contribution, MeanError, ObjectContribution
 from heuristic.errors import InputError
 from reference.records import Estimated, plain
 from reports.files import exr, images
@@ -213,7 +213,7 @@ def test_markdown_is_a_table_with_a_row_a_scene():
 
 def test_a_study_of_cost_is_written_with_its_methods_and_attribution(tmp_path):
     amount = Estimated(1.5, 1.25, 1.75)
-    one = Contribution("occlusion", amount, -0.5, 3.0, amount, 0.0)
+    one = Contribution("occlusion", amount, -0.5, 3.0, 0.0)
     found = cost_records.record()
     seconds, error = Seconds(0.25, 0.125, 0.5), MeanError(12.75, 12.5, 13.0)
     point = structs.replace(found.points[0], method="direct", spp=4, seconds=seconds, error=error)
@@ -226,8 +226,8 @@ def test_a_study_of_cost_is_written_with_its_methods_and_attribution(tmp_path):
     assert sorted(read) == [f"box-{part}.{kind}" for part in parts for kind in ("csv", "md")]
     assert "\nwall,12,0.75,2.5,occlusion,1.5,1.25,1.75\n" in read["box-shapes.csv"]
     assert "\ndirect,4,0.25,0.125,0.5,12.75,12.5,13.0,yes\n" in read["box-cost.csv"]
-    assert "\nocclusion,1.5,1.25,1.75,-0.5,3.0,1.5\n" in read["box-attribution.csv"]
-    assert "| occlusion | 1.50 | 1.25 | 1.75 | −0.500 | 3.00 | 1.50 |" in read["box-attribution.md"]
+    assert "\nocclusion,1.5,1.25,1.75,-0.5,3.0\n" in read["box-attribution.csv"]
+    assert "| occlusion | 1.50 | 1.25 | 1.75 | −0.500 | 3.00 |" in read["box-attribution.md"]
 
 
 @pytest.mark.parametrize("colour", ["", "1"])

@@ -8,10 +8,8 @@ import pytest
 from comparisons import intervals
 from comparisons.case import open_case
 from comparisons.compare import compare
-from comparisons.cost.cost import quick
 from comparisons.departure import regions
-from comparisons.hybrids.attribution import by_object
-from comparisons.hybrids.dominance import named
+from comparisons.hybrids.attribution import by_object, named
 from comparisons.options import Options
 from reference.rendering.gbuffer import ObjectIds, gbuffer
 from reports.terminal import tables
@@ -52,9 +50,8 @@ def shadowed(size=24):
 @pytest.fixture(scope="module")
 def compared():
     case = open_case(shadowed(), Options.of({"resolution": (48, 48)}), "shadowed")
-    found = compare(case.source, case.options)
-    study = quick(case.source, case.options)
-    return SimpleNamespace(found=found, study=study, record=named(found, study.causes.maps))
+    found = compare(case.source, case.options, why=True)
+    return SimpleNamespace(found=found, record=found.record)
 
 
 @pytest.mark.guarantee(
@@ -81,9 +78,9 @@ def test_materials_are_those_of_the_shapes(compared):
 
 
 def test_shadows_remove_the_departure_of_the_floor_alone(compared):
-    record = compared.study.record
-    assert [one.effect for one in record.attribution.effects] == ["occlusion"]
-    floor, sphere = record.objects
+    why = compared.record.why
+    assert [one.effect for one in why.effects] == ["occlusion"]
+    floor, sphere = why.objects
     assert (floor.name, sphere.name) == ("floor", "sphere")
     assert floor.share > 0.99
     assert floor.removes[0].low > 0.98 * floor.departure
@@ -94,14 +91,13 @@ def test_shadows_remove_the_departure_of_the_floor_alone(compared):
     "attribution", "What an effect removes on each shape averages to what it removes in the image."
 )
 def test_what_is_removed_on_shapes_averages_to_that_of_the_image(compared):
-    study = compared.study
-    record = study.record
-    pixels = [row.pixels for row in record.objects]
-    assert sum(pixels) == record.pixels.counted
-    for place, one in enumerate(record.attribution.effects):
-        removed = [row.removes[place].value for row in record.objects]
+    why = compared.record.why
+    pixels = [row.pixels for row in why.objects]
+    assert sum(pixels) == compared.record.pixels.counted
+    for place, one in enumerate(why.effects):
+        removed = [row.removes[place].value for row in why.objects]
         assert np.average(removed, weights=pixels) == pytest.approx(one.removes.value)
-    for row in record.objects:
+    for row in why.objects:
         total = sum(removes.value for removes in row.removes) + row.left
         assert total == pytest.approx(row.departure)
 
@@ -116,8 +112,8 @@ def test_intervals_on_shapes_tell_the_spread_of_replicates():
     means = np.array([spread.mean(), *left_out])
     removed = np.stack([means, means, *[np.full(9, 2.0)] * 3], axis=1)
     departure = np.where(counted, 3.0, 0)
-    causes = SimpleNamespace(removed={"shadow": removed}, departure=departure, left=departure)
-    found = {row.name: row for row in by_object(causes, counted, owners)}
+    rows = by_object(departure, {"shadow": removed}, departure[counted], counted, owners)
+    found = {row.name: row for row in rows}
     still, noisy = found["still"], found["noisy"]
     assert (still.pixels, noisy.pixels) == (3, 2)
     assert still.removes[0].low == still.removes[0].high == 2.0

@@ -26,7 +26,16 @@ def scene(low=0.5, high=None, name="a", exposed=9.0, command="fotismos compare a
     return structs.replace(record, scene=name, metrics=metrics, command=command, **changes)
 
 
-def study(*points, effects=()):
+def why(**effects):
+    """Return an attribution of ``{effect: ΔE2000 removed}``."""
+    removed = [
+        SimpleNamespace(effect=effect, removes=SimpleNamespace(value=value, low=value - 0.9))
+        for effect, value in effects.items()
+    ]
+    return SimpleNamespace(effects=removed)
+
+
+def study(*points):
     """Return a study of the kernel and of methods ``(name, spp, ms, tolerance)``."""
     names = ["Phong kernel", *(name for name, *_ in points)]
     methods = [
@@ -45,13 +54,9 @@ def study(*points, effects=()):
         )
         for name, spp, ms, tolerance in (("Phong kernel", 4, 3.9, 8.0), *points)
     ]
-    removed = [
-        SimpleNamespace(effect=effect, removes=SimpleNamespace(value=value, low=value - 0.9))
-        for effect, value in dict(effects).items()
-    ]
     return SimpleNamespace(
         predicted=made, points=(), at=(64, 48), resolution=(8, 6), methods=methods,
-        interpolation=Interpolation.PHONG, attribution=SimpleNamespace(effects=removed),
+        interpolation=Interpolation.PHONG,
     )  # fmt: skip
 
 
@@ -111,28 +116,27 @@ def test_what_cannot_be_seen_is_exact():
 
 
 def test_a_run_counts_scenes_and_names_what_those_that_fail_lack_by_pixels():
-    effects = study(effects={"interreflection": 3.0, "spectral": 1.0, "environment": 0.5})
-    others = study(effects={"occlusion": 2.0})
+    effects = why(interreflection=3.0, spectral=1.0, environment=0.5)
     scenes = [
-        (scene(0.8, name="a"), effects),
-        (scene(0.1, name="b"), others),
-        (scene(0.01, name="c"), study(effects={"spot cone": 9.0})),
+        (scene(0.8, name="a", why=effects), study()),
+        (scene(0.1, name="b", why=why(occlusion=2.0)), None),
+        (scene(0.01, name="c", why=why(specular=9.0)), None),
         (scene(0.04, 0.06, name="d"), None),
     ]
     made = [record for record, _ in scenes]
-    assert verdict.missing(*scenes[0]) == {"interreflection": 0.75, "spectral": 0.25}
+    assert verdict.missing(made[0]) == {"interreflection": 0.75, "spectral": 0.25}
     expected = "Textbook shading looks right in 1 of 4 scenes; 1 is too close to call."
     assert verdict.headline(made) == expected
     expected = "Mostly missing: light between surfaces, spectral light, shadows."
-    assert verdict.most_missing(scenes) == expected
-    assert verdict.most_missing([(scene(), None)]) == ""
+    assert verdict.most_missing(made) == expected
+    assert verdict.most_missing([scene()]) == ""
     lines = list(verdict.advice(scenes))
     assert [line.partition(":")[0] for line in lines] == ["a", "b", "d"]
     assert lines[0].startswith("a: Mostly missing: light between surfaces. None of the ")
 
 
 def test_one_scene_is_described_in_a_few_sentences():
-    about = verdict.about(scene(0.42), study(AMBIENT, effects={"occlusion": 4.0}))
+    about = verdict.about(scene(0.42, why=why(occlusion=4.0)), study(AMBIENT))
     assert about == (
         "Textbook shading is visibly wrong in 42.0 % of the pixels of a. Mostly missing: shadows."
         " Hemisphere ambient passes: 4.60 ms, kernel 3.90 ms at 64x48."

@@ -1,6 +1,6 @@
 """Study what accuracy costs on one scene."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,9 +9,9 @@ from msgspec import structs
 from comparisons import record
 from comparisons.cost.cost_record import Converged, Cost, LeftOut, Pictures
 from comparisons.cost.front import equal_error, pareto
-from comparisons.cost.measure import QUICK, QUICK_WIDTH, Effort, Size, measure_ladder, reduced
+from comparisons.cost.measure import Effort, Size, measure_ladder
 from comparisons.cost.predict import predict, require
-from comparisons.hybrids.attribution import Causes, attribute, by_object, split
+from comparisons.hybrids.attribution import Causes, attribute
 from comparisons.hybrids.hybrids import HybridImages
 from comparisons.intervals import median_ranks
 from comparisons.options import Options
@@ -26,15 +26,12 @@ from reference.scene.source import Source
 class Study:
     """Results of a study: its record, ``cost.json``, and its images.
 
-    ``methods`` are ``{method: (H, W, 3)}``, one rendering with the most samples of each. ``parts``
-    are ``{part: (H, W, 3)}``, signed and linear; they add up to ``difference``, reference minus
-    kernel. ``counted`` (H, W) are the pixels that count.
+    ``methods`` are ``{method: (H, W, 3)}``, one rendering with the most samples of each.
+    ``counted`` (H, W) are the pixels that count.
     """
 
     record: Cost
     methods: Mapping[str, np.ndarray]
-    parts: Mapping[str, np.ndarray]
-    difference: np.ndarray
     causes: Causes
     reference: np.ndarray
     counted: np.ndarray
@@ -66,10 +63,16 @@ def cost(
     width, height = image_size(ready.scene)
     progress("attributing", 0, 1)
     hybrids = HybridImages(
-        ladder.pairs, ladder.scenes, effort.replicates, effort.replicate_spp, options.seed
+        ladder.pairs,
+        ladder.scenes,
+        effort.replicates,
+        effort.replicate_spp,
+        options.seed,
+        (width, height),
     )
-    causes = attribute(hybrids, found.meter, options.seed, effort.exact_effects, effort.orders)
-    parts, pictures, difference = split(hybrids, counted, options.viewing)
+    causes = attribute(
+        hybrids, found.meter, shapes, options.seed, effort.exact_effects, effort.orders
+    )
     progress("attributing", 1, 1)
     prediction = predict(ladder, at, effort, options.seed, is_measured, progress) if at else None
 
@@ -96,9 +99,9 @@ def cost(
         methods=ladder.methods,
         points=points,
         equal_error=equal_error(points),
-        attribution=causes.attribution,
-        closure=causes.closure,
-        split=parts,
+        attribution=causes.record,
+        closure=causes.record.closure,
+        objects=causes.record.objects,
         viewing=options.viewing,
         pixels=Pixels(counted=int(counted.sum()), total=width * height),
         machine=record.machine(),
@@ -106,40 +109,17 @@ def cost(
         command=command,
         guard=ready.guard or Guard(),
         prediction=prediction,
-        objects=by_object(causes, counted, shapes),
         left_out=tuple(
             LeftOut(name=name, reason=reason) for name, reason in ladder.left_out.items()
         ),
-        pictures=_limits(pictures.values(), causes.maps.values()),
+        pictures=Pictures(
+            effect_limit=float(max([1.0, *(abs(values).max() for values in causes.maps.values())]))
+        ),
     )
     return Study(
         record=made,
         methods=found.images,
-        parts=pictures,
-        difference=difference,
         causes=causes,
         reference=found.reference.mean,
         counted=counted,
-    )
-
-
-def quick(
-    source: Source,
-    options: Options | None = None,
-    progress: Progress | None = None,
-    command: str = "",
-    effort: Effort = QUICK,
-) -> Study:
-    """Study a scene as :func:`cost` does, but quickly: for many scenes in one report."""
-    options = options or Options()
-    small = options.changed(resolution=reduced(source, options, QUICK_WIDTH), spp=None)
-    return cost(source, small, effort, progress, command)
-
-
-def _limits(parts: Iterable[np.ndarray], effects: Iterable[np.ndarray]) -> Pictures:
-    """Return half ranges that hold all pictures, with minima far above rounding."""
-    limits = [abs(signed.mean(axis=2)).max() for signed in parts]
-    removed = [abs(values).max() for values in effects]
-    return Pictures(
-        part_limit=float(max(1e-3, *limits)), effect_limit=float(max(1.0, *removed, 0.0))
     )

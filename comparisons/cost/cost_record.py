@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from comparisons.departure.colour import Viewing
-from comparisons.hybrids.attribution import Attribution, MeanError, ObjectContribution, Split
+from comparisons.hybrids.why import Attribution, MeanError, ObjectContribution
 from heuristic.heuristics import Interpolation
 from reference.planning.plan import Guard
 from reference.records import (
@@ -193,7 +193,6 @@ class Prediction(Record):
 class Pictures(Record):
     """Half ranges of the signed pictures; red is positive."""
 
-    part_limit: Annotated[float, Meta(description="Linear.", gt=0)]
     effect_limit: Annotated[float, Meta(description="ΔE2000 removed.", gt=0)]
 
 
@@ -219,7 +218,6 @@ class Cost(Record, kw_only=True):
         MeanError,
         Meta(description="What remains with all effects simulated: only a fault can leave any."),
     ]
-    split: Split
     viewing: Viewing
     pixels: Pixels
     machine: Machine

@@ -22,7 +22,8 @@ from comparisons import intervals
 from comparisons.cost.cost_record import Measured, Seconds
 from comparisons.cost.methods import DEPTHS, Ladder
 from comparisons.departure.metrics import LEADING, Metric
-from comparisons.hybrids.attribution import ErrorMeter, MeanError
+from comparisons.hybrids.attribution import ErrorMeter
+from comparisons.hybrids.why import MeanError
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
 from heuristic.errors import InputError
@@ -106,9 +107,6 @@ QUICK = Effort(
 """For many scenes in one report, at :data:`QUICK_WIDTH`. There, tracing takes most of the time, so
 renderings are few, with many samples each: with 16 instead of 64, skewed noise left 2 % of the
 Cornell box's departure in the closure."""
-
-COARSE = replace(QUICK, depths=(), orders=4, stand_ins=False)
-"""For a report within a minute: fewer methods, since each is traced again."""
 
 
 def reduced(source: Source, options: Options, width: int) -> Size:

@@ -28,7 +28,7 @@ from comparisons.cost.cost_record import Forecast, Measured, Method, Prediction,
 from comparisons.cost.front import ERRORS, at, reached
 from comparisons.cost.measure import DETERMINISTIC_SPP, Effort, Size, measure, meter_at
 from comparisons.cost.methods import Ladder
-from comparisons.hybrids.attribution import MeanError
+from comparisons.hybrids.why import MeanError
 from heuristic.errors import InputError
 from reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
 

@@ -1,210 +1,136 @@
-"""Attribution: the error that each effect removes, and the time that it adds.
+"""Attribution: the error that each effect removes, and which effect dominates where.
 
-Both depend on what is simulated already: shadows without the light between surfaces can look worse
-than neither. So each is a Shapley value over the effects in which the halves differ: for players
-``N`` and a value ``v(S)`` of each subset, the share of player ``i`` is ::
+What an effect removes depends on what is simulated already: shadows without the light between
+surfaces can look worse than neither. So each is a Shapley value over the effects in which the
+halves differ: for players ``N`` and a value ``v(S)`` of each subset, the share of player ``i`` is
+::
 
     phi_i = sum over S in N without i of  |S|! (n - |S| - 1)! / n!  [v(S + i) - v(S)]
 
 its mean gain over all orders in which the players may come. The shares add up to
-``v(N) - v(empty)``: the errors removed to the departure less the closure, in the mean and in every
-pixel, and the times to the difference between reference and kernel. The closure is the error that
-remains when all effects are simulated; only a fault can cause it.
+``v(N) - v(empty)``, the departure less the closure, in the mean and in every pixel. The closure is
+the error that remains when all effects are simulated; only a fault can cause it.
 Source: L. S. Shapley, *A value for n-person games*, 1953.
-
-The departure is also split into parts, by a chain of images from the kernel to the reference:
-
-==================  ==========================================================================
-Part                Between
-==================  ==========================================================================
-interpolation       the kernel as requested, and with an exact normal at each point
-implementation      the kernel, and the ``phong`` plugin under Mitsuba's direct light: nothing
-spectral            the heuristic half's variant, and the reference's
-visibility          no shadows, and shadows
-light form          the heuristic half's lights, and the physical ones
-BSDF form           phong, and the physical BSDFs, both with direct light
-transport           direct light, and all light
-==================  ==========================================================================
-
-Every part is a signed linear image, later minus earlier: the parts add up to reference minus kernel
-in every pixel. A part that the scene does not have is left out; implementation, BSDF form and
-transport are always there.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from math import comb
-from typing import Annotated, Any, cast
+from time import perf_counter
+from typing import Any, cast
 
 import numpy as np
-from msgspec import Meta
+from msgspec import structs
 from numpy.typing import NDArray
 
 from comparisons import intervals
+from comparisons.comparison import CAUSES, Comparison, ComparisonRecord
 from comparisons.departure.blocks import ratio
 from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import LEADING, Metric, Pixelwise, delta_e_2000
 from comparisons.departure.noise import contrasts, without_noise
-from comparisons.departure.regions import find_objects, means
+from comparisons.departure.regions import Region, find_objects, means
 from comparisons.hybrids.hybrids import (
-    KERNEL,
-    PLAIN_KERNEL,
-    REFERENCE,
     HybridImages,
-    Key,
+    HybridScenes,
+    Pairs,
     Player,
     Replicates,
     labels,
     subsets,
 )
-from reference.planning.effects import PARTS, POLYGONS, Effect
-from reference.records import Amount, Estimated, Positive, Record, Size
-from reference.rendering.gbuffer import ObjectIds
-from reference.rendering.sums import Estimate, block_numbers
+from comparisons.hybrids.why import Attribution, Contribution, Hybrid, MeanError, ObjectContribution
+from comparisons.options import Options
+from comparisons.prepared import Prepared
+from heuristic.errors import FotismosError
+from reference.planning.effects import Effect
+from reference.rendering.gbuffer import ObjectIds, gbuffer, image_size, require_surface, resize
+from reference.rendering.renderer import Progress, Renderer, Stream, passes
+from reference.rendering.sums import MEAN, Accumulator, Estimate, block_numbers
+from reference.scene.source import Source
 
-ALWAYS = ("implementation", "BSDF form", "transport")
+WIDTH = 48
+"""Width of the images that causes are found in, at most."""
+
+REPLICATES, SPP = 4, 64
+"""Replicates of each image, and samples per pixel of each: with 16 instead of 64, skewed noise left
+2 % of the Cornell box's departure in the closure."""
+
+EXACT_EFFECTS, ORDERS = 4, 8
+"""Largest number of effects for which every subset is rendered, and orders drawn for more."""
+
+LEAST = 1.0
+"""ΔE2000: an effect that removes less cannot be seen, and does not dominate."""
+
+ALSO = 0.5
+"""Share of what the first effect removes: a second one that removes as much is named too."""
+
+NONE, UNCOUNTED = -1, -2
 
 
-class Contribution(Record):
-    """What simulating one effect removes and adds.
+def explained(
+    comparison: Comparison,
+    ready: Prepared,
+    source: Source,
+    options: Options,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Return a comparison with its causes, found with its own scenes and plan at a small size.
 
-    Attributes
-    ----------
-    effect
-        Its label.
-    removes
-        Mean ΔE2000 that it removes; negative if it increases the departure.
-    alone, last
-        The same if it is the first effect added, and the last.
-    adds_s
-        Seconds that it adds to one rendering with Attribution.spp samples per pixel.
-    sampling_error
-        Standard error of ``removes`` from drawing orders; 0 if all subsets were rendered.
+    If they cannot be found, a warning says why.
     """
+    begin, record = perf_counter(), comparison.record
+    try:
+        causes = find(ready, source, options, progress)
+    except FotismosError as error:
+        warnings = (*record.warnings, f"The causes are unknown: {error}")
+        return replace(comparison, record=structs.replace(record, warnings=warnings))
+    stages = record.time.stages | {CAUSES: perf_counter() - begin}
+    time = structs.replace(record.time, stages=stages)
+    record = structs.replace(named(comparison, causes.maps), why=causes.record, time=time)
+    return replace(comparison, record=record, causes=causes)
 
-    effect: str
-    removes: Estimated
-    alone: float
-    last: float
-    adds_s: Estimated
-    sampling_error: Amount
+
+def find(
+    ready: Prepared, source: Source, options: Options, progress: Progress | None = None
+) -> "Causes":
+    """Attribute the departure of a prepared scene, on a film of at most :data:`WIDTH` pixels."""
+    width, height = image_size(ready.scene)
+    size = min(WIDTH, width), max(1, round(height * min(1, WIDTH / width)))
+    surface = gbuffer(ready.scene, *size)
+    require_surface(surface.hit, source.name)
+    reference, groups = converged(ready, size, options.seed, progress)
+    meter = ErrorMeter(reference, surface.hit, options.viewing, groups=groups)
+    pairs = Pairs(source, options, ready)
+    scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
+    images = HybridImages(pairs, scenes, REPLICATES, SPP, options.seed, size)
+    if progress:
+        progress(CAUSES, 0, 1)
+    found = attribute(images, meter, surface.shape, options.seed)
+    resize(ready.scene, (width, height))
+    if progress:
+        progress(CAUSES, 1, 1)
+    return found
 
 
-class ObjectContribution(Record):
-    """What each effect removes from the departure on one shape.
+def converged(
+    ready: Prepared, size: tuple[int, int], seed: int, progress: Progress | None
+) -> tuple[Estimate, NDArray]:
+    """Render the reference, with seeds that no hybrid has.
 
-    Weighted by their pixels, the values of all shapes average to those of the whole image.
-
-    Attributes
-    ----------
-    name
-        Id of the shape.
-    pixels
-        Number of counted pixels that see it.
-    share
-        Its part of the departure.
-    departure
-        Mean ΔE2000 of the heuristic half on it, without noise.
-    removes
-        Mean ΔE2000 that each effect removes there, in the order of the attribution's effects.
-    left
-        Mean ΔE2000 that remains there when all effects are simulated.
+    Returns its estimate, and the means (R, H, W, 3) of as many groups of its passes as a hybrid has
+    replicates, with an even number of passes each.
     """
-
-    name: str
-    pixels: Size
-    share: float
-    departure: float
-    removes: tuple[Estimated, ...]
-    left: float
-
-
-class MeanError(Record):
-    """A mean ΔE2000 with its 95 % interval; without noise it may come out below 0."""
-
-    mean: float
-    low: float
-    high: float
-
-
-class Hybrid(Record):
-    """An image in which some effects are simulated.
-
-    Attributes
-    ----------
-    effects
-        Labels of the simulated effects.
-    error
-        Mean ΔE2000 against the reference, with noise removed; it may come out below 0.
-    seconds
-        Median time of one rendering.
-    """
-
-    effects: tuple[str, ...]
-    error: float
-    seconds: float
-
-
-class Attribution(Record):
-    """What all effects remove and add.
-
-    Attributes
-    ----------
-    effects
-        One contribution each.
-    departure
-        Mean ΔE2000 of the heuristic half without noise: the sum of what is removed and the closure.
-    floor
-        Mean ΔE2000 of noise alone: of the reference rendered with as many samples.
-    kernel_s, reference_s
-        Seconds without any effect, and with all of them.
-    spp, replicates, orders
-        Samples per pixel of each replicate, number of replicates, and orders drawn (0: every
-        subset).
-    hybrids
-        All images that were rendered, fewest effects first.
-    """
-
-    effects: tuple[Contribution, ...]
-    departure: float
-    floor: Amount
-    kernel_s: Positive
-    reference_s: Positive
-    spp: int
-    replicates: int
-    orders: int
-    hybrids: tuple[Hybrid, ...] = ()
-
-
-class Part(Record):
-    """One cause of the departure.
-
-    Attributes
-    ----------
-    name
-        Its name in tables.
-    mean, mean_stderr
-        Signed mean over the counted pixels and channels, linear, and its standard error.
-    rms
-        Root mean square.
-    dE2000
-        Mean ΔE2000 between the two images; the values of parts do not add up.
-    """
-
-    name: str
-    mean: float
-    mean_stderr: Amount
-    rms: Amount
-    dE2000: Amount
-
-
-class Split(Record):
-    """The departure by causes, which add up at every pixel."""
-
-    parts: Annotated[tuple[Part, ...], Meta(description="From the kernel to the reference.")]
-    departure: Part
+    renderer = Renderer(ready.scene, ready.reference.integrator, SPP, "reference image", size)
+    total, groups = Accumulator(), [Accumulator(MEAN) for _ in range(REPLICATES)]
+    count = 2 * REPLICATES * -(-ready.plan.passes // (2 * REPLICATES))
+    for one in passes(
+        [renderer], seed, count, stream=Stream.OTHER_SIDE, progress=progress, stage="reference"
+    ):
+        total.add(one.images[0])
+        groups[one.number % REPLICATES].add(one.images[0])
+    return total.estimate(), np.stack([group.mean() for group in groups])
 
 
 class ErrorMeter:
@@ -292,27 +218,33 @@ class ErrorMeter:
 
 @dataclass(frozen=True)
 class Causes:
-    """The attribution, its closure, and where in the image the effects remove what.
+    """The attribution of a departure, and where in the image the effects remove what.
 
     ``maps`` are ``{effect: (H, W)}``, the ΔE2000 that each removes; with ``left``, what remains
-    when all are simulated, they add up to ``departure``. ``previews`` are ``{labels of the
-    simulated effects: (f H, f W, 3)}``, linear. ``removed`` are ``{effect: (R + 1, N)}`` over the
-    counted pixels, by all replicates, then leaving out each in turn.
+    when all are simulated, they add up to ``departure``. ``counted`` (H, W) are the pixels that
+    count. ``previews`` are ``{labels of the simulated effects: (f H, f W, 3)}``, linear.
     """
 
-    attribution: Attribution
-    closure: MeanError
+    record: Attribution
     maps: dict[str, NDArray]
-    departure: np.ndarray
-    left: np.ndarray
+    departure: NDArray
+    left: NDArray
+    counted: NDArray[np.bool_]
     previews: dict[tuple[str, ...], NDArray]
-    removed: dict[str, NDArray]
 
 
 def attribute(
-    images: HybridImages, meter: ErrorMeter, seed: int, exact_effects: int, orders: int
+    images: HybridImages,
+    meter: ErrorMeter,
+    shapes: ObjectIds,
+    seed: int,
+    exact_effects: int = EXACT_EFFECTS,
+    orders: int = ORDERS,
 ) -> Causes:
-    """Attribute errors and times to the effects; the last three arguments as in `shares`."""
+    """Attribute the departure to the effects, as a whole, on each shape, and in each pixel.
+
+    ``shapes`` are what each pixel sees; for the last three arguments see `shares`.
+    """
     effects, everything = images.effects, frozenset(images.effects)
     nothing: frozenset[Effect] = frozenset()
     if len(effects) <= exact_effects:
@@ -330,11 +262,7 @@ def attribute(
             errors[simulated] = meter.without_noise(image(simulated).images)
         return errors[simulated]
 
-    def seconds(simulated: frozenset[Effect]) -> NDArray:
-        return images.simulating(simulated).seconds
-
     gains, sampling_errors, drawn = shares(effects, error, seed, exact_effects, orders)
-    times, _, _ = shares(effects, seconds, seed, exact_effects, orders)
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
     contributions = tuple(
         Contribution(
@@ -342,64 +270,65 @@ def attribute(
             removes=intervals.jackknifed(removed[effect.label].mean(axis=1)),
             alone=float((error(nothing) - error(frozenset({effect})))[0].mean()),
             last=float((error(everything - {effect}) - error(everything))[0].mean()),
-            adds_s=intervals.of_mean(time),
             sampling_error=sampling_error,
         )
-        for effect, time, sampling_error in zip(effects, times, sampling_errors, strict=True)
+        for effect, sampling_error in zip(effects, sampling_errors, strict=True)
     )
-    mean = intervals.jackknifed(error(everything).mean(axis=1))
+    closure = intervals.jackknifed(error(everything).mean(axis=1))
     hybrids = [
-        Hybrid(
-            effects=labels(effects, each),
-            error=float(found[0].mean()),
-            seconds=float(np.median(seconds(each))),
-        )
+        Hybrid(effects=labels(effects, each), error=float(found[0].mean()))
         for each, found in errors.items()
     ]
-    own = images.of(REFERENCE)
 
     def filled(values: NDArray) -> NDArray[np.float64]:
         whole = np.zeros(meter.counted.shape)
         whole[meter.counted] = values
         return whole
 
+    departure, left = error(nothing), error(everything)
+    kernel, plugin = (images.of(key).images.mean(axis=0) for key in (images.plain_kernel, nothing))
+    rounding = delta_e_2000(plugin, kernel, meter.viewing)[meter.counted]
     return Causes(
-        attribution=Attribution(
+        record=Attribution(
             effects=contributions,
-            departure=float(error(nothing)[0].mean()),
-            floor=meter.errors(own.images.mean(axis=0))[0],
-            kernel_s=float(images.of(KERNEL).seconds.mean()),
-            reference_s=float(own.seconds.mean()),
+            departure=float(departure[0].mean()),
+            closure=MeanError(mean=closure.value, low=closure.low, high=closure.high),
+            implementation=float(rounding.mean()),
+            resolution=meter.counted.shape[::-1],
             spp=images.spp,
             replicates=images.replicates,
             orders=drawn,
             hybrids=tuple(sorted(hybrids, key=lambda each: (len(each.effects), each.effects))),
+            objects=by_object(filled(departure[0]), removed, left[0], meter.counted, shapes),
         ),
-        closure=MeanError(mean=mean.value, low=mean.low, high=mean.high),
         maps={name: filled(each[0]) for name, each in removed.items()},
-        departure=filled(error(nothing)[0]),
-        left=filled(error(everything)[0]),
+        departure=filled(departure[0]),
+        left=filled(left[0]),
+        counted=meter.counted,
         previews={labels(effects, each): image(each).preview for each in errors},
-        removed=removed,
     )
 
 
 def by_object(
-    causes: Causes, counted: NDArray[np.bool_], objects: ObjectIds
+    departure: NDArray,
+    removed: Mapping[str, NDArray],
+    left: NDArray,
+    counted: NDArray[np.bool_],
+    shapes: ObjectIds,
 ) -> tuple[ObjectContribution, ...]:
     """Return what the effects remove on each shape, the one with most of the departure first."""
-    found, places = find_objects(causes.departure, counted, objects)
+    found, places = find_objects(departure, counted, shapes)
     rows, count = places[counted], len(found)
-    removed = [means(each, rows, count) for each in causes.removed.values()]
-    left = means(causes.left[counted], rows, count)
+    gains = [means(each, rows, count) for each in removed.values()]
+    remaining = means(left, rows, count)
     return tuple(
         ObjectContribution(
             name=one.name,
             pixels=one.pixels,
             share=one.share,
             departure=one.mean_dE2000,
-            removes=tuple(intervals.jackknifed(each[:, row]) for each in removed),
-            left=float(left[row]),
+            removes=tuple(intervals.jackknifed(each[:, row]) for each in gains),
+            left=float(remaining[row]),
         )
         for row, one in enumerate(found)
     )
@@ -452,45 +381,89 @@ def _exact(
     return total
 
 
-def split(
-    images: HybridImages, counted: NDArray[np.bool_], viewing: Viewing
-) -> tuple[Split, Mapping[str, NDArray], NDArray]:
-    """Return the departure's parts, their images (H, W, 3), and the image of their sum."""
-    effects, simulated = set(images.effects), frozenset[Effect]()
-    chain: list[tuple[str, Key]] = [("", KERNEL)]
-    if POLYGONS in effects:
-        chain.append((str(POLYGONS.part), PLAIN_KERNEL))
-    chain.append(("implementation", simulated))
-    for name in PARTS[1:-1]:
-        added = {effect for effect in effects if effect.part == name}
-        if added or name in ALWAYS:
-            simulated |= added
-            chain.append((name, simulated))
-    chain.append((PARTS[-1], REFERENCE))
-
-    images.render(key for _, key in chain)
-    rendered = [images.of(key).images.astype(float) for _, key in chain]
-    parts = [
-        _part(name, *step, counted, viewing)
-        for (name, _), step in zip(chain[1:], pairwise(rendered), strict=True)
-    ]
-    whole, difference = _part("departure", rendered[0], rendered[-1], counted, viewing)
-    pictures = {part.name: picture for part, picture in parts}
-    return Split(parts=tuple(part for part, _ in parts), departure=whole), pictures, difference
+# --- Which effect dominates where ------------------------------------------------------------
 
 
-def _part(
-    name: str, before: NDArray, after: NDArray, counted: NDArray[np.bool_], viewing: Viewing
-) -> tuple[Part, NDArray]:
-    signed = after - before
-    each = signed[:, counted].mean(axis=(1, 2))
-    mean = signed.mean(axis=0)
-    distance = delta_e_2000(after.mean(axis=0), before.mean(axis=0), viewing)
-    part = Part(
-        name=name,
-        mean=float(each.mean()),
-        mean_stderr=float(each.std(ddof=1) / np.sqrt(len(each))),
-        rms=float(np.sqrt(np.mean(mean[counted] ** 2))),
-        dE2000=float(distance[counted].mean()),
+def dominating(effects: Mapping[str, NDArray], counted: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return (H, W): the place of the dominating effect among ``{name: ΔE2000 removed (H, W)}``.
+
+    :data:`NONE` if no effect removes :data:`LEAST`, :data:`UNCOUNTED` if a pixel does not count.
+    """
+    places = np.full(counted.shape, NONE)
+    if effects:
+        removed = np.stack(list(effects.values()))
+        places = np.where(removed.max(axis=0) >= LEAST, removed.argmax(axis=0), NONE)
+    return np.where(counted, places, UNCOUNTED)
+
+
+def named(comparison: Comparison, effects: Mapping[str, NDArray]) -> ComparisonRecord:
+    """Return a comparison's record in which regions, shapes and materials name their effect.
+
+    ``effects`` are ``{name: (h, w)}``, the ΔE2000 that each removes; the maps may be smaller.
+    """
+    record, images = comparison.record, comparison.images
+    regions = tuple(
+        structs.replace(region, effect=in_region(region, record.resolution, effects))
+        for region in record.regions
     )
-    return part, mean
+
+    def each(objects, places):
+        """Name the effects by the maps' cell in which each pixel of an object lies."""
+        seen = places >= 0
+        found = {
+            name: means(_enlarged(values, places.shape)[seen], places[seen], len(objects))
+            for name, values in effects.items()
+        }
+        return tuple(
+            structs.replace(one, effect=_in_words({name: of[row] for name, of in found.items()}))
+            for row, one in enumerate(objects)
+        )
+
+    return structs.replace(
+        record,
+        regions=regions,
+        objects=each(record.objects, images.objects),
+        materials=each(record.materials, images.materials),
+    )
+
+
+def in_region(
+    region: Region, resolution: tuple[int, int], effects: Mapping[str, NDArray]
+) -> str | None:
+    """Return the effect that removes most in a region, in words; None if none dominates.
+
+    ``resolution`` is ``(width, height)`` of the region's image; the maps may be smaller.
+    """
+    found = {}
+    for name, values in effects.items():
+        height, width = values.shape
+        columns = _cells(region.x, region.width, width / resolution[0])
+        rows = _cells(region.y, region.height, height / resolution[1])
+        found[name] = float(values[rows, columns].mean())
+    return _in_words(found)
+
+
+def _in_words(found: Mapping[str, float]) -> str | None:
+    """Return the effect of the largest mean ``{name: ΔE2000}``, and a second one that has half.
+
+    None if no mean reaches :data:`LEAST`.
+    """
+    ordered = sorted(found, key=lambda name: found[name], reverse=True)
+    if not ordered or found[ordered[0]] < LEAST:
+        return None
+    first, *others = ordered
+    if others and found[others[0]] >= max(ALSO * found[first], LEAST):
+        return f"{first}, then {others[0]}"
+    return first
+
+
+def _cells(start, length, scale):
+    first = int(start * scale)
+    return slice(first, max(first + 1, int(np.ceil((start + length) * scale))))
+
+
+def _enlarged(values, shape):
+    rows, columns = (
+        np.arange(large) * small // large for large, small in zip(shape, values.shape, strict=True)
+    )
+    return values[np.ix_(rows, columns)]

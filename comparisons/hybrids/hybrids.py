@@ -13,7 +13,7 @@ samples, and the mean over a block of them is the pixel that the coarser film wo
 """
 
 from collections.abc import Callable, Hashable, Iterable, Sequence, Set
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from typing import Any, Self, TypeVar
@@ -202,12 +202,11 @@ class HybridScenes:
 class Replicates:
     """The replicates of one image.
 
-    ``images`` are (R, H, W, 3), ``seconds`` the time of each but the first, and ``preview`` the
-    mean of all in finer pixels (f H, f W, 3), ``f`` per pixel in each direction.
+    ``images`` are (R, H, W, 3), and ``preview`` is the mean of all in finer pixels (f H, f W, 3),
+    ``f`` per pixel in each direction.
     """
 
     images: np.ndarray
-    seconds: np.ndarray
     preview: np.ndarray
 
     def __add__(self, other: Self) -> Self:
@@ -223,14 +222,20 @@ class Replicates:
 class HybridImages:
     """All images between the heuristic half as requested and the reference, each rendered once.
 
-    Of each image there are ``replicates``, at least 3, with ``spp`` samples per pixel. The first
-    compiles: its image counts, its time does not. ``scenes`` are in the reference's variant.
+    Of each image there are ``replicates``, at least 3, with ``spp`` samples per pixel, and of a
+    ``size`` of (width, height). ``scenes`` are in the reference's variant.
     """
 
     def __init__(
-        self, pairs: Pairs, scenes: HybridScenes, replicates: int, spp: int, seed: int
+        self,
+        pairs: Pairs,
+        scenes: HybridScenes,
+        replicates: int,
+        spp: int,
+        seed: int,
+        size: tuple[int, int],
     ) -> None:
-        self.replicates, self.spp = replicates, spp
+        self.replicates, self.spp, self.size = replicates, spp, size
         self._pairs, self._ready, self._seed = pairs, pairs.ready, seed
         self._variant = pairs.ready.reference.variant
         self._scenes = {self._variant: scenes}
@@ -290,6 +295,11 @@ class HybridImages:
         return bool(effects) and POLYGONS in self.effects and POLYGONS not in effects
 
     @property
+    def plain_kernel(self) -> Key:
+        """The kernel with an exact normal at each point."""
+        return PLAIN_KERNEL if POLYGONS in self.effects else KERNEL
+
+    @property
     def whole(self) -> Key:
         """The hybrid of all effects, for the closure: not the reference, but edits of its scene."""
         return frozenset(self.effects) - {POLYGONS} if self.effects else KERNEL
@@ -319,9 +329,7 @@ class HybridImages:
         pass_key = mi.variant(), frozenset(IN_EMISSION) & key
         if pass_key not in self._emission:
             renderer = scenes.emission(key, self._finer_spp)
-            made = self._passes(renderer) if renderer else None
-            # Rendered with the rest, emission would cost next to nothing.
-            self._emission[pass_key] = made and replace(made, seconds=0 * made.seconds)
+            self._emission[pass_key] = self._passes(renderer) if renderer else None
         emission = self._emission[pass_key]
         return transport + emission if emission else transport
 
@@ -339,10 +347,10 @@ class HybridImages:
     def finer(self) -> int:
         """Pixels of a preview per pixel of an image, in each direction."""
         scene: Scene = self._ready.scene
-        factor, even, size = 1, 4 * LEAST_SPP, image_size(scene)
+        factor, even = 1, 4 * LEAST_SPP
         if "Box" not in scene.sensors()[0].film().rfilter().class_name():
             return factor
-        while 2 * factor * max(size) <= PREVIEW and self.spp % (even * factor**2) == 0:
+        while 2 * factor * max(self.size) <= PREVIEW and self.spp % (even * factor**2) == 0:
             factor *= 2
         return factor
 
@@ -352,11 +360,11 @@ class HybridImages:
 
     def _passes(self, renderer: Renderer) -> Replicates:
         """Render the replicates on a film of the preview's size, then restore the film's."""
-        width, height = size = image_size(self._ready.scene)
+        (width, height), whole = self.size, image_size(renderer.scene)
         renderer.size = self.finer * width, self.finer * height
         loop = passes([renderer], self._seed, self.replicates, stream=Stream.REPLICATES)
         fine = np.stack([np.array(one.images[0]) for one in loop])
-        resize(renderer.scene, size)
+        resize(renderer.scene, whole)
         blocks = fine.reshape(len(fine), height, self.finer, width, self.finer, -1)
         images = blocks.mean(axis=(2, 4))
-        return Replicates(images, np.array(renderer.times[1:]), fine.mean(axis=0))
+        return Replicates(images, fine.mean(axis=0))

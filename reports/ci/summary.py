@@ -220,10 +220,11 @@ def of_comparison(
             percent(verdict.share(record, threshold).value),
             number(record.metrics[LEADING.name].mean),
         )
-        words = f"{verdict.cause(record, cost)} {verdict.sentence(record, cost, threshold)}"
+        words = f"{verdict.cause(record)} {verdict.sentence(record, cost, threshold)}"
         rows.append((escaped(record.scene), *numbers, escaped(words.strip())))
-    first = verdict.headline([record for record, _ in scenes], threshold)
-    second = verdict.most_missing(scenes, threshold)
+    records = [record for record, _ in scenes]
+    first = verdict.headline(records, threshold)
+    second = verdict.most_missing(records, threshold)
     parts = ["### fotismos compare", escaped(f"{first} {second}".strip())]
     parts.append("\n".join(markdown([headings, *rows])))
     if gates:

@@ -76,7 +76,7 @@ def report(
         rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
     request = jobs.request(rendering)
     names = [] if request.everything else list(SCENES)
-    job = jobs.Job(request, figures, with_cost=True, fresh=fresh, coarse=quick, within=within)
+    job = jobs.Job(request, figures, with_cost=True, fresh=fresh, within=within)
     rendered = jobs.pool(timeout, len(SCENES), workers, scheduler)
     further = _verified(names[VERIFIED_QUICKLY if quick else slice(None)], request, quick)
     batch.run(tuple(SCENES), output, job, rendered, further, jobs.open_page if is_opened else None)

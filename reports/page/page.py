@@ -32,6 +32,7 @@ from reports.terminal.words import difference
 if TYPE_CHECKING:  # few pages need these
     from comparisons.cost.cost_record import Cost
     from comparisons.hard_cases import HardCases
+    from comparisons.hybrids.why import Attribution
     from comparisons.verification import Verification
 
 TITLE = "Textbook shading against physically based rendering"
@@ -85,7 +86,7 @@ def render(
     """
     taken: set[str] = set()
     usual = THRESHOLDS.index(threshold)
-    studied = [(view.record, _cost(view)) for view in views]
+    records = [view.record for view in views]
     scenes = [_scene(view, taken) for view in views]
     scenes.sort(key=lambda scene: -scene.shares[usual])
     failed = [
@@ -99,8 +100,8 @@ def render(
         ],
         "thresholds": THRESHOLDS,
         "usual": threshold,
-        "headlines": _runs(lambda t: verdict.headline([record for record, _ in studied], t)),
-        "missing": _runs(lambda t: verdict.most_missing(studied, t)),
+        "headlines": _runs(lambda t: verdict.headline(records, t)),
+        "missing": _runs(lambda t: verdict.most_missing(records, t)),
         "terms": glossary.meanings(),
         **_drawing(),
     }
@@ -176,11 +177,11 @@ def _scene(view: SceneView, taken: set[str]) -> PageScene:
         id=_identifier(record.scene, taken),
         parts=tuple(
             (effect, EFFECT_COLOURS[effect], part)
-            for effect, part in verdict.missing(record, cost).items()
+            for effect, part in verdict.missing(record).items()
         ),
         shares=tuple(round(share.value, 5) for share in visible),
         verdicts="".join(decide(visible, threshold)[0] for threshold in THRESHOLDS),
-        cause=verdict.cause(record, cost),
+        cause=verdict.cause(record),
         advice=_runs(lambda t: verdict.sentence(record, cost, t)),
     )
 
@@ -204,14 +205,14 @@ def _scene_data(scene: PageScene) -> dict[str, Any]:
         ],
         "images": scene.embedded.manifest() if scene.embedded else None,
         "effects": plain(why.effects) if why else None,
-        "board": _board(why, _cost(scene)),
+        "board": _board(why, record.why),
         "terms": scene.terms.manifest() if scene.terms else None,
     }
 
 
-def _board(why: WhyView | None, cost: Cost | None) -> dict[str, Any] | None:
+def _board(why: WhyView | None, found: Attribution | None) -> dict[str, Any] | None:
     """Return which effects each small picture has, and the mean error that they leave."""
-    if not why or not why.pictures or not cost:
+    if not why or not why.pictures or not found:
         return None
     return {
         "width": why.pictures.width,
@@ -222,7 +223,7 @@ def _board(why: WhyView | None, cost: Cost | None) -> dict[str, Any] | None:
                 "on": [why.effects.names.index(effect) for effect in each.effects],
                 "mean": difference(max(each.error, 0.0)),
             }
-            for each in cost.attribution.hybrids
+            for each in found.hybrids
         ],
     }
 

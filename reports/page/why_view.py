@@ -10,7 +10,7 @@ from PIL import Image
 
 from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import delta_e_2000
-from comparisons.hybrids.dominance import dominating
+from comparisons.hybrids.attribution import dominating
 from reports.charts.theme import EFFECT_COLOURS
 from reports.files import images
 from reports.page.scene_view import EffectMap, WhyView

@@ -267,8 +267,9 @@ def _summary(views: Sequence[SceneView], threshold: float) -> Iterable[str]:
     from reports import verdict
     from reports.terminal import tables
 
-    yield from tables.summary([view.record for view in views], threshold)
+    records = [view.record for view in views]
+    yield from tables.summary(records, threshold)
     studied = [(view.record, view.cost.record if view.cost else None) for view in views]
-    yield from ("", verdict.headline([record for record, _ in studied], threshold))
-    yield from filter(None, [verdict.most_missing(studied, threshold)])
+    yield from ("", verdict.headline(records, threshold))
+    yield from filter(None, [verdict.most_missing(records, threshold)])
     yield from verdict.advice(studied, threshold)

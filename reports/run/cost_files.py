@@ -15,7 +15,7 @@ from reports.page import templating
 from reports.page.scene_view import CostView, picture_name
 from reports.run import results
 from reports.run.results import PAGE
-from reports.terminal.cost_tables import closure, noise
+from reports.terminal.cost_tables import closure
 
 if TYPE_CHECKING:
     from comparisons.cost.cost import Study
@@ -25,10 +25,10 @@ FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BS
 
 
 def documents(study: Study) -> dict[str, bytes]:
-    """Return the named files of a study: chart, pictures of methods, parts and effects.
+    """Return the named files of a study: chart, pictures of methods and effects.
 
-    Pictures of methods have the record's exposure; parts are signed, red where the later image is
-    brighter, over the range in the record's ``pictures``; effects are errors removed.
+    Pictures of methods have the record's exposure; effects are errors removed, over the range in
+    the record's ``pictures``.
     """
     from reports.charts import cost_charts  # Altair takes half a second to import
 
@@ -37,9 +37,6 @@ def documents(study: Study) -> dict[str, bytes]:
     limits = record.pictures
     pictures = {picture_name("method", n): exposed(image) for n, image in study.methods.items()}
     pictures["cost-reference"] = exposed(study.reference)
-    for name, signed in study.parts.items():
-        shown = images.signed_map(signed.mean(axis=2), limits.part_limit)
-        pictures[picture_name("part", name)] = shown
     for name, values in study.causes.maps.items():
         pictures[picture_name("effect", name)] = images.signed_map(values, limits.effect_limit)
     made = {f"{name}.png": images.png(picture) for name, picture in pictures.items()}
@@ -95,7 +92,7 @@ def figures(record: Cost) -> list[vega.Figure]:
 def view(study: Study, made: dict[str, bytes]) -> CostView:
     """Return the :class:`CostView` of a study, with its files ``made`` by :func:`documents`."""
     record, causes = study.record, study.causes
-    said = " ".join(each(record) for each in (noise, closure) if causes.maps)
+    said = closure(record) if causes.maps else ""
     return CostView(
         record=record,
         images={

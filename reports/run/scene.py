@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -17,7 +16,6 @@ from comparisons import atomic
 from comparisons.comparison import CAUSES, ComparisonRecord
 from comparisons.departure.metrics import METRICS, drawn
 from heuristic import program
-from heuristic.errors import FotismosError
 from heuristic.heuristics import named
 from reference.records import VERSION, Record, plain, to_json
 from reports.files import exr, images
@@ -31,6 +29,7 @@ if TYPE_CHECKING:
     from comparisons.cost.cost import Study
     from reference.rendering.renderer import Progress
     from reports.jobs import Job
+    from reports.page.scene_view import WhyView
 
 RECORD, PICTURE, VIEW = "comparison.json", "comparison.exr", "view.json"
 
@@ -60,18 +59,15 @@ def compare(
     if view is not None:
         return view, spent
     begin = perf_counter()
-    comparison = compare(case.source, case.options, progress, case.command(), job.with_cost)
+    causes = {"terms": job.with_cost, "why": job.with_cost}
+    comparison = compare(case.source, case.options, progress, case.command(), **causes)
     spent |= _stages(comparison.record, perf_counter() - begin)
-    study, begin = None, perf_counter()
-    if job.with_cost and not case.options.image:  # no effect can be added to a picture
-        comparison, study = _explained(case, progress, comparison, job.coarse)
-        spent["cost"] = perf_counter() - begin
     begin = perf_counter()
     if job.figures:  # first, since the record marks the scene as finished
         from reports.charts import figures
 
         figures.write_scene(folder / results.FIGURES, place, comparison)
-    view = write(folder, place, comparison, study, key)
+    view = write(folder, place, comparison, key=key)
     return view, spent | {"files": perf_counter() - begin}
 
 
@@ -80,31 +76,13 @@ def _stages(record: ComparisonRecord, seconds: float) -> Seconds:
     stages = record.time.stages
     preparing = sum(stages.get(name, 0.0) for name in ("scene and pairing", "planning", "geometry"))
     rendering = record.time.heuristic.total_s + record.time.reference.total_s
+    causes = stages.get(CAUSES, 0.0)
     return {
         "scenes and plans": preparing,
         "rendering": rendering,
-        "metrics": seconds - preparing - rendering,
+        CAUSES: causes,
+        "metrics": seconds - preparing - rendering - causes,
     }
-
-
-def _explained(
-    case: Case, progress: Progress, comparison: Comparison, coarse: bool
-) -> tuple[Comparison, Study | None]:
-    """Return a comparison with its causes, or a warning, and its study of cost if there is one."""
-    from comparisons.cost.cost import quick
-    from comparisons.cost.measure import COARSE, QUICK
-    from comparisons.hybrids.dominance import named
-
-    begin, record, effort = perf_counter(), comparison.record, COARSE if coarse else QUICK
-    try:
-        study = quick(case.source, case.options, progress, case.command() + " --why", effort)
-        record = named(comparison, study.causes.maps)
-    except FotismosError as error:
-        warnings = (*record.warnings, f"The causes are unknown: {error}")
-        return replace(comparison, record=structs.replace(record, warnings=warnings)), None
-    stages = record.time.stages | {CAUSES: perf_counter() - begin}
-    time = structs.replace(record.time, stages=stages)
-    return replace(comparison, record=structs.replace(record, time=time)), study
 
 
 # --- Finished scenes -------------------------------------------------------------------------
@@ -130,7 +108,7 @@ def key_of(case: Case, job: Job) -> str | None:
     parts: dict[str, Any] = {
         "record": VERSION,
         "metrics": list(METRICS),
-        "cost, figures, coarse": (job.with_cost, job.figures, job.coarse),
+        "why, figures": (job.with_cost, job.figures),
         "options": plain(case.options),
         "variant": case.variant,
         "versions": versions(),
@@ -191,25 +169,13 @@ def write(
     }
     linked: tuple[str, ...] = (RECORD, PICTURE)
     if study:
-        from reports.page.why_view import why_view
         from reports.run import cost_files
 
         priced = cost_files.documents(study)
         made |= priced
         linked = (*linked, "cost.json")
         charts = tuple(cost_files.figures(study.record))
-        causes = study.causes
-        view = structs.replace(
-            view,
-            charts=charts,
-            cost=cost_files.view(study, priced),
-            why=why_view(
-                causes.maps,
-                study.counted,
-                [causes.previews[each.effects] for each in causes.attribution.hybrids],
-                record.viewing,
-            ),
-        )
+        view = structs.replace(view, charts=charts, cost=cost_files.view(study, priced))
     view = structs.replace(view, files={file: f"{name}/{file}" for file in linked})
     for file, content in made.items():
         results.write(place / file, content)
@@ -240,7 +206,19 @@ def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> 
         thumbnails={name: images.webp_of(png) for name, png in small.items()},
         embedded=embedding.embed(exr.channels(layers or _layers(shown)), shown.counted),
         terms=terms_view.view(comparison.terms, comparison.no_terms, picked),
+        why=_why(comparison),
     )
+
+
+def _why(comparison: Comparison) -> WhyView | None:
+    """Return the causes for the page; None without."""
+    causes = comparison.causes
+    if causes is None:
+        return None
+    from reports.page.why_view import why_view  # loaded late: it needs what finds causes
+
+    previews = [causes.previews[each.effects] for each in causes.record.hybrids]
+    return why_view(causes.maps, causes.counted, previews, comparison.record.viewing)
 
 
 def _files(place: Path) -> set[str]:

@@ -43,21 +43,14 @@ def lines(record: Cost) -> Iterator[str]:
         yield f"left out: {left_out.name}: {left_out.reason}"
     yield from _section("Time to reach an error (mean ΔE2000)", _equal_error(record))
     if record.attribution.effects:
-        yield from _section("What each effect removes and adds", _attribution(record))
+        yield from _section("What each effect removes", _attribution(record))
         yield "removed: Shapley value, the mean over all orders of adding the effects"
         yield "alone, last: added first, added last"
-        yield noise(record)
         yield closure(record)
     if len(record.objects) > 1 and record.attribution.effects:
         yield from _section("Mean ΔE2000 removed on each shape", _objects(record))
-    yield from _section("Parts of the departure, linear", _parts(record))
     if record.prediction:
         yield from _predicted(record.prediction)
-
-
-def noise(record: Cost) -> str:
-    """Return the noise that was subtracted from the attribution, in a sentence."""
-    return f"Noise alone gives ΔE2000 = {record.attribution.floor:.2g}; it is subtracted."
 
 
 def closure(record: Cost) -> str:
@@ -169,7 +162,7 @@ def _reached(row: Reached) -> str:
 
 
 def _attribution(record: Cost) -> Rows:
-    yield "effect", "removed", "95 % interval", "alone", "last", "adds", "95 % interval"
+    yield "effect", "removed", "95 % interval", "alone", "last"
     for one in record.attribution.effects:
         yield (
             one.effect,
@@ -177,7 +170,6 @@ def _attribution(record: Cost) -> Rows:
             f"{one.removes.low:.3f} to {one.removes.high:.3f}",
             f"{one.alone:.3f}",
             f"{one.last:.3f}",
-            *_timed(one.adds_s.value, one.adds_s),
         )
 
 
@@ -187,13 +179,6 @@ def _objects(record: Cost) -> Rows:
     for row in record.objects:
         removes = (f"{each.value:.3f} ± {each.high - each.value:.3f}" for each in row.removes)
         yield row.name, f"{row.share:.1%}", f"{row.departure:.3f}", *removes
-
-
-def _parts(record: Cost) -> Rows:
-    yield "part", "mean", "standard error", "RMS", "mean ΔE2000"
-    for part in (*record.split.parts, record.split.departure):
-        numbers = f"{part.mean:+.3g}", f"{part.mean_stderr:.1g}", f"{part.rms:.3g}"
-        yield part.name, *numbers, f"{part.dE2000:.3g}"
 
 
 def _time(value: float) -> str:

@@ -100,11 +100,11 @@ def methods(record: Cost) -> Iterator[Sequence[Any]]:
 
 
 def attribution(record: Cost) -> Iterator[Sequence[Any]]:
-    """Yield the rows of the effects: the mean ΔE2000 that each removes, the seconds it adds."""
-    yield "effect", "removes", "removes_low", "removes_high", "alone", "last", "adds_s"
+    """Yield the rows of the effects: the mean ΔE2000 that each removes."""
+    yield "effect", "removes", "removes_low", "removes_high", "alone", "last"
     for one in record.attribution.effects:
         removes = one.removes.value, one.removes.low, one.removes.high
-        yield one.effect, *removes, one.alone, one.last, one.adds_s.value
+        yield one.effect, *removes, one.alone, one.last
 
 
 def shapes(record: Cost) -> Iterator[Sequence[Any]]:

@@ -49,7 +49,10 @@ def report(tmp_path_factory):
     found = Report((folder / "index.html").as_uri())
     views = []
     study = cost_records.study(NOISY)
-    for name, comparison, priced in ((NOISY, noisy(), study), (EXACT, exact(), None)):
+    for name, comparison, priced in (
+        (NOISY, cost_records.explained(noisy()), study),
+        (EXACT, exact(), None),
+    ):
         place = results.folder_name(name)
         views.append(scene.write(folder, place, comparison, priced))
         found.records[name] = plain(comparison.record)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons.hybrids.dominance import dominating
+from comparisons.hybrids.attribution import dominating
 from reports.charts import theme
 from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
 from tests.cost_records import HEIGHT as ROWS
