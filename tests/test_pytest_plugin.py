@@ -191,15 +191,16 @@ def test_what_cannot_be_measured_is_refused(fixtures):
         checked.unchanged({"type": "scene"})
 
 
-def test_a_departure_compares_with_numbers_and_with_nothing_else():
-    close, far = (Departure("a", "dE2000", value, 0.1, None, 4) for value in (1.0, 2.0))
+def test_a_departure_is_a_number_that_explains_itself():
+    about = {"scene": "a", "metric": "dE2000", "error": 0.1, "noise_floor": None, "passes": 4}
+    close, far = (Departure(value, **about) for value in (1.0, 2.0))
     assert close == 1 != far
     assert close < far <= 2
-    assert close is not None
-    assert (close == None, close != "one") == (False, True)  # noqa: E711
-    assert {close: "a"}[close] == "a"
-    with pytest.raises(TypeError, match="not supported"):
-        close < None  # noqa: B015
+    assert repr(far) == "dE2000 2"
+    low, high = far.interval
+    # Student's t of three degrees of freedom: 3.182 standard errors.
+    assert (low, high) == pytest.approx((2 - 0.3182, 2 + 0.3182), abs=1e-4)
+    assert far.fotismos_explanation()[0] == "a: mean dE2000 2, standard error 0.1"
 
 
 @pytest.mark.guarantee("checks", "A baseline's name leads to no other folder.")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import total_ordering
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +20,8 @@ from reference import records
 from reports.ci import baselines, checks, summary
 
 
-@total_ordering
-@dataclass(frozen=True, eq=False)
-class Departure:
-    """A departure metric of a scene: it compares with numbers by its value.
+class Departure(float):
+    """A departure metric of a scene: a number that explains itself where an assertion fails.
 
     ``error`` is its standard error over ``passes`` independent passes, ``noise_floor`` the value
     that noise alone would give.
@@ -32,32 +29,23 @@ class Departure:
 
     scene: str
     metric: str
-    value: float
     error: float
     noise_floor: float | None
     passes: int
 
-    def __float__(self) -> float:
-        return self.value
-
-    def __eq__(self, other: object) -> bool:
-        number = _number(other)
-        return NotImplemented if number is None else self.value == number
-
-    def __lt__(self, other: object) -> bool:
-        number = _number(other)
-        return NotImplemented if number is None else self.value < number
-
-    def __hash__(self) -> int:
-        return hash(self.value)
+    def __new__(cls, value: float, **about: Any) -> Departure:
+        """Return the number with its attributes."""
+        made = super().__new__(cls, value)
+        vars(made).update(about)
+        return made
 
     def __repr__(self) -> str:
-        return f"{self.metric} {self.value:.4g}"
+        return f"{self.metric} {float(self):.4g}"
 
     @property
     def interval(self) -> tuple[float, float]:
         """Return the 95 % interval of Student's t."""
-        amount = student(self.value, self.error, self.passes)
+        amount = student(float(self), self.error, self.passes)
         return amount.low, amount.high
 
     def fotismos_explanation(self) -> list[str]:
@@ -65,17 +53,9 @@ class Departure:
         low, high = self.interval
         floor = "" if self.noise_floor is None else f"; noise alone: {self.noise_floor:.4g}"
         return [
-            f"{self.scene}: mean {self.metric} {self.value:.6g}, standard error {self.error:.2g}",
+            f"{self.scene}: mean {self.metric} {float(self):.6g}, standard error {self.error:.2g}",
             f"95 % interval: {low:.6g} to {high:.6g}{floor}",
         ]
-
-
-def _number(value: Any) -> float | None:
-    """Return what compares with a departure as a number; None for anything else."""
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        return None
 
 
 @dataclass(frozen=True)
@@ -108,7 +88,14 @@ class Fotismos:
         if metric not in found.metrics:
             raise unknown("metric", metric, found.metrics)
         amount = found.metrics[metric]
-        return Departure(case.name, metric, amount.value, amount.error, amount.noise_floor, PASSES)
+        return Departure(
+            amount.value,
+            scene=case.name,
+            metric=metric,
+            error=amount.error,
+            noise_floor=amount.noise_floor,
+            passes=PASSES,
+        )
 
     def unchanged(
         self,
