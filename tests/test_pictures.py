@@ -79,7 +79,7 @@ def test_a_picture_of_another_run_has_its_departure(run, tmp_path, monkeypatch):
     assert max(map(abs, second["picture"]["shift"])) < 0.3
     assert file in second["command"]
     page = (tmp_path / "theirs/index.html").read_text(encoding="utf-8")
-    assert 0 < page.index("Its content lies") < page.index(f"Mean {METRICS['dE2000'].label}")
+    assert "Its content is moved by" in page
 
 
 def test_a_png_is_read_to_its_bits_by_its_transfer_function(rgb, tmp_path):
