@@ -87,7 +87,7 @@ def test_a_view_is_found_again_unless_anything_is_damaged(comparison, tmp_path):
     assert scene.load(place, None) is None
     text = (place / "view.json").read_text(encoding="utf-8")
     cuts = (text[:size] for size in range(0, len(text), len(text) // 20))
-    for broken in ("", "[]", "{}", text.replace("planes", "plains"), *cuts):
+    for broken in ("", "[]", "{}", text.replace("digests", "digest"), *cuts):
         (place / "view.json").write_text(broken, encoding="utf-8")
         assert scene.load(place, "key") is None
     (place / "view.json").write_text(text, encoding="utf-8")

@@ -109,7 +109,7 @@ def check(
                     results.write(folder / page.DETAILS, page.details(len(views)))
                     results.write(folder / results.PAGE, page.render(views, title))
                 else:
-                    results.clear(folder, (results.PAGE,))
+                    results.clear(folder, (results.PAGE, page.DETAILS))
     place = str(folder / results.PAGE) if views else ""
     for made in found:
         if made.status == "error":
