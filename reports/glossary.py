@@ -59,19 +59,12 @@ VIEWS: Terms = {
         "The same scene with Mitsuba’s physically based materials and light transport."
     ),
     ("textbook, as seen", "physical, as seen"): (
-        "The colour on the screen, after exposure and tone map, as hexadecimal sRGB."
-    ),
-    ("tone map",): (
-        "How linear light becomes a colour of the screen. Clipped: as a display shows it."
+        "The colour on the screen, after the exposure, as hexadecimal sRGB."
     ),
     ("exposure",): "A factor on both images, in stops: one stop doubles the light.",
-    ("range",): "The value at which the colours of the map end.",
     ("map of the error",): "Which measure of the difference the map shows.",
-    ("flicker",): "Both pictures in turn in one place: differences jump out.",
     ("split",): "The textbook’s picture to the left of a line, the physical one to its right.",
-    ("XYZ and L*a*b*",): (
-        "Coordinates of colour: XYZ is linear in light, L*a*b* is nearly even for the eye."
-    ),
+    ("error",): "Grey where no difference is visible, then the brighter, the larger.",
 }
 
 COSTS: Terms = {

@@ -50,16 +50,8 @@ def test_mean_percentile_and_noise_floor_are_marked_where_they_are():
     assert len(silent["layer"]) == 1
 
 
-def test_what_is_not_shown_is_said():
-    data = histogram([0.0, 0.0, 1.0, 2000.0])
-    assert histograms.note(data, 4) == (
-        "Not shown: 50.0 % of the pixels under 0.01, 25.0 % of the pixels at least 1000."
-    )
-    assert histograms.note(histogram([1.0]), 1) == ""
-
-
 def test_a_record_without_counted_pixels_has_no_chart():
     record = records.record()
-    assert [figure.title for figure in histograms.figures(record)] == ["ΔE2000"]
+    assert list(histograms.specs(record)) == ["dE2000"]
     empty = records.record(pixels=Pixels(counted=0, total=24))
-    assert histograms.figures(empty) == []
+    assert histograms.specs(empty) == {}

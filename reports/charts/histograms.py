@@ -8,9 +8,8 @@ from typing import Any
 from comparisons.comparison import ComparisonRecord
 from comparisons.departure.metrics import METRICS
 from comparisons.departure.statistics import Histogram, Summary
-from reports.charts import vega
 from reports.charts.theme import Spec
-from reports.terminal.words import number, percent
+from reports.terminal.words import number
 
 #: Size of the chart in pixels; the page scales it.
 WIDTH, HEIGHT = 300, 130
@@ -39,22 +38,6 @@ TEXT: Spec = {
 }
 
 
-def figures(record: ComparisonRecord) -> list[vega.Figure]:
-    """The histograms of a record for the page."""
-    counted, found = record.pixels.counted, record.histograms
-    return [
-        vega.figure(
-            METRICS[name].label, chart, f"{_unit(name)} {note(found[name], counted)}".strip()
-        )
-        for name, chart in specs(record).items()
-    ]
-
-
-def _unit(name: str) -> str:
-    unit = METRICS[name].unit
-    return f"{unit[0].upper()}{unit[1:]}."
-
-
 def specs(record: ComparisonRecord) -> dict[str, Spec]:
     """The specifications of a record's histograms, by metric; empty if no pixel counts."""
     counted = record.pixels.counted
@@ -70,13 +53,6 @@ def spec(name: str, histogram: Histogram, summary: Summary, counted: int) -> Spe
 
     The axis is logarithmic, the bins have equal ratios, and the height is the share of the pixels
     in each: equal areas are equal shares.
-
-    Parameters
-    ----------
-    name
-        One of `comparisons.departure.metrics.METRICS`.
-    counted
-        Number of all pixels.
     """
     bins = _shares(histogram, counted)
     top = max(row["share"] for row in bins) or 1.0
@@ -92,19 +68,6 @@ def spec(name: str, histogram: Histogram, summary: Summary, counted: int) -> Spe
     if marks := _marks(summary, histogram.low, top):
         layer.append({"data": {"values": marks}, "layer": [LINE, TEXT]})
     return {"width": WIDTH, "height": HEIGHT, "encoding": {"x": x, "y": y}, "layer": layer}
-
-
-def note(histogram: Histogram, counted: int) -> str:
-    """The pixels that the chart leaves out, in words; empty for none."""
-    parts = [
-        f"{percent(count / counted)} of the pixels {side} {limit:g}"
-        for count, side, limit in (
-            (histogram.below, "under", histogram.low),
-            (histogram.above, "at least", histogram.high),
-        )
-        if count
-    ]
-    return "Not shown: " + ", ".join(parts) + "." if parts else ""
 
 
 def _shares(histogram: Histogram, counted: int) -> list[dict[str, float]]:

@@ -70,24 +70,9 @@ class Before(Record):
 class SceneView(Record):
     """A comparison as the page shows it.
 
-    Attributes
-    ----------
-    record
-        The content of ``comparison.json``.
-    thumbnails
-        Small named WebP files, of both halves and of the leading metric's map.
-    embedded
-        The images as numbers; without them the scene has only the thumbnails.
-    files
-        Labels and paths relative to the page, shown as links.
-    charts, cost
-        The study of cost, if there is one.
-    why
-        The causes, if they are known.
-    terms
-        The terms of equation 8.10 at a grid of pixels.
-    before
-        What moved since a baseline, on the page of a check.
+    ``thumbnails`` are small named WebP files of both halves and of the leading metric's map;
+    without ``embedded`` images, the scene has only these. ``files`` are labels, and paths relative
+    to the page. ``before`` is what moved since a baseline, on the page of a check.
     """
 
     record: ComparisonRecord

@@ -39,18 +39,9 @@ class PickedTerms(Record):
 class TermsView(Record):
     """The page's data of the terms of a scene.
 
-    Attributes
-    ----------
-    grid
-        Planes over the grid of pixels; None without terms.
-    tops
-        Of the named planes of values ≥ 0.
-    lights
-        Names, and their ``I_p0``.
-    missing
-        Why there are no terms.
-    picked
-        The terms where the departure is largest, or else in the middle.
+    ``grid`` has planes over the grid of pixels, and ``tops`` those of its values ≥ 0; lights have a
+    name and their ``I_p0``. ``missing`` says why there are no terms. ``picked`` are the terms where
+    the error is largest, or else in the middle.
     """
 
     grid: Embedded | None = None
