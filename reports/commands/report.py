@@ -90,12 +90,12 @@ def _verified(names: Sequence[str], request: Options, quick: bool) -> batch.Furt
     size = QUICKLY_VERIFIED_AT if quick else VERIFIED_AT
     small = request.changed(resolution=size, spp=None)
     level = level_of_each(LEVEL, len(names)) if names else None
-    verified = [  # the last scenes trace paths, which take longest
+    tasks = [  # the last scenes trace paths, which take longest
         Task(name, timed, (verified, name, small, level)) for name in reversed(names)
     ]
     cases = Task(HARD, timed, (hard_cases,))
     shown = partial(_shown, names)
-    return batch.Further("verification and hard cases", [cases, *verified], shown)
+    return batch.Further("verification and hard cases", [cases, *tasks], shown)
 
 
 def _shown(names: Sequence[str], found: Mapping[str, Any]) -> dict[str, Any]:
