@@ -13,12 +13,9 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic.errors import InputError
-from reference.scene.graph import FILENAME, Graph
+from reference.scene.graph import DEEPEST, FILENAME, Graph, require_file
 
 LARGEST = float(np.finfo(np.float32).max)
-
-DEEPEST = 100
-"""Nested elements. Scenes need about ten; some thousands fill the parser's stack."""
 
 FILM_SIZE = (768, 576)
 """Mitsuba's width and height for a film without its own."""
@@ -202,17 +199,3 @@ def require_named_files(description: Mapping[str, Any], depth: int = 1) -> None:
                     require_file("the scene", path)
             except OSError as error:  # a name that is too long
                 raise InputError(f"{value[:60]!r}: {error.strerror}. Give a file.") from error
-
-
-def require_file(where: str, path: Path) -> None:
-    """Reject a folder, pipe, socket or device in place of a file."""
-    if path.is_file():
-        return
-    kinds = {
-        "a folder": path.is_dir,
-        "a pipe": path.is_fifo,
-        "a socket": path.is_socket,
-        "a device": lambda: path.is_char_device() or path.is_block_device(),
-    }
-    kind = next((kind for kind, holds in kinds.items() if holds()), "not a file")
-    raise InputError(f"{where}: {path} is {kind}, which cannot be read as a file. Give a file.")

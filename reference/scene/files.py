@@ -23,8 +23,7 @@ import numpy as np
 
 from heuristic import meshes
 from heuristic.errors import InputError
-from reference.scene.checks import DEEPEST, require_file
-from reference.scene.graph import FILENAME, SCRIPT, Graph, find_file
+from reference.scene.graph import DEEPEST, FILENAME, SCRIPT, Graph, find_file, require_file
 
 MOST_INCLUDES = 1000
 """Files that a scene includes, each as often as it is included."""

@@ -23,6 +23,9 @@ FILENAME = "filename"
 SCRIPT = "scene"
 """Name of a Python file's dictionary, or of the function that returns it."""
 
+DEEPEST = 100
+"""Nested elements. Scenes need about ten; some thousands fill the parser's stack."""
+
 CONTENT = re.compile(r'((?:of spectrum file "[^"]*"|PLY header: unknown token))[: ]*".*', re.DOTALL)
 """Ends of messages that repeat a line of a file, which may be any file."""
 
@@ -243,6 +246,20 @@ def find_file(resolver: mi.FileResolver | None, name: str) -> Path | None:
         return path if path.exists() else None
     except OSError:  # a name that is too long
         return None
+
+
+def require_file(where: str, path: Path) -> None:
+    """Reject a folder, pipe, socket or device in place of a file."""
+    if path.is_file():
+        return
+    kinds = {
+        "a folder": path.is_dir,
+        "a pipe": path.is_fifo,
+        "a socket": path.is_socket,
+        "a device": lambda: path.is_char_device() or path.is_block_device(),
+    }
+    kind = next((kind for kind, holds in kinds.items() if holds()), "not a file")
+    raise InputError(f"{where}: {path} is {kind}, which cannot be read as a file. Give a file.")
 
 
 @contextmanager
