@@ -122,12 +122,8 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
 def guarded(source: Source, options: Options | None = None) -> Prepared:
     """Prepare a scene with :func:`prepare`, and probe it before anything relies on its plan.
 
-    If the probe disagrees with the plan, everything is simulated.
-
-    Raises
-    ------
-    InputError
-        See :func:`prepare`; also when no pixel sees a surface, unless the options allow it.
+    If the probe disagrees with the plan, everything is simulated. A view in which no pixel sees a
+    surface raises `InputError`, unless the options allow it.
     """
     options = options or Options()
     ready = _probed(source, options)
@@ -153,10 +149,8 @@ def require_light(
 ) -> str:
     """Return what makes linear images (H, W, 3) of both halves meaningless, in words; often "".
 
-    Raises
-    ------
-    InputError
-        If both are black, unless the options allow it: they would agree, whatever is wrong.
+    If both are black, it raises `InputError`, unless the options allow it: they would agree,
+    whatever is wrong.
     """
     if not counted.any():
         return ""

@@ -34,31 +34,14 @@ RESAMPLES = 2000
 class Verification(Record, kw_only=True):
     """A planned scene against everything simulated.
 
-    Attributes
-    ----------
-    scene, planned, everything
-        Name, and a short description of each reference.
-    resolution
-        Width and height in pixels.
-    significant
-        Pixels that are shown to differ (:mod:`comparisons.departure.marks`).
-    pixels
-        Pixels compared: those whose centre sees a surface.
-    largest
-        Largest difference of the two means, linear.
-    heuristic_largest
-        Largest difference of the two heuristic images, whose kernels differ in terms that are 0.
-    planned_s, everything_s
-        Median time per pass.
-    planned_noise, everything_noise
-        Root mean square over the pixels of the standard error of one pass.
-    gain
-        ``everything_s everything_noise^2 / (planned_s planned_noise^2)``: how many times faster the
-        planned reference reaches the same noise, with an interval from pairs of passes.
-    planning_s
-        Time of planning, tables included.
-    saved_s
-        Time that the plan saves at the noise of all its passes.
+    ``significant`` of ``pixels`` that see a surface are shown to differ
+    (:mod:`comparisons.departure.marks`). ``largest`` is the largest difference of the two means,
+    linear, and ``heuristic_largest`` that of the two heuristic images, whose kernels differ in
+    terms that are 0. Times are medians per pass, noise the root mean square over the pixels of the
+    standard error of one pass. ``gain`` is ``everything_s everything_noise^2 / (planned_s
+    planned_noise^2)``: how many times faster the planned reference reaches the same noise.
+    ``planning_s`` is the time of planning, ``saved_s`` what the plan saves at the noise of all its
+    passes.
     """
 
     scene: str

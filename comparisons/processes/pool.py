@@ -61,15 +61,9 @@ class Task:
 class Pool:
     """Does tasks in separate processes; a context that ends the processes.
 
-    Parameters
-    ----------
-    count
-        Most processes at the same time. With 0 the tasks are done in this process, one after
-        another and without a time limit.
-    prepare
-        Called once in each process, before its first task.
-    limit_s
-        Seconds that a task may take without reporting progress, start-up included.
+    At most ``count`` processes run at the same time. With 0 the tasks are done in this process, one
+    after another and without a time limit. Each calls ``prepare`` once, before its first task. A
+    task may take ``limit_s`` seconds without reporting progress, start-up included.
     """
 
     def __init__(
