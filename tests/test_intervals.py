@@ -18,9 +18,6 @@ def test_the_interval_of_a_mean_is_that_of_students_table():
     half = 3.182446 * np.std([1, 2, 3, 4], ddof=1) / 2
     assert (found.value, found.low) == (2.5, pytest.approx(2.5 - half, rel=1e-6))
     assert found.high - 2.5 == 2.5 - found.low
-
-
-def test_without_error_the_interval_is_the_value():
     assert intervals.student(0.25, 0.0, 16) == intervals.Estimated(0.25, 0.25, 0.25)
 
 
