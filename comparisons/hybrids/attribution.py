@@ -36,7 +36,6 @@ from comparisons.hybrids.hybrids import (
     HybridScenes,
     Pairs,
     Player,
-    Replicates,
     labels,
     subsets,
 )
@@ -251,15 +250,10 @@ def attribute(
         images.render(key for each in subsets(effects) for key in images.needed(each))
     errors: dict[frozenset[Effect], NDArray] = {}
 
-    def image(simulated: frozenset[Effect]) -> Replicates:
-        # Not the reference itself, which would hide errors of the scene's edits.
-        is_whole = simulated == everything
-        return images.of(images.whole) if is_whole else images.simulating(simulated)
-
     def error(simulated: frozenset[Effect]) -> NDArray:
         """Errors (R + 1, N) in ΔE2000: of all replicates, then leaving out each in turn."""
         if simulated not in errors:
-            errors[simulated] = meter.without_noise(image(simulated).images)
+            errors[simulated] = meter.without_noise(images.simulating(simulated).images)
         return errors[simulated]
 
     gains, sampling_errors, drawn = shares(effects, error, seed, exact_effects, orders)
@@ -305,7 +299,7 @@ def attribute(
         departure=filled(departure[0]),
         left=filled(left[0]),
         counted=meter.counted,
-        previews={labels(effects, each): image(each).preview for each in errors},
+        previews={labels(effects, each): images.simulating(each).preview for each in errors},
     )
 
 

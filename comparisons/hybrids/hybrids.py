@@ -51,10 +51,10 @@ IN_SCENE: frozenset[Effect] = frozenset(REPLACED)
 IN_EMISSION = tuple(effect for effect in REPLACED if effect.emission)
 """Effects that change the emission pass."""
 
-KERNEL, PLAIN_KERNEL, REFERENCE = "kernel", "kernel with Phong interpolation", "reference"
+KERNEL, PLAIN_KERNEL = "kernel", "kernel with Phong interpolation"
 
 Key = str | frozenset[Effect]
-"""An image: one of the three names above, or the effects that it simulates."""
+"""An image: one of the two names above, or the effects that it simulates."""
 
 Player = TypeVar("Player", bound=Hashable)
 """An effect; in tests of the sums, any name."""
@@ -274,8 +274,9 @@ class HybridImages:
     def simulating(self, effects: Set[Effect]) -> Replicates:
         """Return the image in which some of ``effects`` are simulated.
 
-        None is the kernel as requested, all are the reference. Only the kernel has flat and Gouraud
-        shading; where they remain, an image gets the difference that they make there.
+        None is the kernel as requested; all are the scene of the reference, edited, which would
+        show faults of the edits. Only the kernel has flat and Gouraud shading; where they remain,
+        an image gets the difference that they make there.
         """
         found = self.of(self.needed(effects)[-1])
         if not self._keeps_polygons(effects):
@@ -286,8 +287,6 @@ class HybridImages:
         """Return the images that :meth:`simulating` needs for a set of effects."""
         if not effects:
             return [KERNEL]
-        if frozenset(effects) == frozenset(self.effects):
-            return [REFERENCE]
         kernels: list[Key] = [KERNEL, PLAIN_KERNEL] if self._keeps_polygons(effects) else []
         return [*kernels, frozenset(effects) - {POLYGONS}]
 
@@ -299,14 +298,9 @@ class HybridImages:
         """The kernel with an exact normal at each point."""
         return PLAIN_KERNEL if POLYGONS in self.effects else KERNEL
 
-    @property
-    def whole(self) -> Key:
-        """The hybrid of all effects, for the closure: not the reference, but edits of its scene."""
-        return frozenset(self.effects) - {POLYGONS} if self.effects else KERNEL
-
     def _variant_of(self, key: Key) -> str:
         if isinstance(key, str):
-            return self._variant if key == REFERENCE else self._pairs.heuristic_variant
+            return self._pairs.heuristic_variant
         is_current = SPECTRAL in key or SPECTRAL not in self.effects
         return self._variant if is_current else self._pairs.heuristic_variant
 
@@ -319,7 +313,7 @@ class HybridImages:
     def _replicates(self, key: Key) -> Replicates:
         """Render an image in its variant, which is current."""
         if isinstance(key, str):
-            return self._passes(self._half(key))
+            return self._passes(self._kernel(key))
         if mi.variant() not in self._scenes:
             pair = self._pairs.plain()
             physical = with_sampler(pair.physical, self._ready.plan.sampler).instantiate()
@@ -333,11 +327,9 @@ class HybridImages:
         emission = self._emission[pass_key]
         return transport + emission if emission else transport
 
-    def _half(self, key: str) -> Renderer:
-        """Return the renderer of an image that is a half, or nearly."""
+    def _kernel(self, key: str) -> Renderer:
+        """Return the renderer of a kernel."""
         ready, spp = self._ready, self._finer_spp
-        if key == REFERENCE:
-            return Renderer(ready.scene, ready.reference.integrator, spp, "reference image")
         scene = ready.heuristic.scene
         if key == PLAIN_KERNEL:
             scene = with_sampler(self._pairs.plain().heuristic, ready.plan.sampler).instantiate()
