@@ -12,34 +12,29 @@ import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is impo
 
 from comparisons.case import open_case
 from comparisons.cost.cost import cost
-from comparisons.cost.cost_record import Cost, Measured
-from comparisons.cost.front import ERRORS, cheapest
-from comparisons.cost.measure import Effort
+from comparisons.cost.cost_record import Cost, Point
+from comparisons.cost.front import at_size, sufficient
 from comparisons.cost.methods import FULL_PLAN, STAND_INS
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
+from reports.terminal.cost_tables import busy
 from reports.terminal.tables import markdown
 from reports.terminal.words import number, parameter, seconds
 from tests.benchmarks import prediction
 
 LARGER = tuple(sorted((Path(__file__).parent / "scenes").glob("*.py")))
-WIDTH = 256
-TOLERANCES = ERRORS[:3]
+SIZE = 512, 384
+TOLERANCES = (5.0, 2.0, 1.0)
 
-AT_FULL_SIZE = "cornell-box", "plastic-spheres", str(LARGER[0].with_stem("outdoors"))
-FULL_SIZE, FEW_ROUNDS = 512, 3
+AT_FULL_SIZE = "cornell-box", "plastic-spheres", "outdoors"
 
 
-def measured(
-    names: Sequence[str] = (*SCENES, *map(str, LARGER)),
-    size: tuple[int, int] = (WIDTH, 3 * WIDTH // 4),
-    effort: Effort | None = None,
-) -> list[Cost]:
+def measured(names: Sequence[str] = (*SCENES, *map(str, LARGER))) -> list[Cost]:
     """Study what accuracy costs on each scene, in turn."""
     found = []
     for name in names:
-        case = open_case(name, Options(resolution=size))
-        found.append(cost(case.source, case.options, effort).record)
+        case = open_case(name, Options(resolution=(SIZE[0] // 4, SIZE[1] // 4)))
+        found.append(cost(case.source, case.options).record)
         print(name, flush=True)
     return found
 
@@ -49,37 +44,42 @@ def setting(records: Sequence[Cost]) -> Iterator[str]:
     first = records[0]
     width, height = first.resolution
     yield (
-        f"{len(records)} scenes at {width} by {height} pixels, {first.rounds} rounds, on"
-        f" {first.machine.cores} cores of {first.machine.processor}."
+        f"{len(records)} scenes, measured at {width} by {height} pixels in {first.rounds} rounds"
+        f" with {first.threads} threads on {first.machine.processor}."
     )
-
-
-def at_full_size() -> list[Cost]:
-    """Study three scenes at the size at which people render."""
-    return measured(AT_FULL_SIZE, (FULL_SIZE, FULL_SIZE), Effort(rounds=FEW_ROUNDS))
+    yield from (f"{one.scene}: {busy(one)}" for one in records if one.is_busy)
 
 
 def fronts(records: Sequence[Cost]) -> Iterator[str]:
-    """Yield the Pareto front of each study, from the fastest method to the most accurate."""
-    first = records[0]
-    width, height = first.resolution
-    yield f"At {width} by {height} pixels, {first.rounds} rounds."
+    """Yield the front of some studies at full size, from the fastest to the most accurate."""
+    yield f"Times at {SIZE[0]} by {SIZE[1]} pixels."
     yield ""
     rows = [
-        (record.scene, point.method, str(point.spp), _time(point), number(point.error.mean))
+        (
+            record.scene,
+            point.method,
+            f"{record.method(point.method).ratio.value:.2g}",
+            str(point.spp),
+            seconds(point.seconds.value),
+            number(point.error.mean),
+            ", ".join(point.ties),
+        )
         for record in records
-        for point in sorted(record.points, key=lambda point: point.seconds.value)
-        if point.pareto
+        if record.scene in AT_FULL_SIZE
+        for point in sorted(
+            at_size(record.points, record.methods, SIZE), key=lambda point: point.seconds.value
+        )
+        if point.front
     ]
-    head = "Scene", "Method", "Samples per pixel", "Time", "Mean ΔE2000"
-    yield from markdown([head, *rows], right=2)
+    head = "Scene", "Method", "times the kernel", "Samples", "Time", "Mean ΔE2000"
+    yield from markdown([(*head, "too close to call"), *rows], right=2)
 
 
 def predictions() -> Iterator[str]:
     """Yield how predictions compare with later measurements, scene by scene."""
     found = prediction.run(rounds=7)
     width, height = prediction.TARGET
-    yield f"At {width} by {height} pixels, 6 and 32 samples per pixel, none of them fitted."
+    yield f"At {width} by {height} pixels, from studies of 128 pixels."
     yield " ".join(prediction.summary(found))
     yield ""
     yield from markdown([prediction.HEAD, *prediction.rows(found)], right=1)
@@ -98,14 +98,14 @@ def charts(records: Sequence[Cost]) -> Iterator[tuple[Cost, str]]:
 
 
 def methods(records: Sequence[Cost]) -> Iterator[str]:
-    """Yield a row per scene: the kernel, the cheapest way to each error, and the full plan."""
-    head = "Scene", "Textbook", *(f"within {parameter(limit)}" for limit in TOLERANCES), "Full plan"
+    """Yield a row per scene: the kernel, the fastest that suffices, and the full plan."""
+    head = "Scene", "Kernel", *(f"suffices at {parameter(t)}" for t in TOLERANCES), "Full plan"
     rows = [
         (
             record.scene,
-            _cell(_first(record, "Phong kernel")),
-            *(_named(cheapest(record.points, limit)) for limit in TOLERANCES),
-            _cell(_points(record, FULL_PLAN.name)[-1]),
+            seconds(record.methods[0].per_sample_s.value),
+            *(_named(record, sufficient(record.points, limit)) for limit in TOLERANCES),
+            f"{record.method(FULL_PLAN.name).ratio.value:.2g} times the kernel",
         )
         for record in records
     ]
@@ -114,46 +114,53 @@ def methods(records: Sequence[Cost]) -> Iterator[str]:
 
 def attribution(records: Sequence[Cost]) -> Iterator[str]:
     """Yield what each effect removes and adds: the scenes where it matters, and medians there."""
-    worth: dict[str, list[float]] = {}
+    worth: dict[str, list[tuple[float, float]]] = {}
     for record in records:
+        kernel = record.attribution.kernel_s.value
         for one in record.attribution.effects:
             if one.removes.low > 0:
-                worth.setdefault(one.effect, []).append(one.removes.value)
+                found = one.removes.value, one.adds_s.value / kernel
+                worth.setdefault(one.effect, []).append(found)
     rows = [
         (
             effect,
             f"{len(found)}",
-            number(median(found)),
+            number(median(removed for removed, _ in found)),
+            f"{median(times for _, times in found):+.2g}",
         )
         for effect, found in sorted(worth.items(), key=lambda row: -len(row[1]))
     ]
-    head = "Effect", "scenes", "removes, mean ΔE2000"
+    head = "Effect", "scenes", "removes, mean ΔE2000", "adds, in times of the kernel"
     yield from markdown([head, *rows], right=1)
 
 
 def findings(records: Sequence[Cost]) -> Iterator[str]:
     """Yield the common findings of the studies, as list items."""
-    for limit in TOLERANCES:
-        yield f"- {_within(records, limit)}"
+    ratios = [record.method(FULL_PLAN.name).ratio.value for record in records]
+    yield (
+        f"- A sample of the full plan takes {min(ratios):.2g} to {max(ratios):.2g} times as long as"
+        f" the textbook kernel's, {median(ratios):.2g} times in the median."
+    )
+    yield from (f"- {_within(records, limit)}" for limit in TOLERANCES)
     yield f"- {_worth_most(records)}"
     yield f"- {_stand_ins(records)}"
 
 
 def _within(records, limit):
-    """Return how many scenes need only a kernel for an error, and the time it saves."""
-    enough, saved = [], []
+    """Return how many scenes need only a kernel at a tolerance, and how much faster it is."""
+    enough, saved = 0, []
     for record in records:
-        chosen = cheapest(record.points, limit)
-        full = cheapest(_points(record, FULL_PLAN.name), limit)
-        if chosen and _family(record, chosen.method) == "kernel":
-            enough.append(record.scene)
-            if full:
-                saved.append(full.seconds.value / chosen.seconds.value)
-    said = (
-        f"Within a mean ΔE2000 of {parameter(limit)}, a kernel without paths is the cheapest way in"
-        f" {len(enough)} of {len(records)} scenes"
+        chosen = sufficient(record.points, limit)
+        if chosen and record.method(chosen.method).is_kernel:
+            enough += 1
+            full = record.method(FULL_PLAN.name).per_sample_s.value
+            saved.append(full / record.method(chosen.method).per_sample_s.value)
+    said = f"At ΔE2000 {parameter(limit)} a kernel suffices in {enough} of {len(records)} scenes"
+    return (
+        f"{said}: a sample takes 1 / {median(saved):.2g} of the full plan's."
+        if saved
+        else f"{said}."
     )
-    return f"{said}: {median(saved):.2g} times as fast as the full plan." if saved else f"{said}."
 
 
 def _worth_most(records):
@@ -170,12 +177,12 @@ def _worth_most(records):
 
 
 def _stand_ins(records):
-    """Return which stand-ins are on a Pareto front, and in how many scenes."""
+    """Return which stand-ins are on a front, and in how many scenes."""
     names = [method.name for method in STAND_INS]
     on_front = Counter(
         name
         for record in records
-        for name in {point.method for point in record.points if point.pareto}.intersection(names)
+        for name in {point.method for point in record.points if point.front}.intersection(names)
     )
     never = [name for name in names if not on_front[name]]
     said = "; ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
@@ -184,30 +191,11 @@ def _stand_ins(records):
         " Measured in version 0.2, lost in all scenes and gone since: spherical harmonics; ambient"
         " occlusion; ambient occlusion from the depth image."
     )
-    return f"Stand-ins on the Pareto front, by the number of scenes: {said}.{left}"
+    return f"Stand-ins on the front, by the number of scenes: {said}.{left}"
 
 
-def _points(record: Cost, name: str) -> tuple[Measured, ...]:
-    """Return the points of a method, even if a scene has merged it with another."""
-    return record.points_of(next(method.name for method in record.methods if name in method.names))
-
-
-def _first(record, name):
-    return _points(record, name)[0]
-
-
-def _family(record, name):
-    return next(method.family for method in record.methods if method.name == name)
-
-
-def _cell(point):
-    return f"{number(point.error.mean)} in {_time(point)}"
-
-
-def _time(point):
-    time = point.seconds
-    return f"{seconds(time.median)} ({seconds(time.low)} to {seconds(time.high)})"
-
-
-def _named(point):
-    return f"{point.method}, {point.spp} spp: {_cell(point)}" if point else "none"
+def _named(record: Cost, point: Point | None) -> str:
+    if not point:
+        return "none"
+    ratio = record.method(point.method).ratio.value
+    return f"{point.method}, {point.spp} samples ({ratio:.2g} times the kernel)"

@@ -172,7 +172,7 @@ def _accuracy():
     records = accuracy.measured()
     for part in ("setting", "findings", "methods", "attribution", "pictures"):
         replace("accuracy.md", part, getattr(accuracy, part)(records))
-    replace("accuracy.md", "fronts", accuracy.fronts(accuracy.at_full_size()))
+    replace("accuracy.md", "fronts", accuracy.fronts(records))
     replace("accuracy.md", "predictions", accuracy.predictions())
     for record, path in accuracy.charts(records):
         atomic.write(DOCS / path, vega.paper(titled(record)))

@@ -6,7 +6,6 @@ Times belong to the machine; nothing else should run at the same time.
 import subprocess
 import sys
 from collections.abc import Iterator
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,7 +17,6 @@ import numpy as np
 from comparisons import atomic
 from comparisons.case import open_case
 from comparisons.cost.cost import cost
-from comparisons.cost.cost_record import Cost, Measured
 from comparisons.fit.fit_record import FitRecord
 from comparisons.options import Options
 from comparisons.study import dataset, design
@@ -78,9 +76,8 @@ def attribution() -> Iterator[str]:
     case = open_case(COST_SCENE, Options())
     record = cost(case.source, case.options).record
     atomic.write(DOCS / "cost-cornell-box.svg", vega.paper(titled(record)))
-    points = partial(_points, record)
-    kernel, shadows = points("Phong kernel")[-1], points("kernel with shadows")[-1]
-    first, *_, last = points("full plan")
+    times = {one.name: one.ratio.value for one in record.methods}
+    points = {one.method: one for one in record.points}  # the last one has the most samples
     worth = {one.effect: one.removes for one in record.attribution.effects}
     by_worth = sorted(worth, key=lambda effect: -worth[effect].value)
     removed = ", ".join(
@@ -88,12 +85,15 @@ def attribution() -> Iterator[str]:
         for effect in by_worth
     )
     closure = record.closure
+    kernel, shadows, full = (
+        points[name].error.mean for name in ("Phong kernel", "kernel with shadows", "full plan")
+    )
     yield (
-        f"The textbook kernel is {kernel.error.mean:.1f} away from the reference (mean ΔE2000)"
-        f" after {_time(kernel)}, and more samples do not bring it nearer; the full plan is"
-        f" {first.error.mean:.1f} away after {_time(first)} and {last.error.mean:.1f} after"
-        f" {_time(last)}."
-        f" Adding shadows alone gives {shadows.error.mean:.1f}, because the light between surfaces"
+        f"A sample of the full plan takes {times['full plan']:.2g} times as long as one of the"
+        f" textbook kernel, direct light alone {times['direct']:.2g} times. The kernel is"
+        f" {kernel:.1f} away from the reference (mean ΔE2000), and more samples do not bring it"
+        f" nearer; the full plan is {full:.1f} away with {points['full plan'].spp} samples."
+        f" Adding shadows alone gives {shadows:.1f}, because the light between surfaces"
         " that would fill them is missing. Averaged over all orders of adding them, the effects"
         f" remove from {record.attribution.departure:.1f} (95 % intervals): {removed}."
         f" With all of them, {closure.mean:.2g} ({closure.low:.2g} to {closure.high:.2g}) remains."
@@ -144,16 +144,6 @@ def speed() -> Iterator[str]:
         f" point; eight unrolled lights take {unrolled:.2f} ns. Compile time stays under"
         f" {max(row['compile_s'] for row in many):.1g} s."
     )
-
-
-def _points(record: Cost, name: str) -> tuple[Measured, ...]:
-    """Return the points of a method, even if a scene has merged it with another."""
-    (method,) = [method.name for method in record.methods if name in method.names]
-    return record.points_of(method)
-
-
-def _time(point: Measured) -> str:
-    return f"{1e3 * point.seconds.value:.0f} ms"
 
 
 def _run(module: str, *words: str) -> None:

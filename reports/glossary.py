@@ -70,10 +70,14 @@ VIEWS: Terms = {
 COSTS: Terms = {
     ("method",): "A way to render the scene, from flat shading to all light transport.",
     ("samples",): "Samples per pixel: camera rays whose mean is the pixel’s colour.",
-    ("time for one image",): "Of a later image of the same size; the first one also compiles.",
-    ("first run",): "The first image, with tracing and compiling the program.",
-    ("error left",): "The method’s mean distance from the converged reference.",
-    ("reaches ΔE2000 of",): "The time after which the method’s mean error is this small.",
+    ("of the kernel’s per sample",): (
+        "How many times as long as one of the textbook kernel a sample takes: much the same on any"
+        " machine, also a busy one."
+    ),
+    ("overhead",): "The part of an image’s time that does not depend on its samples.",
+    ("first image",): "It also traces and compiles the program.",
+    ("suffices at",): "The ΔE2000 that 5 % of the pixels exceed: the method passes from there on.",
+    ("too close to call",): "Other methods of the front whose time and error may be the same.",
     ("error against time",): (
         "Each point is a method with a number of samples. Further left is faster, lower is better."
     ),
@@ -81,13 +85,15 @@ COSTS: Terms = {
         "The mean ΔE2000 that simulating the effect removes: a Shapley value, the mean over all"
         " orders of adding the effects."
     ),
-    ("adds",): "The time that simulating the effect adds to one image.",
+    ("adds",): (
+        "The time that the samples of an image take more with the effect than without: by kernels,"
+        " or by plans, in this order of effects and in the reverse one."
+    ),
     ("first",): "ΔE2000 removed if the effect is added before all others.",
     ("last",): "ΔE2000 removed if the effect is added after all others.",
     ("left", "left with all"): (
         "ΔE2000 that remains with all effects: 0 apart from noise, or some effect is missing."
     ),
-    ("part",): "A step from the textbook image to the reference; the steps add up.",
     ("per pass, median",): "A pass is one image with a part of the samples.",
     ("compilation",): "Time to turn the rendering program into machine code.",
 }

@@ -395,7 +395,7 @@ class Job:
     """What a command does with each of its scenes.
 
     ``request`` says how to render; ``fresh`` renders finished scenes again; pixels differ
-    visibly above the ΔE2000 ``within``.
+    visibly above the ΔE2000 ``within``. Of the scenes ``ladders`` methods are measured, too.
     """
 
     request: Options
@@ -403,6 +403,7 @@ class Job:
     with_cost: bool = False
     fresh: bool = False
     within: float = 2.0
+    ladders: frozenset[str] = frozenset()
 
 
 def command_line() -> str:

@@ -1,4 +1,4 @@
-"""What page, files and charts show of a study of cost: the record's figures, and what dominates."""
+"""What page, files and charts show of a study of cost: the record's figures, and its front."""
 
 import json
 import re
@@ -10,11 +10,12 @@ import pytest
 import vl_convert
 from msgspec import convert, structs
 
-from comparisons.cost.cost_record import Measured, Prediction
-from reports.charts import cost_charts, vega
+from comparisons.cost.cost_record import Point
+from reports.charts import cost_charts
 from reports.page import page
 from reports.page.scene_view import SceneView
 from reports.run import cost_files, scene
+from reports.terminal import cost_tables
 from tests import cost_records, records
 from tests.browser.conftest import noisy
 from tests.schemas import schema
@@ -43,14 +44,30 @@ def test_the_figures_on_the_page_are_those_of_the_json(study):
     values = {value for value, _ in Page(shown(study)).values}
     data = study.record
     wanted = [data.reference.noise_floor, data.attribution.departure]
+    for method in data.methods:
+        wanted += [*structs.astuple(method.ratio), *structs.astuple(method.per_sample_s)]
+        wanted += [method.overhead_s.value, method.first_s]
     for point in data.points:
         wanted += [*structs.astuple(point.seconds), *structs.astuple(point.error)]
-        wanted += [point.first_s, point.spp]
-    reached = [row.seconds for row in data.equal_error if row.seconds is not None]
-    wanted += [each for row in reached for each in structs.astuple(row)]
+        wanted += [point.spp, point.tolerance.mean]
     for one in data.attribution.effects:
-        wanted += [*structs.astuple(one.removes), one.alone, one.last]
+        wanted += [*structs.astuple(one.removes), one.adds_s.low, one.adds_s.high]
+        wanted += [one.alone, one.last]
     assert not [number for number in wanted if number not in values]
+
+
+def test_page_and_terminal_name_what_cannot_be_measured_a_busy_machine_and_ties(study):
+    busy = structs.replace(study.record, processor_share=0.625)
+    for record, is_busy in ((study.record, False), (busy, True)):
+        html = Page(shown(replace(study, record=record))).text
+        text = "\n".join(cost_tables.lines(record))
+        for said in (" ".join(html.split()), text):
+            assert said.count("no measurable time") == 1  # of microfacets
+            assert ("The machine was busy: samples got 62%" in said) is is_busy
+            assert "direct <b>" in said
+            assert "the scene's own paths end at depth 3" in said
+    assert "Phong kernel" in text
+    assert "22.25" in text
 
 
 def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_cost(study):
@@ -103,22 +120,22 @@ def test_names_stand_apart_in_order_and_inside():
     assert cost_charts.spread([100, 102], 15, 380) == [93.5, 108.5]
 
 
-def point(method, spp, time, error, pareto=False):
-    return convert(cost_records.point(method, spp, time, error, pareto), Measured)
+def point(method, spp, time, error, **more):
+    return convert(cost_records.point(method, spp, time, error, **more), Point)
 
 
-def record(points, floor=0.4):
+def record(points, floor=0.4, **more):
     whole = cost_records.record("synthetic")
     reference = structs.replace(whole.reference, noise_floor=floor)
-    return structs.replace(whole, points=tuple(points), reference=reference)
+    return structs.replace(whole, points=tuple(points), reference=reference, **more)
 
 
-SAMPLED = [point("full plan", n, 0.02 * n, 8 / n**0.5, True) for n in (4, 16, 64)]
+SAMPLED = [point("full plan", n, 0.02 * n, 8 / n**0.5, front=True) for n in (4, 16, 64)]
 
 
 def test_a_chart_names_axes_units_and_every_method():
     for error, points, floor in ((12.0, [], 0.0), (0.0, [], 0.0), (12.0, SAMPLED, 0.4)):
-        points = [point("Phong kernel", 16, 0.01, error, True), *points]
+        points = [point("Phong kernel", 16, 0.01, error, front=True), *points]
         svg = vl_convert.vegalite_to_svg(cost_charts.titled(record(points, floor)))
         for word in ("time for one image (ms", "mean ΔE2000", *(p.method for p in points)):
             assert word in svg
@@ -153,79 +170,14 @@ def test_points_guides_and_names_lie_where_the_axes_say():
         assert names[name][1] == pytest.approx(place[1] + 3, abs=cost_charts.LABEL_GAP)
 
 
-def about(name, value):
-    return {name: value, "low": 0.8 * value, "high": 1.5 * value}
-
-
-FORECASTS = [
-    ("full plan", 4, 0.04, 4.0),
-    ("full plan", 16, 0.16, 2.0),
-    ("Phong kernel", 4, 0.002, 7.0),
-]
-
-
-def predicted(forecasts=FORECASTS, measured=()):
-    """A record with forecasts at a size, and the seconds and errors measured for the first ones."""
-    rows = [
-        {"method": name, "spp": spp, "seconds": about("value", time)}
-        | {"error": about("mean", error)}
-        for name, spp, time, error in forecasts
-    ]
-    for row, (time, error) in zip(rows, measured, strict=False):
-        row["measured"] = cost_records.point(row["method"], 4, time, error, False)
-    found = {"resolution": (640, 480), "level": 0.9, "fitted": [(64, 48), (128, 96)], "rounds": 3}
-    return convert(found | {"forecasts": rows, "cheapest": []}, Prediction)
-
-
-def drawn(prediction):
-    return vl_convert.vegalite_to_svg(
-        cost_charts.prediction_chart(cost_records.record("synthetic"), prediction)
-    )
-
-
-def on_axes(places, values):
-    """Return where logarithmic axes through the first and the last place have other values."""
-    places, logarithms = np.array(places), np.log(values)
-    begin, end = logarithms[0], logarithms[-1]
-    return places[0] + (logarithms - begin) / (end - begin) * (places[-1] - places[0])
-
-
-def test_forecasts_bands_and_measurements_lie_on_the_same_axes():
-    measured = [(0.05, 5.0), (0.02, 2.5)]
-    svg = drawn(predicted(measured=measured))
-    points, crosses = symbol_layers(svg)
-    values = [row[2:] for row in FORECASTS]
-    expected = on_axes([points[0], *crosses, *points[1:]], [values[0], *measured, *values[1:]])
-    np.testing.assert_allclose([points[0], *crosses, *points[1:]], expected, atol=1e-3)
-    (slow_x, low_y), (fast_x, high_y) = points[1:]
-    assert fast_x < slow_x
-    assert high_y < low_y  # larger errors stand higher
-    bands = re.findall(r'aria-roledescription="area mark" d="([^"]+)Z"', svg)
-    outline = np.array([place.split(",") for band in bands for place in band[1:].split("L")], float)
-    rise = (low_y - high_y) / np.log(3.5)  # from an error of 2 to one of 7
-    for x, y in points:
-        for share in (0.8, 1.5):
-            place = x, y - rise * np.log(share)
-            assert np.abs(outline - place).max(axis=1).min() < 0.15
-
-
-def test_a_prediction_is_titled_and_tells_of_crosses_only_where_some_are():
-    for measured in ([], [(0.05, 5.0)]):
-        svg = drawn(predicted(measured=measured))
+def test_predictions_and_measurements_lie_on_the_same_axes():
+    size = (640, 480)
+    measured = [point("full plan", 8, 0.16, 8 / 8**0.5)]
+    for crosses in ([], measured):
+        whole = record([], at=size, predicted=tuple(SAMPLED), measured=tuple(crosses))
+        svg = vl_convert.vegalite_to_svg(cost_charts.titled(whole, size))
         assert "synthetic: predicted at 640 × 480 pixels" in svg
-        assert "fitted to 64x48, 128x96" in svg
-        assert "90% intervals" in svg
-        assert ("crosses: measured" in svg) == bool(measured)
-        assert len(symbol_layers(svg)) == 1 + bool(measured)
-    rows = [("full plan", 4, 0.04, 4.0), ("Phong kernel", 4, 2e-3, 0.0)]
-    svg = drawn(predicted(rows, measured=[(0.05, 0.0)]))
-    (_, nothing), (cross,) = symbol_layers(svg)  # errors of 0 are drawn at the lower border
-    assert nothing[1] == cross[1] == pytest.approx(380, abs=25)
-    assert "NaN" not in svg
-
-
-def test_the_chart_of_the_attribution_has_a_bar_for_each_effect():
-    svg = vega.paper(cost_charts.attribution_chart(cost_records.record())).decode()
-    for effect in cost_records.EFFECTS:
-        assert effect in svg
-    assert svg.count('role="graphics-symbol" aria-roledescription="bar"') == 3
+        assert ("crosses: measured" in svg) == bool(crosses)
+        assert len(symbol_layers(svg)) == 1 + bool(crosses)
+    points, ((x, y),) = symbol_layers(svg)
+    assert (x, y) == pytest.approx(np.mean(points[:2], axis=0), abs=0.1)  # 8 is between 4 and 16

@@ -12,9 +12,9 @@ from markdown_it import MarkdownIt
 from msgspec import structs
 from PIL import Image
 
-from comparisons.cost.cost_record import Seconds
+from comparisons.cost.cost_record import EffectCost
 from comparisons.departure.metrics import METRICS, RATIO, drawn
-from comparisons.hybrids.why import Contribution, MeanError, ObjectContribution
+from comparisons.hybrids.why import MeanError
 from heuristic.errors import InputError
 from reference.records import Estimated, plain
 from reports.files import exr, images
@@ -213,21 +213,21 @@ def test_markdown_is_a_table_with_a_row_a_scene():
 
 def test_a_study_of_cost_is_written_with_its_methods_and_attribution(tmp_path):
     amount = Estimated(1.5, 1.25, 1.75)
-    one = Contribution("occlusion", amount, -0.5, 3.0, 0.0)
+    one = EffectCost("occlusion", amount, -0.5, 3.0, 0.0, adds_s=amount)
     found = cost_records.record()
-    seconds, error = Seconds(0.25, 0.125, 0.5), MeanError(12.75, 12.5, 13.0)
-    point = structs.replace(found.points[0], method="direct", spp=4, seconds=seconds, error=error)
+    seconds, error = Estimated(0.25, 0.125, 0.5), MeanError(12.75, 12.5, 13.0)
+    more = {"seconds": seconds, "error": error, "tolerance": error}
+    point = structs.replace(found.points[0], method="direct", spp=4, **more)
     whole = structs.replace(found.attribution, effects=(one,))
-    wall = ObjectContribution("wall", 12, 0.75, 2.5, (amount,), 1.0)
-    shown = structs.replace(found, points=(point,), attribution=whole, objects=(wall,))
+    shown = structs.replace(found, points=(point,), attribution=whole)
     tables.write_cost(tmp_path / "tables", "box", shown)
     read = {path.name: path.read_text("utf-8") for path in (tmp_path / "tables").glob("box*")}
-    parts = ("attribution", "cost", "shapes")
+    parts = ("attribution", "cost", "methods")
     assert sorted(read) == [f"box-{part}.{kind}" for part in parts for kind in ("csv", "md")]
-    assert "\nwall,12,0.75,2.5,occlusion,1.5,1.25,1.75\n" in read["box-shapes.csv"]
-    assert "\ndirect,4,0.25,0.125,0.5,12.75,12.5,13.0,yes\n" in read["box-cost.csv"]
-    assert "\nocclusion,1.5,1.25,1.75,-0.5,3.0\n" in read["box-attribution.csv"]
-    assert "| occlusion | 1.50 | 1.25 | 1.75 | −0.500 | 3.00 |" in read["box-attribution.md"]
+    assert "\ndirect,4,0.25,0.125,0.5,12.75,12.5,13.0,12.75,12.5,13.0\n" in read["box-cost.csv"]
+    assert "\nfull plan,6.78" in read["box-methods.csv"]
+    assert "\nocclusion,-0.5,3.0,1.5,1.25,1.75,1.5,1.25,1.75\n" in read["box-attribution.csv"]
+    assert "| occlusion | −0.500 | 3.00 | 1.50 | 1.25 | 1.75 |" in read["box-attribution.md"]
 
 
 @pytest.mark.parametrize("colour", ["", "1"])

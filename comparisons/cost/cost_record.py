@@ -1,17 +1,18 @@
-"""The record of a study of cost, ``cost.json``: linear values are in units of display white."""
+"""The record of a study of cost, ``cost.json``."""
 
 from typing import Annotated, Literal
 
 from msgspec import Meta
 
 from comparisons.departure.colour import Viewing
-from comparisons.hybrids.why import Attribution, MeanError, ObjectContribution
+from comparisons.hybrids.why import Contribution, MeanError
 from heuristic.heuristics import Interpolation
 from reference.planning.plan import Guard
 from reference.records import (
     VERSION,
     Amount,
     Count,
+    Estimated,
     Machine,
     Pixels,
     Positive,
@@ -38,6 +39,8 @@ class Method(Record):
     interpolation, shadows, heuristic
         Of a kernel: how it shades, whether it traces shadow rays, and the declared heuristic that
         shades, if not the one under study.
+    variant
+        Of a kernel: its Mitsuba variant, if not that of the heuristic half.
     without, max_depth
         Of a plan: effects to leave out, and the limit of path length as Mitsuba counts, if not the
         scene's own.
@@ -54,6 +57,7 @@ class Method(Record):
     interpolation: Interpolation = Interpolation.PHONG
     shadows: bool = False
     heuristic: str = ""
+    variant: str = ""
     without: tuple[str, ...] = ()
     max_depth: int | None = None
     stands_in_for: tuple[str, ...] = ()
@@ -66,6 +70,71 @@ class Method(Record):
         return self.family == "kernel"
 
 
+class TimedMethod(Method, kw_only=True):
+    """A method and its time: ``overhead_s + per_sample_s * samples`` for one image.
+
+    Attributes
+    ----------
+    overhead_s, per_sample_s
+        Wall time in seconds of a later image, and of each sample of a pixel: ``processor_s`` over
+        the processors that worked at once.
+    ratio
+        ``per_sample_s`` over that of the textbook kernel.
+    processor_s
+        Time of all processor cores for each sample.
+    bend
+        How far the time at a third count is from the straight line, as a share.
+    first_s, prepare_s
+        Time of the first image, which is also compiled, and of preparing the scene for it.
+    """
+
+    overhead_s: Estimated
+    per_sample_s: Estimated
+    ratio: Estimated
+    processor_s: float
+    bend: float
+    first_s: Positive
+    prepare_s: Amount = 0.0
+
+    def seconds(self, samples: int) -> Estimated:
+        """Return the time of an image with some samples over all pixels."""
+        ends = {
+            end: max(getattr(self.overhead_s, end) + samples * getattr(self.per_sample_s, end), 0.0)
+            for end in ("value", "low", "high")
+        }
+        return Estimated(**ends)
+
+
+class Point(Record):
+    """A method at one sample count.
+
+    Attributes
+    ----------
+    method, spp
+        Name of the method, and samples per pixel.
+    seconds
+        Wall time of one image, by the method's overhead and time per sample.
+    error
+        Mean ΔE2000 of one image to the reference.
+    tolerance
+        The ΔE2000 that at most 5 % of an image's pixels exceed: the method suffices at this
+        tolerance and at larger ones.
+    front
+        Whether no other point is clearly faster or clearly more accurate without being clearly
+        worse in the other.
+    ties
+        Other methods of the front whose time and error are both too close to call.
+    """
+
+    method: str
+    spp: Size
+    seconds: Estimated
+    error: MeanError
+    tolerance: MeanError
+    front: bool = False
+    ties: tuple[str, ...] = ()
+
+
 class Converged(Record):
     """The reference with which images are compared."""
 
@@ -74,130 +143,57 @@ class Converged(Record):
     spp: Annotated[int, Meta(description="Samples per pixel in all.", ge=2)]
     passes: Annotated[int, Meta(ge=2)]
     noise_floor: Annotated[float, Meta(description="Mean ΔE2000 of its noise alone.", ge=0)]
-    mean_variance: Annotated[
-        float, Meta(description="Subtracted from each mean squared error.", ge=0)
-    ]
 
 
-class LeftOut(Record):
-    """A method that the scene does not allow, and why."""
+class EffectCost(Contribution, kw_only=True):
+    """What simulating one effect removes, and the seconds that it adds to an image."""
 
-    name: str
-    reason: str
-
-
-class Seconds(Record):
-    """A time, and the ends of its interval."""
-
-    value: Amount
-    low: Amount
-    high: Amount
+    adds_s: Estimated
 
 
-class Measured(Record):
-    """A method at one sample count.
+class CostAttribution(Record):
+    """What all effects remove and add.
 
     Attributes
     ----------
-    method, spp
-        Name of the method, and samples per pixel as rendered.
-    seconds
-        Median of the rounds. Its interval are order statistics, which hold the true median with the
-        chance Cost.level, for any distribution.
-    error
-        Mean ΔE2000 of one rendering, averaged over the rounds, with its 95 % interval.
-    mse
-        Linear mean squared error less the reference's variance.
-    first_s, compile_s
-        Time of the first run, and LLVM's part of it.
-    prepare_s
-        The heuristic's part of the first run, for preparing the scene; 0 if it prepares nothing.
-    pareto
-        Whether it is on the front of time and error (:func:`comparisons.cost.front.pareto`).
+    effects
+        One for each effect. What they add, and ``renderer_s``, is ``plan_s`` less ``kernel_s``.
+    departure
+        Mean ΔE2000 of the heuristic half, without noise.
+    kernel_s, plan_s
+        Seconds that the samples of an image take with no effect, and with all of them, without
+        overhead.
+    renderer_s
+        Seconds that Mitsuba's integrator, on the scene's own shapes, takes more than the kernel to
+        simulate the same effects.
+    resolution, spp
+        Size of that image, and its samples per pixel.
     """
 
-    method: str
-    spp: int
-    seconds: Seconds
-    error: MeanError
-    mse: float
-    first_s: Positive
-    compile_s: Amount
-    prepare_s: Amount = 0.0
-    pareto: bool = False
-
-
-class Reached(Record):
-    """When a method reaches an error.
-
-    ``seconds`` is None if the error is not reached within the measured counts. It is an upper
-    bound, ``at_most``, if the smallest measured count already reaches the error. Its interval, of
-    about 95 %, covers the variation of times and errors, and ends with the measured counts. ``spp``
-    is only given in predictions.
-    """
-
-    method: str
-    error: Positive
-    seconds: Seconds | None
-    at_most: bool = False
-    spp: Size | None = None
-
-
-class Forecast(Record):
-    """The predicted time of a later frame, and mean ΔE2000, of a method and sample count.
-
-    Attributes
-    ----------
-    method, spp
-        Name of the method, and samples per pixel.
-    seconds, error
-        Predictions, with intervals at Prediction.level.
-    measured
-        What was measured there; of ``cost --measure``.
-    """
-
-    method: str
-    spp: Size
-    seconds: Seconds
-    error: MeanError
-    measured: Measured | None = None
-
-
-class Prediction(Record):
-    """Costs of methods at a size, predicted from smaller sizes.
-
-    Attributes
-    ----------
-    resolution
-        The requested size.
-    level
-        Chance that an interval holds a later measurement.
-    fitted
-        The sizes measured for it.
-    rounds
-        Timed repeats of each method, size and sample count.
-    forecasts
-        One for each method and sample count.
-    cheapest
-        The method predicted to reach an error first, of each error; nameless if none does.
-    """
-
+    effects: tuple[EffectCost, ...]
+    departure: float
+    kernel_s: Estimated
+    plan_s: Estimated
+    renderer_s: Estimated
     resolution: Resolution
-    level: Share
-    fitted: tuple[Resolution, ...]
-    rounds: Size
-    forecasts: tuple[Forecast, ...]
-    cheapest: tuple[Reached, ...]
-
-
-class Pictures(Record):
-    """Half ranges of the signed pictures; red is positive."""
-
-    effect_limit: Annotated[float, Meta(description="ΔE2000 removed.", gt=0)]
+    spp: Size
 
 
 class Cost(Record, kw_only=True):
-    """What accuracy costs in time on one scene; times are in seconds for one image."""
+    """What accuracy costs in time on one scene; times are in seconds for one image.
+
+    Attributes
+    ----------
+    threads
+        Threads that render.
+    processor_share
+        Processor time that samples took, as a share of what these threads could take: the rest
+        went to other programs.
+    at, predicted, measured
+        A larger size, what is predicted there, and what was measured there.
+    left_out
+        Methods that the scene does not allow, and why.
+    """
 
     record_version: int = VERSION
     scene: str
@@ -208,12 +204,12 @@ class Cost(Record, kw_only=True):
     seed: Count
     resolution: Resolution
     rounds: Annotated[int, Meta(description="Timed repeats of each method.", ge=2)]
-    level: Annotated[Share, Meta(description="Chance that intervals of seconds hold the median.")]
+    threads: Size
+    processor_share: Share
     reference: Converged
-    methods: tuple[Method, ...]
-    points: tuple[Measured, ...]
-    equal_error: tuple[Reached, ...]
-    attribution: Attribution
+    methods: tuple[TimedMethod, ...]
+    points: tuple[Point, ...]
+    attribution: CostAttribution
     closure: Annotated[
         MeanError,
         Meta(description="What remains with all effects simulated: only a fault can leave any."),
@@ -223,18 +219,25 @@ class Cost(Record, kw_only=True):
     machine: Machine
     versions: Versions
     command: str
-    pictures: Pictures
     guard: Guard | None = None
-    prediction: Prediction | None = None
-    left_out: tuple[LeftOut, ...] = ()
-    objects: Annotated[
-        tuple[ObjectContribution, ...], Meta(description="What the effects remove on each shape.")
-    ] = ()
+    at: Resolution | None = None
+    predicted: tuple[Point, ...] = ()
+    measured: tuple[Point, ...] = ()
+    left_out: dict[str, str]
 
-    def points_of(self, method: str) -> tuple[Measured, ...]:
+    @property
+    def is_busy(self) -> bool:
+        """Whether other programs took processor time while it was measured."""
+        return self.processor_share < LEAST_SHARE
+
+    def method(self, name: str) -> TimedMethod:
+        """Return a method by any of its names, also one that was merged with another."""
+        return next(one for one in self.methods if name in (one.name, *one.names))
+
+    def points_of(self, name: str) -> tuple[Point, ...]:
         """Return the points of a method."""
-        return tuple(point for point in self.points if point.method == method)
+        return tuple(point for point in self.points if point.method == name)
 
-    def reached_by(self, method: str) -> tuple[Reached, ...]:
-        """Return when a method reaches each error."""
-        return tuple(row for row in self.equal_error if row.method == method)
+
+LEAST_SHARE = 0.85
+"""Share of the threads' processor time: less tells of a busy machine."""

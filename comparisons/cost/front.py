@@ -1,94 +1,84 @@
-"""Compare measured methods: Pareto front, cheapest, equal error.
+"""Which methods are worth their time: the front of time and error, and what suffices.
 
-A point is a method at one sample count, with a time in seconds and an error. Equal error is
-interpolated between two counts of one method, along a straight line in logarithms: its slope is
-−1/2 if the error is noise alone, and flatter near the method's own bias. Nothing is extrapolated
-beyond the counts.
+A method suffices at a tolerance t if at most 5 % of the pixels of its image exceed ΔE2000 t
+(:mod:`comparisons.departure.criterion`). Intervals decide: what lies inside one another's is too
+close to call.
 """
 
-from collections.abc import Iterable, Sequence
-from itertools import pairwise
-from math import log
+from collections.abc import Sequence
 
-import numpy as np
+from msgspec import structs
 
-from comparisons.cost.cost_record import LeftOut, Measured, Reached, Seconds
-from comparisons.cost.measure import Effort, measure_ladder
+from comparisons.cost.cost_record import Point, TimedMethod
+from comparisons.cost.measure import Effort, Size, measure_ladder
 from comparisons.cost.methods import FULL_PLAN
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.criterion import checked_threshold
+from comparisons.hybrids.why import MeanError
 from comparisons.options import Options
-from heuristic.errors import unknown
-from reference.records import VERSION, Positive, Record, Resolution
-from reference.rendering.gbuffer import image_size
+from reference.pairing.prepare import film_size
+from reference.records import VERSION, Estimated, Positive, Record, Resolution
 from reference.rendering.renderer import Progress
 from reference.scene.source import Source
 
-ERRORS = (5.0, 2.0, 1.0, 0.5)
+Interval = Estimated | MeanError
 
 
-def reached(errors: Sequence[float], error: float) -> float | None:
-    """Return where the errors of one method, its fastest point first, fall to an error.
-
-    As a place for :func:`at`: 1.5 is half way from the second point to the third, in logarithms.
-    """
-    if errors[0] <= error:
-        return 0.0
-    for number, (before, after) in enumerate(pairwise(errors)):
-        if after <= error < before:
-            share = log(before / error) / log(before / after) if after > 0 else 1.0
-            return number + share
-    return None
+def is_below(one: Interval, other: Interval) -> bool:
+    """Return whether one interval lies below another."""
+    return one.high < other.low
 
 
-def at(values: Sequence[float], place: float) -> float:
-    """Return the value at a place on a curve, given positive values at the points."""
-    return float(np.exp(np.interp(place, range(len(values)), np.log(values))))
+def beats(one: Point, other: Point) -> bool:
+    """Return whether a point is clearly faster or more accurate, and not clearly the opposite."""
+    faster, better = is_below(one.seconds, other.seconds), is_below(one.error, other.error)
+    slower, worse = is_below(other.seconds, one.seconds), is_below(other.error, one.error)
+    return (faster and not worse) or (better and not slower)
 
 
-def cheapest(points: Iterable[Measured], within: float) -> Measured | None:
-    """Return the fastest point with at most this error; of equally fast ones the most accurate."""
-    allowed = (point for point in points if point.error.mean <= within)
-    return min(allowed, key=lambda point: (point.seconds.value, point.error.mean), default=None)
+def fronted(points: Sequence[Point]) -> tuple[Point, ...]:
+    """Return the points, of which those that none beats are on the front, with their ties."""
+    front = [one for one in points if not any(beats(other, one) for other in points)]
 
+    def ties(one: Point) -> tuple[str, ...]:
+        same = (
+            other.method
+            for other in front
+            if other.method != one.method and not _differ(one, other)
+        )
+        return tuple(dict.fromkeys(same))
 
-def pareto(points: Iterable[Measured]) -> tuple[Measured, ...]:
-    """Return the points that no other point beats in time or error while matching the other."""
-    front, best = [], float("inf")
-    for point in sorted(points, key=lambda p: (p.seconds.value, p.error.mean)):
-        if point.error.mean < best:
-            front.append(point)
-            best = point.error.mean
-    return tuple(front)
-
-
-def equal_error(
-    points: Sequence[Measured], errors: Sequence[float] = ERRORS
-) -> tuple[Reached, ...]:
-    """Return when each method reaches each error, in the order of the points."""
-    methods = list(dict.fromkeys(point.method for point in points))
     return tuple(
-        _reached(method, [point for point in points if point.method == method], error)
-        for method in methods
-        for error in errors
+        structs.replace(one, front=True, ties=ties(one)) if one in front else one for one in points
     )
 
 
-def _reached(method: str, points: Iterable[Measured], error: float) -> Reached:
-    """Return when a method reaches an error, with an interval from its points' uncertainty."""
-    ordered = sorted(points, key=lambda point: point.seconds.value)
-    found = reached([point.error.mean for point in ordered], error)
-    if found is None:
-        return Reached(method=method, error=error, seconds=None)
-    ends = []
-    for end in ("low", "high"):
-        errors = [max(getattr(p.error, end), 0.0) for p in ordered]
-        place = reached(errors, error)
-        place = len(ordered) - 1 if place is None else place
-        ends.append(at([getattr(p.seconds, end) for p in ordered], place))
-    value = at([point.seconds.value for point in ordered], found)
-    seconds = Seconds(value=value, low=min(ends[0], value), high=max(ends[1], value))
-    at_most = ordered[0].error.mean <= error
-    return Reached(method=method, error=error, seconds=seconds, at_most=at_most)
+def _differ(one: Point, other: Point) -> bool:
+    pairs = ((one.seconds, other.seconds), (one.error, other.error))
+    return any(is_below(a, b) or is_below(b, a) for a, b in pairs)
+
+
+def sufficient(points: Sequence[Point], tolerance: float) -> Point | None:
+    """Return the fastest point that surely suffices at a tolerance; None if none does.
+
+    Of those whose times are too close to call it is the most accurate; the others are its ties.
+    """
+    enough = [point for point in points if point.tolerance.high <= tolerance]
+    if not enough:
+        return None
+    fastest = min(enough, key=lambda point: point.seconds.value)
+    alike = [one for one in enough if not is_below(fastest.seconds, one.seconds)]
+    best = min(alike, key=lambda point: point.tolerance.mean)
+    ties = dict.fromkeys(one.method for one in alike if one.method != best.method)
+    return structs.replace(best, ties=tuple(ties))
+
+
+def at_size(points: Sequence[Point], methods: Sequence[TimedMethod], size: Size) -> list[Point]:
+    """Return points as they are at another size: with the times there, and the same errors."""
+    known = {method.name: method for method in methods}
+    samples = size[0] * size[1]
+    return [
+        structs.replace(one, seconds=known[one.method].seconds(one.spp * samples)) for one in points
+    ]
 
 
 class Choice(Record, kw_only=True):
@@ -96,26 +86,28 @@ class Choice(Record, kw_only=True):
 
     Attributes
     ----------
-    metric, within
-        Name of the metric, and the largest allowed mean.
+    resolution, measured
+        Size of the times, and of the images in which errors were measured.
+    within
+        The tolerance, ΔE2000.
     chosen
-        The cheapest point within the tolerance; None if there is none.
+        The fastest point that suffices; None if none does.
     best
-        The one with the smallest error.
+        The one that suffices at the smallest tolerance.
     full
-        The full plan with the fewest samples within the tolerance, else with the most samples.
+        The full plan with the fewest samples that suffice, else with the most samples.
     left_out
-        Methods that the scene cannot have.
+        Methods that the scene cannot have, and why.
     """
 
     scene: str
     resolution: Resolution
-    metric: str
+    measured: Resolution
     within: Positive
-    chosen: Measured | None
-    best: Measured
-    full: Measured
-    left_out: tuple[LeftOut, ...] = ()
+    chosen: Point | None
+    best: Point
+    full: Point
+    left_out: dict[str, str]
     record_version: int = VERSION
 
 
@@ -124,25 +116,23 @@ def choose(
     within: float,
     options: Options | None = None,
     effort: Effort | None = None,
-    metric: str = "dE2000",
     progress: Progress | None = None,
 ) -> Choice:
     """Measure the ladder of a scene, in the current variant, and choose from it."""
-    if metric not in METRICS:
-        raise unknown("metric", metric, METRICS)
-    shown = progress or (lambda *_: None)
-    found = measure_ladder(source, options or Options(), effort or Effort(), shown, METRICS[metric])
-    full = next(one.name for one in found.ladder.methods if FULL_PLAN.name in one.names)
-    of_full = [point for point in found.points if point.method == full]
+    checked_threshold(within)
+    options = options or Options()
+    found = measure_ladder(source, options, effort or Effort(), progress or (lambda *_: None))
+    size = options.resolution or film_size(source.parse(), options.sensor)
+    points = at_size(found.points, found.methods, size)
+    full = next(one.name for one in found.methods if FULL_PLAN.name in one.names)
+    of_full = [point for point in points if point.method == full]
     return Choice(
         scene=source.name,
-        resolution=image_size(found.ready.scene),
-        metric=metric,
+        resolution=size,
+        measured=found.size,
         within=within,
-        chosen=cheapest(found.points, within),
-        best=min(found.points, key=lambda point: (point.error.mean, point.seconds.value)),
-        full=cheapest(of_full, within) or max(of_full, key=lambda point: point.spp),
-        left_out=tuple(
-            LeftOut(name=name, reason=reason) for name, reason in found.ladder.left_out.items()
-        ),
+        chosen=sufficient(points, within),
+        best=min(points, key=lambda point: (point.tolerance.mean, point.seconds.value)),
+        full=sufficient(of_full, within) or max(of_full, key=lambda point: point.spp),
+        left_out=found.ladder.left_out,
     )

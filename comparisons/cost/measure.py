@@ -1,39 +1,45 @@
-"""Measure the ladder: time each method, and its error against a converged reference.
+"""Measure the ladder: the time of each method, and its error against a converged reference.
 
-Methods are timed in turn, so a drift of the machine affects all equally. Each time is of one
-rendering of the whole image, evaluated and synchronised. The first run of a method traces and
-compiles, and is reported separately; the second warms caches; the rounds follow, each with its own
-seed, so their errors are independent.
+The first image of a method traces and compiles, and is reported separately. Then all methods take
+turns, at several sample counts; :mod:`comparisons.cost.times` makes overhead and time per sample of
+it. Each round has its own seed, so the errors of the rounds are independent.
 """
 
 import gc
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from itertools import count as count_from
 from itertools import takewhile
 from math import sqrt
 from statistics import NormalDist
-from typing import TypeVar
+from typing import Any
 
+import drjit as dr
 import numpy as np
-from numpy.typing import ArrayLike
+from msgspec import structs
+from numpy.typing import ArrayLike, NDArray
 
-from comparisons import intervals
-from comparisons.cost.cost_record import Measured, Seconds
-from comparisons.cost.methods import DEPTHS, Ladder
-from comparisons.departure.metrics import LEADING, Metric
-from comparisons.hybrids.attribution import ErrorMeter
+from comparisons.cost import times
+from comparisons.cost.cost_record import Converged, Method, Point, TimedMethod
+from comparisons.cost.methods import DEPTHS, Ladder, Step
+from comparisons.departure.colour import Viewing
+from comparisons.departure.criterion import LIMIT
+from comparisons.departure.metrics import LEADING
 from comparisons.hybrids.why import MeanError
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
 from heuristic.errors import InputError
 from reference.pairing.prepare import film_size
-from reference.rendering.gbuffer import gbuffer
+from reference.rendering.gbuffer import image_size
 from reference.rendering.renderer import Progress, Renderer, Stream, passes
-from reference.rendering.sums import MEAN, Accumulator, Estimate
+from reference.rendering.sums import Accumulator, Estimate
 from reference.scene.source import Source
 
 Size = tuple[int, int]
+
+Key = tuple[Any, ...]
+"""Name of a method, samples per pixel, and what else tells renderings apart."""
 
 SURE = NormalDist().inv_cdf(0.975)
 """Standard errors to each side of an interval of 95 %."""
@@ -41,11 +47,17 @@ SURE = NormalDist().inv_cdf(0.975)
 DETERMINISTIC_SPP = (4, 16)
 """Samples per pixel of methods without random numbers; only the pixel filter needs them."""
 
-WIDTH, QUICK_WIDTH = 128, 48
-"""Default width of an image in pixels; costs are proportional to the number of pixels."""
+WIDTH, QUICK_WIDTH = 128, 64
+"""Default width of an image in pixels: the time of a sample does not depend on it."""
 
-Key = TypeVar("Key", bound=tuple)
-"""Name of a method, samples per pixel, and what else tells measurements apart."""
+REFERENCE_SPP, REFERENCE_PASSES = 64, 16
+"""Samples per pixel of each pass of the converged reference, and passes at least."""
+
+MOST_SAMPLES = 2**24
+"""Samples of one image, at most."""
+
+WARM = 2
+"""Rounds before those that are timed: the first traces and compiles, the second warms caches."""
 
 
 @dataclass(frozen=True)
@@ -55,22 +67,16 @@ class Effort:
     Parameters
     ----------
     rounds
-        Timed repeats of each method, at least 2. From 6 on the median has a 95 % interval.
+        Timed repeats of each method, at least 2.
     largest
-        Most samples per pixel of the Monte Carlo methods. Their counts are powers of 4, at which
-        the sampler stratifies best.
+        Most samples per pixel at which errors of the Monte Carlo methods are measured. The counts
+        are powers of 4, at which the sampler stratifies best.
     deterministic
         Samples per pixel of the other methods.
     depths
         Depths of ``path`` that are methods.
     stand_ins
         Whether what engines use in place of transport is measured too.
-    reference_spp
-        Samples per pixel of each pass of the converged reference.
-    replicates, replicate_spp
-        Replicates of each hybrid, at least 3, and samples per pixel of each.
-    exact_effects, orders
-        Largest number of effects for which every subset is rendered, and orders drawn for more.
     """
 
     rounds: int = 7
@@ -78,60 +84,66 @@ class Effort:
     deterministic: tuple[int, ...] = DETERMINISTIC_SPP
     depths: tuple[int, ...] = DEPTHS
     stand_ins: bool = True
-    reference_spp: int = 64
-    replicates: int = 8
-    replicate_spp: int = 64
-    exact_effects: int = 6
-    orders: int = 48
 
     def __post_init__(self) -> None:
         if self.rounds < 2:
             raise InputError(f"rounds = {self.rounds} is not allowed: give at least 2.")
 
-    @property
-    def counts(self) -> tuple[int, ...]:
-        """The sample counts of the Monte Carlo methods."""
+    def counts(self, method: Method) -> tuple[int, ...]:
+        """Return the sample counts at which the error of a method is measured."""
+        if not method.monte_carlo:
+            return self.deterministic
         powers = takewhile(lambda count: count <= self.largest, (4**i for i in count_from(1)))
         return tuple(powers) or (self.largest,)
 
 
-QUICK = Effort(
-    rounds=3,
-    largest=16,
-    deterministic=(16,),
-    depths=(3,),
-    replicates=4,
-    exact_effects=4,
-    orders=8,
-)
-"""For many scenes in one report, at :data:`QUICK_WIDTH`. There, tracing takes most of the time, so
-renderings are few, with many samples each: with 16 instead of 64, skewed noise left 2 % of the
-Cornell box's departure in the closure."""
+QUICK = Effort(rounds=3, largest=16, deterministic=(16,), depths=(3,), stand_ins=False)
+"""For scenes of a report."""
 
 
 def reduced(source: Source, options: Options, width: int) -> Size:
     """Return the requested resolution, else that of the film, reduced to a width."""
-    given = options.resolution or film_size(source.parse(), options.sensor)
-    if given[0] <= width:
-        return given
-    return width, max(1, round(given[1] * width / given[0]))
+    size = options.resolution or film_size(source.parse(), options.sensor)
+    if size[0] <= width:
+        return size
+    return width, max(1, round(size[1] * width / size[0]))
+
+
+Judge = Callable[[NDArray], tuple[float, float]]
+"""Returns an image's mean ΔE2000, and the ΔE2000 that a share LIMIT of its pixels exceed."""
+
+
+def judge_by(reference: Estimate, counted: NDArray[np.bool_], viewing: Viewing) -> Judge:
+    """Return what measures the errors of single images against a converged reference."""
+    distances = LEADING.against(reference.mean, counted, viewing)
+
+    def judge(image: NDArray) -> tuple[float, float]:
+        found = distances(image)
+        return LEADING.mean(found), float(np.quantile(found, 1 - LIMIT))
+
+    return judge
 
 
 @dataclass(frozen=True)
 class Measurements:
-    """A measured ladder: the options and effort used, and the points.
+    """A measured ladder: the options and effort used, methods and points.
 
-    ``images`` are ``{method: (H, W, 3)}``, one rendering with the most samples of each.
+    ``lines`` are the times of all methods and steps, by name; ``images`` are ``{method: (H, W,
+    3)}``, one rendering with the most samples of each; ``size`` is that of the images.
     """
 
     options: Options
     effort: Effort
     ready: Prepared
     ladder: Ladder
+    size: Size
     reference: Estimate
-    meter: ErrorMeter
-    points: tuple[Measured, ...]
-    images: Mapping[str, np.ndarray]
+    converged: Converged
+    methods: tuple[TimedMethod, ...]
+    points: tuple[Point, ...]
+    lines: Mapping[str, times.Line]
+    steps: tuple[Step, ...]
+    images: Mapping[str, NDArray]
 
 
 def measure_ladder(
@@ -139,122 +151,187 @@ def measure_ladder(
     options: Options,
     effort: Effort,
     progress: Progress,
-    metric: Metric = LEADING,
     at: Size | None = None,
+    width: int = WIDTH,
+    alone: AbstractContextManager[Any] | None = None,
 ) -> Measurements:
     """Measure every method of a scene's ladder, in the current variant.
 
-    If ``options.resolution`` is omitted, that of ``at``, or of the film, is reduced to
-    :data:`WIDTH`. ``options.spp`` is the largest sample count of a Monte Carlo method. Errors are
-    means of ``metric``.
+    If ``options.resolution`` is omitted, that of ``at``, or of the film, is reduced to ``width``.
+    ``options.spp`` is the largest sample count of a Monte Carlo method. Times are measured within
+    the context ``alone``.
     """
     options.require_model("a study of cost")
     if options.resolution is None:
         shaped = options.changed(resolution=at)
-        options = options.changed(resolution=reduced(source, shaped, WIDTH))
+        options = options.changed(resolution=reduced(source, shaped, width))
     if options.spp is not None:
         effort = replace(effort, largest=options.spp)
     ready = guarded(source, options.changed(spp=None, allow_empty=False))
-    reference, groups = converged(ready, effort, options.seed, progress)
-    meter = ErrorMeter(reference, ready.counted, options.viewing, metric, groups)
+    reference = converged(ready, options.seed, progress)
+    judge = judge_by(reference, ready.counted, options.viewing)
     ladder = Ladder(source, options, ready, effort.depths, effort.stand_ins)
-    renderers = {
-        (method.name, spp): ladder.renderer(method, spp)
-        for method in ladder.methods
-        for spp in (effort.counts if method.monte_carlo else effort.deterministic)
-    }
+    size = image_size(ready.scene)
     gc.collect()  # release scenes that pairing left behind
-    points, images = measure(
-        renderers, lambda _: meter, effort.rounds, options.seed, progress, "timing"
+    steps = tuple(ladder.steps())
+    wanted = {one.name: one for step in steps for one in (step.before, step.after)}
+    wanted |= {one.name: one for one in ladder.methods}
+    counts = {name: effort.counts(one) for name, one in wanted.items()}
+    with alone or nullcontext():
+        renderers = tried(
+            {name: ladder.renderer(one, counts[name][-1]) for name, one in wanted.items()},
+            counts, size[0] * size[1], progress,
+        )  # fmt: skip
+        judged = {(one.name, spp) for one in ladder.methods for spp in counts[one.name]}
+        errors, images = rendered(
+            renderers, lambda _: judge, judged, effort.rounds, options.seed, progress, "timing"
+        )
+    found = timed(renderers, effort.rounds, size[0] * size[1], options.seed)
+    methods = tuple(
+        timed_method(one, found, steps[0].before.name, renderers[one.name, counts[one.name][-1]])
+        for one in ladder.methods
     )
-    ladder.forget()  # its scenes would slow later work
     return Measurements(
         options=options,
         effort=effort,
         ready=ready,
         ladder=ladder,
+        size=size,
         reference=reference,
-        meter=meter,
-        points=tuple(points.values()),
-        images={name: image for (name, _), image in images.items()},
+        converged=Converged(
+            integrator=ready.plan.integrator,
+            max_depth=ready.plan.max_depth,
+            spp=REFERENCE_SPP * reference.passes,
+            passes=reference.passes,
+            noise_floor=judge(reference.mean + reference.noise)[0],
+        ),
+        methods=methods,
+        points=tuple(
+            point(one, spp, size, *errors[one.name, spp])
+            for one in methods
+            for spp in counts[one.name]
+        ),
+        lines=found,
+        steps=steps,
+        images={name: image for (name, *_), image in images.items()},
     )
 
 
 def converged(
-    ready: Prepared,
-    effort: Effort,
-    seed: int,
-    progress: Progress | None,
-    size: Size | None = None,
-) -> tuple[Estimate, np.ndarray]:
-    """Render the reference, with seeds that no method has.
-
-    Returns its estimate, and the means (R, H, W, 3) of as many groups of its passes as a hybrid has
-    replicates, with an even number of passes each.
-    """
-    groups = effort.replicates
+    ready: Prepared, seed: int, progress: Progress | None, size: Size | None = None
+) -> Estimate:
+    """Render the reference, with seeds that no method has."""
     integrator = ready.reference.integrator
-    renderer = Renderer(ready.scene, integrator, effort.reference_spp, "reference image", size)
-    total, means = Accumulator(), [Accumulator(MEAN) for _ in range(groups)]
-    count, stream = 2 * groups * -(-ready.plan.passes // (2 * groups)), Stream.OTHER_SIDE
+    renderer = Renderer(ready.scene, integrator, REFERENCE_SPP, "reference image", size)
+    total, count = Accumulator(), max(REFERENCE_PASSES, ready.plan.passes)
+    stream = Stream.OTHER_SIDE
     for one in passes([renderer], seed, count, stream=stream, progress=progress, stage="reference"):
         total.add(one.images[0])
-        means[one.number % groups].add(one.images[0])
-    return total.estimate(), np.stack([mean.mean() for mean in means])
+    return total.estimate()
 
 
-def meter_at(
-    ladder: Ladder, effort: Effort, seed: int, progress: Progress, size: Size
-) -> ErrorMeter:
-    """Return the error meter of a ladder's scene at another size."""
-    ready = ladder.ready
-    reference, _ = converged(ready, effort, seed, progress, size)
-    return ErrorMeter(reference, gbuffer(ready.scene, *size).hit, ladder.viewing)
+def tried(
+    firsts: Mapping[str, Renderer],
+    counts: Mapping[str, Collection[int]],
+    pixels: int,
+    progress: Progress | None = None,
+) -> dict[Key, Renderer]:
+    """Return renderers by name and samples per pixel: those of ``counts``, and some for the time.
+
+    The largest takes at least :data:`times.LEAST_S`, and one a fourth of its samples. ``firsts``
+    have the most samples of the method's counts.
+    """
+    renderers: dict[Key, Renderer] = {}
+    for number, (name, first) in enumerate(firsts.items()):
+        if progress:
+            progress("compiling", number, len(firsts))
+        own = {first.spp: first}
+        last = first
+        while True:
+            for seed in (0, 1):
+                last.render(seed)
+            if last.times[-1] >= times.LEAST_S or 4 * last.spp * pixels > MOST_SAMPLES:
+                break
+            last = first.sampled(4 * last.spp)
+            own[last.spp] = last
+        for spp in {*counts[name], max(1, last.spp // 4), max(1, last.spp // 16)} - own.keys():
+            own[spp] = first.sampled(spp)
+        renderers |= {(name, spp): own[spp] for spp in sorted(own)}
+    if progress:
+        progress("compiling", len(firsts), len(firsts))
+    return renderers
 
 
-def measure(
+def rendered(
     renderers: Mapping[Key, Renderer],
-    meter_of: Callable[[Key], ErrorMeter],
+    judge_of: Callable[[Key], Judge],
+    judged: Collection[Key],
     rounds: int,
     seed: int,
     progress: Progress | None,
     stage: str,
-) -> tuple[dict[Key, Measured], dict[Key, np.ndarray]]:
-    """Time renderers in turn, at least twice, and measure their errors.
+) -> tuple[dict[Key, tuple[MeanError, MeanError]], dict[Key, NDArray]]:
+    """Render in turn, at least twice; the renderers note their times.
 
-    Returns one record per renderer, in order, and the last round's image (H, W, 3) of each.
+    Returns the errors of those that are ``judged``, mean and tolerance, and their last images.
     """
-    errors: dict[Key, list[tuple[float, float]]] = {key: [] for key in renderers}
-    images: dict[Key, np.ndarray] = {}
-    loop = passes([*renderers.values()], seed, rounds + 2, progress=progress, stage=stage)
+    errors: dict[Key, list[tuple[float, float]]] = {key: [] for key in renderers if key in judged}
+    images: dict[Key, NDArray] = {}
+    loop = passes([*renderers.values()], seed, rounds + WARM, progress=progress, stage=stage)
     for one in loop:
-        images = dict(zip(renderers, map(np.array, one.images), strict=True))
-        if one.number > 1:
-            for key, image in images.items():
-                errors[key].append(meter_of(key).errors(image))
-    points = {}
-    for key, renderer in renderers.items():
-        error, mse = np.mean(errors[key], axis=0).tolist()
-        half = SURE * float(np.std(errors[key], axis=0, ddof=1)[0]) / sqrt(rounds)
-        points[key] = Measured(
-            method=key[0],
-            spp=key[1],
-            seconds=median(renderer.times[2:])[0],
-            error=MeanError(mean=error, low=error - half, high=error + half),
-            mse=mse,
-            first_s=renderer.times[0],
-            compile_s=renderer.compilation,
-            prepare_s=getattr(renderer.integrator, "preparation", 0.0),
-        )
-    return points, images
+        for key, image in zip(renderers, one.images, strict=True):
+            if key in judged and one.number >= WARM:
+                images[key] = np.array(image)
+                errors[key].append(judge_of(key)(images[key]))
+    return {key: _mean_errors(each) for key, each in errors.items()}, images
 
 
-def median(values: ArrayLike) -> tuple[Seconds, float]:
-    """Return the median of at least two repeats, with an interval, and the interval's level.
+def _mean_errors(errors: ArrayLike) -> tuple[MeanError, MeanError]:
+    each = np.asarray(errors)
+    means, halves = each.mean(axis=0), SURE * each.std(axis=0, ddof=1) / sqrt(len(each))
+    mean, tolerance = (
+        MeanError(mean=float(m), low=float(m - half), high=float(m + half))
+        for m, half in zip(means, halves, strict=True)
+    )
+    return mean, tolerance
 
-    With fewer than six repeats even the extremes hold the true median with a chance below 95 %.
-    """
-    ordered = np.sort(np.asarray(values, float))
-    low, high, level = intervals.median_ranks(len(ordered))
-    ends = {"low": float(ordered[low]), "high": float(ordered[high])}
-    return Seconds(value=float(np.median(ordered)), **ends), level
+
+def timed(
+    renderers: Mapping[Key, Renderer], rounds: int, pixels: int, seed: int = 0
+) -> dict[str, times.Line]:
+    """Return the time of each method from the last rounds of its renderers."""
+    seconds: dict[str, dict[int, tuple[Any, Any]]] = {}
+    for (name, spp, *_), renderer in renderers.items():
+        own = renderer.times[-rounds:], renderer.processor_times[-rounds:]
+        seconds.setdefault(name, {})[spp * pixels] = own
+    return times.lines(seconds, seed)
+
+
+def timed_method(
+    method: Method, found: Mapping[str, times.Line], textbook: str, first: Renderer
+) -> TimedMethod:
+    """Return a method with its times; ``first`` rendered its first image."""
+    line = found[method.name]
+    return TimedMethod(
+        **structs.asdict(method),
+        overhead_s=times.interval(line.overhead, times.UNSEEN * line.shortest),
+        per_sample_s=times.interval(line.per_sample, times.UNSEEN * float(line.per_sample[0])),
+        ratio=times.ratio(line, found[textbook]),
+        processor_s=float(line.per_sample[0]) * line.processors,
+        bend=line.bend,
+        first_s=first.times[0],
+        prepare_s=getattr(first.integrator, "preparation", 0.0),
+    )
+
+
+def point(
+    method: TimedMethod, spp: int, size: Size, error: MeanError, tolerance: MeanError
+) -> Point:
+    """Return the point of a method, with errors, at a size."""
+    seconds = method.seconds(spp * size[0] * size[1])
+    return Point(method=method.name, spp=spp, seconds=seconds, error=error, tolerance=tolerance)
+
+
+def threads() -> int:
+    """Return the number of threads that render."""
+    return int(dr.thread_count())

@@ -10,9 +10,9 @@ before the full plan::
     declare(Method(name="no shadows", family="physical", without=("occlusion",), max_depth=2))
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from functools import cache
+from typing import Any, NamedTuple
 
 import mitsuba as mi
 from msgspec import structs
@@ -21,17 +21,23 @@ from comparisons.cost.cost_record import Method
 from comparisons.hybrids.hybrids import HybridScenes, Pairs
 from comparisons.options import Options
 from comparisons.prepared import Prepared
+from heuristic.convention import Scene
 from heuristic.errors import InputError
-from heuristic.heuristics import PHONG, Heuristic, Interpolation, named
+from heuristic.heuristics import PHONG, Interpolation, named
+from heuristic.tessellation import RESOLUTION
 from reference.pairing.halves import INTEGRATOR
 from reference.planning.effects import (
     EFFECTS,
     ENVIRONMENT,
     INTERREFLECTION,
     OCCLUSION,
+    POLYGONS,
+    SPECTRAL,
+    Effect,
     PrunedEffect,
     ReplacedEffect,
 )
+from reference.planning.facts import SHAPE
 from reference.planning.plan import physical_integrator
 from reference.rendering.renderer import Renderer, variant
 from reference.rendering.sampler import with_sampler
@@ -117,104 +123,25 @@ def declare(method: Method) -> Method:
     return method
 
 
-@dataclass(frozen=True)
-class Traits:
-    """What the scene has, according to its plan.
+class Step(NamedTuple):
+    """Two methods of which the second has one effect more, and the step's weight in a sum.
 
-    ``effects`` are labels of those that make a difference when left out, ``kernel_shadows`` whether
-    the heuristic half has its own shadows, ``max_depth`` the scene's own limit of path length, -1
-    if unlimited, ``random`` whether direct light needs random numbers, and ``background`` whether
-    the heuristic half has an environment, which its own ``I_a`` does not need.
+    Without an ``effect``, both simulate the same: the kernel, and Mitsuba's integrator on the
+    scene's own shapes.
     """
 
-    effects: frozenset[str]
-    kernel_shadows: bool
-    max_depth: int
-    random: bool
-    background: bool
-
-
-def distinct(
-    scene: Traits, refusals: Mapping[str, str], depths: tuple[int, ...] = DEPTHS
-) -> tuple[Method, ...]:
-    """Return the methods that differ in a scene, cheapest idea first.
-
-    ``refusals`` tell why the scene does not allow an interpolation or heuristic, by name; empty if
-    it does. A merged method has the plainest name: the first of kernels, else the last, such as
-    full plan.
-    """
-    found: dict[Method, list[Method]] = {}
-    for method in all_methods(depths):
-        if not why_not(method, scene, refusals):
-            found.setdefault(_reduced(method, scene), []).append(method)
-    made = []
-    for reduced, merged in found.items():
-        plainest = merged[0 if reduced.is_kernel else -1]
-        is_indirect = INTERREFLECTION.label in scene.effects - set(reduced.without)
-        made.append(
-            structs.replace(
-                reduced,
-                name=plainest.name,
-                family=plainest.family,
-                stands_in_for=plainest.stands_in_for,
-                names=tuple(method.name for method in merged),
-                monte_carlo=not reduced.is_kernel and (scene.random or is_indirect),
-            )
-        )
-    return tuple(made)
-
-
-def shaded_by(heuristic: Heuristic, method: Method) -> Method:
-    """Return a method; if a kernel, its name includes a heuristic other than Phong."""
-    if heuristic is PHONG or not method.is_kernel or method.heuristic:
-        return method
-    name = f"{method.name}: {heuristic.label}"
-    return structs.replace(method, name=name, names=(name, *method.names))
-
-
-def why_not(method: Method, scene: Traits, refusals: Mapping[str, str]) -> str:
-    """Return why a scene cannot have a method, in words; empty if it can."""
-    # Without an environment in the heuristic half, a stand-in for it has no input.
-    indirect = scene.effects - (frozenset() if scene.background else {ENVIRONMENT.label})
-    if method.stands_in_for and not indirect.intersection(method.stands_in_for):
-        effects = " or ".join(e.label for e in EFFECTS if e.label in method.stands_in_for)
-        return f"it stands in for {effects}, which the scene does not have"
-    if method.is_kernel:
-        words = (refusals.get(name, "") for name in (method.interpolation.value, method.heuristic))
-        return next(filter(None, words), "")
-    depth = method.max_depth
-    if depth is None or scene.max_depth == UNLIMITED or depth <= scene.max_depth:
-        return ""
-    return f"the scene's own paths end at depth {scene.max_depth}"
-
-
-def _reduced(method: Method, scene: Traits) -> Method:
-    """Return only what a method renders, without what the scene does not have."""
-    if method.is_kernel:
-        shadows = method.shadows and OCCLUSION.label in scene.effects
-        return Method(
-            name="",
-            family="kernel",
-            interpolation=method.interpolation,
-            shadows=shadows or scene.kernel_shadows,
-            heuristic=method.heuristic,
-        )
-    without = {*method.without, *([INTERREFLECTION.label] if method.max_depth == 2 else [])}
-    is_indirect = INTERREFLECTION.label in scene.effects - without
-    is_limited = is_indirect and method.max_depth != scene.max_depth
-    return Method(
-        name="",
-        family="physical",
-        without=tuple(sorted(without & scene.effects)),
-        max_depth=method.max_depth if is_limited else None,
-    )
+    effect: str
+    weight: float
+    before: Method
+    after: Method
 
 
 class Ladder:
     """The methods of a prepared comparison, and a renderer for each of them.
 
     ``depths`` are those of ``path`` that are methods, and ``stand_ins`` whether heuristics in place
-    of transport are. ``left_out`` tells why the scene cannot have a method, by its name.
+    of transport are. ``left_out`` tells why the scene cannot have a method, by its name. All
+    kernels have the same mesh, or the scene's own shapes.
     """
 
     def __init__(
@@ -225,53 +152,165 @@ class Ladder:
         depths: tuple[int, ...] = DEPTHS,
         stand_ins: bool = True,
     ) -> None:
-        self.ready, self.viewing = ready, options.viewing
+        if options.polygon_shading is not Interpolation.PHONG and options.tessellation is None:
+            options = options.changed(tessellation=RESOLUTION)
+        self.ready, self.options = ready, options
         self.pairs = Pairs(source, options, ready)
         self.scenes = HybridScenes(self.pairs.plain(), ready.plan, ready.scene)
         plan, differences = ready.plan, set(self.scenes.differences)
         # If both halves have shadows, a method without them differs from both.
         shadows = {OCCLUSION} if plan.calls_for(OCCLUSION) else set()
+        self._effects = frozenset(effect.label for effect in differences | shadows)
         sampled = {effect for effect in EFFECTS if effect.sampled}
         if plan.tabulated_environment:
             sampled.remove(ENVIRONMENT)
-        self.traits = Traits(
-            effects=frozenset(effect.label for effect in differences | shadows),
-            kernel_shadows=self.scenes.facts.has_shadows,
-            max_depth=plan.scene_depth,
-            random=any(plan.calls_for(one) or one in differences for one in sampled),
-            background=ready.heuristic.scene.environment() is not None,
-        )
+        self._is_random = any(plan.calls_for(one) or one in differences for one in sampled)
         refusals = self._refused_interpolations() | self._refused_heuristics(stand_ins)
-        found = distinct(self.traits, refusals, depths)
-        self.methods = tuple(shaded_by(named(options.heuristic), method) for method in found)
-        reasons = {one.name: why_not(one, self.traits, refusals) for one in all_methods(depths)}
-        self.left_out = {name: reason for name, reason in reasons.items() if reason}
+        merged: dict[Method, list[Method]] = {}
+        self.left_out: dict[str, str] = {}
+        for method in all_methods(depths):
+            if reason := self._why_not(method, refusals):
+                self.left_out[method.name] = reason
+            else:
+                merged.setdefault(self._form(method), []).append(method)
+        self._known = {form: self._merged(form, alike) for form, alike in merged.items()}
         self._kernel_scene = cache(self._make_kernel_scene)
+        self._plan_scenes: dict[frozenset[Effect], Scene] = {}
+
+    @property
+    def methods(self) -> tuple[Method, ...]:
+        """The methods that differ in the scene, cheapest idea first."""
+        return tuple(self._known.values())
 
     @property
     def heuristic_variant(self) -> str:
         """The Mitsuba variant of the kernels."""
         return self.pairs.heuristic_variant
 
+    def _form(self, method: Method) -> Method:
+        """Return only what a method renders, without what the scene does not have."""
+        if method.is_kernel:
+            shadows = method.shadows and OCCLUSION.label in self._effects
+            return Method(
+                name="",
+                family="kernel",
+                interpolation=method.interpolation,
+                shadows=shadows or self.scenes.facts.has_shadows,
+                heuristic=method.heuristic,
+            )
+        without = {*method.without, *([INTERREFLECTION.label] if method.max_depth == 2 else [])}
+        is_limited = (
+            INTERREFLECTION.label in self._effects - without
+            and method.max_depth != self.ready.plan.scene_depth
+        )
+        return Method(
+            name="",
+            family="physical",
+            without=tuple(sorted(without & self._effects)),
+            max_depth=method.max_depth if is_limited else None,
+        )
+
+    def _merged(self, form: Method, alike: list[Method]) -> Method:
+        """Return methods of one form as one, named as the first of kernels, or the last of plans.
+
+        The name of a kernel includes a heuristic other than Phong.
+        """
+        plainest, heuristic = alike[0 if form.is_kernel else -1], named(self.options.heuristic)
+        name, names = plainest.name, tuple(method.name for method in alike)
+        if form.is_kernel and heuristic is not PHONG and not form.heuristic:
+            name = f"{name}: {heuristic.label}"
+            names = (name, *names)
+        is_indirect = INTERREFLECTION.label in self._effects - set(form.without)
+        return structs.replace(
+            form,
+            name=name,
+            family=plainest.family,
+            stands_in_for=plainest.stands_in_for,
+            names=names,
+            monte_carlo=not form.is_kernel and (self._is_random or is_indirect),
+        )
+
+    def _why_not(self, method: Method, refusals: Mapping[str, str]) -> str:
+        """Return why the scene cannot have a method, in words; empty if it can.
+
+        ``refusals`` are the reasons against interpolations and heuristics, by name.
+        """
+        # Without an environment in the heuristic half, a stand-in for it has no input.
+        has_background = self.ready.heuristic.scene.environment() is not None
+        missing = self._effects - (set() if has_background else {ENVIRONMENT.label})
+        if method.stands_in_for and not missing.intersection(method.stands_in_for):
+            effects = " or ".join(e.label for e in EFFECTS if e.label in method.stands_in_for)
+            return f"it stands in for {effects}, which the scene does not have"
+        if method.is_kernel:
+            found = (refusals.get(name) for name in (method.interpolation.value, method.heuristic))
+            return next(filter(None, found), "")
+        depth, own = method.max_depth, self.ready.plan.scene_depth
+        is_there = depth is None or own == UNLIMITED or depth <= own
+        return "" if is_there else f"the scene's own paths end at depth {own}"
+
     def renderer(self, method: Method, spp: int, size: tuple[int, int] | None = None) -> Renderer:
         """Return a renderer of a method, with samples per pixel of a pass, and an image size."""
         if method.is_kernel:
-            with variant(self.heuristic_variant):
-                scene, integrator = self._kernel_scene(method.interpolation), self._kernel(method)
-                return Renderer(scene, integrator, spp, "image of the kernel", size)
+            with variant(method.variant or self.heuristic_variant):
+                scene = self._kernel_scene(method.interpolation, mi.variant())
+                return Renderer(scene, self._kernel(method), spp, "image of the kernel", size)
         simulated = {effect for effect in EFFECTS if effect.label not in method.without}
         plan = self.ready.plan.simulating(simulated, method.max_depth)
-        scene = self.scenes.of(simulated)
+        key = self.scenes.key(simulated)
+        if key not in self._plan_scenes:
+            self._plan_scenes[key] = self.scenes.of(key)
+        scene = self._plan_scenes[key]
         integrator = physical_integrator(plan, scene, self.ready.pair.hide_emitters)
         return Renderer(scene, integrator, spp, f"image of {method.name}", size)
 
     def forget(self) -> None:
         """Release the scenes of methods."""
         self._kernel_scene.cache_clear()
+        self._plan_scenes.clear()
         self.scenes.forget()
 
-    def _make_kernel_scene(self, interpolation: Interpolation) -> mi.Scene:
-        if interpolation is self.pairs.options.polygon_shading:
+    def steps(self) -> Iterator[Step]:
+        """Yield the steps from the kernel as requested to the full plan, an effect at a time.
+
+        The kernel gains the effects that it can have. Then plans gain the others, half of the
+        weight in their order, and half in the reverse one.
+        """
+        options, own = self.options, self.ready.reference.variant
+        effects = {effect.label for effect in self.scenes.differences}
+        if options.polygon_shading is not Interpolation.PHONG or options.tessellation is not None:
+            effects.add(POLYGONS.label)
+        if self.heuristic_variant != own:
+            effects.add(SPECTRAL.label)
+        kernel = self._form(KERNELS[2])
+        kernel = structs.replace(kernel, interpolation=options.polygon_shading)
+        changes: dict[str, dict[str, Any]] = {
+            POLYGONS.label: {"interpolation": Interpolation.PHONG},
+            OCCLUSION.label: {"shadows": True},
+            SPECTRAL.label: {"variant": own},
+        }
+        for label, change in changes.items():
+            if label in effects:
+                before, kernel = kernel, structs.replace(kernel, **change)
+                yield Step(label, 1.0, self._named(before), self._named(kernel))
+        others = [effect.label for effect in EFFECTS if effect.label in effects - changes.keys()]
+        for order in (others, others[::-1]):
+            plans = [
+                self._named(self._form(structs.replace(FULL_PLAN, without=tuple(order[place:]))))
+                for place in range(len(order) + 1)
+            ]
+            yield Step("", 0.5, self._named(kernel), plans[0])
+            for label, before, after in zip(order, plans, plans[1:], strict=False):
+                yield Step(label, 0.5, before, after)
+
+    def _named(self, form: Method) -> Method:
+        """Return the ladder's method of a form, or the form with a name."""
+        left_out = ", ".join(form.without)
+        name = f"kernel in {form.variant}" if form.is_kernel else f"full plan without {left_out}"
+        return self._known.get(form) or structs.replace(form, name=name)
+
+    def _make_kernel_scene(self, interpolation: Interpolation, name: str) -> mi.Scene:
+        is_own = name == self.heuristic_variant
+        if is_own and interpolation is self.options.polygon_shading:
             return self.ready.heuristic.scene
         graph = self.pairs.of(interpolation).heuristic
         return with_sampler(graph, self.ready.plan.sampler).instantiate()
@@ -288,15 +327,22 @@ class Ladder:
     def _refused_interpolations(self) -> dict[str, str]:
         """Return why shapes or sensor do not allow interpolations: some cannot be meshes."""
         refused = {}
-        for interpolation in Interpolation:
-            try:
-                with variant(self.heuristic_variant):
-                    self.pairs.of(interpolation)
-            except InputError as error:
-                if interpolation is Interpolation.PHONG:
-                    raise
-                refused[interpolation.value] = str(error)
+        with variant(self.heuristic_variant):
+            own = self._shapes(Interpolation.PHONG)
+            for interpolation in (Interpolation.FLAT, Interpolation.GOURAUD):
+                try:
+                    if self._shapes(interpolation) != own:
+                        refused[interpolation.value] = (
+                            "it needs a mesh, and the others have the scene's own shapes: give"
+                            " --tessellation to measure all on one mesh"
+                        )
+                except InputError as error:
+                    refused[interpolation.value] = str(error)
         return refused
+
+    def _shapes(self, interpolation: Interpolation) -> list[str]:
+        graph = self.pairs.of(interpolation).heuristic
+        return [graph.plugin(index) for index in graph.nodes(SHAPE)]
 
     def _refused_heuristics(self, stand_ins: bool) -> dict[str, str]:
         """Return why the scene does not allow the heuristics of methods that have their own."""

@@ -1,270 +1,188 @@
-"""Predict the cost of methods at a size too large to try them all, from three smaller sizes.
+"""Predict time and error of methods at a size too large to try them all.
 
-Time of one image of ``w × h`` pixels with ``s`` samples each, for later frames (the first also
-traces and compiles), and error against the reference::
+The time of an image follows from its method's overhead and time per sample. Its error, against the
+reference, is measured at three small sizes. At a width of ``w`` pixels and ``s`` samples each ::
 
-    T(w, h, s) = t0 + t1 w h + t2 w h s
     E²(w, s) = b + d / w + c / s + e / (w² s)
 
 The share of pixels at edges is proportional to ``1 / w``, so edges cause the terms with ``w``;
 ``b`` is the method's bias, ``c`` its noise. All coefficients are at least 0 (but ``d``, since a
-small image may also hide errors), fitted by least squares of relative misfits.
-
-An interval covers the misfit of the measurements at the largest size to a fit without them, over
-all methods of a run, with more weight on a method's own, and the jackknife over all measurements.
+small image may also hide errors), fitted by least squares of relative misfits. An interval of 95 %
+covers the misfits, also those of the largest size to a fit without it, and grows by as much with
+each factor of 2 beyond the counts.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from itertools import groupby
-from math import exp, hypot, inf, sqrt
-from operator import attrgetter
+from collections.abc import Mapping, Sequence
+from math import sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy import stats
+from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from comparisons.cost.cost_record import Forecast, Measured, Method, Prediction, Reached, Seconds
-from comparisons.cost.front import ERRORS, at, reached
-from comparisons.cost.measure import DETERMINISTIC_SPP, Effort, Size, measure, meter_at
-from comparisons.cost.methods import Ladder
+from comparisons.cost.cost_record import Point, TimedMethod
+from comparisons.cost.measure import (
+    DETERMINISTIC_SPP,
+    SURE,
+    Key,
+    Measurements,
+    Size,
+    converged,
+    judge_by,
+    point,
+    rendered,
+)
 from comparisons.hybrids.why import MeanError
 from heuristic.errors import InputError
+from reference.records import Estimated
+from reference.rendering.gbuffer import gbuffer
 from reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
 
-LARGEST_FITTED = 256**2
-"""Pixels of the largest fitted size, if the requested one has at least four times as many."""
+FORECAST_SPP = tuple(4**power for power in range(7))
 
-FITTED_SPP = (4, 16, 64), (4, 16, 64), (4, 16)
-"""Counts at each size, from the smallest."""
+MEASURED_SPP, MEASURED_ROUNDS = 8, 3
+"""Samples per pixel that are measured at the requested size; no error is fitted to them."""
 
-MEASURED_SPP = (6, 32)
-"""Counts measured at the requested size; none of them is fitted."""
-
-FORECAST_SPP = tuple(2**power for power in range(13))
-
-LEVEL = 0.9
-"""Chance that an interval holds a later measurement."""
-
-SHARED = 6
-"""Weight of the misfits of all methods together, next to a method's own."""
-
-LEAST_SPREAD = 0.01
-"""Relative spread of times, at least: no clock or machine is better."""
-
-UNSEEN, UNRESOLVED = 0.02, 0.015
-"""Half an interval of an error, at least: in ΔE, and as a share of the error. Three small sizes
-show no less: all methods share the reference's chance of rare bright pixels."""
-
-Place = tuple[float, float, float]
-"""Width, height and samples per pixel."""
-
-Terms = Callable[[NDArray], NDArray]
+UNSEEN, UNRESOLVED = 0.02, 0.04
+"""Half an interval of an error, at least: in ΔE, and as a share of the error. Small sizes show no
+less: all methods share the reference's chance of rare bright pixels."""
 
 TINY = 1e-9
 """Stands for an error of 0, which has no logarithm."""
 
-
-class Curve:
-    """A positive quantity over width, height and samples, ``places`` (n, 3).
-
-    It is linear in ``terms`` of them, (n, 3) -> (n, k), with coefficients of at least 0. They are
-    fitted to ``values`` (n,), of which the last ``held`` are of the largest size.
-    """
-
-    def __init__(self, terms: Terms, places: ArrayLike, values: ArrayLike, held: int) -> None:
-        self._terms, known = terms, terms(np.asarray(places, float))
-        measured = np.maximum(np.asarray(values, float), TINY)
-        count = len(measured)
-
-        def fitted(rows: NDArray) -> NDArray:
-            relative = known[rows] / measured[rows, None]
-            return np.asarray(nnls(relative, np.ones(len(relative)))[0])
-
-        every = np.arange(count)
-        found = known[-held:] @ fitted(every < count - held)
-        self.missed = np.log(np.maximum(found, TINY) / measured[-held:])
-        """Misfit in logarithms, to a fit without the largest size."""
-        self._fits = np.stack([fitted(every != out) for out in (-1, *range(count))])
-
-    def at(self, place: Place) -> tuple[float, float]:
-        """Return the value at a place, and its uncertainty in logarithms by the jackknife."""
-        (there,) = self._terms(np.array([place], float))
-        value, *left_out = np.maximum(self._fits @ there, TINY)
-        return float(value), sqrt((len(left_out) - 1) * float(np.var(np.log(left_out))))
-
-
-def time_curve(places: ArrayLike, seconds: ArrayLike, held: int) -> Curve:
-    """Return the curve of a method's time."""
-
-    def terms(places: NDArray) -> NDArray:
-        pixels = places[:, 0] * places[:, 1]
-        return np.stack([np.ones(len(places)), pixels, pixels * places[:, 2]], axis=1)
-
-    return Curve(terms, places, seconds, held)
-
-
-def error_curve(places: ArrayLike, errors: ArrayLike, held: int) -> Curve:
-    """Return the curve of a method's squared mean error."""
-
-    def terms(places: NDArray) -> NDArray:
-        width, _, spp = places.T
-        edges = 1 / width
-        return np.stack([edges**0, edges, -edges, 1 / spp, edges**2 / spp], axis=1)
-
-    return Curve(terms, places, np.square(errors), held)
-
-
-def spreads(curves: Sequence[Curve]) -> list[float]:
-    """Return the spread of each curve's logarithm, from its own misfits and those of all."""
-    shared = float(np.mean(np.concatenate([curve.missed for curve in curves]) ** 2))
-    return [
-        sqrt((float(np.sum(curve.missed**2)) + SHARED * shared) / (len(curve.missed) + SHARED))
-        for curve in curves
-    ]
-
-
-def time_at(curve: Curve, place: Place, spread: float) -> Seconds:
-    """Return seconds at a place, with their interval."""
-    value, uncertainty = curve.at(place)
-    factor = exp(_reach(curve) * hypot(uncertainty, spread, LEAST_SPREAD))
-    return Seconds(value=value, low=value / factor, high=value * factor)
-
-
-def error_at(curve: Curve, place: Place, spread: float) -> MeanError:
-    """Return the mean error at a place, with its interval."""
-    square, uncertainty = curve.at(place)
-    value = sqrt(square)
-    # Half of the square's, since it is of a logarithm.
-    half = value * _reach(curve) * hypot(uncertainty, spread) / 2
-    half = hypot(half, UNSEEN, UNRESOLVED * value)
-    return MeanError(mean=value, low=max(value - half, 0.0), high=value + half)
-
-
-def _reach(curve: Curve) -> float:
-    return float(stats.t.ppf((1 + LEVEL) / 2, len(curve.missed) + SHARED - 1))
+Places = NDArray[np.float64]
+"""Width and samples per pixel of images, (n, 2)."""
 
 
 def predict(
-    ladder: Ladder,
-    target: Size,
-    effort: Effort,
-    seed: int,
-    is_measured: bool,
-    progress: Progress,
-) -> Prediction:
-    """Predict time and error of each method at a size of the film's shape, in pixels.
+    found: Measurements, target: Size, is_measured: bool, progress: Progress
+) -> tuple[tuple[Point, ...], tuple[Point, ...]]:
+    """Return the points of each method at a size of the film's shape, and those measured there.
 
-    On request, they are also measured there, in the same turns, with counts that are not fitted.
     It resizes the films of the ladder's scenes.
     """
-    fitted = sizes(target)
-    counts = dict(zip(fitted, FITTED_SPP, strict=True))
+    ready, options = found.ready, found.options
+    known = {(one.method, one.spp, found.size): (one.error, one.tolerance) for one in found.points}
+    counts = {
+        size: [(one.name, spp) for one in found.methods for spp in found.effort.counts(one)]
+        for size in sizes(found.size, target)
+        if size != found.size
+    }
     if is_measured:
-        counts[target] = MEASURED_SPP
-    meters = {size: meter_at(ladder, effort, seed, progress, size) for size in counts}
-    renderers = {}
-    for method in ladder.methods:
-        for size, (first, *others) in counts.items():  # what a kernel prepares may depend on it
-            own = renderers[method.name, first, size] = ladder.renderer(method, first, size)
-            renderers |= {(method.name, spp, size): own.sampled(spp) for spp in others}
-    points, _ = measure(
-        renderers, lambda key: meters[key[2]], effort.rounds, seed, progress, "predicting"
+        counts[target] = [(one.name, MEASURED_SPP) for one in found.methods]
+    by_name = {method.name: method for method in found.methods}
+    judges, renderers = {}, {}
+    for size, own in counts.items():
+        reference = converged(ready, options.seed, progress, size)
+        judges[size] = judge_by(reference, gbuffer(ready.scene, *size).hit, options.viewing)
+        for name, spp in own:
+            renderers[name, spp, size] = found.ladder.renderer(by_name[name], spp, size)
+    errors, _ = rendered(
+        renderers,
+        lambda key: judges[key[2]],
+        renderers.keys(),
+        MEASURED_ROUNDS,
+        options.seed,
+        progress,
+        "predicting",
     )
-    return predicted(ladder.methods, points, target, fitted, effort.rounds)
-
-
-def predicted(
-    methods: Sequence[Method],
-    points: Mapping[tuple[str, int, Size], Measured],
-    target: Size,
-    fitted: tuple[Size, ...],
-    rounds: int,
-) -> Prediction:
-    """Predict from points, those at ``target`` only to stand beside the forecasts."""
-    times, errors = [], []
-    for method in methods:
-        own = [(k, p) for k, p in points.items() if k[0] == method.name and k[2] in fitted]
-        places = [(*size, spp) for (_, spp, size), _ in own]
-        held = len(FITTED_SPP[-1])
-        times.append(time_curve(places, [p.seconds.value for _, p in own], held))
-        errors.append(error_curve(places, [p.error.mean for _, p in own], held))
-    forecasts = [
-        Forecast(
-            method=method.name,
+    measured = tuple(
+        Point(
+            method=name,
             spp=spp,
-            seconds=time_at(time, (*target, spp), time_spread),
-            error=error_at(error, (*target, spp), error_spread),
-            measured=points.get((method.name, spp, target)),
+            seconds=Estimated(min(took), min(took), max(took)),
+            error=errors[name, spp, target][0],
+            tolerance=errors[name, spp, target][1],
         )
-        for method, time, error, time_spread, error_spread in zip(
-            methods, times, errors, spreads(times), spreads(errors), strict=True
+        for (name, spp, size), renderer in renderers.items()
+        if size == target and (took := renderer.times[-MEASURED_ROUNDS:])
+    )
+    fitted = known | {key: each for key, each in errors.items() if key[2] != target}
+    return forecast(found.methods, fitted, target, (MEASURED_SPP,) * is_measured), measured
+
+
+def forecast(
+    methods: Sequence[TimedMethod],
+    known: Mapping[Key, tuple[MeanError, MeanError]],
+    target: Size,
+    more: Sequence[int] = (),
+) -> tuple[Point, ...]:
+    """Return the points of methods at a size, at usual sample counts and ``more``.
+
+    ``known`` are ``{(method, spp, size): (error, tolerance)}``.
+    """
+    found = []
+    for one in methods:
+        own = [key for key in known if key[0] == one.name]
+        places = np.array([(size[0], spp) for _, spp, size in own], float)
+        counts = sorted({*(FORECAST_SPP if one.monte_carlo else DETERMINISTIC_SPP), *more})
+        targets = np.array([(target[0], spp) for spp in counts], float)
+        errors = (
+            errors_at(places, np.array([known[key][kind].mean for key in own]), targets)
+            for kind in (0, 1)
         )
-        for spp in _counts(method, (method.name, MEASURED_SPP[0], target) in points)
+        found += [
+            point(one, spp, target, *each) for spp, *each in zip(counts, *errors, strict=True)
+        ]
+    return tuple(found)
+
+
+def errors_at(places: Places, errors: NDArray, targets: Places) -> tuple[MeanError, ...]:
+    """Return the errors of a method at other places."""
+    squares = np.maximum(np.square(errors), TINY)
+    held = places[:, 0] == places[:, 0].max()
+    every = np.ones(len(places), bool)
+    fits = [
+        nnls(_terms(places[rows]) / squares[rows, None], np.ones(rows.sum()))[0]
+        for rows in (every, ~held)
     ]
-    return Prediction(
-        resolution=target,
-        level=LEVEL,
-        fitted=fitted,
-        rounds=rounds,
-        forecasts=tuple(forecasts),
-        cheapest=tuple(cheapest(forecasts, error) for error in ERRORS),
+    whole, small = np.maximum(np.stack(fits) @ _terms(places).T, TINY)
+    missed = np.concatenate([np.log(whole / squares), np.log(small / squares)[held]]) / 2
+    inside = np.clip(targets[:, 1], places[:, 1].min(), places[:, 1].max())
+    beyond = np.abs(np.log2(targets[:, 1] / inside))
+    values = np.sqrt(np.maximum(_terms(targets) @ fits[0], TINY))
+    spread = max(SURE * sqrt(float(np.mean(missed**2))), UNRESOLVED)
+    halves = np.hypot(values * spread * (1 + beyond), UNSEEN)
+    return tuple(
+        MeanError(mean=float(v), low=float(max(v - half, 0.0)), high=float(v + half))
+        for v, half in zip(values, halves, strict=True)
     )
 
 
-def cheapest(forecasts: Sequence[Forecast], error: float) -> Reached:
-    """Return the method predicted to reach an error first; it has no name if none does."""
-    found = [Reached(method="", error=error, seconds=None)]
-    for method, group in groupby(forecasts, key=attrgetter("method")):
-        own = list(group)
-        place = reached([forecast.error.mean for forecast in own], error)
-        if place is not None:
-            ends = {
-                end: at([getattr(forecast.seconds, end) for forecast in own], place)
-                for end in ("value", "low", "high")
-            }
-            spp = round(at([forecast.spp for forecast in own], place))
-            found.append(Reached(method=method, error=error, seconds=Seconds(**ends), spp=spp))
-    return min(found, key=lambda one: one.seconds.value if one.seconds else inf)
+def _terms(places: Places) -> NDArray:
+    width, spp = places.T
+    edges = 1 / width
+    return np.stack([edges**0, edges, -edges, 1 / spp, edges**2 / spp], axis=1)
 
 
-def _counts(method: Method, is_measured: bool) -> Sequence[int]:
-    """Return the counts of a method's forecasts; one without random numbers needs few."""
-    measured = MEASURED_SPP if is_measured else ()
-    return sorted({*(FORECAST_SPP if method.monte_carlo else DETERMINISTIC_SPP), *measured})
-
-
-def sizes(target: Size) -> tuple[Size, Size, Size]:
-    """Return the sizes fitted for another: smaller ones of its shape."""
-    area = target[0] * target[1]
-    largest = min(LARGEST_FITTED, area / 4)
-    scales = [sqrt(largest / area) * factor for factor in (1 / 4, 1 / 2, 1)]
-    smallest, middle, last = ((round(target[0] * s), round(target[1] * s)) for s in scales)
+def sizes(own: Size, target: Size) -> tuple[Size, Size, Size]:
+    """Return the sizes at which errors are measured for another: small ones of its shape."""
+    is_far = 4 * own[0] <= target[0]
+    largest = (2 * own[0], 2 * own[1]) if is_far else min(own, target)
+    smallest, middle = ((round(largest[0] / s), round(largest[1] / s)) for s in (4, 2))
     if min(smallest) < 4:
         raise InputError(
             f"{target[0]}x{target[1]} is too small for a prediction: measure it with --resolution."
         )
-    return smallest, middle, last
+    return smallest, middle, largest
 
 
-def require(name: str, target: Size, rendered: Size | None, is_measured: bool) -> None:
+def require(name: str, target: Size, size: Size, is_measured: bool) -> None:
     """Reject sizes that cannot be predicted for a scene, or measured if that is requested.
 
-    ``rendered`` is the size of the study itself; None if derived from ``target``.
+    ``size`` is that of the study.
     """
-    sizes(target)
-    (width, height), (wide, high) = sorted([rendered or target, target])
+    sizes(size, target)
+    (width, height), (wide, high) = sorted([size, target])
     if abs(high * width / wide - height) > 1:  # a pixel of the smaller one is tolerated
         raise InputError(
             f"{width}x{height} and {wide}x{high} differ in shape: give --resolution the shape of"
             " --at, or omit it."
         )
     if is_measured:
-        width, height = target
-        most = LARGEST_PASS // max(*MEASURED_SPP, *DETERMINISTIC_SPP)
-        if width * height > most:
+        most = LARGEST_PASS // MEASURED_SPP
+        if target[0] * target[1] > most:
             raise InputError(
-                f"{width}x{height} is too large to measure: at most {most} pixels are allowed. Omit"
-                " --measure to predict it."
+                f"{target[0]}x{target[1]} is too large to measure: at most {most} pixels are"
+                " allowed. Omit --measure to predict it."
             )
-        require_memory(name, width, height)
+        require_memory(name, *target)

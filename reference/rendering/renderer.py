@@ -14,7 +14,7 @@ from enum import IntEnum
 from math import isqrt
 from pathlib import Path
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -96,6 +96,7 @@ class Renderer:
         self.size = size
         self.variant = mi.variant()
         self.times: list[float] = []
+        self.processor_times: list[float] = []
         self.compilation = 0.0
         # A user's code may be impossible to record: NumPy ends the process.
         self._replayed = None if self._is_users else dr.freeze(_rendered)
@@ -113,7 +114,7 @@ class Renderer:
             )
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
-            begin = perf_counter()
+            begin, used = perf_counter(), process_time()
             try:
                 image = self._image(dr.opaque(mi.UInt32, seed))
                 dr.eval(image)
@@ -126,6 +127,7 @@ class Renderer:
                 reason = str(chain[-1]).strip()
                 raise InputError(f"{self.label}: Mitsuba cannot render it: {reason}") from error
             self.times.append(perf_counter() - begin)
+            self.processor_times.append(process_time() - used)
             kernels = dr.kernel_history([dr.KernelType.JIT])
         # The film keeps its developed image.
         self.scene.sensors()[0].film().clear()
@@ -151,7 +153,7 @@ class Renderer:
     def sampled(self, spp: int) -> "Renderer":
         """Return the same renderer with another number of samples."""
         other = copy(self)
-        other.spp, other.times, other.compilation = spp, [], 0.0
+        other.spp, other.times, other.processor_times, other.compilation = spp, [], [], 0.0
         return other
 
     def _image(self, seed):

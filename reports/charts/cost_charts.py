@@ -1,6 +1,6 @@
-"""Charts of a study of cost: error against time, its prediction, and what each effect removes."""
+"""Charts of a study of cost: error against time, measured and predicted."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import log10
 from typing import Any, TypeAlias
 
@@ -8,8 +8,9 @@ import altair as alt
 import numpy as np
 from scipy.optimize import isotonic_regression
 
-from comparisons.cost.cost_record import Cost, Measured, Method, Prediction, Seconds
-from reports.charts.theme import EFFECT_COLOURS, FAINT, Spec
+from comparisons.cost.cost_record import Cost, Point
+from reference.records import Resolution
+from reports.charts.theme import FAINT, Spec
 from reports.charts.vega import specification
 
 WIDTH, HEIGHT = 560, 380
@@ -34,128 +35,54 @@ Ends: TypeAlias = tuple[float, float]
 """Of an axis."""
 
 
-def titled(record: Cost) -> Spec:
-    """Return the chart of error against time with a title, on white."""
-    width, height = record.resolution
-    subtitle = [f"{width} × {height} pixels, {record.rounds} rounds, {_machine(record)}"]
-    title = {"text": f"{record.scene}: error against time", "subtitle": subtitle + reading(record)}
-    description = f"Error against time of the methods on {record.scene}"
-    return error_over_time(record, "white") | {"title": title, "description": description}
+def titled(record: Cost, at: Resolution | None = None) -> Spec:
+    """Return the chart of error against time with a title, on white; ``at`` is a predicted size."""
+    width, height = at or record.resolution
+    what = f"predicted at {width} × {height} pixels" if at else "error against time"
+    busy = ", busy" if record.is_busy else ""
+    machine = f"{record.threads} threads, {record.machine.processor}{busy}"
+    measured = f"{record.resolution[0]} × {record.resolution[1]} pixels, {record.rounds} rounds"
+    title = {
+        "text": f"{record.scene}: {what}",
+        "subtitle": [f"measured at {measured}, {machine}", *reading(record)],
+    }
+    chart = error_over_time(record, "white", is_predicted=bool(at))
+    return chart | {"title": title, "description": f"{title['text']}, of all methods"}
 
 
-def _machine(record: Cost) -> str:
-    return f"{record.machine.cores} cores, {record.machine.processor}"
-
-
-def error_over_time(record: Cost, ground: str = "transparent") -> Spec:
+def error_over_time(
+    record: Cost, ground: str = "transparent", *, is_predicted: bool = False
+) -> Spec:
     """Return the chart of mean ΔE2000 over seconds, both logarithmic, on a ground of any colour.
 
-    Points of the Pareto front are filled. Lines join the sample counts of one method. The dashed
-    line is the slope −1/2 of plain Monte Carlo. The dotted line is the reference's own noise, below
-    which errors are not resolved.
+    Points of the front are filled. Lines join the sample counts of one method. The dashed line is
+    the slope −1/2 of plain Monte Carlo. The dotted line is the reference's own noise, below which
+    errors are not resolved. Crosses are points that were measured where others are predicted.
     """
-    methods = {method.name: method for method in record.methods}
-    rows = [_row(point, methods[point.method]) for point in record.points]
     floor = record.reference.noise_floor
-    times = _domain([row[bound] for row in rows for bound in ("fastest", "slowest")])
+    rows = _rows(record, record.predicted if is_predicted else record.points)
+    crosses = _rows(record, record.measured if is_predicted else ())
+    times = _domain([row[end] for row in (*rows, *crosses) for end in ("fastest", "slowest")])
     errors = _domain([row["error"] for row in rows] + ([floor] if floor > 0 else []))
-    for row in rows:
-        row["shown"] = max(row["error"], errors[0])
     colour = _by_family(alt.Color, 0)
     chart = _charted(rows, times, errors).encode(color=colour)
     layers = [
         *_slope(rows, times, errors),
         *([_guide([floor, floor], times, errors, [1, 3])] if floor > errors[0] else []),
         chart.mark_line(strokeWidth=1.2, opacity=0.75).encode(detail="method:N"),
-        chart.mark_rule(strokeWidth=1.2, opacity=0.8).encode(
-            x=_time("fastest", times), x2="slowest"
-        ),
+        chart.mark_rule(strokeWidth=1.2, opacity=0.8).encode(x="fastest:Q", x2="slowest:Q"),
         chart.mark_point(size=55, strokeWidth=1.6, opacity=1).encode(
             shape=_by_family(alt.Shape, 1),
             fill=alt.condition("datum.front", colour, alt.value(ground)),
         ),
     ]
-    return _layered(layers, rows, times, errors)
-
-
-def prediction_chart(record: Cost, prediction: Prediction) -> Spec:
-    """Return the chart of a prediction with a title, on white: curves, bands, measured points."""
-    width, height = prediction.resolution
-    fitted = ", ".join("x".join(map(str, size)) for size in prediction.fitted)
-    says = (
-        f"bands and strokes: {prediction.level:.0%} intervals of error and time; points: powers of"
-        " 2 samples"
-    )
-    families = {method.name: method.family for method in record.methods}
-    rows: list[dict[str, Any]] = []
-    measured: list[dict[str, Any]] = []
-    for one in prediction.forecasts:
-        own = {"method": one.method, "family": families[one.method]}
-        error = {"error": one.error.mean, "low": one.error.low, "high": one.error.high}
-        rows.append(own | _milliseconds(one.seconds) | error)
-        if point := one.measured:
-            measured.append(own | _milliseconds(point.seconds) | {"error": point.error.mean})
-    x = _domain([row[end] for row in rows for end in ("fastest", "slowest")])
-    # An interval down to 0 would take all the room of a logarithmic axis.
-    y = _domain([each for row in rows for each in (max(row["low"], row["error"] / 4), row["high"])])
-    for row in (*rows, *measured):
-        row["shown"] = max(row["error"], y[0])
-    for row in rows:
-        row["low"] = max(row["low"], y[0])
-    colour = _by_family(alt.Color, 0)
-    curves = _charted(rows, x, y).encode(color=colour)
-    layers = [
-        curves.mark_area(opacity=0.18).encode(y="low:Q", y2="high:Q", detail="method:N"),
-        curves.mark_line(strokeWidth=1.4).encode(detail="method:N"),
-        curves.mark_rule(strokeWidth=1, opacity=0.35).encode(x="fastest:Q", x2="slowest:Q"),
-        curves.mark_point(size=18, filled=True, opacity=0.9),
-    ]
-    if measured:
-        says += "; crosses: measured"
-        crosses = _charted(measured, x, y).encode(color=colour)
-        layers.append(crosses.mark_point(shape="cross", size=90, fill="white", strokeWidth=1.5))
-    title = {
-        "text": f"{record.scene}: predicted at {width} × {height} pixels",
-        "subtitle": [f"fitted to {fitted}; {_machine(record)}", says],
-    }
-    return _layered(layers, rows, x, y) | {"title": title}
-
-
-def attribution_chart(record: Cost) -> Spec:
-    """Return the chart of the attribution: ΔE2000 removed by each effect, as bars.
-
-    Rules are 95 % intervals. The circle and the stroke show the ΔE2000 removed if the effect is
-    added first and last.
-    """
-    rows = [
-        {
-            "effect": one.effect,
-            "removes": one.removes.value,
-            "low": one.removes.low,
-            "high": one.removes.high,
-            "alone": one.alone,
-            "last": one.last,
-        }
-        for one in record.attribution.effects
-    ]
-    names = [one.effect for one in record.attribution.effects]
-    colours = alt.Scale(domain=names, range=[EFFECT_COLOURS[name] for name in names])
-    chart = alt.Chart(alt.Data(values=rows)).encode(
-        y=alt.Y("effect:N", sort=None, title=None).axis(labelLimit=200, ticks=False, domain=False)
-    )
-
-    def x(name: str) -> alt.X:
-        return alt.X(f"{name}:Q", title="mean ΔE2000 that it removes")
-
-    removed = alt.Color("effect:N", legend=None, scale=colours)
-    layers = alt.layer(
-        chart.mark_bar(size=13).encode(x=x("removes"), color=removed),
-        chart.mark_rule(strokeWidth=1.5).encode(x=x("low"), x2="high"),
-        chart.mark_point(filled=False, size=45, shape="circle").encode(x=x("alone")),
-        chart.mark_point(filled=False, size=160, shape="stroke", angle=90).encode(x=x("last")),
-    )
-    padding = {"left": 30, "right": 5, "top": 5, "bottom": 5}
-    return specification(layers.properties(width=340, height=alt.Step(30), padding=padding))
+    if crosses:
+        marks = _charted(crosses, times, errors).encode(color=colour)
+        layers.append(marks.mark_point(shape="cross", size=90, fill=ground, strokeWidth=1.5))
+    # Names may be wider in the reader's font than in the font of the picture.
+    padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
+    whole = alt.layer(*layers, *_names_beside(rows, times, errors))
+    return specification(whole.properties(width=WIDTH, height=HEIGHT, padding=padding))
 
 
 def reading(record: Cost) -> list[str]:
@@ -163,34 +90,28 @@ def reading(record: Cost) -> list[str]:
     sampled = any(method.monte_carlo for method in record.methods)
     slope = "dashed: slope −1/2, plain Monte Carlo; " if sampled else ""
     return [
-        "filled: Pareto front (nothing else is as fast and as good); bars: interval of the median",
-        f"{slope}dotted: noise of the reference itself",
+        "filled: front (nothing else is clearly faster or better); bars: 95 % intervals of times",
+        f"{slope}dotted: noise of the reference itself"
+        + ("; crosses: measured" if record.measured else ""),
     ]
 
 
-def _row(point: Measured, method: Method) -> dict[str, Any]:
-    return {
-        "method": point.method,
-        "family": method.family,
-        "sampled": method.monte_carlo,
-        "spp": point.spp,
-        **_milliseconds(point.seconds),
-        "error": point.error.mean,
-        "front": point.pareto,
-    }
-
-
-def _milliseconds(seconds: Seconds) -> dict[str, Any]:
-    ends = {"time": seconds.value, "fastest": seconds.low, "slowest": seconds.high}
-    return {name: 1e3 * each for name, each in ends.items()}
-
-
-def _layered(layers: Iterable[alt.Chart], rows: Rows, times: Ends, errors: Ends) -> Spec:
-    """Return the specification of layers over the two axes, with the methods' names beside them."""
-    # Names may be wider in the reader's font than in the font of the picture.
-    padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
-    whole = alt.layer(*layers, *_names_beside(rows, times, errors))
-    return specification(whole.properties(width=WIDTH, height=HEIGHT, padding=padding))
+def _rows(record: Cost, points: Sequence[Point]) -> list[dict[str, Any]]:
+    methods = {method.name: method for method in record.methods}
+    return [
+        {
+            "method": point.method,
+            "family": methods[point.method].family,
+            "sampled": methods[point.method].monte_carlo,
+            "spp": point.spp,
+            "time": 1e3 * point.seconds.value,
+            "fastest": 1e3 * max(point.seconds.low, point.seconds.value / 10),
+            "slowest": 1e3 * point.seconds.high,
+            "error": point.error.mean,
+            "front": point.front,
+        }
+        for point in points
+    ]
 
 
 def _by_family(channel: Callable[..., Any], place: int) -> Any:
@@ -220,8 +141,8 @@ def _logarithmic(channel: Any, domain: Ends, title: str) -> Any:
 
 
 def _charted(rows: Sequence[Mapping[str, Any]], times: Ends, errors: Ends) -> alt.Chart:
-    """Return a chart of rows over the two axes, without marks."""
-    data = alt.Data(values=rows)
+    """Return a chart of rows over the two axes, without marks; an error of 0 is at the border."""
+    data = alt.Data(values=[{**row, "shown": max(row["error"], errors[0])} for row in rows])
     return alt.Chart(data).encode(x=_time("time", times), y=_error("shown", errors))
 
 
@@ -230,14 +151,14 @@ def _slope(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
     sampled = [row for row in rows if row["sampled"]]
     if not sampled:
         return []
-    best = min(sampled, key=lambda row: row["shown"])
-    ends = [best["shown"] * (time / best["time"]) ** -0.5 for time in times]
+    best = min(sampled, key=lambda row: row["error"])
+    ends = [max(best["error"], errors[0]) * (time / best["time"]) ** -0.5 for time in times]
     return [_guide(ends, times, errors, [6, 4])]
 
 
 def _guide(ends: Sequence[float], times: Ends, errors: Ends, dash: list[int]) -> alt.Chart:
     """Return a faint line between errors at both ends of the time axis."""
-    rows = [{"time": time, "shown": end} for time, end in zip(times, ends, strict=True)]
+    rows = [{"time": time, "error": end} for time, end in zip(times, ends, strict=True)]
     style: Spec = {"color": FAINT, "strokeWidth": 1.2, "strokeDash": dash, "clip": True}
     style["aria"] = False
     return _charted(rows, times, errors).mark_line(**style)
@@ -247,8 +168,8 @@ def _names_beside(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
     """Return the methods' names to the right of the plot, with lines to their slowest points."""
     low, high = errors
     last = {row["method"]: row for row in sorted(rows, key=lambda row: row["time"])}
-    ordered = sorted(last.values(), key=lambda row: -row["shown"])
-    heights = [HEIGHT * log10(high / row["shown"]) / log10(high / low) for row in ordered]
+    ordered = sorted(last.values(), key=lambda row: -row["error"])
+    heights = [HEIGHT * log10(high / max(row["error"], low)) / log10(high / low) for row in ordered]
     named = [
         {**row, "beside": high * (low / high) ** (place / HEIGHT)}
         for row, place in zip(ordered, spread(heights, LABEL_GAP, HEIGHT), strict=True)

@@ -26,10 +26,8 @@ if TYPE_CHECKING:
     "--within",
     type=jobs.Within(min=0, min_open=True),
     metavar="ERROR",
-    help="Measure the ladder of `cost`, and name its cheapest method within this error.",
-)
-@click.option(
-    "--metric", default="dE2000", show_default=True, help="With --within: metric of the mean error."
+    help="Measure the methods of `cost`, and name the fastest that suffices: at most 5 % of its"
+    " pixels exceed this ΔE2000.",
 )
 @jobs.timeout_option
 @jobs.rendering_options
@@ -40,13 +38,12 @@ def plan(
     as_json: bool,
     verify: bool,
     within: float | None,
-    metric: str,
     timeout: float,
     **rendering: Any,
 ) -> None:
     """List the effects that a scene calls for, by which rule, and what will be simulated.
 
-    With --within, the exit code is 1 if no measured method stays within the error.
+    With --within, the exit code is 1 if no measured method suffices.
 
     \b
     Examples:
@@ -66,7 +63,7 @@ def plan(
         request, code = jobs.request(rendering), 0
         if within is not None:
             with progress.shown() as bar:
-                words = (scene, request, within, metric)
+                words = (scene, request, within)
                 found = pool.do(Task(scene, chosen, words, bar.of(scene)))
             lines, code = cost_tables.choice_lines(found), int(found.chosen is None)
         elif verify:
@@ -110,10 +107,10 @@ def verified(
     return verify(case.source, case.options, progress, usual)
 
 
-def chosen(name: str, request: Options, within: float, metric: str, progress: Any) -> Choice:
-    """Measure the ladder of a scene, and name the cheapest method within an error."""
+def chosen(name: str, request: Options, within: float, progress: Any) -> Choice:
+    """Measure the methods of a scene, and name the fastest that suffices at a tolerance."""
     from comparisons.case import open_case
     from comparisons.cost.front import choose
 
     case = open_case(name, request)
-    return choose(case.source, within, case.options, None, metric, progress)
+    return choose(case.source, within, case.options, None, progress)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from comparisons.processes.pool import Task
+from comparisons.processes.turns import Turn
 from reports import jobs
 from reports.commands.plan import verified
 from reports.run import batch
@@ -29,6 +30,9 @@ QUICK = {"resolution": (64, 64), "spp": 16}
 QUICKLY_VERIFIED_AT = (32, 32)
 
 HARD = "hard cases"
+
+LADDERS = frozenset({"fig-8-9", "fig-6-10", "plastic-spheres", "cornell-box"})
+"""Scenes of which methods are measured: an analytic lobe, meshes, shadows, and interreflection."""
 
 VERIFIED_QUICKLY = slice(3, None, 4)
 """``--quick`` verifies one scene in four, from each group."""
@@ -76,13 +80,14 @@ def report(
         rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
     request = jobs.request(rendering)
     names = [] if request.everything else list(SCENES)
-    job = jobs.Job(request, figures, with_cost=True, fresh=fresh, within=within)
+    ladders = frozenset() if quick else LADDERS
+    job = jobs.Job(request, figures, with_cost=True, fresh=fresh, within=within, ladders=ladders)
     rendered = jobs.pool(timeout, len(SCENES), workers, scheduler)
-    further = _verified(names[VERIFIED_QUICKLY if quick else slice(None)], request, quick)
+    further = _verified(output, names[VERIFIED_QUICKLY if quick else slice(None)], request, quick)
     batch.run(tuple(SCENES), output, job, rendered, further, jobs.open_page if is_opened else None)
 
 
-def _verified(names: Sequence[str], request: Options, quick: bool) -> batch.Further:
+def _verified(folder: Path, names: Sequence[str], request: Options, quick: bool) -> batch.Further:
     """Evaluate the hard cases, and compare the plans of scenes with everything simulated."""
     from comparisons.check.moved import level_of_each
     from comparisons.verification import LEVEL
@@ -91,9 +96,9 @@ def _verified(names: Sequence[str], request: Options, quick: bool) -> batch.Furt
     small = request.changed(resolution=size, spp=None)
     level = level_of_each(LEVEL, len(names)) if names else None
     tasks = [  # the last scenes trace paths, which take longest
-        Task(name, timed, (verified, name, small, level)) for name in reversed(names)
+        Task(name, timed, (folder, verified, name, small, level)) for name in reversed(names)
     ]
-    cases = Task(HARD, timed, (hard_cases,))
+    cases = Task(HARD, timed, (folder, hard_cases))
     shown = partial(_shown, names)
     return batch.Further("verification and hard cases", [cases, *tasks], shown)
 
@@ -103,10 +108,13 @@ def _shown(names: Sequence[str], found: Mapping[str, Any]) -> dict[str, Any]:
     return {"verifications": [found[name] for name in names], "hard_cases": found[HARD]}
 
 
-def timed(function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
-    """Return what a task returns, and the seconds that it took."""
-    begin = perf_counter()
-    return function(*arguments), perf_counter() - begin
+def timed(folder: Path, function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
+    """Return what a task returns, and the seconds that it took in its turn."""
+    from reports.run import results
+
+    with Turn(folder, folder / results.TABLES):
+        begin = perf_counter()
+        return function(*arguments), perf_counter() - begin
 
 
 def hard_cases() -> HardCases:

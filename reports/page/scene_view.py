@@ -40,16 +40,18 @@ class WhyView(Record):
 class CostView(Record):
     """A page's data of a study.
 
-    ``images`` are PNG files by their bare names; ``colours`` are those of the effects.
+    ``images`` are PNG files of the methods, by their bare names; ``said`` and ``busy`` are
+    sentences on its sums and on the machine; ``colours`` are those of the effects.
     """
 
     record: Cost
     images: dict[str, bytes]
-    noise: str
+    said: str
+    busy: str
     colours: tuple[str, ...]
 
     def picture(self, kind: str, name: str) -> bytes:
-        """Return the picture of a method, a part or an effect."""
+        """Return the picture of a method."""
         return self.images[picture_name(kind, name)]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +14,7 @@ from reports.page import templating
 from reports.page.scene_view import CostView, picture_name
 from reports.run import results
 from reports.run.results import PAGE
-from reports.terminal.cost_tables import closure
+from reports.terminal.cost_tables import busy, closure, together
 
 if TYPE_CHECKING:
     from comparisons.cost.cost import Study
@@ -25,25 +24,19 @@ FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BS
 
 
 def documents(study: Study) -> dict[str, bytes]:
-    """Return the named files of a study: chart, pictures of methods and effects.
-
-    Pictures of methods have the record's exposure; effects are errors removed, over the range in
-    the record's ``pictures``.
-    """
+    """Return the named files of a study: charts, and pictures of methods with its exposure."""
     from reports.charts import cost_charts  # Altair takes half a second to import
 
     record = study.record
-    exposed = partial(images.tonemap, exposure=record.viewing.exposure)
-    limits = record.pictures
-    pictures = {picture_name("method", n): exposed(image) for n, image in study.methods.items()}
-    pictures["cost-reference"] = exposed(study.reference)
-    for name, values in study.causes.maps.items():
-        pictures[picture_name("effect", name)] = images.signed_map(values, limits.effect_limit)
-    made = {f"{name}.png": images.png(picture) for name, picture in pictures.items()}
+    pictures = {picture_name("method", name): image for name, image in study.methods.items()}
+    pictures["cost-reference"] = study.reference
+    made = {
+        f"{name}.png": images.png(images.tonemap(image, exposure=record.viewing.exposure))
+        for name, image in pictures.items()
+    }
     made["cost.svg"] = vega.paper(cost_charts.titled(record))
-    if record.prediction:
-        chart = cost_charts.prediction_chart(record, record.prediction)
-        made["prediction.svg"] = vega.paper(chart)
+    if record.at:
+        made["prediction.svg"] = vega.paper(cost_charts.titled(record, record.at))
     made["cost.json"] = records.to_json(record).encode()
     return made
 
@@ -72,27 +65,18 @@ def write(place: Path, study: Study) -> None:
 
 
 def figures(record: Cost) -> list[vega.Figure]:
-    """Return the charts of a study: error against time, and what each effect removes."""
+    """Return the chart of a study: error against time."""
     from reports.charts import cost_charts  # Altair takes half a second to import
 
-    made = [
-        vega.figure(
-            "Error against time",
-            cost_charts.error_over_time(record),
-            "; ".join([FAMILIES, *cost_charts.reading(record)]) + ".",
-        )
-    ]
-    if record.attribution.effects:
-        note = "Circle: error removed if added first; stroke: if added last."
-        chart = cost_charts.attribution_chart(record)
-        made.append(vega.figure("What each effect removes", chart, note))
-    return made
+    note = "; ".join([FAMILIES, *cost_charts.reading(record)]) + "."
+    return [vega.figure("Error against time", cost_charts.error_over_time(record), note)]
 
 
 def view(study: Study, made: dict[str, bytes]) -> CostView:
     """Return the :class:`CostView` of a study, with its files ``made`` by :func:`documents`."""
-    record, causes = study.record, study.causes
-    said = closure(record) if causes.maps else ""
+    record = study.record
+    effects = record.attribution.effects
+    said = [together(record), closure(record)] if effects else []
     return CostView(
         record=record,
         images={
@@ -100,6 +84,7 @@ def view(study: Study, made: dict[str, bytes]) -> CostView:
             for name, content in made.items()
             if name.endswith(".png")
         },
-        noise=re.sub(r"-(?=\d)", "−", said),
-        colours=tuple(theme.EFFECT_COLOURS[name] for name in causes.maps),
+        said=re.sub(r"(?<!\d)-(?=\d)", "−", " ".join(said)),
+        busy=busy(record) if record.is_busy else "",
+        colours=tuple(theme.EFFECT_COLOURS[one.effect] for one in effects),
     )

@@ -15,6 +15,7 @@ from msgspec import structs
 from comparisons import atomic
 from comparisons.comparison import CAUSES, ComparisonRecord
 from comparisons.departure.metrics import METRICS, drawn
+from comparisons.processes.turns import Turn
 from heuristic import program
 from heuristic.heuristics import named
 from reference.records import VERSION, Record, plain, to_json
@@ -49,25 +50,46 @@ def compare(
 ) -> tuple[SceneView, Seconds]:
     """Compare a scene and write its files to ``folder/place``, unless it is finished there."""
     from comparisons.case import open_case
+
+    with Turn(folder, folder / results.TABLES) as turn:
+        begin = perf_counter()
+        case = open_case(name, job.request)
+        key = key_of(case, job)
+        view = None if job.fresh else load(folder / place, key)
+        spent = {"finished scenes": perf_counter() - begin}
+        if view is not None:
+            return view, spent
+        return _compared(case, folder, place, job, key, turn, progress)
+
+
+def _compared(
+    case: Case,
+    folder: Path,
+    place: str,
+    job: Job,
+    key: str | None,
+    turn: Turn,
+    progress: Progress,
+) -> tuple[SceneView, Seconds]:
     from comparisons.compare import compare
 
     begin = perf_counter()
-    case = open_case(name, job.request)
-    key = key_of(case, job)
-    view = None if job.fresh else load(folder / place, key)
-    spent = {"finished scenes": perf_counter() - begin}
-    if view is not None:
-        return view, spent
-    begin = perf_counter()
-    causes = {"terms": job.with_cost, "why": job.with_cost}
-    comparison = compare(case.source, case.options, progress, case.command(), **causes)
-    spent |= _stages(comparison.record, perf_counter() - begin)
+    why = {"terms": job.with_cost, "why": job.with_cost}
+    comparison = compare(case.source, case.options, progress, case.command(), **why)
+    spent = _stages(comparison.record, perf_counter() - begin)
+    study = None
+    if case.word in job.ladders and comparison.causes:
+        from comparisons.cost.cost import quick  # loaded late: for a handful of scenes
+
+        begin, command = perf_counter(), case.command("cost")
+        study = quick(case.source, case.options, comparison.causes, progress, command, turn.alone())
+        spent["methods"] = perf_counter() - begin
     begin = perf_counter()
     if job.figures:  # first, since the record marks the scene as finished
         from reports.charts import figures
 
         figures.write_scene(folder / results.FIGURES, place, comparison)
-    view = write(folder, place, comparison, key=key)
+    view = write(folder, place, comparison, study, key)
     return view, spent | {"files": perf_counter() - begin}
 
 
@@ -108,7 +130,7 @@ def key_of(case: Case, job: Job) -> str | None:
     parts: dict[str, Any] = {
         "record": VERSION,
         "metrics": list(METRICS),
-        "why, figures": (job.with_cost, job.figures),
+        "why, figures, ladder": (job.with_cost, job.figures, case.word in job.ladders),
         "options": plain(case.options),
         "variant": case.variant,
         "versions": versions(),

@@ -5,52 +5,86 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
-from comparisons.departure.metrics import METRICS
+from comparisons.departure.metrics import LEADING
 from reports.glossary import meanings
 from reports.terminal.tables import printed
 from reports.terminal.words import number, parameter, seconds
 
 if TYPE_CHECKING:
-    from comparisons.cost.cost_record import Cost, Measured, Prediction, Reached, Seconds
+    from comparisons.cost.cost_record import Cost, Point
     from comparisons.cost.front import Choice
+    from comparisons.hybrids.why import MeanError
     from reference.records import Estimated
 
 Rows: TypeAlias = Iterator[Sequence[str]]
 
-SHOWN_SPP = (1, 4, 16, 64, 256, 1024, 4096)
-"""Sample counts whose forecasts are shown, besides the measured ones."""
+BENT = 0.1
+"""Share by which a time is off its method's straight line: more is mentioned."""
 
 
 def lines(record: Cost) -> Iterator[str]:
-    """Yield the lines of a study: methods, equal error, attribution, and parts."""
-    reference = record.reference
+    """Yield the lines of a study: methods, points, attribution, and what is predicted."""
+    reference, size = record.reference, sized(record.resolution)
     yield (
-        f"{record.scene}, {record.resolution[0]}x{record.resolution[1]}, {record.rounds} rounds"
-        f" on {record.machine.cores} cores of {record.machine.processor}"
+        f"{record.scene}, {size}, {record.rounds} rounds with {record.threads} threads on"
+        f" {record.machine.processor}"
     )
+    if record.is_busy:
+        yield busy(record)
     yield (
         f"reference: {reference.integrator}, {reference.spp} samples per pixel; its noise alone"
         f" gives ΔE2000 = {reference.noise_floor:.3g}"
     )
     if record.guard and record.guard.state == "disagreed":
         yield "a probe disagreed with the plan, so everything is simulated: please report it"
-    yield from _section("Error and time of each method", _methods(record))
+    yield from _section("Time of each method: overhead + samples x time per sample", _times(record))
+    for method in record.methods:
+        if abs(method.bend) > BENT:
+            yield f"{method.name}: a third count is {method.bend:+.0%} off the straight line"
     known = meanings()
     for method in record.methods:  # the names of the others say what they are
         if method.family == "physical" and method.name in known:
             yield f"{method.name}: {known[method.name]}"
-    for left_out in record.left_out:
-        yield f"left out: {left_out.name}: {left_out.reason}"
-    yield from _section("Time to reach an error (mean ΔE2000)", _equal_error(record))
+    for name, reason in record.left_out.items():
+        yield f"left out: {name}: {reason}"
+    yield from _section(f"Error and time of one image at {size}", _points(record.points))
     if record.attribution.effects:
-        yield from _section("What each effect removes", _attribution(record))
+        yield from _section("What each effect removes and adds", _attribution(record))
         yield "removed: Shapley value, the mean over all orders of adding the effects"
         yield "alone, last: added first, added last"
+        yield together(record)
         yield closure(record)
-    if len(record.objects) > 1 and record.attribution.effects:
-        yield from _section("Mean ΔE2000 removed on each shape", _objects(record))
-    if record.prediction:
-        yield from _predicted(record.prediction)
+    if record.at:
+        yield from _section(f"Predicted at {sized(record.at)}", _points(record.predicted))
+    if record.measured:
+        spp = record.measured[0].spp
+        yield from _section(f"Predicted and measured there, {spp} samples", _off(record))
+
+
+def sized(resolution: tuple[int, int]) -> str:
+    """Return a size as options have it."""
+    return "x".join(map(str, resolution))
+
+
+def busy(record: Cost) -> str:
+    """Return what a busy machine means for the times of a study."""
+    return (
+        f"The machine was busy: samples got {record.processor_share:.0%} of the processor time of"
+        f" {record.threads} threads. Seconds are too long; their ratios hold."
+    )
+
+
+def together(record: Cost) -> str:
+    """Return the sum of what the effects add, in times of the kernel."""
+    whole = record.attribution
+    kernel = whole.kernel_s.value
+    added = sum(one.adds_s.value for one in whole.effects)
+    return (
+        f"A sample of the full plan takes {number(whole.plan_s.value / kernel)} times as long as"
+        f" the kernel's: 1, {number(added / kernel)} for the effects, and"
+        f" {number(whole.renderer_s.value / kernel)} for Mitsuba's integrator in place of the"
+        " kernel."
+    )
 
 
 def closure(record: Cost) -> str:
@@ -70,127 +104,114 @@ def choice_lines(choice: Choice) -> Iterator[str]:
 
     Then what each method in the sentence is.
     """
-    label = METRICS[choice.metric].label
-    size = "x".join(map(str, choice.resolution))
-    within = parameter(choice.within)
+    size, within = sized(choice.resolution), f"{LEADING.label} {parameter(choice.within)}"
     chosen, full = choice.chosen, choice.full
     if chosen is None:
         yield (
-            f"At {size} no measured method stays within {label} {within}. The nearest is"
-            f" {_offer(choice.best, label)}. Give more samples with --spp, or a larger tolerance."
+            f"At {size} no measured method suffices at {within}. The nearest is"
+            f" {_offer(choice.best)}. Give more samples with --spp, or a larger tolerance."
         )
     elif chosen.method == full.method:
-        yield f"At {size}: {_offer(chosen, label)}. Nothing cheaper stays within {within}."
+        yield f"At {size}: {_offer(chosen)}. Nothing faster suffices at {within}."
     else:
-        yield f"At {size}: {_offer(chosen, label)}, in place of {_offer(full, label)}."
+        yield f"At {size}: {_offer(chosen)}, in place of {_offer(full)}."
+    if chosen and chosen.ties:
+        yield f"Too close to call: {', '.join(chosen.ties)}."
+    if choice.measured != choice.resolution:
+        yield f"Errors were measured at {sized(choice.measured)}."
     known = meanings()
     for method in dict.fromkeys(((chosen or choice.best).method, full.method)):
         if method in known:
             yield f"{method}: {known[method]}"
 
 
-def _offer(point: Measured, label: str) -> str:
-    once = f" and once {seconds(point.prepare_s)} to prepare" if point.prepare_s else ""
+def _offer(point: Point) -> str:
     return (
-        f"{point.method} with {point.spp} samples per pixel: {label} {number(point.error.mean)} at"
-        f" {seconds(point.seconds.value)}{once}"
+        f"{point.method} with {point.spp} samples per pixel in {seconds(point.seconds.value)}:"
+        f" 5 % of the pixels exceed {LEADING.label} {number(point.tolerance.mean)}"
     )
 
 
-def _predicted(prediction: Prediction) -> Iterator[str]:
-    width, height = prediction.resolution
-    sizes = ", ".join("x".join(map(str, size)) for size in prediction.fitted)
-    yield from _section(f"Predicted at {width}x{height}", _forecasts(prediction))
-    yield f"{prediction.level:.0%} intervals, from {sizes}. Times are of later frames."
-    yield ""
-    for row in prediction.cheapest:
-        if row.seconds is None:
-            yield f"ΔE2000 = {row.error:g}: no method reaches it."
-        else:
-            time, interval = _timed(row.seconds.value, row.seconds)
-            yield f"ΔE2000 = {row.error:g}: {row.method}, {row.spp} samples, {time} ({interval})."
-
-
-def _forecasts(prediction: Prediction) -> Rows:
-    is_measured = any(forecast.measured for forecast in prediction.forecasts)
-    measured = ("measured time", "measured error") if is_measured else ()
-    yield "method", "samples", "time", "interval", "mean ΔE2000", "interval", *measured
-    for row in prediction.forecasts:
-        if row.spp in SHOWN_SPP or row.measured:
-            point = row.measured
-            found = (_time(point.seconds.value), f"{point.error.mean:.3f}") if point else ("", "")
-            yield (
-                row.method,
-                f"{row.spp}",
-                *_timed(row.seconds.value, row.seconds),
-                f"{row.error.mean:.3f}",
-                f"{row.error.low:.3f} to {row.error.high:.3f}",
-                *(found if is_measured else ()),
-            )
-
-
-def _methods(record: Cost) -> Rows:
-    first = "first run (preparing)"
-    yield "method", "samples", "median", "interval", first, "mean ΔE2000", "RMSE", ""
-    names = {method.name: method.names for method in record.methods}
-    for point in record.points:
-        others = ", ".join(other for other in names[point.method] if other != point.method)
-        prepared = f" ({_time(point.prepare_s)})" if point.prepare_s else ""
+def _times(record: Cost) -> Rows:
+    yield "method", "x kernel", "interval", "per sample", "overhead", "first image (preparing)"
+    for one in record.methods:
+        others = ", ".join(other for other in one.names if other != one.name)
+        prepared = f" ({seconds(one.prepare_s)})" if one.prepare_s else ""
         yield (
-            f"{point.method} (= {others})" if others else point.method,
-            f"{point.spp}",
-            *_timed(point.seconds.value, point.seconds),
-            f"{_time(point.first_s)}{prepared}",
-            _error(point),
-            f"{max(point.mse, 0) ** 0.5:.2g}",
-            "front" if point.pareto else "",
+            f"{one.name} (= {others})" if others else one.name,
+            f"{one.ratio.value:.2f}",
+            f"{one.ratio.low:.2f} to {one.ratio.high:.2f}",
+            seconds(one.per_sample_s.value),
+            seconds(one.overhead_s.value),
+            f"{seconds(one.first_s)}{prepared}",
         )
 
 
-def _equal_error(record: Cost) -> Rows:
-    aims = record.reached_by(record.equal_error[0].method) if record.equal_error else ()
-    yield "method", *(f"{aim.error:g}" for aim in aims)
-    for method in dict.fromkeys(row.method for row in record.equal_error):
-        yield method, *map(_reached, record.reached_by(method))
+def _points(points: Sequence[Point]) -> Rows:
+    yield "method", "samples", "time", "interval", "mean ΔE2000", "suffices at", "front"
+    for point in points:
+        close = f"front, too close to call: {', '.join(point.ties)}" if point.ties else "front"
+        yield (
+            point.method,
+            f"{point.spp}",
+            *timed(point.seconds),
+            f"{point.error.mean:.3f} ± {half(point.error):.3f}",
+            f"{point.tolerance.mean:.2f} ± {half(point.tolerance):.2f}",
+            close if point.front else "",
+        )
 
 
-def _reached(row: Reached) -> str:
-    if row.seconds is None:
-        return "not reached"
-    time, interval = _timed(row.seconds.value, row.seconds)
-    return f"{'at most ' if row.at_most else ''}{time} ({interval})"
+def half(error: MeanError) -> float:
+    """Return half an interval."""
+    return error.high - error.mean
+
+
+def _off(record: Cost) -> Rows:
+    """Yield how far off the predictions are."""
+    yield "method", "time", "predicted", "off", "mean ΔE2000", "predicted", "off"
+    known = {(point.method, point.spp): point for point in record.predicted}
+    for found in record.measured:
+        said = known[found.method, found.spp]
+        time, error = found.seconds.value, found.error.mean
+        yield (
+            found.method,
+            seconds(time),
+            seconds(said.seconds.value),
+            f"{said.seconds.value / time - 1:+.0%}",
+            f"{error:.3f}",
+            f"{said.error.mean:.3f}",
+            f"{said.error.mean / error - 1:+.0%}" if error else "",
+        )
 
 
 def _attribution(record: Cost) -> Rows:
-    yield "effect", "removed", "95 % interval", "alone", "last"
-    for one in record.attribution.effects:
+    whole = record.attribution
+    adds = f"adds at {sized(whole.resolution)}, {whole.spp} samples"
+    yield "effect", "removed", "95 % interval", "alone", "last", adds, "95 % interval"
+    for one in whole.effects:
         yield (
             one.effect,
             f"{one.removes.value:.3f}",
             f"{one.removes.low:.3f} to {one.removes.high:.3f}",
             f"{one.alone:.3f}",
             f"{one.last:.3f}",
+            added(one.adds_s),
+            timed(one.adds_s)[1],
         )
 
 
-def _objects(record: Cost) -> Rows:
-    effects = (one.effect for one in record.attribution.effects)
-    yield "shape", "of the departure", "mean ΔE2000", *effects
-    for row in record.objects:
-        removes = (f"{each.value:.3f} ± {each.high - each.value:.3f}" for each in row.removes)
-        yield row.name, f"{row.share:.1%}", f"{row.departure:.3f}", *removes
+def added(time: Estimated) -> str:
+    """Return the time that an effect adds, in words."""
+    return "no measurable time" if time.low <= 0 <= time.high else timed(time)[0]
 
 
-def _time(value: float) -> str:
-    return f"{value:.3g} s" if abs(value) >= 1 else f"{value * 1e3:.3g} ms"
-
-
-def _error(point: Measured) -> str:
-    return f"{point.error.mean:.3f} ± {point.error.high - point.error.mean:.3f}"
-
-
-def _timed(value: float, interval: Seconds | Estimated) -> tuple[str, str]:
-    return _time(value), f"{_time(interval.low)} to {_time(interval.high)}"
+def timed(time: Estimated) -> tuple[str, str]:
+    """Return a time, which may be below 0, and its interval."""
+    value, low, high = (
+        f"{each:.3g} s" if abs(each) >= 1 else f"{each * 1e3:.3g} ms"
+        for each in (time.value, time.low, time.high)
+    )
+    return value, f"{low} to {high}"
 
 
 def _section(title: str, rows: Rows) -> Iterator[str]:

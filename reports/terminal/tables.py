@@ -9,6 +9,7 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from msgspec import structs
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -70,50 +71,38 @@ def write(folder: Path, records: Sequence[ComparisonRecord]) -> None:
 
 
 def write_cost(folder: Path, name: str, record: Cost) -> None:
-    """Write the tables of a study of cost: ``name-cost``, ``-attribution``, ``-shapes``."""
+    """Write the tables of a study of cost: ``name-cost``, ``-methods``, ``-attribution``."""
     results.own(folder)
-    made = {"cost": methods(record), "attribution": attribution(record), "shapes": shapes(record)}
-    for part, rows in ((part, [*found]) for part, found in made.items()):
+    made = {
+        "cost": _interval_rows(record.points, ("method", "spp"), ("seconds", "error", "tolerance")),
+        "methods": _interval_rows(
+            record.methods, ("name", "processor_s"), ("ratio", "per_sample_s", "overhead_s")
+        ),
+        "attribution": _interval_rows(
+            record.attribution.effects, ("effect", "alone", "last"), ("removes", "adds_s")
+        ),
+    }
+    for part, rows in made.items():
         results.write(folder / f"{name}-{part}.csv", comma_separated(rows))
         shown = ([_shown(cell) for cell in row] for row in rows)
         results.write(folder / f"{name}-{part}.md", "\n".join(markdown(shown)) + "\n")
 
 
-def methods(record: Cost) -> Iterator[Sequence[Any]]:
-    """Yield the rows of a study's methods: seconds for one image, and mean ΔE2000."""
-    yield (
-        "method",
-        "spp",
-        "median_s",
-        "low_s",
-        "high_s",
-        "error",
-        "error_low",
-        "error_high",
-        "front",
-    )
-    for point in record.points:
-        seconds, error = point.seconds, point.error
-        numbers = seconds.value, seconds.low, seconds.high, error.mean, error.low, error.high
-        front = "yes" if point.pareto else "no"
-        yield point.method, point.spp, *numbers, front
-
-
-def attribution(record: Cost) -> Iterator[Sequence[Any]]:
-    """Yield the rows of the effects: the mean ΔE2000 that each removes."""
-    yield "effect", "removes", "removes_low", "removes_high", "alone", "last"
-    for one in record.attribution.effects:
-        removes = one.removes.value, one.removes.low, one.removes.high
-        yield one.effect, *removes, one.alone, one.last
-
-
-def shapes(record: Cost) -> Iterator[Sequence[Any]]:
-    """Yield the rows of the shapes: the mean ΔE2000 that each effect removes there."""
-    yield "shape", "pixels", "share", "dE2000", "effect", "removes", "removes_low", "removes_high"
-    for row in record.objects:
-        for one, removes in zip(record.attribution.effects, row.removes, strict=True):
-            found = removes.value, removes.low, removes.high
-            yield row.name, row.pixels, row.share, row.departure, one.effect, *found
+def _interval_rows(
+    records: Iterable[Any], plain_fields: Sequence[str], intervals: Sequence[str]
+) -> list[list[Any]]:
+    """Return a row per record: some fields, and value, low and high of others."""
+    ends = "", "_low", "_high"
+    return [
+        [*plain_fields, *(f"{name}{end}" for name in intervals for end in ends)],
+        *(
+            [
+                *(getattr(one, name) for name in plain_fields),
+                *(end for name in intervals for end in structs.astuple(getattr(one, name))),
+            ]
+            for one in records
+        ),
+    ]
 
 
 def metrics_csv(records: Iterable[ComparisonRecord]) -> str:

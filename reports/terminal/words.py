@@ -124,13 +124,13 @@ def parameter(value: float) -> str:
 
 
 def seconds(value: float | None) -> str:
-    """A time with its unit: µs, ms or s."""
+    """A time with its unit: ns, µs, ms or s."""
     if value is None:
         return "–"
-    for scale, unit in ((1.0, "s"), (1e-3, "ms")):
+    for scale, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")):
         if abs(value) >= scale:
             return f"{number(value / scale)} {unit}"
-    return f"{number(value / 1e-6)} µs" if value else "0 s"
+    return f"{number(value / 1e-9)} ns" if value else "0 s"
 
 
 def percent(value: float) -> str:

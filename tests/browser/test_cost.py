@@ -8,6 +8,7 @@ from reports.charts import theme
 from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
 from tests.cost_records import HEIGHT as ROWS
 from tests.cost_records import WIDTH as COLUMNS
+from tests.cost_records import causes
 
 SCENE = f"#scene={NOISY_ID}&mode=error"
 
@@ -22,21 +23,21 @@ def place(x, y):
 
 
 @pytest.mark.parametrize("pixel", [(5, 12), (40, 12), (23, 16), (24, 16), (30, 31), (30, 1)])
-def test_map_and_inspector_name_the_effect_that_dominates(visitor, report, pixel):
+def test_map_and_inspector_name_the_effect_that_dominates(visitor, pixel):
     visitor.open(f"{SCENE}&map=effects&pixel={pixel[0]},{pixel[1]}")
-    study = report.study
-    known = dominating(study.causes.maps, study.counted)[place(*pixel)]
-    names = [*study.causes.maps, "unknown", "none visible"]
-    colours = [*map(theme.EFFECT_COLOURS.get, study.causes.maps), "#82888f", theme.NO_EFFECT]
+    found = causes()
+    known = dominating(found.maps, found.counted)[place(*pixel)]
+    names = [*found.maps, "unknown", "none visible"]
+    colours = [*map(theme.EFFECT_COLOURS.get, found.maps), "#82888f", theme.NO_EFFECT]
     assert visitor.inspected()["cause"] == names[known]
     x, y = pixel[0] + (2 if pixel[0] != 23 else -2), pixel[1]  # beside the mark
     np.testing.assert_allclose(visitor.colour_of(x, y), bytes_of(colours[known]), atol=1)
 
 
-def test_the_legend_names_every_effect_of_the_scene(visitor, report):
+def test_the_legend_names_every_effect_of_the_scene(visitor):
     page = visitor.open(f"{SCENE}&map=effects")
     keys = page.locator(".legend .key").all_text_contents()
-    assert keys == [*report.study.causes.maps, "none visible"]
+    assert keys == [*causes().maps, "none visible"]
 
 
 def test_a_scene_without_causes_has_no_map_of_effects(visitor):

@@ -1,0 +1,253 @@
+"""Hybrids and attributions on real scenes: sums, closure, previews."""
+
+from types import SimpleNamespace
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons.case import open_case
+from comparisons.cost.cost_record import Method
+from comparisons.cost.methods import Ladder
+from comparisons.departure.metrics import delta_e_2000
+from comparisons.gallery.builtin import SCENES
+from comparisons.hybrids import attribution
+from comparisons.hybrids.hybrids import LEAST_SPP, PREVIEW, HybridImages, HybridScenes
+from comparisons.options import Options
+from comparisons.prepared import guarded, prepare
+from reference.planning.effects import OCCLUSION, labelled
+from reference.rendering.renderer import Stream, passes
+from reference.rendering.sums import Accumulator
+from reference.scene.graph import set_variant
+from reference.scene.source import Source
+from tests.misplanned import scene as described
+from tests.test_objects import shadowed
+
+MADE_OF = {
+    "cornell-box": {"occlusion", "extended lights", "interreflection"},
+    "fig-6-10": {
+        "distance attenuation", "polygon interpolation", "microfacets and Fresnel", "environment",
+    },
+    "narrow-band-lamp": {"occlusion", "spectral"},
+}  # fmt: skip
+"""Effects of scenes that between them have all that the built-in ones have."""
+
+
+def whole(renderer, count=8, seed=40):
+    total = Accumulator()
+    for number in range(count):
+        total.add(renderer.render(seed + number))
+    return total.estimate()
+
+
+# -- Attribution -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        "cornell-box",
+        "fig-6-10",
+        pytest.param("narrow-band-lamp", marks=pytest.mark.thorough),
+    ],
+)
+def found(request):
+    """The causes of one small scene, and its kernel and reference, rendered anew."""
+    scene = SCENES[request.param]
+    set_variant(scene.variant)
+    options = Options(
+        resolution=(24, 24),
+        heuristic_variant=scene.heuristic_variant,
+        interpolation=scene.interpolation,
+        tessellation=scene.tessellation,
+    )
+    ready = guarded(scene.source(), options)
+    causes = attribution.find(ready, scene.source(), options)
+    images = [whole(half).mean for half in (ready.heuristic, ready.reference)]
+    yield SimpleNamespace(name=request.param, causes=causes, images=images)
+    set_variant("llvm_ad_rgb")
+
+
+@pytest.mark.guarantee(
+    "attribution",
+    "Attributions and closure add up to the departure, in the mean and in every pixel.",
+)
+def test_attributions_add_up_to_the_departure_in_the_mean_and_in_every_pixel(found):
+    causes = found.causes
+    record = causes.record
+    assert set(causes.maps) == MADE_OF[found.name]
+    removed = [one.removes.value for one in record.effects]
+    assert sum(removed) + record.closure.mean == pytest.approx(record.departure, abs=1e-9)
+    total = sum(causes.maps.values()) + causes.left
+    np.testing.assert_allclose(total, causes.departure, atol=1e-9)
+    assert causes.departure.max() > 1
+    assert (causes.departure[~causes.counted] == 0).all()
+    # Single precision: a few units in the last place of values around 1.
+    assert record.implementation < 1e-3
+
+
+def test_the_departure_is_that_of_the_kernel_rendered_anew(found):
+    """Noise of a few samples on both sides; the mean over all pixels is sharper than one."""
+    causes, (kernel, reference) = found.causes, found.images
+    error = delta_e_2000(kernel, reference, Options().viewing)[causes.counted].mean()
+    departure = causes.departure[causes.counted].mean()
+    assert departure == pytest.approx(error, abs=0.05 * error + 0.5)
+    first, *_, last = causes.record.hybrids
+    assert (first.effects, first.error) == ((), pytest.approx(departure))
+    assert set(last.effects) == set(causes.maps)
+    assert set(causes.previews) == {each.effects for each in causes.record.hybrids}
+
+
+def removes(options, name="cornell-box"):
+    source = SCENES[name].source()
+    return attribution.find(guarded(source, options), source, options).record
+
+
+@pytest.mark.guarantee(
+    "attribution",
+    "With all effects simulated no departure remains: the closure's interval contains 0.",
+)
+def test_with_all_effects_nothing_is_left(rgb, monkeypatch):
+    monkeypatch.setattr(attribution, "REPLICATES", 8)
+    record = removes(Options(resolution=(32, 32)))
+    closure = record.closure
+    assert closure.low <= 0 <= closure.high or abs(closure.mean) < 0.02
+    assert closure.high - closure.low < 0.1 * record.departure
+
+
+@pytest.mark.slow
+@pytest.mark.guarantee(
+    "attribution", "A quick closure is unbiased: below 1 % of the Cornell box's departure."
+)
+def test_a_quick_closure_is_not_biased(rgb):
+    records = [removes(Options(resolution=(48, 48), seed=seed)) for seed in range(5)]
+    mean = np.mean([record.closure.mean for record in records])
+    assert abs(mean) < 0.01 * records[0].departure
+
+
+@pytest.mark.guarantee(
+    "attribution",
+    "On the Cornell box, intervals of attributions contain the converged value in at least 35 of"
+    " 40 runs.",
+)
+@pytest.mark.slow
+def test_intervals_of_attributions_hold_the_converged_value(rgb, capsys, monkeypatch):
+    def effects(seed):
+        record = removes(Options(resolution=(48, 48), seed=seed))
+        return {one.effect: one.removes for one in record.effects}
+
+    runs = [effects(seed) for seed in range(40)]
+    monkeypatch.setattr(attribution, "SPP", 8 * attribution.SPP)
+    for effect, exact in effects(1_000).items():
+        held = sum(one[effect].low <= exact.value <= one[effect].high for one in runs)
+        width = np.median([one[effect].high - one[effect].low for one in runs])
+        with capsys.disabled():
+            print(f"\n{effect}: {exact.value:.3f}, held {held} of 40, median width {width:.3f}")
+        assert held >= 35
+        assert width < max(0.2, exact.value / 2)
+
+
+# -- Hybrids ---------------------------------------------------------------------------------------
+
+
+class Shown:
+    """Renders the hybrid of some effects: transported light, and the emission pass."""
+
+    def __init__(self, scenes, simulated, spp):
+        made = scenes.transport(simulated, spp), scenes.emission(simulated, spp)
+        self.parts = [renderer for renderer in made if renderer is not None]
+
+    def render(self, seed):
+        return sum(mi.TensorXf(part.render(seed)) for part in self.parts)
+
+
+def hybrid_scenes(source, size=24):
+    ready = prepare(source, Options(resolution=(size, size)))
+    return ready, HybridScenes(ready.pair, ready.plan, ready.scene)
+
+
+def test_without_effects_the_plugins_give_the_kernels_image(rgb):
+    for name in ("fig-8-9", "plastic-spheres", "fig-6-5-m40"):
+        ready, scenes = hybrid_scenes(SCENES[name].source())
+        found = np.array(Shown(scenes, (), ready.heuristic.spp).render(3))
+        expected = np.array(ready.heuristic.render(3))
+        assert expected.max() > 0.1
+        np.testing.assert_allclose(found, expected, atol=2e-5)
+
+
+def test_with_all_effects_they_give_the_reference(rgb):
+    for name in ("fig-8-9", "cornell-box"):
+        ready, scenes = hybrid_scenes(SCENES[name].source())
+        found = whole(Shown(scenes, scenes.differences, 64))
+        ready.reference.spp = 64
+        expected = whole(ready.reference, seed=90)
+        noise = np.hypot(found.standard_error, expected.standard_error)
+        assert (np.abs(found.mean - expected.mean) > 7 * noise + 1e-5).mean() < 5e-3
+        mean_noise = np.sqrt(np.mean(noise**2) / noise.size)
+        assert abs((found.mean - expected.mean).mean()) < 4 * mean_noise + 1e-6
+
+
+def test_light_without_shadows_passes_through_what_is_in_its_way(rgb):
+    """A lamp behind a board: black with shadows, and without them what the lamp gives alone."""
+
+    def board(factor, place=(0, 0, 0), turned=False, **more):
+        transform = mi.ScalarTransform4f().translate(place)
+        transform = transform.rotate((1, 0, 0), 180) if turned else transform
+        return {"type": "rectangle", "to_world": transform.scale(factor), **more}
+
+    def diffuse(reflectance):
+        return {"type": "diffuse", "reflectance": reflectance}
+
+    # The camera stands under the board, which it does not see.
+    view = {
+        "viewer": (0, -3, 1.5),
+        "size": 16,
+        "floor": board(2, bsdf=diffuse(0.5)),
+        "lamp": board(
+            0.5,
+            (0, 0, 3),
+            turned=True,
+            bsdf=diffuse(0.0),
+            emitter={"type": "area", "radiance": 20.0},
+        ),
+    }
+    images = {}
+    for key, parts in (("open", {}), ("hidden", {"board": board(4, (0, 0, 2), bsdf=diffuse(0.0))})):
+        _, scenes = hybrid_scenes(Source(key, described(**view | parts)), 16)
+        everything = set(scenes.differences)
+        shown = (Shown(scenes, each, 64) for each in (everything, everything - {OCCLUSION}))
+        images[key] = [whole(each) for each in shown]
+    assert images["open"][0].mean.max() > 0.1
+    assert images["hidden"][0].mean.max() < 1e-6
+    found = images["hidden"][1]
+    np.testing.assert_allclose(
+        found.mean, images["open"][0].mean, atol=8 * found.standard_error.max() + 1e-4
+    )
+
+
+@pytest.mark.guarantee(
+    "attribution", "A preview of the switchboard equals a rendering that simulates its effects."
+)
+def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
+    """By the kernel's own shadow rays, where the hybrid has Mitsuba's direct light."""
+    scene = shadowed(24)
+    scene["sensor"]["film"]["rfilter"] = {"type": "box"}
+    case = open_case(scene, Options.of({"resolution": (24, 24)}), "shadowed")
+    found = Ladder(case.source, case.options, guarded(case.source, case.options))
+    for spp, finer in ((1, 1), (8, 1), (64, 4), (4096, 4), (16, 2)):
+        hybrids = HybridImages(found.pairs, found.scenes, 3, spp, 0, (24, 24))
+        assert hybrids.finer == finer
+        assert finer * 24 <= PREVIEW
+        assert finer == 1 or spp / finer**2 >= LEAST_SPP
+    for effects in ((), ("occlusion",)):
+        image = hybrids.simulating({labelled(effect) for effect in effects})
+        assert image.preview.shape == (48, 48, 3)
+        blocks = image.preview.reshape(24, 2, 24, 2, 3).mean(axis=(1, 3))
+        np.testing.assert_allclose(blocks, image.images.mean(axis=0), rtol=1e-5, atol=1e-6)
+    for rendered in (found.ready.scene, found.ready.heuristic.scene):
+        assert tuple(rendered.sensors()[0].film().size()) == (24, 24)
+    shadows = Method(name="shadows", family="kernel", shadows=True)
+    loop = passes([found.renderer(shadows, 4, (48, 48))], 0, 3, stream=Stream.REPLICATES)
+    expected = np.mean([np.array(one.images[0]) for one in loop], axis=0)
+    np.testing.assert_allclose(image.preview, expected, rtol=1e-3, atol=1e-4)
+    assert abs(image.preview - hybrids.simulating(()).preview).max() > 0.05
