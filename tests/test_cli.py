@@ -37,7 +37,8 @@ def test_compare_writes_what_the_contract_names(two_scenes):
     tables = {path.name for path in (out / "tables").iterdir()}
     assert tables == {".fotismos", "carriers.csv", "metrics.csv", "metrics.md"}
     names = {path.name for path in out.iterdir()} - {".fotismos", ".fotismos-lock"}
-    assert names == {"index.html", "run.json", "tables", "lambert-sphere", "fig-8-9"}
+    pages = {"index.html", "details.html"}
+    assert names == pages | {"run.json", "tables", "lambert-sphere", "fig-8-9"}
 
 
 def test_the_recorded_command_repeats_the_result(run, scene_file, tmp_path):
