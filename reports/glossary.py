@@ -68,6 +68,7 @@ VIEWS: Terms = {
 }
 
 COSTS: Terms = {
+    ("per sample",): "The time that each further sample per pixel adds to an image.",
     ("method",): "A way to render the scene, from flat shading to all light transport.",
     ("samples",): "Samples per pixel: camera rays whose mean is the pixel’s colour.",
     ("of the kernel’s per sample",): (
