@@ -18,6 +18,7 @@ from comparisons.comparison import ComparisonRecord
 from comparisons.departure.criterion import LIMIT, TOLERANCE, Verdict, decide, share_above
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import VisibleShare
+from comparisons.gallery.builtin import SCENES
 from heuristic import program
 from reports.terminal.words import number, percent, seconds
 
@@ -42,6 +43,9 @@ MISSING = {
     "spot cone": "the fall-off in a spot's cone",
 }
 """What an image without an effect lacks."""
+
+CHOICES = ("--heuristic", "--pairing", "--interpolation")
+"""Options that a command repeats only where they differ from the scene's defaults."""
 
 TEXTBOOK = ("phong", "blinn")
 """The heuristics of the chapters."""
@@ -165,10 +169,13 @@ def search(record: ComparisonRecord, threshold: float, spp: int | None = None) -
     """Return the command that finds the cheapest method for a scene at a tolerance."""
     words = shlex.split(record.command)
     scene, *rest = words[words.index("compare") + 1 :]
+    known = SCENES.get(scene)
+    default = ("phong", "matched", (known and known.interpolation) or "phong")
     kept = [
         word
         for option, value in pairwise([*rest, ""])
-        if option in ("-D", "--sensor", "--heuristic", "--pairing", "--interpolation")
+        if option in ("-D", "--sensor")
+        or (option in CHOICES and value != default[CHOICES.index(option)])
         for word in (option, value)
     ]
     more = ["--spp", spp] if spp else []

@@ -93,6 +93,15 @@ RULES = {
         "To find the cheapest method that passes: `fotismos plan 'my scene.xml' --within 1 -D"
         " a=1`.",
     ),
+    "the scene's defaults are not repeated": (
+        scene(command="fotismos compare fig-6-14 --heuristic phong --interpolation gouraud"), None,
+        2.0, "To find the cheapest method that passes: `fotismos plan fig-6-14 --within 2`.",
+    ),
+    "other choices than the scene's are": (
+        scene(command="fotismos compare fig-6-14 --heuristic blinn --interpolation phong"), None,
+        2.0, "To find the cheapest method that passes: `fotismos plan fig-6-14 --within 2"
+        " --heuristic blinn --interpolation phong`.",
+    ),
     "caution": (scene(caution="No pixel sees light."), None, 2.0, "No pixel sees light."),
 }  # fmt: skip
 
