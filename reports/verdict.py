@@ -206,6 +206,8 @@ Studied = tuple[ComparisonRecord, "Cost | None"]
 
 def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> str:
     """Return how many scenes look right at a tolerance; of a single one, how much is wrong."""
+    if not records:
+        return "No scene was compared."
     subjects = {judged(record).subject for record in records}
     subject = subjects.pop() if len(subjects) == 1 else "The first half"
     decisions = Counter(decision(record, threshold) for record in records)
