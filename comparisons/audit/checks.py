@@ -1,4 +1,4 @@
-"""The checks of an audit, and the audit itself, from a heuristic's or BSDF's values alone."""
+"""The checks of an audit, and the audit itself, from a heuristic's values alone."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -11,13 +11,7 @@ from msgspec import Meta
 
 from comparisons import record
 from comparisons.audit import diagnosis, furnace
-from comparisons.audit.subjects import (
-    INCIDENT,
-    LEVEL,
-    ScatteringSubject,
-    ShadingSubject,
-    Subject,
-)
+from comparisons.audit.subjects import ShadingSubject
 from heuristic import heuristics
 from reference.records import VERSION, Amount, Record, Versions
 
@@ -43,8 +37,6 @@ GRAZING = 1e-6
 
 JUMP = 0.01
 """In units of display white."""
-
-Kind = Literal["heuristic", "bsdf"]
 
 # --- The record, ``audit.json`` ----------------------------------------------------------------
 
@@ -73,12 +65,11 @@ class MaterialCurves(Record):
 
 
 class Audit(Record, kw_only=True):
-    """What holds for one heuristic or BSDF."""
+    """What holds for one heuristic."""
 
     record_version: int = VERSION
     subject: str
-    kind: Kind
-    parameters: Annotated[dict[str, float | str], Meta(description="Those given, by name.")]
+    parameters: Annotated[dict[str, float], Meta(description="Those given, by name.")]
     variant: str
     angles: Annotated[tuple[Amount, ...], Meta(description="From the normal, in degrees.")]
     curves: tuple[MaterialCurves, ...]
@@ -106,21 +97,16 @@ class Audit(Record, kw_only=True):
 # --- Checks ------------------------------------------------------------------------------------
 
 
-def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "") -> Audit:
-    """Make every check of a heuristic, as ``compare --heuristic`` accepts it, or of a type of BSDF.
+def audit(name: str, parameters: Mapping[str, float], command: str = "") -> Audit:
+    """Make every check of a heuristic, as ``compare --heuristic`` accepts it.
 
     In the current variant. ``command`` is the one that was run, for the record.
     """
-    subject: Subject
-    if kind == "bsdf":
-        subject = ScatteringSubject(name, parameters)
-    else:
-        subject = ShadingSubject(heuristics.named(name), parameters)
+    subject = ShadingSubject(heuristics.named(name), parameters)
     curves = tuple(curve(subject, material) for material in subject.materials)
     derivatives = {by: disagreement(value, shade) for by, value, shade in subject.numbers()}
     return Audit(
         subject=name,
-        kind=kind,
         parameters=dict(parameters),
         variant=mi.variant(),
         angles=ANGLES,
@@ -130,14 +116,14 @@ def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "
         derivatives=derivatives,
         checks=all_checks(subject, curves, derivatives),
         faults=tuple(subject.faults),
-        mistakes=diagnosis.describe(name) if kind == "heuristic" else (),
+        mistakes=diagnosis.describe(name),
         command=command,
         versions=record.versions(),
     )
 
 
 def all_checks(
-    subject: Subject, curves: tuple[MaterialCurves, ...], derivatives: Mapping[str, float]
+    subject: ShadingSubject, curves: tuple[MaterialCurves, ...], derivatives: Mapping[str, float]
 ) -> tuple[Checked, ...]:
     """Make every check."""
     return (
@@ -146,13 +132,12 @@ def all_checks(
         reciprocity(subject),
         horizon(subject),
         light_from_below(subject),
-        gradient(subject, derivatives),
-        sampling(subject),
+        gradient(derivatives),
         values(subject),  # last: it reports what the others met
     )
 
 
-def curve(subject: Subject, material: str) -> MaterialCurves:
+def curve(subject: ShadingSubject, material: str) -> MaterialCurves:
     """Return the two albedos of a white material over :data:`ANGLES`, and its lobes."""
     response, alpha = partial(subject.response, material), subject.materials[material]
     lights = LIGHTS if alpha in (None, PICTURED) else ()
@@ -165,7 +150,7 @@ def curve(subject: Subject, material: str) -> MaterialCurves:
     )
 
 
-def lobe(subject: Subject, material: str, degrees: float) -> tuple[float, ...]:
+def lobe(subject: ShadingSubject, material: str, degrees: float) -> tuple[float, ...]:
     """Return ``pi f`` at :data:`VIEWS`."""
     light = furnace.direction(np.deg2rad(-degrees), 0.0)
     view = furnace.direction(np.deg2rad(VIEWS), 0.0)
@@ -191,7 +176,7 @@ def energy(curves: tuple[MaterialCurves, ...]) -> Checked:
     return _checked("energy", value <= 1 + TOLERANCE, value, f"at most {1 + TOLERANCE}", worst)
 
 
-def reciprocity(subject: Subject) -> Checked:
+def reciprocity(subject: ShadingSubject) -> Checked:
     """Check that ``f(i, o) = f(o, i)`` for random pairs of directions."""
     a, b = furnace.random_pairs(PAIRS)
     differences = {
@@ -203,7 +188,7 @@ def reciprocity(subject: Subject) -> Checked:
     return _checked("reciprocity", value <= RECIPROCAL, value, expected, worst)
 
 
-def horizon(subject: Subject) -> Checked:
+def horizon(subject: ShadingSubject) -> Checked:
     """Check that no value jumps as a light along x sets."""
     polar, azimuth = np.meshgrid(np.linspace(0, 80, 33), np.linspace(0, 180, 61))
     view = furnace.direction(np.deg2rad(polar.ravel()), np.deg2rad(azimuth.ravel()))
@@ -218,7 +203,7 @@ def horizon(subject: Subject) -> Checked:
     return _checked("horizon", value <= JUMP, value, f"a jump of at most {JUMP}", worst)
 
 
-def light_from_below(subject: Subject) -> Checked:
+def light_from_below(subject: ShadingSubject) -> Checked:
     """Check that light from behind the surface is not seen."""
     degrees = np.linspace(91, 180, 90), np.arange(0, 181, 20.0), np.array([0.0, 30, 60, 80])
     polar, azimuth, viewer = (np.deg2rad(each.ravel()) for each in np.meshgrid(*degrees))
@@ -228,18 +213,7 @@ def light_from_below(subject: Subject) -> Checked:
     return _checked("light from below", value <= 1e-5, value, "0", worst)
 
 
-def sampling(subject: Subject) -> Checked:
-    """Check the density of samples against ``pdf``, of BSDFs."""
-    bound = 1 - (1 - LEVEL) ** (1 / len(INCIDENT))  # Šidák
-    expected = f"p of χ² at least {bound:.2g}"
-    if not isinstance(subject, ScatteringSubject):
-        return _not_asked("sampling", expected, "a heuristic is not sampled")
-    if (least := subject.sampling()) is None:
-        return _not_asked("sampling", expected, "it reflects nothing")
-    return _checked("sampling", least[0] >= bound, least[0], expected, least[1])
-
-
-def values(subject: Subject) -> Checked:
+def values(subject: ShadingSubject) -> Checked:
     """Check that hard cases, and all values met so far, are finite and not negative."""
     for case in subject.hard_cases():
         subject.note(*case)
@@ -251,10 +225,6 @@ def values(subject: Subject) -> Checked:
 def _checked(name: str, holds: bool, value: float, expected: str, worst: str) -> Checked:
     verdict: Literal["holds", "does not hold"] = "holds" if holds else "does not hold"
     return Checked(name=name, verdict=verdict, value=value, expected=expected, worst=worst)
-
-
-def _not_asked(name: str, expected: str, why: str) -> Checked:
-    return Checked(name=name, verdict="not asked", value=None, expected=expected, worst=why)
 
 
 def _largest(
@@ -284,11 +254,14 @@ OPPOSITE = 2.0
 """The largest possible relative difference; it also stands for derivatives that are not finite."""
 
 
-def gradient(subject: Subject, derivatives: Mapping[str, float]) -> Checked:
+def gradient(derivatives: Mapping[str, float]) -> Checked:
     """Check that Dr.Jit's derivatives by all numbers are right."""
     expected = f"at most {AGREES} of it at {QUANTILE:.0%} of the points"
     if not derivatives:
-        return _not_asked("gradient", expected, subject.untuned)
+        why = "Dr.Jit cannot differentiate it"
+        return Checked(
+            name="gradient", verdict="not asked", value=None, expected=expected, worst=why
+        )
     worst = max(derivatives, key=derivatives.__getitem__)
     value = derivatives[worst]
     return _checked("gradient", value <= AGREES, value, expected, f"by {worst}")
