@@ -12,7 +12,7 @@ from comparisons.options import LARGEST_SPP, Options
 from heuristic.errors import InputError
 from heuristic.tessellation import FINEST
 from reference.scene import source
-from tests.small_scene import PLAIN, SCENE
+from tests.small_scene import PLAIN
 
 SMALL = ("--spp", 4, "--resolution", "12x12")
 
@@ -86,29 +86,6 @@ def test_notebook_and_command_line_choose_one_variant(rgb):
     assert open_case(spectral_scene).variant == "llvm_ad_spectral"
     assert "--variant llvm_ad_spectral" in shown.comparison.record.command
     assert open_case(mi.cornell_box(), name="box").variant == "llvm_ad_rgb"
-
-
-def test_every_file_is_named_where_mitsuba_finds_it(rgb, tmp_path, monkeypatch):
-    """What is included, beside the scene or in the current folder; not what has a like name."""
-    scenes, current = tmp_path / "scenes", tmp_path / "current"
-    for folder in (scenes, current):
-        folder.mkdir()
-    texture = (
-        '<texture type="bitmap" name="diffuse_reflectance">'
-        '<string name="filename" value="{}"/></texture>'
-    )
-    colour = '<rgb name="diffuse_reflectance" value="0.2, 0.3, 0.5"/>'
-    part = '<scene version="3.0.0"><bsdf type="diffuse" id="unused"/></scene>'
-    (scenes / "part.xml").write_text(part, encoding="utf-8")
-    include = '<include filename="part.xml"/></scene>'
-    monkeypatch.chdir(current)
-    for name, folder in (("beside.png", scenes), ("current.png", current)):
-        (folder / name).write_bytes(b"one")
-        (tmp_path / name).write_bytes(b"not this one")
-        text = SCENE.replace(colour, texture.format(name)).replace("</scene>", include)
-        (scenes / "s.xml").write_text(text, encoding="utf-8")
-        found = open_case(scenes / "s.xml").source.files()
-        assert set(found) == {scenes / "part.xml", scenes / "s.xml", folder / name}
 
 
 def test_options_that_are_not_known_are_refused_with_those_that_are():

@@ -1,13 +1,12 @@
-"""FLIP: closed forms, an independent computation of its colour stage, exposures, and neighbours."""
+"""FLIP against its authors' program, closed forms, and exposures."""
 
 import numpy as np
 import pytest
-from colour.models import RGB_COLOURSPACE_BT709, XYZ_to_Lab
 from flip_evaluator import evaluate
 
 from comparisons.departure.colour import DEFAULT_VIEWING, Viewing
 from comparisons.departure.flip import LARGEST, MOST_STOPS, exposures, hdr_flip, ldr_flip
-from comparisons.departure.metrics import LEADING, METRICS
+from comparisons.departure.metrics import METRICS
 
 FLIPS = pytest.mark.parametrize("name", ["ldr_flip", "hdr_flip"])
 SIZE = (11, 13, 3)
@@ -37,34 +36,6 @@ def defined(name, test, reference, viewing):
 
 def flat(colour):
     return np.broadcast_to(np.asarray(colour, float), SIZE)
-
-
-def hunted(colour):
-    """L*a*b* of a linear colour, its chroma scaled by the lightness (Hunt's effect)."""
-    matrix = RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ
-    lab = XYZ_to_Lab(matrix @ colour, RGB_COLOURSPACE_BT709.whitepoint)
-    return lab * [1.0, 0.01 * lab[0], 0.01 * lab[0]]
-
-
-def colour_difference(first, second):
-    """Sections 4.1.2 and 4.1.3 of the paper, from 0 to 1: HyAB, compressed and redistributed."""
-
-    def compressed(a, b):
-        delta = hunted(np.array(a)) - hunted(np.array(b))
-        return (abs(delta[0]) + np.hypot(*delta[1:])) ** 0.7
-
-    largest = compressed([0, 1, 0], [0, 0, 1])
-    found, knee = compressed(first, second), 0.4 * largest
-    if found < knee:
-        return 0.95 * found / knee
-    return 0.95 + 0.05 * (found - knee) / (largest - knee)
-
-
-def test_colours_without_a_pattern_differ_as_the_paper_says():
-    for seed in range(8):
-        first, second = np.random.default_rng(seed).random((2, 3))
-        found = ldr_flip(flat(first), flat(second), DEFAULT_VIEWING)
-        np.testing.assert_allclose(found, colour_difference(first, second), atol=2e-3)
 
 
 def cases():
@@ -109,26 +80,7 @@ def test_closed_forms():
     green_blue = ldr_flip(flat([0, 1, 0]), flat([0, 0, 1]), DEFAULT_VIEWING)
     np.testing.assert_allclose(green_blue, 1.0, atol=1e-5)
     white_black = ldr_flip(flat([1, 1, 1]), flat([0, 0, 0]), DEFAULT_VIEWING)
-    np.testing.assert_allclose(white_black, colour_difference([1] * 3, [0] * 3), atol=1e-4)
-
-
-def test_ldr_flip_is_symmetric_and_ends_at_white():
-    first, second = np.random.default_rng(1).random((2, *SIZE))
-    there, back = (ldr_flip(*pair, DEFAULT_VIEWING) for pair in ((first, second), (second, first)))
-    np.testing.assert_allclose(there, back, atol=1e-6)
-    assert not ldr_flip(1.0 + first, 1.0 + second, DEFAULT_VIEWING).any()
-    assert hdr_flip(1.0 + first, 1.0 + second, DEFAULT_VIEWING).max() > 0.01
-
-
-def test_a_pattern_counts_less_the_more_pixels_there_are_to_a_degree():
-    """Pixel by pixel a fine checkerboard is far from its mean, and from afar nobody sees it."""
-    fine = np.indices(SIZE)[:2].sum(axis=0) % 2.0
-    grey = flat([0.5] * 3)
-    means = [
-        ldr_flip(fine, grey, Viewing(pixels_per_degree=pixels)).mean() for pixels in (5, 30, 120)
-    ]
-    assert means[0] > 1.5 * means[1] > 2.25 * means[2]
-    assert LEADING(fine, grey).mean() > 20
+    np.testing.assert_allclose(white_black, 0.967, atol=1e-3)
 
 
 def test_exposures_are_those_of_the_authors():
@@ -151,11 +103,3 @@ def test_no_reference_ends_the_process_or_the_range():
             found = function(test, reference, DEFAULT_VIEWING)
             assert found.shape == SIZE[:2]
             assert ((found >= 0.0) & (found <= 1.0)).all()
-
-
-@FLIPS
-def test_exposure_is_that_of_the_viewing_conditions(name):
-    test, reference = np.random.default_rng(2).random((2, *SIZE))
-    bright = METRICS[name](2.0 * test, 2.0 * reference)
-    exposed = METRICS[name](test, reference, Viewing(exposure=2.0))
-    np.testing.assert_allclose(bright, exposed, atol=1e-6)

@@ -94,8 +94,13 @@ def image(source):
     return np.array(Renderer(graph.instantiate(), integrator, 4, "test").render(0))
 
 
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("kind", "place"),
+    [
+        *((kind, "own") for kind in KINDS),
+        *(("texture", place) for place in PLACES if place != "own"),
+    ],
+)
 def test_a_file_that_changes_changes_image_and_key(kind, place, folder):
     name, write, element = KINDS[kind]
     scene, file = folder / "scene/s.xml", file_in(place, name, folder)
@@ -110,19 +115,6 @@ def test_a_file_that_changes_changes_image_and_key(kind, place, folder):
     assert np.abs(after - before).max() > 0.01, "Mitsuba reads the file"
     assert first == same
     assert first != second
-
-
-def test_the_nearest_file_counts(folder):
-    name, write, element = KINDS["texture"]
-    scene = folder / "scene/s.xml"
-    scene.write_text(SCENE % ("", element % name))
-    keys = []
-    for place in ("current", "own"):
-        write(file_in(place, name, folder), 0.2 if place == "current" else 0.9)
-        source = Source("s", scene)
-        keys.append(digest(source))
-        assert file_in(place, name, folder).resolve() in source.files()
-    assert keys[0] != keys[1]
 
 
 def test_a_place_that_one_scene_adds_is_not_searched_for_the_next(folder):

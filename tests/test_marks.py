@@ -9,7 +9,6 @@ import pytest
 from scipy import stats
 
 from comparisons.departure.marks import LEVEL, MARKED, UNDETERMINED
-from reference.rendering.sums import sample
 from tests import noisy
 
 KINDS = ("lognormal", "poisson", "spikes")
@@ -104,29 +103,6 @@ def test_without_noise_only_rounding_is_excused(rgb):
     bright, dim = np.full((1, 4, 3), 100.0), np.full((1, 4, 3), 0.1)
     assert noisy.found(differences, bright, exact=True).tolist() == [[0, 0, 0, 1]]
     assert noisy.found(differences, dim, exact=True).tolist() == [[0, 0, 1, 1]]
-
-
-def test_the_sums_are_those_of_the_definition(rgb):
-    rng = np.random.default_rng(9)
-    for count in (4, 11):
-        passes = rng.lognormal(size=(count, 9, 17, 3))
-        found = noisy.estimate(passes)
-        third = stats.kstat(passes.reshape(count, -1)[:, 0], 3) / count**2
-        assert found.third[0, 0, 0] == pytest.approx(third, rel=1e-9)
-        every = stats.moment(passes, 3, axis=0) * count**2 / ((count - 1) * (count - 2)) / count**2
-        np.testing.assert_allclose(found.third, every, rtol=1e-9, atol=1e-12)
-        mean = np.average(found.grouped.means, axis=0, weights=found.grouped.sizes)
-        np.testing.assert_allclose(mean, found.mean.reshape(-1, 3)[found.grouped.places])
-        assert found.grouped.means.shape == (min(count, 8), 9 * 17, 3)
-
-
-def test_a_large_image_is_sampled_and_its_blocks_are_whole():
-    counted = np.ones((200, 200), bool)
-    counted[:, :8] = False
-    places, blocks, total = sample(counted)
-    assert total == 25 * 24
-    assert np.bincount(blocks).tolist() == [64] * 256
-    assert (places % 200 >= 8).all()
 
 
 def check(name, samples, passes, runs, size=noisy.SIZE):
