@@ -1,4 +1,4 @@
-"""The content of docs/audit.md: audits of shaders."""
+"""The content of docs/audit.md: audits of shaders and of some Mitsuba BSDFs."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,20 +22,30 @@ ENGINES = {
 """Lobes of engines, by their published formulas."""
 
 ARGUED = ("white furnace", "energy", "reciprocity")
+BSDFS = (
+    ("diffuse", {}),
+    ("roughplastic", {"alpha": 0.1}),
+    ("roughplastic", {"alpha": 0.5}),
+    ("roughconductor", {"alpha": 0.3}),
+    ("principled", {"roughness": 0.5}),
+)
 
 
 def audits() -> dict[str, Audit]:
     """Return all audits, by their names in the table."""
-    found = {name: audit(name, {}) for name in (PICTURED, "blinn")}
+    found = {name: audit("heuristic", name, {}) for name in (PICTURED, "blinn")}
     for name in SHADED:
         link = f"[{name.replace('_', ' ')}](shaders/{name}.py)"
-        found[link] = audit(str(SHADERS / f"{name}.py"), {})
+        found[link] = audit("heuristic", str(SHADERS / f"{name}.py"), {})
+    for plugin, given in BSDFS:
+        words = "".join(f", {name} {value:g}" for name, value in given.items())
+        found[f"`{plugin}`{words}"] = audit("bsdf", plugin, given)
     return found
 
 
 def engines() -> dict[str, Audit]:
     """Return the audits of :data:`ENGINES` by their names."""
-    return {name: audit(str(SHADERS / file), {}) for name, file in ENGINES.items()}
+    return {name: audit("heuristic", str(SHADERS / file), {}) for name, file in ENGINES.items()}
 
 
 def argued(found: dict[str, Audit]) -> Iterator[str]:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import comparisons.compare
-from comparisons.audit.checks import Audit
+from comparisons.audit.checks import Audit, Kind
 from comparisons.audit.checks import audit as examined
 from comparisons.case import RGB, Scene, open_case
 from comparisons.check.moved import LEVEL
@@ -183,11 +183,14 @@ def check(baseline: str | Path, significance: float = LEVEL) -> CheckRecord:
     return made
 
 
-def audit(heuristic: str, **parameters: float) -> Audit:
-    """Return the checks of a heuristic by itself."""
+def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: Any) -> Audit:
+    """Return the checks of a heuristic, or of a type of BSDF, by itself."""
+    if (heuristic is None) == (bsdf is None):
+        raise InputError("audit needs one of heuristic and bsdf.")
     set_variant(RGB)
     register()
-    return examined(heuristic, parameters)
+    kind: Kind = "bsdf" if heuristic is None else "heuristic"
+    return examined(kind, str(heuristic or bsdf), parameters)
 
 
 def declare(entry: Heuristic | Metric | Method) -> Any:

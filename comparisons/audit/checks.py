@@ -1,4 +1,4 @@
-"""The checks of an audit, and the audit itself, from a heuristic's values alone."""
+"""The checks of an audit, and the audit itself, from a heuristic's or BSDF's values alone."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -11,7 +11,13 @@ from msgspec import Meta
 
 from comparisons import record
 from comparisons.audit import diagnosis, furnace
-from comparisons.audit.subjects import ShadingSubject
+from comparisons.audit.subjects import (
+    INCIDENT,
+    LEVEL,
+    ScatteringSubject,
+    ShadingSubject,
+    Subject,
+)
 from heuristic import heuristics
 from reference.records import VERSION, Amount, Record, Versions
 
@@ -37,6 +43,8 @@ GRAZING = 1e-6
 
 JUMP = 0.01
 """In units of display white."""
+
+Kind = Literal["heuristic", "bsdf"]
 
 # --- The record, ``audit.json`` ----------------------------------------------------------------
 
@@ -65,11 +73,12 @@ class MaterialCurves(Record):
 
 
 class Audit(Record, kw_only=True):
-    """What holds for one heuristic."""
+    """What holds for one heuristic or BSDF."""
 
     record_version: int = VERSION
     subject: str
-    parameters: Annotated[dict[str, float], Meta(description="Those given, by name.")]
+    kind: Kind
+    parameters: Annotated[dict[str, float | str], Meta(description="Those given, by name.")]
     variant: str
     angles: Annotated[tuple[Amount, ...], Meta(description="From the normal, in degrees.")]
     curves: tuple[MaterialCurves, ...]
@@ -97,16 +106,21 @@ class Audit(Record, kw_only=True):
 # --- Checks ------------------------------------------------------------------------------------
 
 
-def audit(name: str, parameters: Mapping[str, float], command: str = "") -> Audit:
-    """Make every check of a heuristic, as ``compare --heuristic`` accepts it.
+def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "") -> Audit:
+    """Make every check of a heuristic, as ``compare --heuristic`` accepts it, or of a type of BSDF.
 
     In the current variant. ``command`` is the one that was run, for the record.
     """
-    subject = ShadingSubject(heuristics.named(name), parameters)
+    subject: Subject
+    if kind == "bsdf":
+        subject = ScatteringSubject(name, parameters)
+    else:
+        subject = ShadingSubject(heuristics.named(name), parameters)
     curves = tuple(curve(subject, material) for material in subject.materials)
     derivatives = {by: disagreement(value, shade) for by, value, shade in subject.numbers()}
     return Audit(
         subject=name,
+        kind=kind,
         parameters=dict(parameters),
         variant=mi.variant(),
         angles=ANGLES,
@@ -116,14 +130,14 @@ def audit(name: str, parameters: Mapping[str, float], command: str = "") -> Audi
         derivatives=derivatives,
         checks=all_checks(subject, curves, derivatives),
         faults=tuple(subject.faults),
-        mistakes=diagnosis.describe(name),
+        mistakes=diagnosis.describe(name) if kind == "heuristic" else (),
         command=command,
         versions=record.versions(),
     )
 
 
 def all_checks(
-    subject: ShadingSubject, curves: tuple[MaterialCurves, ...], derivatives: Mapping[str, float]
+    subject: Subject, curves: tuple[MaterialCurves, ...], derivatives: Mapping[str, float]
 ) -> tuple[Checked, ...]:
     """Make every check."""
     return (
@@ -132,12 +146,13 @@ def all_checks(
         reciprocity(subject),
         horizon(subject),
         light_from_below(subject),
-        gradient(derivatives),
+        gradient(subject, derivatives),
+        sampling(subject),
         values(subject),  # last: it reports what the others met
     )
 
 
-def curve(subject: ShadingSubject, material: str) -> MaterialCurves:
+def curve(subject: Subject, material: str) -> MaterialCurves:
     """Return the two albedos of a white material over :data:`ANGLES`, and its lobes."""
     response, alpha = partial(subject.response, material), subject.materials[material]
     lights = LIGHTS if alpha in (None, PICTURED) else ()
@@ -150,7 +165,7 @@ def curve(subject: ShadingSubject, material: str) -> MaterialCurves:
     )
 
 
-def lobe(subject: ShadingSubject, material: str, degrees: float) -> tuple[float, ...]:
+def lobe(subject: Subject, material: str, degrees: float) -> tuple[float, ...]:
     """Return ``pi f`` at :data:`VIEWS`."""
     light = furnace.direction(np.deg2rad(-degrees), 0.0)
     view = furnace.direction(np.deg2rad(VIEWS), 0.0)
@@ -176,7 +191,7 @@ def energy(curves: tuple[MaterialCurves, ...]) -> Checked:
     return _checked("energy", value <= 1 + TOLERANCE, value, f"at most {1 + TOLERANCE}", worst)
 
 
-def reciprocity(subject: ShadingSubject) -> Checked:
+def reciprocity(subject: Subject) -> Checked:
     """Check that ``f(i, o) = f(o, i)`` for random pairs of directions."""
     a, b = furnace.random_pairs(PAIRS)
     differences = {
@@ -188,7 +203,7 @@ def reciprocity(subject: ShadingSubject) -> Checked:
     return _checked("reciprocity", value <= RECIPROCAL, value, expected, worst)
 
 
-def horizon(subject: ShadingSubject) -> Checked:
+def horizon(subject: Subject) -> Checked:
     """Check that no value jumps as a light along x sets."""
     polar, azimuth = np.meshgrid(np.linspace(0, 80, 33), np.linspace(0, 180, 61))
     view = furnace.direction(np.deg2rad(polar.ravel()), np.deg2rad(azimuth.ravel()))
@@ -203,7 +218,7 @@ def horizon(subject: ShadingSubject) -> Checked:
     return _checked("horizon", value <= JUMP, value, f"a jump of at most {JUMP}", worst)
 
 
-def light_from_below(subject: ShadingSubject) -> Checked:
+def light_from_below(subject: Subject) -> Checked:
     """Check that light from behind the surface is not seen."""
     degrees = np.linspace(91, 180, 90), np.arange(0, 181, 20.0), np.array([0.0, 30, 60, 80])
     polar, azimuth, viewer = (np.deg2rad(each.ravel()) for each in np.meshgrid(*degrees))
@@ -213,7 +228,18 @@ def light_from_below(subject: ShadingSubject) -> Checked:
     return _checked("light from below", value <= 1e-5, value, "0", worst)
 
 
-def values(subject: ShadingSubject) -> Checked:
+def sampling(subject: Subject) -> Checked:
+    """Check the density of samples against ``pdf``, of BSDFs."""
+    bound = 1 - (1 - LEVEL) ** (1 / len(INCIDENT))  # Šidák
+    expected = f"p of χ² at least {bound:.2g}"
+    if not isinstance(subject, ScatteringSubject):
+        return _not_asked("sampling", expected, "a heuristic is not sampled")
+    if (least := subject.sampling()) is None:
+        return _not_asked("sampling", expected, "it reflects nothing")
+    return _checked("sampling", least[0] >= bound, least[0], expected, least[1])
+
+
+def values(subject: Subject) -> Checked:
     """Check that hard cases, and all values met so far, are finite and not negative."""
     for case in subject.hard_cases():
         subject.note(*case)
@@ -225,6 +251,10 @@ def values(subject: ShadingSubject) -> Checked:
 def _checked(name: str, holds: bool, value: float, expected: str, worst: str) -> Checked:
     verdict: Literal["holds", "does not hold"] = "holds" if holds else "does not hold"
     return Checked(name=name, verdict=verdict, value=value, expected=expected, worst=worst)
+
+
+def _not_asked(name: str, expected: str, why: str) -> Checked:
+    return Checked(name=name, verdict="not asked", value=None, expected=expected, worst=why)
 
 
 def _largest(
@@ -254,14 +284,11 @@ OPPOSITE = 2.0
 """The largest possible relative difference; it also stands for derivatives that are not finite."""
 
 
-def gradient(derivatives: Mapping[str, float]) -> Checked:
+def gradient(subject: Subject, derivatives: Mapping[str, float]) -> Checked:
     """Check that Dr.Jit's derivatives by all numbers are right."""
     expected = f"at most {AGREES} of it at {QUANTILE:.0%} of the points"
     if not derivatives:
-        why = "Dr.Jit cannot differentiate it"
-        return Checked(
-            name="gradient", verdict="not asked", value=None, expected=expected, worst=why
-        )
+        return _not_asked("gradient", expected, subject.untuned)
     worst = max(derivatives, key=derivatives.__getitem__)
     value = derivatives[worst]
     return _checked("gradient", value <= AGREES, value, expected, f"by {worst}")

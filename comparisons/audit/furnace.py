@@ -8,7 +8,10 @@ surface. The share of light from ``l`` that is returned is
 """
 
 from collections.abc import Callable
+from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -20,6 +23,30 @@ Response = Callable[[NDArray, NDArray], NDArray]
 GRID = (240, 180)
 """Azimuths and heights. It errs by a thousandth for GGX of an alpha of 0.1, even at 89 degrees,
 where its lobe is 0.2 degrees wide."""
+
+
+def of_bsdf(bsdf: Any) -> Response:
+    """Return the response of a BSDF; Mitsuba's ``wi`` is the viewer's side."""
+
+    def response(light: NDArray, view: NDArray) -> NDArray:
+        return np.array(evaluate(bsdf, light, view), float).reshape(-1, _count(light, view))
+
+    return response
+
+
+def evaluate(bsdf: Any, light: NDArray, view: NDArray) -> Any:
+    """Return a BSDF's response as a Dr.Jit array."""
+    count = _count(light, view)
+    si = dr.zeros(mi.SurfaceInteraction3f, count)
+    si.wi = mi.Vector3f(np.broadcast_to(view, (3, count)))
+    if mi.is_spectral:
+        si.wavelengths = 550.0
+    toward = mi.Vector3f(np.broadcast_to(light, (3, count)))
+    return dr.pi * mi.Spectrum(bsdf.eval(mi.BSDFContext(), si, toward))
+
+
+def _count(light: NDArray, view: NDArray) -> int:
+    return max(light.shape[1], view.shape[1])
 
 
 def direction(theta: ArrayLike, phi: ArrayLike) -> NDArray:

@@ -1,5 +1,10 @@
-"""A heuristic as an audit sees it: one white material, one light and one viewer at a time."""
+"""What can be audited: a heuristic, or a Mitsuba BSDF, by its response to a light.
 
+A heuristic has one white material, one light and one viewer at a time; a BSDF is known by its
+``eval``, ``sample`` and ``pdf``.
+"""
+
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
@@ -29,6 +34,56 @@ CaseValues = tuple[str, np.ndarray, tuple[np.ndarray, np.ndarray] | None]
 Number = tuple[str, float, Callable[[Any], Any]]
 """Name and value of a number to differentiate by, and the function of it, one value per point."""
 
+
+class Subject(ABC):
+    """A heuristic or a BSDF, with white materials and the roughness of those that have several.
+
+    ``untuned`` is why no derivative can be checked, if so; ``faults`` are values that light cannot
+    have, in words, from any check.
+    """
+
+    materials: dict[str, float | None]
+    grid = furnace.GRID
+    untuned = "it depends on no number"
+
+    def __init__(self) -> None:
+        self.faults: list[str] = []
+
+    @abstractmethod
+    def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        """Return what ``response`` returns, before it is checked."""
+
+    @abstractmethod
+    def hard_cases(self) -> Iterator[CaseValues]:
+        """Evaluate the hard cases."""
+
+    @abstractmethod
+    def numbers(self) -> Iterator[Number]:
+        """Yield the numbers that it depends on."""
+
+    def response(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        """Return ``pi f cos(theta_l)``, (C, N): see :mod:`comparisons.audit.furnace`.
+
+        Values that are not finite, or negative, are noted and count as 0.
+        """
+        count = max(light.shape[1], view.shape[1])
+        light, view = (np.broadcast_to(each, (3, count)) for each in (light, view))
+        values = np.broadcast_to(self.evaluate(material, light, view), (3, count))
+        self.note(material, values, (light, view))
+        return np.where(np.isfinite(values) & (values > 0), values, 0.0)
+
+    def note(
+        self, words: str, values: np.ndarray, pairs: tuple[np.ndarray, np.ndarray] | None
+    ) -> None:
+        """Note the first value (C, N) that is not finite, or negative."""
+        is_wrong = ~(np.isfinite(values) & (values >= -ROUNDING))
+        if is_wrong.any():
+            channel, place = np.argwhere(is_wrong)[0]
+            where = f"{words}, {furnace.describe(*pairs, place)}" if pairs else words
+            self.faults.append(f"{values[channel, place]:.3g} ({where})")
+
+
+# --- Heuristics --------------------------------------------------------------------------------
 
 COLOURS = ("k_i", "k_a", "k_d", "k_s", "base_color")
 
@@ -68,17 +123,11 @@ def white(form: str) -> dict[str, dict[str, float]]:
     return materials
 
 
-class ShadingSubject:
-    """A heuristic, with white materials and values for some of its parameters.
-
-    ``materials`` are the roughness of those that have one; ``faults`` are values that light cannot
-    have, in words, from any check.
-    """
-
-    grid = furnace.GRID
+class ShadingSubject(Subject):
+    """A heuristic, with values for some of its parameters."""
 
     def __init__(self, heuristic: Heuristic, parameters: Mapping[str, float]) -> None:
-        self.faults: list[str] = []
+        super().__init__()
         self.heuristic = heuristic
         if heuristic.needs == {"position"}:
             raise InputError(
@@ -96,31 +145,13 @@ class ShadingSubject:
         self.materials = {name: each.get("alpha") for name, each in self.white.items()}
         prepared = {each.name: self.values[each.name] for each in known.values() if each.prepared}
         self.prepared = heuristic.prepared(_square(), prepared)
+        if not heuristic.traced:
+            self.untuned = "Dr.Jit cannot differentiate it"
 
-    def response(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
-        """Return ``pi f cos(theta_l)``, (C, N): see :mod:`comparisons.audit.furnace`.
-
-        Values that are not finite, or negative, are noted and count as 0.
-        """
-        count = max(light.shape[1], view.shape[1])
-        light, view = (np.broadcast_to(each, (3, count)) for each in (light, view))
-        values = self._array(self.white[material], _sun(light), view)
-        values = np.broadcast_to(values, (3, count))
-        self.note(material, values, (light, view))
-        return np.where(np.isfinite(values) & (values > 0), values, 0.0)
-
-    def note(
-        self, words: str, values: np.ndarray, pairs: tuple[np.ndarray, np.ndarray] | None
-    ) -> None:
-        """Note the first value (C, N) that is not finite, or negative."""
-        is_wrong = ~(np.isfinite(values) & (values >= -ROUNDING))
-        if is_wrong.any():
-            channel, place = np.argwhere(is_wrong)[0]
-            where = f"{words}, {furnace.describe(*pairs, place)}" if pairs else words
-            self.faults.append(f"{values[channel, place]:.3g} ({where})")
+    def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        return self._array(self.white[material], _sun(light), view)
 
     def hard_cases(self) -> Iterator[CaseValues]:
-        """Evaluate the hard cases."""
         light, view = pairs = furnace.random_and_mirrored()
         for words, change in EXTREMES:
             yield words, self._array(MIDDLE | change, _sun(light), view), pairs
@@ -143,7 +174,6 @@ class ShadingSubject:
         yield "a viewer at the point itself", self._array(MIDDLE, _sun(UP), nothing), None
 
     def numbers(self) -> Iterator[Number]:
-        """Yield the numbers that it depends on, if Dr.Jit can differentiate it."""
         if not self.heuristic.traced:
             return
         light, view = furnace.random_pairs(512)
@@ -244,3 +274,143 @@ def _square() -> Any:
         },
         optimize=False,
     )  # fmt: skip
+
+
+# --- BSDFs -------------------------------------------------------------------------------------
+
+WHITE: dict[str, dict[str, Any]] = {
+    "diffuse": {"reflectance": 1.0},
+    "roughplastic": {"diffuse_reflectance": 1.0},
+    "principled": {"base_color": {"type": "rgb", "value": 1.0}},
+    "roughconductor": {"material": "none"},
+    "phong": {"k_d": 1.0},
+}
+"""Parameters that make BSDFs white; other types keep Mitsuba's defaults."""
+
+NARROWEST = {"alpha": 0.1, "alpha_u": 0.1, "alpha_v": 0.1, "roughness": 0.32}
+"""Roughness below which neither quadrature nor the cells of χ² resolve the lobe."""
+
+SHARPEST = 50.0
+"""Phong's exponent above which they do not."""
+
+LEVEL = 0.001
+"""Chance that correct densities fail, over all angles together."""
+
+INCIDENT = (0.0, 45.0, 75.0)
+"""Degrees at which samples are compared with the density."""
+
+
+class ScatteringSubject(Subject):
+    """A BSDF of some type; parameters that are omitted are of :data:`WHITE`.
+
+    If no roughness is given, and it has one, it is evaluated at each of :data:`ALPHAS`. BSDFs that
+    transmit light or reflect it as a mirror are refused: no quadrature covers them.
+    """
+
+    def __init__(self, plugin: str, parameters: Mapping[str, Any]) -> None:
+        super().__init__()
+        self.plugin, self.parameters = plugin, dict(parameters)
+        self._require_resolved()
+        self.bsdf = self._made()
+        if mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Transmission) or mi.has_flag(
+            self.bsdf.flags(), mi.BSDFFlags.Delta
+        ):
+            raise InputError(
+                f"BSDF {plugin!r} transmits light or reflects it as a mirror; an audit needs"
+                " reflection with a density: give roughplastic, roughconductor or the like."
+            )
+        self.bsdfs = {plugin: self.bsdf}
+        self.materials: dict[str, float | None] = {plugin: None}
+        self.keys = {key.partition(".")[0] for key, _ in mi.traverse(self.bsdf)}
+        keys = set() if NARROWEST.keys() & self.parameters.keys() else self.keys
+        if keys & NARROWEST.keys():
+            self.bsdfs, self.materials = {}, {}
+            for alpha in ALPHAS:
+                name = f"{plugin}, alpha {alpha:g}"
+                rough = {"roughness": alpha**0.5} if "roughness" in keys else {"alpha": alpha}
+                self.bsdfs[name], self.materials[name] = self._made(**rough), alpha
+
+    def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+        return furnace.of_bsdf(self.bsdfs[material])(light, view)
+
+    def hard_cases(self) -> Iterator[CaseValues]:
+        light, view = furnace.grazing()
+        pairs = np.hstack([light, light]), np.hstack([view, -view])
+        yield "grazing, head on and from behind", furnace.of_bsdf(self.bsdf)(*pairs), pairs
+        yield "a direction of length 0", furnace.of_bsdf(self.bsdf)(np.zeros((3, 1)), UP), None
+        light, view = pairs = furnace.random_and_mirrored()
+        for alpha in (1e-4, 1.0) if "alpha" in self.keys else ():
+            yield f"alpha = {alpha:g}", furnace.of_bsdf(self._made(alpha=alpha))(light, view), pairs
+
+    def numbers(self) -> Iterator[Number]:
+        light, view = furnace.random_pairs(512)
+        parameters = mi.traverse(self.bsdf)
+        for key in parameters.keys():  # noqa: SIM118 not a mapping
+            value = parameters[key]
+            is_smooth = not (parameters.flags(key) & mi.ParamFlags.NonDifferentiable)
+            is_one = isinstance(value, (mi.Float, mi.Color3f)) and dr.width(value) == 1
+            if is_smooth and is_one and (centre := float(np.array(value, float).ravel()[0])):
+                # Leave room for differences: reflectances must not exceed 1.
+                centre = min(max(centre, 0.1), 0.9) if "reflectance" in key else centre
+                yield key, centre, partial(self._changed, key, type(value), light, view)
+
+    def sampling(self) -> tuple[float, str] | None:
+        """Return the least p of χ² between samples and ``pdf`` (Mitsuba's test), and its angle.
+
+        It is None for a BSDF that reflects nothing.
+        """
+        if not furnace.of_bsdf(self.bsdf)(*furnace.random_pairs(256)).any():
+            return None
+        return min((self._p_value(angle), f"viewer at {angle:g}°") for angle in INCIDENT)
+
+    def _p_value(self, degrees: float) -> float:
+        wi = mi.Vector3f(furnace.direction(np.deg2rad(degrees), 0.3))
+        parameters = {"type": self.plugin} | WHITE.get(self.plugin, {}) | self.parameters
+        sample, density = mi.chi2.BSDFAdapter(self.plugin, parameters, wi=wi)
+
+        def above(wo: Any) -> Any:
+            # Samples below the horizon weigh nothing: roughplastic's density there is irrelevant.
+            return dr.select(wo.z > 0, density(wo), 0)
+
+        test = mi.chi2.ChiSquareTest(
+            mi.chi2.SphericalDomain(), sample, above, sample_dim=3,
+            sample_count=200_000, ires=32, res=100,
+        )  # fmt: skip
+        test.run(LEVEL, len(INCIDENT), quiet=True)
+        p = 0.0 if test.fail else float(np.array(test.p_value).ravel()[0])
+        return p if np.isfinite(p) else 0.0
+
+    def _made(self, **instead: Any) -> Any:
+        parameters = WHITE.get(self.plugin, {}) | self.parameters | instead
+        try:
+            return mi.load_dict({"type": self.plugin} | parameters)
+        except RuntimeError as error:
+            reason = " ".join(str(error).split())
+            raise InputError(
+                f"BSDF {self.plugin!r} with {self.parameters} cannot be made: give a Mitsuba BSDF"
+                f" type, and its parameters as -p name=value. Mitsuba reports: {reason}"
+            ) from error
+
+    def _changed(
+        self, key: str, kind: type, light: np.ndarray, view: np.ndarray, number: Any
+    ) -> Any:
+        bsdf = self._made()
+        parameters = mi.traverse(bsdf)
+        parameters[key] = kind(number)
+        parameters.update()
+        return dr.mean(furnace.evaluate(bsdf, light, view))
+
+    def _require_resolved(self) -> None:
+        """Reject lobes that the quadrature would miss."""
+        narrow = [
+            (name, f"{least:g} or more")
+            for name, least in NARROWEST.items()
+            if isinstance(value := self.parameters.get(name), float) and not value >= least
+        ]
+        if isinstance(n := self.parameters.get("n"), float) and not n <= SHARPEST:
+            narrow.append(("n", f"{SHARPEST:g} or less"))
+        for name, needed in narrow:
+            raise InputError(
+                f"BSDF {self.plugin!r}: {name} = {self.parameters[name]:g} makes a lobe too narrow"
+                f" for the audit: give {needed}."
+            )

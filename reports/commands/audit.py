@@ -1,9 +1,9 @@
-"""``fotismos audit``: properties of a heuristic, before any scene."""
+"""``fotismos audit``: properties of a heuristic or a BSDF, before any scene."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,37 +12,40 @@ from reports import jobs
 from reports.terminal.words import quiet_option, tell, tell_where, verbose_option
 
 if TYPE_CHECKING:
-    from comparisons.audit.checks import Audit
+    from comparisons.audit.checks import Audit, Kind
 
 
-def _parameter(text: str) -> tuple[str, float]:
-    """Parse ``NAME=VALUE``."""
-    name, _, value = text.partition("=")
+def _parameter(text: str) -> tuple[str, float | bool | str]:
+    """Parse ``NAME=VALUE``: a number, ``true`` or ``false``, or else a word."""
+    name, separator, value = text.partition("=")
+    if not (separator and name and value):
+        raise click.BadParameter(f"{text!r} is not a parameter; write it like alpha=0.1.")
     try:
         return name, float(value)
-    except ValueError as error:
-        message = f"{text!r} is not a parameter; write it like gloss=0.1."
-        raise click.BadParameter(message) from error
+    except ValueError:
+        return name, {"true": True, "false": False}.get(value, value)
 
 
 @jobs.command()
-@click.option("--heuristic", required=True, metavar="NAME|FILE.py[:FUNCTION]",
+@click.option("--heuristic", metavar="NAME|FILE.py[:FUNCTION]",
               help="What `compare --heuristic` takes.")  # fmt: skip
+@click.option("--bsdf", metavar="TYPE", help="A BSDF plugin of Mitsuba, such as roughplastic.")
 @click.option("-p", "parameters", type=_parameter, multiple=True, metavar="NAME=VALUE",
-              help="A parameter of the heuristic; may be repeated.")  # fmt: skip
+              help="A parameter of the heuristic or the BSDF; may be repeated.")  # fmt: skip
 @jobs.output_option("out", "audit/NAME")
 @jobs.timeout_option
 @quiet_option
 @verbose_option
 @jobs.json_option
 def audit(
-    heuristic: str,
-    parameters: tuple[tuple[str, float], ...],
+    heuristic: str | None,
+    bsdf: str | None,
+    parameters: tuple[tuple[str, float | bool | str], ...],
     output: Path,
     timeout: float,
     as_json: bool,
 ) -> None:
-    """Check a heuristic: energy, reciprocity, continuity, gradients.
+    """Check a heuristic or BSDF: energy, reciprocity, continuity, gradients.
 
     Evaluates it on white materials for all directions, and prints a table of checks with the worst
     case of each. Writes a page (index.html), audit.json with all numbers, and audit.svg, the lobes,
@@ -54,7 +57,12 @@ def audit(
     Examples:
       fotismos audit --heuristic blinn
       fotismos audit --heuristic my_shader.py:toon
+      fotismos audit --bsdf roughplastic -p alpha=0.1
     """  # noqa: D301 click reads the \b as: keep these lines
+    name = heuristic or bsdf
+    if not name or (heuristic and bsdf):
+        raise click.UsageError("give one of --heuristic and --bsdf.")
+    kind = "heuristic" if heuristic else "bsdf"
     with jobs.pool(timeout) as pool:
         pool.start()
         from reference.records import to_json
@@ -64,9 +72,9 @@ def audit(
         command = jobs.command_line()
         with hold(output, command) as top:
             folder = own(top / "audit")
-            (place,) = assigned(folder, [_folder_of(heuristic)])
-            words = (heuristic, dict(parameters), command, folder / place)
-            record = pool.do(Task(heuristic, audited, words))
+            (place,) = assigned(folder, [_folder_of(name)])
+            words = (kind, name, dict(parameters), command, folder / place)
+            record = pool.do(Task(name, audited, words))
     if as_json:
         click.echo(to_json(record), nl=False)
     else:
@@ -86,8 +94,8 @@ def _folder_of(name: str) -> tuple[str, Path | None]:
     return "-".join(filter(None, (file.stem, function))), Path(name)
 
 
-def audited(name: str, parameters: dict[str, float], command: str, place: Path) -> Audit:
-    """Audit a heuristic, and write the audit's files."""
+def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, place: Path) -> Audit:
+    """Audit a heuristic or a BSDF, and write the audit's files."""
     from comparisons.audit.checks import audit
     from comparisons.case import RGB
     from heuristic import plugins
@@ -96,6 +104,6 @@ def audited(name: str, parameters: dict[str, float], command: str, place: Path) 
 
     set_variant(RGB)
     plugins.register()
-    record = audit(name, parameters, command)
+    record = audit(kind, name, parameters, command)
     audit_files.write(place, record)
     return record
