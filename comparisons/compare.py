@@ -76,20 +76,19 @@ def compare(
     options: Options | None = None,
     progress: Progress | None = None,
     command: str = "",
-    terms: bool = True,
     why: bool = False,
 ) -> Comparison:
     """Compare the heuristic half of a scene with the physical one, in the current variant.
 
     ``command`` repeats the comparison, for the record. ``progress(stage, done, total)`` is called
-    after each pass; with a noise target, ``total`` is the limit. ``terms`` traces equation 8.10 at
-    pixels, and ``why`` finds causes. Raises `InputError` if the scene cannot be read or paired, no
+    after each pass; with a noise target, ``total`` is the limit. ``why`` finds causes, and traces
+    equation 8.10 at pixels. Raises `InputError` if the scene cannot be read or paired, no
     pixel sees a surface, or both halves are black; `NonFiniteError` for a NaN or an infinity in a
     rendering.
     """
     printed: list[str] = []
     with collect_messages(printed):
-        comparison, ready = _compare(source, options or Options(), progress, command, terms)
+        comparison, ready = _compare(source, options or Options(), progress, command, why)
     lines = count_messages([*source.messages, *printed])
     made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *lines))
     comparison = replace(comparison, record=made)
@@ -101,7 +100,7 @@ def compare(
 
 
 def _compare(
-    source: Source, options: Options, progress: Progress | None, command: str, terms: bool
+    source: Source, options: Options, progress: Progress | None, command: str, why: bool
 ) -> tuple[Comparison, Prepared]:
     stages: dict[str, float] = {}
     begin = perf_counter()
@@ -132,7 +131,7 @@ def _compare(
     picture = picture_warnings.picture_record(place, options, images) if options.image else None
     done("metrics")
     traced: Terms = None, "Terms are traced with --why."
-    if terms:
+    if why:
         from comparisons import pixel_terms  # loaded late: --no-why traces none
 
         traced = pixel_terms.trace(ready.heuristic, options)

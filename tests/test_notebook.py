@@ -56,7 +56,7 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
 def shown():
     """A sphere in front of nothing, wider than high so that no column passes for a row."""
     case = open_case("fig-8-9", Options(spp=4, resolution=(24, 16)))
-    return Shown(compare(case.source, case.options), page="")
+    return Shown(compare(case.source, case.options, why=True), page="")
 
 
 @pytest.mark.parametrize("place", [(12, 8), (9, 5)])

@@ -74,8 +74,7 @@ def _compared(
     from comparisons.compare import compare
 
     begin = perf_counter()
-    why = {"terms": job.with_cost, "why": job.with_cost}
-    comparison = compare(case.source, case.options, progress, case.command(), **why)
+    comparison = compare(case.source, case.options, progress, case.command(), job.with_cost)
     spent = _stages(comparison.record, perf_counter() - begin)
     study = None
     if case.word in job.ladders and comparison.causes:
