@@ -6,7 +6,6 @@ of wrong kernels (`test_mutations`) run the very same ones.
 
 from dataclasses import dataclass
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -83,16 +82,15 @@ def kernel_light(light):
     )
 
 
-def check_kernel(vector_type, tolerance, coefficients="rgb", n=9, opaque_n=False, lights=LIGHTS):
+def check_kernel(vector_type, tolerance, coefficients="rgb"):
     """Compare `heuristic.shade` with the oracle over random points, under every kind of light."""
     points = random_points()
-    lights = tinted(lights, TINTS[coefficients])
-    values = COEFFICIENTS[coefficients]
+    lights = tinted(LIGHTS, TINTS[coefficients])
+    values = COEFFICIENTS[coefficients] | {"n": 9}
     ambient = 0.5
-    exponent = dr.opaque(dr.value_t(vector_type), n) if opaque_n else n
     found = kernel.shade(
         *(vector_type(vectors.T) for vectors in (points.position, points.normal, points.view)),
-        heuristic.Material(**values, n=exponent),
+        heuristic.Material(**values),
         [kernel_light(light) for light in lights],
         ambient,
     )
@@ -100,7 +98,7 @@ def check_kernel(vector_type, tolerance, coefficients="rgb", n=9, opaque_n=False
         points.position,
         points.normal,
         points.view,
-        oracle.Material(**values, n=n),
+        oracle.Material(**values),
         lights,
         ambient,
     )

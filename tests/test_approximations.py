@@ -112,20 +112,6 @@ def test_ambient_light_of_its_own_stays_without_an_environment(rgb):
         np.testing.assert_allclose(image(scene, model, ambient=2.0), plain, atol=1e-6)
 
 
-def test_light_from_surfaces_and_from_around_add_up(rgb):
-    """The mean of a picture by ``path``, of the same surfaces under the same sky and lamp."""
-    given = corner()
-    given["sky"] = sky_above(two_colours)["sky"]
-    given["wall"]["bsdf"] = {"type": "phong", "k_d": 0.9, "twosided": True}
-    given["lamp"] = {"type": "heuristic_directional", "direction": (-2, 1, -1)}
-    scene = mi.load_dict(given)
-    path = mi.load_dict({"type": "path", "hide_emitters": True})
-    expected = np.array(mi.render(scene, integrator=path, spp=128)).mean(axis=(0, 1))
-    for model in AMBIENT:
-        found = image(scene, model, 4, occlusion=True, hide_emitters=True).mean(axis=(0, 1))
-        np.testing.assert_allclose(found, expected, rtol=0.02, err_msg=model)
-
-
 def test_sky_and_ground_are_found_again(rgb):
     prepared = indirect_light.prepare(mi.load_dict(sky_above(two_colours)))
     assert list(prepared[2]) == [0, 0, 1]
@@ -230,17 +216,6 @@ def test_no_plane_hides_itself_with_the_default_bias(rgb):
     scene = floor_under("point", float(np.deg2rad(60)))
     bare = image(scene, "shadow-map", 1, bias=0.0)
     assert np.mean(bare < 0.5 * image(scene, "phong", 1)) > 0.1
-
-
-def test_a_filter_has_the_mean_of_rays_and_softens_edges(rgb):
-    scene = still_life("directional")
-    rays, soft = image(scene, "phong", 16, occlusion=True), image(scene, "soft-shadow-map", 16)
-    assert soft.mean() == pytest.approx(rays.mean(), rel=0.02)
-    wide = image(scene, "soft-shadow-map", 1, radius=8.0)
-    bright, dark = (image(scene, "phong", 1, occlusion=hides) for hides in (False, True))
-    half = np.all((wide < 0.95 * bright) & (wide > dark + 0.05 * bright), axis=2)
-    assert half.mean() > 0.02
-    assert (wide <= bright + 1e-5).all()
 
 
 def test_an_edge_is_a_ramp_as_wide_as_the_filter(rgb):

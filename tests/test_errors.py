@@ -36,12 +36,3 @@ def test_a_word_that_is_not_known_is_told_with_what_is_allowed():
 def test_the_nearest_word_is_suggested(ask, meant):
     with pytest.raises(InputError, match=rf"did you mean {meant}\?"):
         ask()
-
-
-def test_a_command_suggests_scenes_and_commands(run, tmp_path):
-    code, _, messages = run("compare", "cornel-box", "-o", tmp_path)
-    assert code == 2
-    assert "did you mean cornell-box?" in messages
-    code, _, messages = run("compair", "cornell-box")
-    assert code == 2
-    assert "compare" in messages

@@ -65,11 +65,6 @@ def test_the_kernel_agrees_with_mitsubas_direct_on_every_pixel(rgb, name):
     checks.check_against_direct(SCENES[name].make())
 
 
-@pytest.mark.parametrize("name", ["fig-8-5c", "fig-8-8a", "fig-8-9", "fig-8-11-n3"])
-def test_so_it_does_on_spectra(spectral, name):
-    checks.check_against_direct(SCENES[name].make())
-
-
 def test_every_light_and_colour_agrees_with_the_oracle(rgb):
     checks.check_figure(everything())
 
@@ -109,13 +104,6 @@ def several(form, normalised):
 def test_several_materials_agree_with_mitsubas_direct(rgb, form, normalised):
     """With shadow rays in both: Mitsuba's integrators know no light without them."""
     checks.check_against_direct(several(form, normalised))
-
-
-@pytest.mark.parametrize("form", ["phong", "blinn"])
-def test_both_forms_of_the_lobe_agree_with_mitsubas_direct(rgb, form):
-    scene = everything()
-    scene["sphere"]["bsdf"] |= {"form": form, "normalised": True}
-    checks.check_against_direct(scene)
 
 
 def test_the_figures_show_what_the_chapter_says(rgb):

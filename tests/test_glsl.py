@@ -5,7 +5,6 @@ import re
 import sys
 from pathlib import Path
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -170,16 +169,6 @@ def test_points_are_shaded_in_portions(rgb, monkeypatch):
     assert len(np.unique(whole)) > user_shaders.POINTS
 
 
-@opengl
-def test_only_what_is_read_is_needed(written):
-    found = named(written(
-        "// not ambient\nvec3 shade(Point point) { /* uv\n */ return point.material.k_d; }",
-        "mine.glsl",
-    ))  # fmt: skip
-    assert found.needs == {"material"}
-    assert found.reads == ("material", "material.k_d")
-
-
 # --- Mistakes ------------------------------------------------------------------------------------
 
 MISTAKES = {
@@ -232,15 +221,6 @@ def test_what_is_not_a_shader_file_is_refused(tmp_path, monkeypatch):
 def test_other_colours_than_rgb_are_refused(variant):
     with pytest.raises(InputError, match=rf"needs RGB colours, which {variant} does not have"):
         image("fig-8-9", PHONG, variant=variant)
-
-
-@opengl
-def test_a_symbolic_loop_is_refused(rgb):
-    shader, point = points(returning("point.normal + 1.0"))
-    with pytest.raises(RuntimeError) as caught:
-        dr.while_loop((mi.UInt32([0, 1]), mi.Spectrum(0)), lambda i, _: i < 2,
-                      lambda i, _: (i + 1, shader(point)), mode="symbolic")  # fmt: skip
-    assert "Dr.Jit cannot record" in str(caught.value.__cause__)
 
 
 LOGS = {

@@ -13,7 +13,6 @@ from heuristic.errors import InputError
 from heuristic.normals import WEIGHTINGS
 from heuristic.plugins.interpolated import (
     Interpolation,
-    barycentric_coordinates,
     between,
     face_corners,
     scan_line_normal,
@@ -73,24 +72,8 @@ def test_scan_lines_of_any_direction_give_the_barycentric_mean(s, t, turn):
     np.testing.assert_allclose(rows(found)[0], mean / np.linalg.norm(mean), atol=1e-9)
 
 
-@settings(max_examples=30, deadline=None)
-@given(s=place, t=place, height=st.floats(-1, 1))
-def test_barycentric_coordinates_of_a_point_and_of_its_foot(s, t, height):
-    weights, point = inside(s, t)
-    x, y = point.tolist()
-    found = barycentric_coordinates(
-        Array3f64(x, y, 2 + height), *(Array3f64(*corner, 2) for corner in TRIANGLE)
-    )
-    assert [float(w[0]) for w in found] == pytest.approx(list(weights), abs=1e-12)
-
-
-# --- Convergence --------------------------------------------------------------------------------
-
 INNER = np.random.default_rng(5).dirichlet((1, 1, 1), 20)
 """Where in every triangle the ways of shading are compared."""
-
-
-DIFFUSE, GLOSSY = Material(k_d=0.8), Material(k_d=0.3, k_s=0.6, n=5)
 
 
 # --- In Mitsuba -----------------------------------------------------------------------------------
@@ -145,10 +128,9 @@ def test_gouraud_is_stored_at_vertices_and_interpolated(rgb):
     at_vertices = by_oracle(CORNERS, TILTED, (1, 1, 9))
     stored = np.array(mesh.attribute_buffer("vertex_heuristic")).reshape(-1, 3)
     np.testing.assert_allclose(stored, at_vertices, rtol=1e-5)
-    weights = INNER
-    si = hits(mesh, looking_down((weights @ CORNERS)[:, :2]))
+    si = hits(mesh, looking_down((INNER @ CORNERS)[:, :2]))
     found = rows(mi.Color3f(stored_shade(si, GOURAUD)))
-    np.testing.assert_allclose(found, weights @ at_vertices, rtol=1e-5, atol=1e-6)
+    np.testing.assert_allclose(found, INNER @ at_vertices, rtol=1e-5, atol=1e-6)
 
 
 def test_a_highlight_inside_a_triangle_is_lost_by_gouraud_and_kept_by_phong(rgb):
@@ -180,16 +162,6 @@ def test_large_meshes_are_stored_whole(rgb, interpolation):
     toward = dr.normalize(mi.Vector3f(0, -1, 2))
     expected = 0.5 * dr.maximum(dr.dot(points.n, toward), 0)
     assert float(dr.max(abs(stored.y - expected))[0]) < 1e-6
-
-
-def test_the_back_is_black_or_has_its_own_values(rgb):
-    mesh = triangle_mesh(CORNERS, -TILTED, [(0, 2, 1)])
-    material, lights = Material(k_d=1.0), [DirectionalLight((0, 0, -1), 1.0)]
-    si = hits(mesh, looking_down([(1, 1)]))
-    for interpolation in (FLAT, GOURAUD):
-        shade_mesh(mesh, interpolation, (1, 1, 9), material, lights, twosided=True)
-        assert float(stored_shade(si, interpolation).x[0]) == 0
-        assert float(stored_shade(si, interpolation, twosided=True).x[0]) > 0.7
 
 
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
@@ -345,9 +317,6 @@ def test_degenerate_faces_and_lone_vertices_stay_black_and_finite(rgb):
         assert np.isfinite(stored).all()
         assert stored[0].min() > 0
         assert not stored[-1].any()
-
-
-# --- Whole pictures -------------------------------------------------------------------------------
 
 
 # --- Through the plugins --------------------------------------------------------------------------

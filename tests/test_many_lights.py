@@ -121,21 +121,6 @@ def test_the_sum_is_that_of_the_closed_form(rgb):
     assert np.abs(found / want - 1).mean() < 2e-6
 
 
-def test_a_few_lights_are_unrolled_as_ever(rgb):
-    """To the last bit the sum in order of what Mitsuba's emitters give."""
-    made = mi.load_dict(floor(**lights(point, 8), **lights(spot, 8)))
-    assert len(made.emitters()) == direct.UNROLLED
-    ray = rays(made)
-    si = made.ray_intersect(ray)
-    bsdf, total = si.bsdf(ray), mi.Spectrum(0)
-    for emitter in made.emitters():
-        ds, weight = emitter.sample_direction(si, mi.Point2f(0.5))
-        seen = (ds.pdf > 0) & ~made.ray_test(si.spawn_ray_to(ds.p))
-        value = bsdf.eval(mi.BSDFContext(), si, si.to_local(ds.d), seen) * weight
-        total += dr.select(seen, value, 0)
-    np.testing.assert_array_equal(radiance(made)[:, 0], np.array(total, float))
-
-
 def test_the_kernel_does_not_grow_with_the_lights(rgb):
     def operations(count):
         made = mi.load_dict(floor(**lights(point, count // 2), **lights(spot, count // 2)))

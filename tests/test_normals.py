@@ -127,17 +127,6 @@ def test_gradient_and_tangents_are_the_derivatives():
 
 
 @EVERY_TYPE
-def test_an_ellipsoid_has_no_parametric_normal_at_its_poles(vector_type):
-    number = dr.value_t(vector_type)
-    u, v = number([0.3, 0.3, 2.0]), number([np.pi / 2, -np.pi / 2, np.pi / 2])
-    tangents = normals.ellipsoid_tangents(u, v, 3, 2, 1)
-    require_units(normals.parametric_normal(*tangents), np.zeros((3, 3)), 0)
-    point = normals.ellipsoid_point(u, v, 3, 2, 1)
-    implicit = normals.implicit_normal(normals.ellipsoid_gradient(point, 3, 2, 1))
-    require_units(implicit, [(0, 0, 1), (0, 0, -1), (0, 0, 1)], rounding(vector_type))
-
-
-@EVERY_TYPE
 def test_what_has_no_direction_has_the_zero_normal(vector_type):
     zero = vector_type(0)
     require_units(normals.implicit_normal(zero), (0, 0, 0), 0)
@@ -148,44 +137,6 @@ def test_what_has_no_direction_has_the_zero_normal(vector_type):
 
 
 # --- Vertices ------------------------------------------------------------------------------------
-
-
-def uv_sphere(bands, vector_type=DOUBLE):
-    """A closed sphere of ``bands`` bands whose vertices at the seam and the poles are shared."""
-    columns = 2 * bands
-    v = np.repeat(np.linspace(-np.pi / 2, np.pi / 2, bands + 1)[1:-1], columns)
-    u = np.tile(np.arange(columns) * 2 * np.pi / columns, bands - 1)
-    points = np.stack([np.cos(v) * np.cos(u), np.cos(v) * np.sin(u), np.sin(v)], 1)
-    points = np.concatenate([points, [[0, 0, -1], [0, 0, 1]]])
-    south, north = len(points) - 2, len(points) - 1
-    faces = []
-    for c in range(columns):
-        d = (c + 1) % columns
-        faces.append((south, d, c))
-        for r in range(bands - 2):
-            low, high = r * columns, (r + 1) * columns
-            faces += [(low + c, low + d, high + d), (low + c, high + d, high + c)]
-        top = (bands - 2) * columns
-        faces.append((top + c, top + d, north))
-    return vector_type(points.T), Array3u(np.array(faces).T.astype(np.uint32))
-
-
-@EVERY_WEIGHTING
-def test_vertex_normals_of_a_sphere_converge_to_its_own(weighting):
-    """At second order by angle; by the others the rows next to the poles, where faces are unlike,
-    stay wrong, which leaves 3/2.
-    """
-    errors = []
-    for bands in (8, 16, 32, 64):
-        points, faces = uv_sphere(bands)
-        found = vertex_normals(points, faces, weighting)
-        distance = dr.norm(found - points)
-        errors.append(float(dr.sqrt(dr.mean(dr.square(distance)))[0]))
-    orders = -np.diff(np.log2(errors))
-    print(weighting, "rms errors", errors, "orders", orders)
-    least = 1.85 if weighting == "angle" else 1.45
-    assert np.all(orders > least)
-    assert np.all(orders < least + 0.3)
 
 
 def cube_corner(cuts):

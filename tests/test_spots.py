@@ -36,21 +36,6 @@ def test_no_other_exponent_or_cone_fits_better():
                 assert error >= best * (1 - 1e-3)
 
 
-def test_an_even_cone_is_a_beam_as_wide_as_the_cone():
-    assert lamps.cone_for(30, 0) == pytest.approx((30, 30), rel=1e-3)
-    assert lamps.exponent_for(30, 29.999) == pytest.approx(0, abs=1e-2)
-
-
-def test_mitsubas_spot_falls_off_as_the_fit_believes(rgb):
-    light = mi.load_dict({"type": "spot", "intensity": 1.0, "cutoff_angle": 40, "beam_width": 10})
-    theta = np.linspace(0, 50, 101)
-    it = mi.SurfaceInteraction3f()
-    angle = mi.Float(np.radians(theta))
-    it.p = mi.Point3f(dr.sin(angle), 0, dr.cos(angle))
-    _, weight = light.sample_direction(it, mi.Point2f(0.5))
-    assert np.array(weight)[0] == pytest.approx(lamps.linear_falloff(theta, 40, 10), abs=1e-5)
-
-
 def flux_of(emitter, widest):
     """Integrate a light's own sampling over the cone about the z axis, as far as ``widest``."""
     count = 100_000

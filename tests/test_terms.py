@@ -37,17 +37,6 @@ def directions(draw):
     return Vector(*(vector / length))
 
 
-# --- Emission, ambient and diffuse light -----------------------------------------------------
-
-
-@FLOATS
-def test_diffuse_is_the_cosine_and_nothing_at_or_below_the_horizon(float_type):
-    found = terms.diffuse(2.0, 0.5, float_type(COSINES))
-    require(found, np.where(COSINES > 0, COSINES, 0), 4 * step(float_type))
-    assert not np.array(found)[COSINES <= 0].any()
-    assert dr.all(terms.diffuse(2.0, 0.5, float_type(0.0)) == 0)
-
-
 # --- Specular light --------------------------------------------------------------------------
 
 
@@ -69,23 +58,6 @@ def test_specular_is_the_power_and_nothing_where_the_lobe_ends(float_type, n, op
     assert np.all(np.abs(found - expected)[big] <= (tolerance * expected)[big])
     assert np.all(found[~big] <= 2 * smallest)
     assert not found[base <= 0].any()
-
-
-@FLOATS
-def test_a_large_exponent_tends_to_the_perfect_mirror(float_type):
-    """8.8 becomes 8.7: on the axis nothing changes, off it the ratio falls to 0."""
-    angles = np.deg2rad([0, 0.5, 1, 5, 30])
-    exponents = [1, 10, 100, 1e3, 1e4, 1e5, 1e6]
-    lobe = np.array(
-        [
-            np.array(terms.power(float_type(np.cos(angles)), dr.opaque(float_type, n)))
-            for n in exponents
-        ]
-    )
-    on_axis, off_axis = lobe[:, :1], lobe[:, 1:]
-    assert np.all(on_axis == 1)
-    assert np.all(np.diff(off_axis, axis=0) <= 0)
-    assert np.all(off_axis[-1] / on_axis[-1] < 1e-15)
 
 
 # --- Vectors ---------------------------------------------------------------------------------
@@ -136,23 +108,6 @@ def test_directions_that_do_not_exist_are_zero():
 
 
 @FLOATS
-@pytest.mark.parametrize(
-    "coefficients", [(1, 0, 0), (0, 0, 1), (0, 1, 0), (0.25, 0.5, 0.125), (2, 0, 0)], ids=str
-)
-def test_attenuation_is_the_inverse_of_the_polynomial(float_type, coefficients):
-    distance = np.array([0.25, 0.5, 1, 2, 3.75, 100, 1e4])
-    k0, k1, k2 = coefficients
-    denominator = k0 + k1 * distance + k2 * distance**2
-    tolerance = 8 * step(float_type)
-    require(terms.attenuation(float_type(distance), *coefficients), 1 / denominator, tolerance)
-    require(
-        terms.clamped_attenuation(float_type(distance), *coefficients),
-        np.minimum(1 / denominator, 1),
-        tolerance,
-    )
-
-
-@FLOATS
 def test_attenuation_on_the_light_itself(float_type):
     """Where the polynomial is 0 the open form gives nothing, and the clamped one its limit 1."""
     assert dr.all(terms.attenuation(float_type(0), 0, 0, 1) == 0)
@@ -176,6 +131,3 @@ def test_the_cone_holds_its_edge_and_nothing_beyond(float_type):
     edge = float_type(0.75)
     inside = np.array(terms.spot_cone(float_type([1, 0.7501, 0.75, 0.7499, 0, -1]), edge))
     np.testing.assert_array_equal(inside, [1, 1, 1, 0, 0, 0])
-
-
-# --- The convention --------------------------------------------------------------------------

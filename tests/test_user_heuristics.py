@@ -10,7 +10,7 @@ import pytest
 from comparisons.case import open_case
 from comparisons.options import Options
 from comparisons.prepared import prepare
-from heuristic import Range, user_shaders
+from heuristic import Range
 from heuristic.errors import FotismosError, InputError
 from heuristic.heuristics import HEURISTICS, Heuristic, Parameter, known_as, named
 from reference.pairing import halves
@@ -284,19 +284,6 @@ def test_a_mistake_is_named_with_file_and_line(rgb, written):
         named("none.py")
 
 
-def test_a_colour_may_come_in_any_kind_of_array(written):
-    for value in (
-        "mi.Float(np.array(point.ambient.x))",  # which Dr.Jit cannot record
-        "dr.float64_array_t(mi.Float)(point.ambient.x)",
-        "np.float32(1)",
-    ):
-        name = written(
-            "import drjit as dr\nimport mitsuba as mi\nimport numpy as np\n"
-            f"def shade(point):\n    return {value} * 0 + 0.25\n"
-        )
-        assert image("fig-6-10", name, interpolation="gouraud").max() == pytest.approx(0.25)
-
-
 def test_values_that_only_a_scene_shows_name_pixel_and_file(rgb, written):
     up = mi.ScalarTransform4f()
     scene = {
@@ -366,24 +353,6 @@ def test_an_object_in_a_file_keeps_its_declaration(rgb, written):
     assert image("fig-8-9", f"{name}:mine").max() == pytest.approx(0.5)
 
 
-def test_only_what_is_read_is_needed(rgb, written):
-    written(
-        "import drjit as dr\n"
-        "def lit(point):\n"
-        "    seen = [dr.select(each.visible(), each.intensity, 0) for each in point.lights]\n"
-        "    return sum(seen) * point.material.k_d\n"
-        "def still(point): return point.uv.x * point.material.base_color\n"
-    )
-    lit, still = named("mine.py:lit"), named("mine.py:still")
-    assert lit.needs == {"lights", "material", "visible"}
-    assert still.inputs == ("material", "material.base_color", "uv")
-    graphs = [halves.pair(open_case("fig-8-9").source, heuristic=h.name) for h in (lit, still)]
-    casts = [
-        g.heuristic.props(g.heuristic.nodes(halves.INTEGRATOR)[0])["occlusion"] for g in graphs
-    ]
-    assert casts == [True, False]
-
-
 def test_the_plan_and_the_record_say_what_is_read(run, written, tmp_path):
     name = written("def shade(point): return point.material.k_d * point.ambient\n")
     words = ("fig-8-9", "--heuristic", name, "--resolution", "8x8")
@@ -396,17 +365,6 @@ def test_the_plan_and_the_record_say_what_is_read(run, written, tmp_path):
     assert record["plan"]["heuristic_reads"] == ["ambient", "material", "material.k_d"]
     code, said, _ = run("plan", "fig-8-9")
     assert "phong, which reads ambient, lights, material, normal, position, view" in said
-
-
-def test_files_of_a_heuristic_are_its_own_and_the_modules_that_it_imports(rgb, written, tmp_path):
-    written("LEVEL = 0.25\n", "level.py")
-    name = written("import fotismos, json, level\ndef shade(point): return level.LEVEL\n")
-    assert named(name).files == (tmp_path / "level.py", tmp_path / "mine.py")
-    assert named("phong").files == ()
-    first = named(name).digest()
-    written("LEVEL = 0.75\n", "level.py")
-    assert named(name).digest() != first
-    assert image("fig-8-9", name).max() == pytest.approx(0.75)
 
 
 # --- Functions and objects of a program ----------------------------------------------------------
@@ -428,21 +386,3 @@ def test_a_program_gives_a_function_or_an_object(undeclared):
     flat = Heuristic("flat-grey", lambda point: 0.5, parameters=(Parameter("x", 0, 0, 1),))
     assert compare("fig-8-9", heuristic=flat, **SMALL).comparison.images.heuristic.max() == 0.5
     assert known_as("blinn") == "blinn"
-
-
-def test_wrong_names_and_numpy_are_named_in_a_users_words(undeclared, rgb):
-    for shade, said in (
-        (lambda p: p.material.albedo, "a material has no 'albedo', but "),
-        (lambda p: p.lights[0].direction, "a light has no 'direction', but "),
-        (lambda p: np.dot(p.normal, p.view), "use drjit.dot"),
-    ):
-        with pytest.raises(InputError, match=said):
-            user_shaders.examine(Heuristic("mine", shade))
-
-    def broken(point):
-        return point.nothing
-
-    with pytest.raises(InputError, match=r"test_user_heuristics.py, line \d+: AttributeError"):
-        known_as(broken)
-    with pytest.raises(InputError, match="is of type int"):
-        user_shaders.of_function(3, "three")
