@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from comparisons.comparison import ComparisonRecord
 from comparisons.departure.criterion import LIMIT, TOLERANCE, Verdict, decide, share_above
@@ -120,25 +120,22 @@ def sentence(
         return f"Only the level is off: ×{number(lead.after_exposure.exposure)} makes it pass."
     if record.picture:
         return "The map shows where the picture is wrong."
-    if cost is None or not hasattr(cost, "predicted"):  # a study without tolerances
+    if cost is None:
         return f"To find the cheapest method that passes: `{search(record, threshold)}`."
     return _remedy(record, cost, threshold)
 
 
-def _remedy(record: ComparisonRecord, cost: Any, threshold: float) -> str:
+def _remedy(record: ComparisonRecord, cost: Cost, threshold: float) -> str:
     """Return the cheapest method of a study that passes, or else the nearest that is better.
 
-    At the scene's own size, if the study predicts for it. Times that cannot be told apart are not
-    ranked: of these methods, the most accurate is named.
+    At the scene's own size, if the study predicts for it.
     """
+    from comparisons.cost.front import sufficient  # loaded late: few scenes have a study
+
     points = cost.predicted or cost.points
     size = "x".join(map(str, cost.at if cost.predicted and cost.at else cost.resolution))
     kernels = [point for point in points if _is_judged(cost, point.method)]
-    passing = [point for point in points if point.tolerance.high <= threshold]
-    if passing:
-        fastest = min(passing, key=lambda point: point.seconds.value)
-        tied = [point for point in passing if point.seconds.low <= fastest.seconds.high]
-        best = min(tied, key=lambda point: point.tolerance.mean)
+    if best := sufficient(points, threshold):
         time = seconds(best.seconds.value)
         if kernels:
             time += f", kernel {seconds(min(point.seconds.value for point in kernels))}"
@@ -154,7 +151,7 @@ def _remedy(record: ComparisonRecord, cost: Any, threshold: float) -> str:
     )
 
 
-def _is_judged(cost: Any, name: str) -> bool:
+def _is_judged(cost: Cost, name: str) -> bool:
     """Return whether a method of a study is the kernel that is judged."""
     return any(
         name in (one.name, *one.names)

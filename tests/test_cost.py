@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from comparisons.cost import front, measure, methods, times
+from comparisons.cost import cost as studies
+from comparisons.cost import measure, methods, times
 from comparisons.cost.cost import cost
 from comparisons.cost.cost_record import Method
 from comparisons.cost.measure import WIDTH, Effort, measure_ladder, reduced
-from comparisons.cost.methods import Ladder, built_in, declare
+from comparisons.cost.methods import BUILT_IN, Ladder, declare
 from comparisons.gallery.builtin import SCENES
 from comparisons.hybrids.why import MeanError
 from comparisons.options import Options
@@ -24,7 +25,6 @@ from heuristic.heuristics import Interpolation
 from reference.rendering.sums import Accumulator
 from reference.scene.graph import set_variant
 from reference.scene.source import Source
-from reports import cli
 from reports.run import cost_files
 from reports.terminal import cost_tables
 from tests.misplanned import scene as described
@@ -32,7 +32,7 @@ from tests.schemas import schema
 from tests.small_scene import SCENE
 
 SCHEMA = schema("cost")
-TINY = Effort(rounds=2, largest=4, depths=(3,))
+TINY = Effort(rounds=2, largest=4)
 CORPUS = Path(__file__).parent / "corpus"
 
 
@@ -92,9 +92,9 @@ def declared(monkeypatch):
     monkeypatch.setattr(methods, "_DECLARED", {})
 
 
-def ladder(source, depths=(3,), **options):
+def ladder(source, **options):
     chosen = Options(**{"resolution": (12, 12)} | options)
-    return Ladder(source, chosen, prepare(source, chosen), depths)
+    return Ladder(source, chosen, prepare(source, chosen))
 
 
 def whole(renderer, count=8, seed=40):
@@ -123,7 +123,7 @@ def test_merged_methods_are_equal_images(rgb, name):
     effects = tuple(structs.replace(one, called_for=True) for one in ready.plan.effects)
     plan = structs.replace(ready.plan, effects=effects)
     telling = Ladder(source, chosen, replace(ready, plan=plan))
-    apart = {method.name: method for method in built_in()}
+    apart = {method.name: method for method in BUILT_IN}
     for method in merged:
         expected = whole(found.renderer(method, 16))
         for other in set(method.names) & set(apart):
@@ -148,7 +148,7 @@ HALF = Method(
 def test_methods_stand_in_order_with_declared_ones_before_the_full_plan(rgb, declared):
     declare(TOY)
     declare(HALF)
-    everything = ladder(SCENES["plastic-spheres"].source(), (3, 4, 5))
+    everything = ladder(SCENES["plastic-spheres"].source())
     assert [method.names for method in everything.methods] == [
         ("Phong kernel",),
         ("kernel with shadows",),
@@ -167,7 +167,14 @@ def test_methods_stand_in_order_with_declared_ones_before_the_full_plan(rgb, dec
     ]
     # Nothing shadows the one ball of the figure.
     figure = ladder(SCENES["fig-8-9"].source())
-    assert figure.methods[-1].names == ("direct", "path 3", TOY.name, "full plan")
+    assert figure.methods[-1].names == (
+        "direct",
+        "path 3",
+        "path 4",
+        "path 5",
+        TOY.name,
+        "full plan",
+    )
     reason = "it stands in for interreflection, which the scene does not have"
     assert figure.left_out[HALF.name] == reason
 
@@ -217,7 +224,7 @@ def test_steps_lead_from_the_kernel_to_the_full_plan_an_effect_at_a_time(rgb):
 def test_a_scene_says_why_it_cannot_have_a_method(rgb, tmp_path):
     path = tmp_path / "parallel.xml"
     path.write_text(SCENE.replace("perspective", "orthographic"), encoding="utf-8")
-    found = ladder(Source("parallel", path), (3, 4))
+    found = ladder(Source("parallel", path))
     assert "has no single viewpoint" in found.left_out["Gouraud kernel"]
     assert found.left_out["path 4"] == "the scene's own paths end at depth 3"
     source = Source("orthographic", CORPUS / "sensor-orthographic.xml")
@@ -248,31 +255,23 @@ def test_size_and_methods_are_of_the_chosen_sensor(rgb):
 # -- Commands --------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def predicted(tmp_path_factory):
-    """The command's folder and record of a prediction that is measured."""
-    out = tmp_path_factory.mktemp("cost")
-    words = ["cost", "lambert-sphere", "--spp", "4", "--rounds", "2", "--at", "64x40", "--measure"]
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("sys.argv", ["fotismos", *words, "-o", str(out)])
-        patched.setattr("reports.jobs.IN_PROCESSES", False)
-        cli.main()
-    place = out / "cost/lambert-sphere"
-    return place, json.loads((place / "cost.json").read_text(encoding="utf-8"))
-
-
 @pytest.mark.guarantee(
     "attribution", "`cost --at` predicts, and with `--measure` measures, at a size of any shape."
 )
-def test_the_command_predicts_and_measures_at_another_shape_than_the_films(predicted):
-    place, record = predicted
+def test_the_command_predicts_and_measures_at_another_shape_than_the_films(rgb, run, tmp_path):
+    words = ("--spp", 4, "--rounds", 2, "--at", "160x100", "--measure", "-o", tmp_path)
+    code, said, _ = run("cost", "lambert-sphere", *words)
+    assert code == 0
+    assert "Predicted and measured there" in said
+    place = tmp_path / "cost/lambert-sphere"
+    record = json.loads((place / "cost.json").read_text(encoding="utf-8"))
     jsonschema.Draft202012Validator(SCHEMA).validate(record)
     assert record["command"].startswith("fotismos cost lambert-sphere")
     assert "--rounds 2" in record["command"]
-    assert {"cost.svg", "prediction.svg", "cost-reference.png", "cost-method-phong-kernel.png"} <= {
+    assert {"cost.svg", "cost-reference.png", "cost-method-phong-kernel.png"} <= {
         path.name for path in place.iterdir()
     }
-    assert record["at"] == [64, 40]
+    assert (record["resolution"], record["at"]) == ([128, 80], [160, 100])
     measured = {row["method"]: row for row in record["measured"]}
     assert measured.keys() == {method["name"] for method in record["methods"]}
     for row in record["predicted"]:
@@ -283,11 +282,12 @@ def test_the_command_predicts_and_measures_at_another_shape_than_the_films(predi
             assert row["error"]["mean"] == pytest.approx(found, abs=0.05)
 
 
-def test_sizes_without_pixels_or_prediction_are_refused(run):
+def test_sizes_that_cannot_be_predicted_or_measured_are_refused(run):
     for words, reason in (
         (("--at", "0x0"), "at least 1"),
         (("--measure",), "give one with --at"),
-        (("--at", "8x8"), "too small for a prediction"),
+        (("--at", "64x48", "--resolution", "32x32"), "differ in shape"),
+        (("--at", "10000x10000", "--measure"), "too large to measure"),
     ):
         code, _, error = run("cost", "fig-8-9", *words)
         assert code == 2
@@ -299,7 +299,7 @@ def test_plan_within_names_the_fastest_that_suffices_and_exits_with_1_if_none_do
 ):
     source, few = SCENES["fig-8-9"].source(), Options(resolution=(12, 12))
     found = measure_ladder(source, few, TINY, lambda *_: None)
-    monkeypatch.setattr(front, "measure_ladder", lambda *_: found)
+    monkeypatch.setattr(studies, "measure_ladder", lambda *_: found)
     words = "plan", "fig-8-9", "--resolution", "12x12"
     code, said, _ = run(*words, "--within", 10, "--json")
     assert code == 0
@@ -311,7 +311,7 @@ def test_plan_within_names_the_fastest_that_suffices_and_exits_with_1_if_none_do
     assert {"shadow map", "constant ambient"} <= made["left_out"].keys()
     none = MeanError(mean=20.0, low=19.0, high=21.0)
     points = tuple(structs.replace(point, tolerance=none) for point in found.points)
-    monkeypatch.setattr(front, "measure_ladder", lambda *_: replace(found, points=points))
+    monkeypatch.setattr(studies, "measure_ladder", lambda *_: replace(found, points=points))
     code, said, _ = run(*words, "--within", 10)
     assert code == 1
     assert said.startswith("At 12x12 no measured method suffices at ΔE2000 10")

@@ -168,16 +168,3 @@ def test_points_guides_and_names_lie_where_the_axes_say():
     assert {x for x, _ in names.values()} == {cost_charts.WIDTH + 14}
     for name, place in (("full plan", places[2]), ("Phong kernel", places[3])):
         assert names[name][1] == pytest.approx(place[1] + 3, abs=cost_charts.LABEL_GAP)
-
-
-def test_predictions_and_measurements_lie_on_the_same_axes():
-    size = (640, 480)
-    measured = [point("full plan", 8, 0.16, 8 / 8**0.5)]
-    for crosses in ([], measured):
-        whole = record([], at=size, predicted=tuple(SAMPLED), measured=tuple(crosses))
-        svg = vl_convert.vegalite_to_svg(cost_charts.titled(whole, size))
-        assert "synthetic: predicted at 640 × 480 pixels" in svg
-        assert ("crosses: measured" in svg) == bool(crosses)
-        assert len(symbol_layers(svg)) == 1 + bool(crosses)
-    points, ((x, y),) = symbol_layers(svg)
-    assert (x, y) == pytest.approx(np.mean(points[:2], axis=0), abs=0.1)  # 8 is between 4 and 16

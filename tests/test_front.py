@@ -1,17 +1,16 @@
-"""Times, fronts, choices and predictions on numbers: a clock and renderers that are made up."""
+"""Times, fronts, and choices on numbers: a clock and renderers that are made up."""
 
 from dataclasses import dataclass, field
-from math import erf, exp, pi, sqrt
 
 import numpy as np
 import pytest
 from msgspec import structs
 
 from comparisons.cost import times
+from comparisons.cost.cost import Choice
 from comparisons.cost.cost_record import Method, Point
-from comparisons.cost.front import Choice, at_size, beats, fronted, sufficient
-from comparisons.cost.measure import QUICK, Effort, timed, timed_method, tried
-from comparisons.cost.predict import forecast, require, sizes
+from comparisons.cost.front import at_size, beats, fronted, sufficient
+from comparisons.cost.measure import QUICK, Effort, timed, tried
 from comparisons.hybrids.why import MeanError
 from heuristic.errors import InputError
 from reference.records import Estimated
@@ -255,79 +254,6 @@ def test_errors_are_measured_at_powers_of_four():
     assert Effort(largest=100).counts(random) == (4, 16, 64)
     assert Effort(largest=2).counts(random) == (2,)
     assert Effort().counts(sure) == (4, 16)
-    assert QUICK.counts(sure) == QUICK.counts(random)[-1:] == (16,)
+    assert QUICK.counts(sure) == QUICK.counts(random) == (4, 16)
     with pytest.raises(InputError, match="rounds"):
         Effort(rounds=1)
-
-
-# -- Predictions -----------------------------------------------------------------------------------
-
-OWN, TARGET = (128, 96), (1024, 768)
-NAMES = "abcdef"
-
-
-def folded(bias, spread):
-    """The mean distance of normal noise around a bias."""
-    share = bias / spread
-    near = spread * sqrt(2 / pi) * exp(-(share**2) / 2)
-    return near + bias * erf(share / sqrt(2))
-
-
-def error_of(number, width, spp):
-    """A bias, which edges add to, and noise."""
-    return folded(0.2 * number + 4 / width, 4 / sqrt(spp))
-
-
-def forecasts(rng, scatter):
-    """Predict methods from errors that scatter by a share of their values."""
-    line = lines_of({"a": KERNEL}, np.random.default_rng(0), taken=0)[0]
-    known, methods = {}, []
-    for number, name in enumerate(NAMES):
-        method = Method(name=name, family="physical", monte_carlo=True)
-        first = Clock(1e-3, KERNEL, rng)
-        first.render(0)
-        first.integrator = None
-        methods.append(timed_method(method, {name: line["a"], "a": line["a"]}, "a", first))
-        for size in sizes(OWN, TARGET):
-            for spp in (4, 16, 64):
-                error = error_of(number, size[0], spp) * exp(scatter * rng.normal())
-                known[name, spp, size] = (
-                    about(error, kind=MeanError),
-                    about(3 * error, 0, MeanError),
-                )
-    return methods, forecast(methods, known, TARGET)
-
-
-def test_without_scatter_errors_follow_bias_and_noise_and_times_their_line(rgb):
-    methods, found = forecasts(np.random.default_rng(1), 0.0)
-    for row in found:
-        number = NAMES.index(row.method)
-        assert row.error.mean == pytest.approx(error_of(number, TARGET[0], row.spp), rel=0.2)
-        assert row.tolerance.mean == pytest.approx(3 * row.error.mean, rel=1e-6)
-        assert row.seconds == methods[number].seconds(row.spp * TARGET[0] * TARGET[1])
-
-
-@pytest.mark.guarantee(
-    "attribution", "Intervals of predicted errors hold later ones about as often as they say."
-)
-def test_intervals_of_predicted_errors_hold_as_often_as_they_say(rgb):
-    rng, held, widths = np.random.default_rng(5), [], []
-    for _ in range(25):
-        for row in forecasts(rng, 0.0125)[1]:
-            error = error_of(NAMES.index(row.method), TARGET[0], row.spp)
-            held.append(row.error.low <= error <= row.error.high)
-            widths.append(row.error.high / row.error.mean)
-    assert np.mean(held) > 0.88
-    assert np.median(widths) < 1.5
-
-
-def test_sizes_that_cannot_be_predicted_or_measured_are_refused():
-    assert sizes((128, 72), (1920, 1080)) == ((64, 36), (128, 72), (256, 144))
-    assert sizes((128, 96), (200, 150)) == ((32, 24), (64, 48), (128, 96))
-    with pytest.raises(InputError, match="too small for a prediction"):
-        sizes((16, 8), (16, 8))
-    require("box", (640, 480), (64, 48), is_measured=False)
-    with pytest.raises(InputError, match="differ in shape"):
-        require("box", (640, 480), (64, 64), is_measured=False)
-    with pytest.raises(InputError, match="too large to measure"):
-        require("box", (10_000, 10_000), (100, 100), is_measured=True)

@@ -1,6 +1,6 @@
 """The glossary: what the page must explain has a sentence."""
 
-from comparisons.cost.methods import built_in
+from comparisons.cost.methods import BUILT_IN
 from reference.planning.effects import EFFECTS
 from reports import glossary
 
@@ -8,7 +8,7 @@ from reports import glossary
 def test_effects_and_methods_have_their_sentence():
     known = glossary.meanings()
     effects = {effect.label for effect in EFFECTS if effect.colour}
-    assert effects | {method.name for method in built_in()} <= set(known)
+    assert effects | {method.name for method in BUILT_IN} <= set(known)
 
 
 def test_no_name_has_two_meanings():

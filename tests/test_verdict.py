@@ -5,9 +5,12 @@ from types import SimpleNamespace
 import pytest
 from msgspec import structs
 
+from comparisons.cost import cost_record
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import VisibleShare
+from comparisons.hybrids.why import MeanError
 from heuristic.heuristics import HEURISTICS, Interpolation, Point
+from reference.records import Estimated
 from reports import verdict
 from reports.terminal import tables
 from tests import records
@@ -46,11 +49,12 @@ def study(*points):
         for name in names
     ]  # fmt: skip
     made = [
-        SimpleNamespace(
+        cost_record.Point(
             method=name,
             spp=spp,
-            seconds=SimpleNamespace(value=ms / 1e3, low=0.95 * ms / 1e3, high=1.05 * ms / 1e3),
-            tolerance=SimpleNamespace(mean=tolerance, low=tolerance, high=1.01 * tolerance),
+            seconds=Estimated(value=ms / 1e3, low=0.95 * ms / 1e3, high=1.05 * ms / 1e3),
+            error=MeanError(mean=1.0, low=1.0, high=1.0),
+            tolerance=MeanError(mean=tolerance, low=tolerance, high=1.01 * tolerance),
         )
         for name, spp, ms, tolerance in (("Phong kernel", 4, 3.9, 8.0), *points)
     ]

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,27 +10,30 @@ from msgspec import structs
 
 from comparisons import record
 from comparisons.cost import times
-from comparisons.cost.cost_record import Cost, CostAttribution, EffectCost
-from comparisons.cost.front import at_size, fronted
+from comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
+from comparisons.cost.front import at_size, fronted, sufficient
 from comparisons.cost.measure import (
+    LARGEST_CERTAIN,
     QUICK,
     QUICK_WIDTH,
     WIDTH,
     Effort,
     Measurements,
     Size,
+    measure_at,
     measure_ladder,
     reduced,
     threads,
 )
-from comparisons.cost.predict import predict, require
+from comparisons.cost.methods import FULL_PLAN
+from comparisons.departure.criterion import checked_threshold
 from comparisons.hybrids.attribution import Causes, find
 from comparisons.options import Options
+from heuristic.errors import InputError
 from reference.pairing.prepare import film_size
 from reference.planning.plan import Guard
-from reference.records import Pixels
-from reference.rendering.gbuffer import resize
-from reference.rendering.renderer import Progress
+from reference.records import VERSION, Pixels, Positive, Record, Resolution
+from reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
 from reference.scene.source import Source
 
 SPP = 64
@@ -64,8 +67,9 @@ def cost(
 
     For ``source``, ``options``, ``progress`` and ``command`` see
     :func:`comparisons.compare.compare`, and :func:`comparisons.cost.measure.measure_ladder` for an
-    omitted resolution, ``options.spp`` and ``alone``. ``at`` is a size to predict for, where
-    methods are also measured if ``is_measured``. ``causes`` are those of the scene, if known.
+    omitted resolution, ``options.spp`` and ``alone``. ``at`` is a size to predict for: times
+    follow from overhead and time per sample, and errors are those of the study's size. If
+    ``is_measured``, methods also render there. ``causes`` are those of the scene, if known.
     """
     progress = progress or (lambda *_: None)
     options, effort = options or Options(), effort or Effort()
@@ -75,9 +79,9 @@ def cost(
     found = measure_ladder(source, options, effort, progress, at=at, alone=alone)
     options, ready, ladder = found.options, found.ready, found.ladder
     counted = ready.counted
-    predicted, measured = predict(found, at, is_measured, progress) if at else ((), ())
+    predicted = at_size(found.points, found.methods, at) if at else ()
+    measured = measure_at(found, at, progress) if at and is_measured else ()
     ladder.forget()  # its scenes would slow later work
-    resize(ready.scene, found.size)  # a prediction has other sizes
     known = causes or find(ready, source, options, progress)
     made = Cost(
         scene=source.name,
@@ -117,16 +121,28 @@ def quick(
     command: str,
     alone: AbstractContextManager[Any],
 ) -> Study:
-    """Study a compared scene with less effort; points of its own size have the small one's errors.
-
-    For the arguments see :func:`cost`.
-    """
+    """Study a compared scene with less effort, and predict for its own size; see :func:`cost`."""
     own = options.resolution or film_size(source.parse(), options.sensor)
     small = options.changed(resolution=reduced(source, options, QUICK_WIDTH), spp=None)
-    study = cost(source, small, QUICK, progress, command, causes=causes, alone=alone)
-    points = at_size(study.record.points, study.record.methods, own)
-    made = structs.replace(study.record, at=own, predicted=fronted(points))
-    return replace(study, record=made)
+    return cost(source, small, QUICK, progress, command, own, causes=causes, alone=alone)
+
+
+def require(name: str, target: Size, size: Size, is_measured: bool) -> None:
+    """Reject a size of another shape than the study's, or one that is too large to measure."""
+    (width, height), (wide, high) = sorted([size, target])
+    if abs(high * width / wide - height) > 1:  # a pixel of the smaller one is tolerated
+        raise InputError(
+            f"{width}x{height} and {wide}x{high} differ in shape: give --resolution the shape of"
+            " --at, or omit it."
+        )
+    if is_measured:
+        most = LARGEST_PASS // LARGEST_CERTAIN
+        if target[0] * target[1] > most:
+            raise InputError(
+                f"{target[0]}x{target[1]} is too large to measure: at most {most} pixels are"
+                " allowed. Omit --measure to predict it."
+            )
+        require_memory(name, *target)
 
 
 def attribution(found: Measurements, causes: Causes) -> CostAttribution:
@@ -159,4 +175,61 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
         renderer_s=adds(""),
         resolution=found.size,
         spp=SPP,
+    )
+
+
+class Choice(Record, kw_only=True):
+    """The answer of ``fotismos plan --within``.
+
+    Attributes
+    ----------
+    resolution, measured
+        Size of the times, and of the images in which errors were measured.
+    within
+        The tolerance, ΔE2000.
+    chosen
+        The fastest point that suffices; None if none does.
+    best
+        The one that suffices at the smallest tolerance.
+    full
+        The full plan with the fewest samples that suffice, else with the most samples.
+    left_out
+        Methods that the scene cannot have, and why.
+    """
+
+    scene: str
+    resolution: Resolution
+    measured: Resolution
+    within: Positive
+    chosen: Point | None
+    best: Point
+    full: Point
+    left_out: dict[str, str]
+    record_version: int = VERSION
+
+
+def choose(
+    source: Source,
+    within: float,
+    options: Options | None = None,
+    effort: Effort | None = None,
+    progress: Progress | None = None,
+) -> Choice:
+    """Measure the ladder of a scene, in the current variant, and choose from it."""
+    checked_threshold(within)
+    options = options or Options()
+    found = measure_ladder(source, options, effort or Effort(), progress or (lambda *_: None))
+    size = options.resolution or film_size(source.parse(), options.sensor)
+    points = at_size(found.points, found.methods, size)
+    full = next(one.name for one in found.methods if FULL_PLAN.name in one.names)
+    of_full = [point for point in points if point.method == full]
+    return Choice(
+        scene=source.name,
+        resolution=size,
+        measured=found.size,
+        within=within,
+        chosen=sufficient(points, within),
+        best=min(points, key=lambda point: (point.tolerance.mean, point.seconds.value)),
+        full=sufficient(of_full, within) or max(of_full, key=lambda point: point.spp),
+        left_out=found.ladder.left_out,
     )

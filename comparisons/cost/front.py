@@ -10,15 +10,8 @@ from collections.abc import Sequence
 from msgspec import structs
 
 from comparisons.cost.cost_record import Point, TimedMethod
-from comparisons.cost.measure import Effort, Size, measure_ladder
-from comparisons.cost.methods import FULL_PLAN
-from comparisons.departure.criterion import checked_threshold
 from comparisons.hybrids.why import MeanError
-from comparisons.options import Options
-from reference.pairing.prepare import film_size
-from reference.records import VERSION, Estimated, Positive, Record, Resolution
-from reference.rendering.renderer import Progress
-from reference.scene.source import Source
+from reference.records import Estimated
 
 Interval = Estimated | MeanError
 
@@ -72,67 +65,12 @@ def sufficient(points: Sequence[Point], tolerance: float) -> Point | None:
     return structs.replace(best, ties=tuple(ties))
 
 
-def at_size(points: Sequence[Point], methods: Sequence[TimedMethod], size: Size) -> list[Point]:
+def at_size(
+    points: Sequence[Point], methods: Sequence[TimedMethod], size: tuple[int, int]
+) -> list[Point]:
     """Return points as they are at another size: with the times there, and the same errors."""
     known = {method.name: method for method in methods}
     samples = size[0] * size[1]
     return [
         structs.replace(one, seconds=known[one.method].seconds(one.spp * samples)) for one in points
     ]
-
-
-class Choice(Record, kw_only=True):
-    """The answer of ``fotismos plan --within``.
-
-    Attributes
-    ----------
-    resolution, measured
-        Size of the times, and of the images in which errors were measured.
-    within
-        The tolerance, ΔE2000.
-    chosen
-        The fastest point that suffices; None if none does.
-    best
-        The one that suffices at the smallest tolerance.
-    full
-        The full plan with the fewest samples that suffice, else with the most samples.
-    left_out
-        Methods that the scene cannot have, and why.
-    """
-
-    scene: str
-    resolution: Resolution
-    measured: Resolution
-    within: Positive
-    chosen: Point | None
-    best: Point
-    full: Point
-    left_out: dict[str, str]
-    record_version: int = VERSION
-
-
-def choose(
-    source: Source,
-    within: float,
-    options: Options | None = None,
-    effort: Effort | None = None,
-    progress: Progress | None = None,
-) -> Choice:
-    """Measure the ladder of a scene, in the current variant, and choose from it."""
-    checked_threshold(within)
-    options = options or Options()
-    found = measure_ladder(source, options, effort or Effort(), progress or (lambda *_: None))
-    size = options.resolution or film_size(source.parse(), options.sensor)
-    points = at_size(found.points, found.methods, size)
-    full = next(one.name for one in found.methods if FULL_PLAN.name in one.names)
-    of_full = [point for point in points if point.method == full]
-    return Choice(
-        scene=source.name,
-        resolution=size,
-        measured=found.size,
-        within=within,
-        chosen=sufficient(points, within),
-        best=min(points, key=lambda point: (point.tolerance.mean, point.seconds.value)),
-        full=sufficient(of_full, within) or max(of_full, key=lambda point: point.spp),
-        left_out=found.ladder.left_out,
-    )

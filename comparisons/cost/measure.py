@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from comparisons.cost import times
 from comparisons.cost.cost_record import Converged, Method, Point, TimedMethod
-from comparisons.cost.methods import DEPTHS, Ladder, Step
+from comparisons.cost.methods import Ladder, Step
 from comparisons.departure.colour import Viewing
 from comparisons.departure.criterion import LIMIT
 from comparisons.departure.metrics import LEADING
@@ -31,21 +31,25 @@ from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
 from heuristic.errors import InputError
 from reference.pairing.prepare import film_size
-from reference.rendering.gbuffer import image_size
-from reference.rendering.renderer import Progress, Renderer, Stream, passes
+from reference.records import Estimated
+from reference.rendering.gbuffer import gbuffer, image_size, resize
+from reference.rendering.renderer import LARGEST_PASS, Progress, Renderer, Stream, passes
 from reference.rendering.sums import Accumulator, Estimate
 from reference.scene.source import Source
 
 Size = tuple[int, int]
 
-Key = tuple[Any, ...]
-"""Name of a method, samples per pixel, and what else tells renderings apart."""
+Key = tuple[str, int]
+"""Name of a method, and samples per pixel."""
 
 SURE = NormalDist().inv_cdf(0.975)
 """Standard errors to each side of an interval of 95 %."""
 
-DETERMINISTIC_SPP = (4, 16)
-"""Samples per pixel of methods without random numbers; only the pixel filter needs them."""
+LARGEST_CERTAIN = 16
+"""Most samples per pixel of methods without random numbers: only the pixel filter needs them."""
+
+MEASURED_ROUNDS = 3
+"""Rounds at the size of a prediction."""
 
 WIDTH, QUICK_WIDTH = 128, 64
 """Default width of an image in pixels: the time of a sample does not depend on it."""
@@ -69,21 +73,16 @@ class Effort:
     rounds
         Timed repeats of each method, at least 2.
     largest
-        Most samples per pixel at which errors of the Monte Carlo methods are measured. The counts
-        are powers of 4, at which the sampler stratifies best.
-    deterministic
-        Samples per pixel of the other methods.
-    depths
-        Depths of ``path`` that are methods.
-    stand_ins
-        Whether what engines use in place of transport is measured too.
+        Most samples per pixel at which errors are measured; :data:`LARGEST_CERTAIN` at most for
+        methods without random numbers. The counts are powers of 4, at which the sampler stratifies
+        best.
+    is_short
+        Whether the ladder is short, see :func:`comparisons.cost.methods.all_methods`.
     """
 
     rounds: int = 7
     largest: int = 64
-    deterministic: tuple[int, ...] = DETERMINISTIC_SPP
-    depths: tuple[int, ...] = DEPTHS
-    stand_ins: bool = True
+    is_short: bool = False
 
     def __post_init__(self) -> None:
         if self.rounds < 2:
@@ -91,13 +90,12 @@ class Effort:
 
     def counts(self, method: Method) -> tuple[int, ...]:
         """Return the sample counts at which the error of a method is measured."""
-        if not method.monte_carlo:
-            return self.deterministic
-        powers = takewhile(lambda count: count <= self.largest, (4**i for i in count_from(1)))
-        return tuple(powers) or (self.largest,)
+        most = self.largest if method.monte_carlo else min(self.largest, LARGEST_CERTAIN)
+        powers = takewhile(lambda count: count <= most, (4**i for i in count_from(1)))
+        return tuple(powers) or (most,)
 
 
-QUICK = Effort(rounds=3, largest=16, deterministic=(16,), depths=(3,), stand_ins=False)
+QUICK = Effort(rounds=3, largest=16, is_short=True)
 """For scenes of a report."""
 
 
@@ -170,7 +168,7 @@ def measure_ladder(
     ready = guarded(source, options.changed(spp=None, allow_empty=False))
     reference = converged(ready, options.seed, progress)
     judge = judge_by(reference, ready.counted, options.viewing)
-    ladder = Ladder(source, options, ready, effort.depths, effort.stand_ins)
+    ladder = Ladder(source, options, ready, effort.is_short)
     size = image_size(ready.scene)
     gc.collect()  # release scenes that pairing left behind
     steps = tuple(ladder.steps())
@@ -184,7 +182,7 @@ def measure_ladder(
         )  # fmt: skip
         judged = {(one.name, spp) for one in ladder.methods for spp in counts[one.name]}
         errors, images = rendered(
-            renderers, lambda _: judge, judged, effort.rounds, options.seed, progress, "timing"
+            renderers, judge, judged, effort.rounds, options.seed, progress, "timing"
         )
     found = timed(renderers, effort.rounds, size[0] * size[1], options.seed)
     methods = tuple(
@@ -207,13 +205,19 @@ def measure_ladder(
         ),
         methods=methods,
         points=tuple(
-            point(one, spp, size, *errors[one.name, spp])
+            Point(
+                method=one.name,
+                spp=spp,
+                seconds=one.seconds(spp * size[0] * size[1]),
+                error=errors[one.name, spp][0],
+                tolerance=errors[one.name, spp][1],
+            )
             for one in methods
             for spp in counts[one.name]
         ),
         lines=found,
         steps=steps,
-        images={name: image for (name, *_), image in images.items()},
+        images={name: image for (name, _), image in images.items()},
     )
 
 
@@ -222,7 +226,9 @@ def converged(
 ) -> Estimate:
     """Render the reference, with seeds that no method has."""
     integrator = ready.reference.integrator
-    renderer = Renderer(ready.scene, integrator, REFERENCE_SPP, "reference image", size)
+    width, height = size or image_size(ready.scene)
+    spp = min(REFERENCE_SPP, LARGEST_PASS // (width * height))
+    renderer = Renderer(ready.scene, integrator, spp, "reference image", size)
     total, count = Accumulator(), max(REFERENCE_PASSES, ready.plan.passes)
     stream = Stream.OTHER_SIDE
     for one in passes([renderer], seed, count, stream=stream, progress=progress, stage="reference"):
@@ -264,7 +270,7 @@ def tried(
 
 def rendered(
     renderers: Mapping[Key, Renderer],
-    judge_of: Callable[[Key], Judge],
+    judge: Judge,
     judged: Collection[Key],
     rounds: int,
     seed: int,
@@ -282,7 +288,7 @@ def rendered(
         for key, image in zip(renderers, one.images, strict=True):
             if key in judged and one.number >= WARM:
                 images[key] = np.array(image)
-                errors[key].append(judge_of(key)(images[key]))
+                errors[key].append(judge(images[key]))
     return {key: _mean_errors(each) for key, each in errors.items()}, images
 
 
@@ -301,7 +307,7 @@ def timed(
 ) -> dict[str, times.Line]:
     """Return the time of each method from the last rounds of its renderers."""
     seconds: dict[str, dict[int, tuple[Any, Any]]] = {}
-    for (name, spp, *_), renderer in renderers.items():
+    for (name, spp), renderer in renderers.items():
         own = renderer.times[-rounds:], renderer.processor_times[-rounds:]
         seconds.setdefault(name, {})[spp * pixels] = own
     return times.lines(seconds, seed)
@@ -324,12 +330,31 @@ def timed_method(
     )
 
 
-def point(
-    method: TimedMethod, spp: int, size: Size, error: MeanError, tolerance: MeanError
-) -> Point:
-    """Return the point of a method, with errors, at a size."""
-    seconds = method.seconds(spp * size[0] * size[1])
-    return Point(method=method.name, spp=spp, seconds=seconds, error=error, tolerance=tolerance)
+def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Point, ...]:
+    """Render each method with its fewest samples at another size."""
+    scene, options = found.ready.scene, found.options
+    reference = converged(found.ready, options.seed, progress, size)
+    judge = judge_by(reference, gbuffer(scene, *size).hit, options.viewing)
+    renderers = {
+        (one.name, spp): found.ladder.renderer(one, spp, size)
+        for one in found.methods
+        for spp in found.effort.counts(one)[:1]
+    }
+    errors, _ = rendered(
+        renderers, judge, renderers, MEASURED_ROUNDS, options.seed, progress, "measuring"
+    )
+    resize(scene, found.size)
+    return tuple(
+        Point(
+            method=name,
+            spp=spp,
+            seconds=Estimated(min(took), min(took), max(took)),
+            error=errors[name, spp][0],
+            tolerance=errors[name, spp][1],
+        )
+        for (name, spp), renderer in renderers.items()
+        if (took := renderer.times[-MEASURED_ROUNDS:])
+    )
 
 
 def threads() -> int:

@@ -43,9 +43,6 @@ from reference.rendering.renderer import Renderer, variant
 from reference.rendering.sampler import with_sampler
 from reference.scene.source import Source
 
-DEPTHS = (3, 4, 5)
-"""Depths of ``path`` that are methods, as Mitsuba counts: 2 is direct light."""
-
 UNLIMITED = -1
 
 KERNELS = (
@@ -80,21 +77,27 @@ PHONG_BSDF = Method(
     without=tuple(effect.label for effect in EFFECTS if effect.part == "BSDF form"),
 )
 DIRECT = Method(name="direct", family="physical", without=(INTERREFLECTION.label,))
+PATHS = tuple(
+    Method(name=f"path {depth}", family="physical", max_depth=depth) for depth in (3, 4, 5)
+)
+"""Paths of some depths, as Mitsuba counts: 2 is direct light."""
+
 FULL_PLAN = Method(name="full plan", family="physical")
+
+BUILT_IN = (*KERNELS, *STAND_INS, PHONG_BSDF, DIRECT, *PATHS, FULL_PLAN)
+"""The package's own methods, cheapest idea first."""
 
 _DECLARED: dict[str, Method] = {}
 
 
-def built_in(depths: tuple[int, ...] = DEPTHS) -> tuple[Method, ...]:
-    """Return the package's own methods, cheapest idea first, with paths of some depths."""
-    paths = [Method(name=f"path {depth}", family="physical", max_depth=depth) for depth in depths]
-    return (*KERNELS, *STAND_INS, PHONG_BSDF, DIRECT, *paths, FULL_PLAN)
+def all_methods(is_short: bool = False) -> tuple[Method, ...]:
+    """Return all methods, cheapest idea first.
 
-
-def all_methods(depths: tuple[int, ...] = DEPTHS) -> tuple[Method, ...]:
-    """Return all methods, cheapest idea first."""
-    *cheaper, full = built_in(depths)
-    return (*cheaper, *_DECLARED.values(), full)
+    A short ladder has only the shortest of the paths, and nothing that stands in for transport.
+    """
+    *cheaper, full = BUILT_IN
+    left_out = (*STAND_INS, *PATHS[1:]) if is_short else ()
+    return tuple(one for one in (*cheaper, *_DECLARED.values(), full) if one not in left_out)
 
 
 def declare(method: Method) -> Method:
@@ -103,7 +106,7 @@ def declare(method: Method) -> Method:
     ``InputError`` for a name of the package itself, and for an effect that a plan cannot leave out:
     it needs the kernel, or a second image.
     """
-    if method.name in {own.name for own in built_in()}:
+    if method.name in {own.name for own in BUILT_IN}:
         raise InputError(
             f"method {method.name!r} is already declared by fotismos: give another name."
         )
@@ -139,18 +142,12 @@ class Step(NamedTuple):
 class Ladder:
     """The methods of a prepared comparison, and a renderer for each of them.
 
-    ``depths`` are those of ``path`` that are methods, and ``stand_ins`` whether heuristics in place
-    of transport are. ``left_out`` tells why the scene cannot have a method, by its name. All
-    kernels have the same mesh, or the scene's own shapes.
+    ``left_out`` tells why the scene cannot have a method, by its name. All kernels have the same
+    mesh, or the scene's own shapes.
     """
 
     def __init__(
-        self,
-        source: Source,
-        options: Options,
-        ready: Prepared,
-        depths: tuple[int, ...] = DEPTHS,
-        stand_ins: bool = True,
+        self, source: Source, options: Options, ready: Prepared, is_short: bool = False
     ) -> None:
         if options.polygon_shading is not Interpolation.PHONG and options.tessellation is None:
             options = options.changed(tessellation=RESOLUTION)
@@ -165,10 +162,10 @@ class Ladder:
         if plan.tabulated_environment:
             sampled.remove(ENVIRONMENT)
         self._is_random = any(plan.calls_for(one) or one in differences for one in sampled)
-        refusals = self._refused_interpolations() | self._refused_heuristics(stand_ins)
+        refusals = self._refused_interpolations() | self._refused_heuristics()
         merged: dict[Method, list[Method]] = {}
         self.left_out: dict[str, str] = {}
-        for method in all_methods(depths):
+        for method in all_methods(is_short):
             if reason := self._why_not(method, refusals):
                 self.left_out[method.name] = reason
             else:
@@ -344,14 +341,12 @@ class Ladder:
         graph = self.pairs.of(interpolation).heuristic
         return [graph.plugin(index) for index in graph.nodes(SHAPE)]
 
-    def _refused_heuristics(self, stand_ins: bool) -> dict[str, str]:
+    def _refused_heuristics(self) -> dict[str, str]:
         """Return why the scene does not allow the heuristics of methods that have their own."""
         refused = {}
         with variant(self.heuristic_variant):
             for name in {method.heuristic for method in all_methods()} - {""}:
                 refuse = named(name).refuse
-                if not stand_ins:
-                    refused[name] = "A quick report does not measure it."
-                elif refuse:
+                if refuse:
                     refused[name] = refuse(self.ready.heuristic.scene)
         return refused

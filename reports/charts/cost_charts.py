@@ -1,4 +1,4 @@
-"""Charts of a study of cost: error against time, measured and predicted."""
+"""The chart of a study of cost: error against time."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import log10
@@ -8,8 +8,7 @@ import altair as alt
 import numpy as np
 from scipy.optimize import isotonic_regression
 
-from comparisons.cost.cost_record import Cost, Point
-from reference.records import Resolution
+from comparisons.cost.cost_record import Cost
 from reports.charts.theme import FAINT, Spec
 from reports.charts.vega import specification
 
@@ -35,34 +34,29 @@ Ends: TypeAlias = tuple[float, float]
 """Of an axis."""
 
 
-def titled(record: Cost, at: Resolution | None = None) -> Spec:
-    """Return the chart of error against time with a title, on white; ``at`` is a predicted size."""
-    width, height = at or record.resolution
-    what = f"predicted at {width} × {height} pixels" if at else "error against time"
+def titled(record: Cost) -> Spec:
+    """Return the chart of error against time with a title, on white."""
     busy = ", busy" if record.is_busy else ""
     machine = f"{record.threads} threads, {record.machine.processor}{busy}"
     measured = f"{record.resolution[0]} × {record.resolution[1]} pixels, {record.rounds} rounds"
     title = {
-        "text": f"{record.scene}: {what}",
+        "text": f"{record.scene}: error against time",
         "subtitle": [f"measured at {measured}, {machine}", *reading(record)],
     }
-    chart = error_over_time(record, "white", is_predicted=bool(at))
+    chart = error_over_time(record, "white")
     return chart | {"title": title, "description": f"{title['text']}, of all methods"}
 
 
-def error_over_time(
-    record: Cost, ground: str = "transparent", *, is_predicted: bool = False
-) -> Spec:
+def error_over_time(record: Cost, ground: str = "transparent") -> Spec:
     """Return the chart of mean ΔE2000 over seconds, both logarithmic, on a ground of any colour.
 
     Points of the front are filled. Lines join the sample counts of one method. The dashed line is
     the slope −1/2 of plain Monte Carlo. The dotted line is the reference's own noise, below which
-    errors are not resolved. Crosses are points that were measured where others are predicted.
+    errors are not resolved.
     """
     floor = record.reference.noise_floor
-    rows = _rows(record, record.predicted if is_predicted else record.points)
-    crosses = _rows(record, record.measured if is_predicted else ())
-    times = _domain([row[end] for row in (*rows, *crosses) for end in ("fastest", "slowest")])
+    rows = _rows(record)
+    times = _domain([row[end] for row in rows for end in ("fastest", "slowest")])
     errors = _domain([row["error"] for row in rows] + ([floor] if floor > 0 else []))
     colour = _by_family(alt.Color, 0)
     chart = _charted(rows, times, errors).encode(color=colour)
@@ -76,9 +70,6 @@ def error_over_time(
             fill=alt.condition("datum.front", colour, alt.value(ground)),
         ),
     ]
-    if crosses:
-        marks = _charted(crosses, times, errors).encode(color=colour)
-        layers.append(marks.mark_point(shape="cross", size=90, fill=ground, strokeWidth=1.5))
     # Names may be wider in the reader's font than in the font of the picture.
     padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
     whole = alt.layer(*layers, *_names_beside(rows, times, errors))
@@ -91,12 +82,11 @@ def reading(record: Cost) -> list[str]:
     slope = "dashed: slope −1/2, plain Monte Carlo; " if sampled else ""
     return [
         "filled: front (nothing else is clearly faster or better); bars: 95 % intervals of times",
-        f"{slope}dotted: noise of the reference itself"
-        + ("; crosses: measured" if record.measured else ""),
+        f"{slope}dotted: noise of the reference itself",
     ]
 
 
-def _rows(record: Cost, points: Sequence[Point]) -> list[dict[str, Any]]:
+def _rows(record: Cost) -> list[dict[str, Any]]:
     methods = {method.name: method for method in record.methods}
     return [
         {
@@ -110,7 +100,7 @@ def _rows(record: Cost, points: Sequence[Point]) -> list[dict[str, Any]]:
             "error": point.error.mean,
             "front": point.front,
         }
-        for point in points
+        for point in record.points
     ]
 
 

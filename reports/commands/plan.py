@@ -12,7 +12,7 @@ from reports import jobs
 from reports.terminal.words import tell, verbose_option
 
 if TYPE_CHECKING:
-    from comparisons.cost.front import Choice
+    from comparisons.cost.cost import Choice
     from comparisons.options import Options
     from comparisons.verification import Verification
     from reports.terminal.plan_lines import PlanReport
@@ -110,7 +110,7 @@ def verified(
 def chosen(name: str, request: Options, within: float, progress: Any) -> Choice:
     """Measure the methods of a scene, and name the fastest that suffices at a tolerance."""
     from comparisons.case import open_case
-    from comparisons.cost.front import choose
+    from comparisons.cost.cost import choose
 
     case = open_case(name, request)
     return choose(case.source, within, case.options, None, progress)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from msgspec import field
 
 from comparisons.comparison import ComparisonRecord
-from comparisons.cost.cost_record import Cost
 from reference.records import Record
 from reports.charts.vega import Figure
 from reports.files.images import Sheet
@@ -40,11 +40,12 @@ class WhyView(Record):
 class CostView(Record):
     """A page's data of a study.
 
+    ``record`` is a :class:`comparisons.cost.cost_record.Cost`, whose type few pages need to load.
     ``images`` are PNG files of the methods, by their bare names; ``said`` and ``busy`` are
     sentences on its sums and on the machine; ``colours`` are those of the effects.
     """
 
-    record: Cost
+    record: Any
     images: dict[str, bytes]
     said: str
     busy: str

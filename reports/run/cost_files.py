@@ -35,8 +35,6 @@ def documents(study: Study) -> dict[str, bytes]:
         for name, image in pictures.items()
     }
     made["cost.svg"] = vega.paper(cost_charts.titled(record))
-    if record.at:
-        made["prediction.svg"] = vega.paper(cost_charts.titled(record, record.at))
     made["cost.json"] = records.to_json(record).encode()
     return made
 

@@ -149,7 +149,15 @@ def load(place: Path, key: str | None) -> SceneView | None:
         # JSON has no bytes: pictures are text in it.
         found = msgspec.convert(atomic.Entry(place / VIEW, key).load(), Finished, builtin_types=())
         current = {name: _digest_of(place / name) for name in found.digests}
-        return found.view if current == found.digests else None
+        if current != found.digests:
+            return None
+        view = found.view
+        if view.cost:
+            from comparisons.cost.cost_record import Cost  # loaded late: few scenes have a study
+
+            record = msgspec.convert(view.cost.record, Cost, builtin_types=())
+            view = structs.replace(view, cost=structs.replace(view.cost, record=record))
+        return view
     except (msgspec.ValidationError, OSError):
         return None
 

@@ -11,8 +11,8 @@ from reports.terminal.tables import printed
 from reports.terminal.words import number, parameter, seconds
 
 if TYPE_CHECKING:
+    from comparisons.cost.cost import Choice
     from comparisons.cost.cost_record import Cost, Point
-    from comparisons.cost.front import Choice
     from comparisons.hybrids.why import MeanError
     from reference.records import Estimated
 
@@ -55,10 +55,10 @@ def lines(record: Cost) -> Iterator[str]:
         yield together(record)
         yield closure(record)
     if record.at:
-        yield from _section(f"Predicted at {sized(record.at)}", _points(record.predicted))
+        title = f"Predicted at {sized(record.at)}, with the errors at {size}"
+        yield from _section(title, _points(record.predicted))
     if record.measured:
-        spp = record.measured[0].spp
-        yield from _section(f"Predicted and measured there, {spp} samples", _off(record))
+        yield from _section("Predicted and measured there, fewest samples", _off(record))
 
 
 def sized(resolution: tuple[int, int]) -> str:
