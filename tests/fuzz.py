@@ -116,26 +116,6 @@ def check_normalise(rows, seed):
     return _of_components({"v": vector}, found, expected, 4 * STEP, length >= 4 * SMALLEST)
 
 
-def check_light_vector(rows, seed):
-    """``L`` and ``d``, within five rounding steps, wherever light and point are."""
-    draw = Source(rows, seed)
-    position, light = draw.vector(), draw.vector()
-    is_near = (draw.bits() & 3) == 0
-    light = dr.select(is_near, position + draw.direction() * draw.magnitude(1e-38, 1), light)
-    light = dr.select(dr.all(dr.isfinite(light)), light, 0)
-    dr.eval(position, light)
-    offset = Array3f64(light) - Array3f64(position)
-    length = dr.norm(offset)
-    toward, distance = vectors.light_vector(light, position)
-    inputs = {"position": position, "light": light}
-    is_away = length >= 2**26 * SMALLEST  # a component of either may count as zero
-    expected = offset / dr.select(length > 0, length, 1)
-    first = _of_components(inputs, toward, expected, 5 * STEP, is_away)
-    within = dr.minimum(length, LARGEST)
-    second = _judge(inputs, distance, within, 5 * STEP * within, is_away)
-    return Tally(rows, first.judged, max(first.worst, second.worst))
-
-
 def check_attenuation(rows, seed, clamped=False):
     """``I_0 f_att``, within ten rounding steps, for every distance, intensity and coefficient."""
     draw = Source(rows, seed)
@@ -234,7 +214,6 @@ def check_shade(rows, seed):
 CHECKS = {
     "power": check_power,
     "normalise": check_normalise,
-    "light vector": check_light_vector,
     "attenuation": check_attenuation,
     "clamped attenuation": lambda rows, seed: check_attenuation(rows, seed, clamped=True),
     "cone": check_cone,

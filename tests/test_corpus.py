@@ -85,14 +85,6 @@ def render(scene):
     return scene.integrator().render(scene, spp=1)  # mi.render hides what went wrong
 
 
-def mitsuba_renders(path):
-    try:
-        image = render(mi.load_file(str(path)))
-    except RuntimeError:
-        return False
-    return bool(np.isfinite(np.array(image)).all())
-
-
 def reason_of_mitsuba(path):
     """Return why Mitsuba does not render a scene, without the places in its own sources."""
     with pytest.raises(RuntimeError) as refusal:
@@ -141,17 +133,6 @@ def test_a_scene_is_compared(name, rgb, corpus):
 @pytest.mark.parametrize("name", sorted({*NAMES} - {*IN_EVERY_RUN, *REFUSED, *ENDS_PYTHON}))
 def test_any_other_scene_is_compared(name, rgb, corpus):
     check(corpus / f"{name}.xml")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [n for n in NAMES if n.startswith(("bsdf", "emitter", "medium"))])
-def test_a_scene_is_compared_in_spectra(name, spectral, corpus):
-    path = corpus / f"{name}.xml"
-    if not mitsuba_renders(path):
-        with pytest.raises(InputError):
-            compare(Source(name, path), Options(spp=4))
-        return
-    assert np.isfinite(compare(Source(name, path), Options(spp=4)).images.heuristic).all()
 
 
 def test_the_corpus_covers_all_plugins_but_those_that_it_says():

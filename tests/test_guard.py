@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
 from comparisons.compare import compare
 from comparisons.options import Options
@@ -13,7 +12,6 @@ from reference.scene.source import Source
 from reports.page import page
 from reports.page.scene_view import SceneView
 from reports.terminal import tables
-from tests import misplanned
 from tests.misplanned import SCENES, SKY, lamp, prune_blindly, scene, sphere
 
 SLIGHTLY_WRONG = {"an anisotropic sphere"}
@@ -74,32 +72,6 @@ def test_nothing_is_probed_where_nothing_is_left_out(rgb):
     assert guarded(source, Options(everything=True)).guard == Guard()
 
 
-@pytest.mark.thorough
-@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "llvm_ad_mono"], indirect=True)
-def test_it_probes_in_other_variants(variant, monkeypatch):
-    description = scene(ball=sphere(misplanned.TWO_SIDED), light=lamp((0, -4, 1), 9.0))
-    assert guarded(Source("seen", description)).guard.state == "agreed"
-    inside = SCENES["a camera inside a two-sided sphere, a point outside"]()
-    prune_blindly(monkeypatch)
-    assert guarded(Source("wrong", inside)).guard.state == "disagreed"
-
-
-@pytest.mark.parametrize(
-    "sensor",
-    [
-        {"type": "radiancemeter", "origin": (0, -4, 0), "direction": (0, 1, 0)},
-        {"type": "distant", "direction": (0, 1, 0), "target": (0, 0, 0)},
-    ],
-    ids=lambda sensor: sensor["type"],
-)
-def test_it_probes_cameras_of_a_single_ray(rgb, sensor):
-    film = {"type": "hdrfilm", "width": 1, "height": 1, "rfilter": {"type": "box"}}
-    description = scene(ball=sphere(), light=lamp((0, -3, 0)))
-    description["sensor"] = sensor | {"film": film}
-    found = guarded(Source("ray", description)).guard
-    assert (found.state, found.departure) == ("agreed", pytest.approx(0, abs=1e-5))
-
-
 def pretending(monkeypatch, draw):
     """Let the probe's rays return what ``draw(rng, count)`` does: two arrays."""
     rng = np.random.default_rng(7)
@@ -133,20 +105,14 @@ def fireflies(rng, count):
     return np.ones(count), 2 / 3 + 1000 / 3 * rare
 
 
-@pytest.mark.parametrize("noise", [normal, fireflies])
-def test_noise_alone_raises_no_alarm(pruned, monkeypatch, noise):
-    pretending(monkeypatch, noise)
-    assert rate(pruned, 2**20, 100) == 0
-
-
 @pytest.mark.guarantee(
     "plans", "Noise alone makes the guard disagree in at most one scene in a thousand."
 )
-@pytest.mark.slow
+@pytest.mark.parametrize("repeats", [100, pytest.param(10_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("noise", [normal, fireflies])
-def test_noise_alone_raises_one_alarm_in_a_thousand_at_most(pruned, monkeypatch, noise):
+def test_noise_alone_raises_one_alarm_in_a_thousand_at_most(pruned, monkeypatch, noise, repeats):
     pretending(monkeypatch, noise)
-    assert rate(pruned, 2**20, 10_000) <= 0.001
+    assert rate(pruned, 2**20, repeats) <= 0.001
 
 
 @pytest.mark.parametrize(("departure", "caught"), [(0.0, 0.0), (0.2, 1.0)])
@@ -158,26 +124,3 @@ def test_a_fifth_of_the_light_is_seen_through_noise(pruned, monkeypatch, departu
 
     pretending(monkeypatch, draw)
     assert rate(pruned, 1, 40) == caught
-
-
-def test_the_rays_are_a_share_of_the_samples_within_limits(pruned, monkeypatch):
-    pretending(monkeypatch, lambda rng, count: (1 + 9 * rng.normal(size=count), np.ones(count)))
-    few, some, many = (
-        guard.examine_plan(pruned.plan, None, False, samples, 3).rays
-        for samples in (1, 2**23, 2**40)
-    )
-    assert few == guard.FEWEST
-    assert some == pytest.approx(guard.SHARE * 2**23, rel=0.01)
-    assert guard.FEWEST < many <= guard.MOST
-
-
-def test_a_plan_made_by_hand_is_guarded_as_well(rgb):
-    """Depth 2 where the scene has light that is reflected more than once."""
-    room = {"type": "sphere", "flip_normals": True, "bsdf": misplanned.DIFFUSE}
-    source = Source("room", scene((0, 0, 0), (0, 1, 0), room=room, light=lamp((0, 0, 0.3))))
-    ready = guarded(source)
-    assert ready.guard.state == "not needed"
-    shallow = replace(ready.plan, integrator="direct_all", max_depth=2)
-    found = guard.examine_plan(shallow, ready.scene, False, 2**18, 0)
-    assert found.state == "disagreed"
-    assert found.departure == pytest.approx(-0.7, abs=0.1)

@@ -11,12 +11,11 @@ from comparisons.options import Options
 from comparisons.prepared import prepare
 from heuristic.errors import InputError
 from reference import Convention, Source
-from reference.pairing import albedo, halves, nearest, partners, probe
+from reference.pairing import albedo, partners, probe
 from reference.pairing.albedo import RoughPlastic
 from reference.pairing.bsdfs import Context
 from reference.pairing.nearest import rule_of
 from reference.pairing.probe import beam, mean_radiance
-from reference.scene.graph import Reference
 from tests.test_physics import look_at
 
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
@@ -76,20 +75,6 @@ def normal_map():
     return raw((np.stack([x, y, np.sqrt(1 - x**2 - y**2)], axis=2) + 1) / 2)
 
 
-def test_a_part_of_a_scene_is_a_node_and_what_it_refers_to(rgb):
-    nested = {"type": "twosided", "inner": DIFFUSE}
-    description = {"type": "scene"} | {f"s{k}": {"type": "sphere", "b": nested} for k in range(9)}
-    graph = Source("a test", description).parse()
-    wall = min(one for one in graph.nodes(BSDF) if graph.plugin(one) == "twosided")
-    part = graph.part(wall)
-    plugins = [part.plugin(one) for one in range(len(part.state.nodes))]
-    assert plugins == ["twosided", "diffuse", "checkerboard"]
-    assert part.location(1) == graph.location(wall + 1)
-    assert isinstance(part.instantiate(), mi.BSDF)
-    part.props(1)["reflectance"] = 0.25
-    assert not isinstance(graph.props(wall + 1)["reflectance"], float)
-
-
 # --- Exact pairs -----------------------------------------------------------------------------
 
 DIFFUSE = {"type": "diffuse", "reflectance": CHECKS}
@@ -139,15 +124,6 @@ def test_two_sides_may_differ_in_a_lobe_higher_than_one(rgb):
     assert all(np.isfinite(image).all() and image.max() > 0 for image in found)
 
 
-def test_a_colour_as_roughness_is_taken_for_its_mean(rgb):
-    """As Mitsuba takes it: one number is read of a texture of three."""
-    (of_colour, _), (of_mean, _) = (
-        images(scene({"s": {"type": "sphere", "b": {"type": "roughconductor", "alpha": alpha}}}))
-        for alpha in ({"type": "rgb", "value": [0.1, 0.2, 0.3]}, 0.2)
-    )
-    np.testing.assert_allclose(of_colour, of_mean, rtol=1e-5)
-
-
 # --- Transparency ----------------------------------------------------------------------------
 
 
@@ -185,18 +161,6 @@ def test_a_box_that_is_not_there_changes_nothing(rgb):
     np.testing.assert_allclose(with_box, without, atol=1e-5)
 
 
-def test_nothing_is_traced_for_transparency_where_no_material_has_it(rgb, kernel_history):
-    def kernel(bsdf):
-        pair = halves.pair(Source("a test", scene({"floor": {"type": "rectangle", "b": bsdf}})))
-        made = pair.heuristic.instantiate()
-        kernels = kernel_history(lambda: mi.render(made, spp=1))
-        return max(kernel["operation_count"] for kernel in kernels)
-
-    opaque = {"type": "mask", "opacity": 1.0, "nested": OTHER}
-    holed = {"type": "mask", "opacity": 0.5, "nested": OTHER}
-    assert kernel(opaque) == kernel(OTHER) < kernel(holed)
-
-
 # --- Materials -------------------------------------------------------------------------------
 
 
@@ -229,38 +193,6 @@ def test_a_textured_plastic_is_at_each_point_what_its_colour_alone_is(rgb, nonli
         assert np.abs(image - other).max() > 0.1
 
 
-def at(graph, value, uv):
-    """Evaluate a value of a material at a place of the texture plane, in the first channel."""
-    if not isinstance(value, Reference):
-        return float(np.ravel(value)[0])
-    si = dr.zeros(mi.SurfaceInteraction3f)
-    si.uv = mi.Point2f(*uv)
-    return float(graph.instantiate(value.index()).eval(si)[0][0])
-
-
-def test_a_textured_plastic_is_paired_by_name_at_each_point(rgb):
-    given = {"type": "roughplastic", "alpha": 0.2, "specular_reflectance": 0.7}
-    for reflectance in ("diffuse_reflectance", "specular_reflectance"):
-        graph, index = ball(given | {reflectance: GREY_CHECKS})
-        textured = Context(graph, Convention.LITERAL, rule_of).nearest(index)
-        for level, uv in ((0.2, (0.1, 0.1)), (0.8, (0.1, 0.6))):
-            plain = material(given | {reflectance: level}, Convention.LITERAL)
-            for name in ("k_a", "k_d", "k_s", "n"):
-                found, expected = (at(graph, getattr(one, name), uv) for one in (textured, plain))
-                assert found == pytest.approx(expected, rel=1e-5), name
-
-
-def test_a_smooth_plastic_is_paired_by_name_as_a_rough_one_with_a_narrow_lobe(rgb):
-    given = {"diffuse_reflectance": 0.4, "specular_reflectance": 0.7}
-    smooth = material({"type": "plastic", **given}, Convention.LITERAL)
-    alpha = nearest.SMOOTH_ALPHA
-    rough = material({"type": "roughplastic", "alpha": alpha, **given}, Convention.LITERAL)
-    for name in ("k_a", "k_d", "k_s", "n"):
-        expected = np.ravel(getattr(rough, name))
-        assert np.broadcast_to(getattr(smooth, name), expected.shape) == pytest.approx(expected)
-    assert "mirror image" in dict(smooth.lost)
-
-
 PHONG = {"type": "phong", "k_d": 0.2, "k_s": 0.5, "n": 12.0}
 TEXTURED_LOBE = {"type": "roughconductor", "alpha": {"type": "checkerboard", "color0": 0.15,
                                                      "color1": 0.4}}  # fmt: skip
@@ -275,15 +207,6 @@ def test_a_blend_of_lobes_of_two_scales_is_at_its_ends_each_of_them(rgb):
         )
         assert expected.max() > 0.1
         np.testing.assert_allclose(shown, expected, atol=1e-5)
-
-
-def test_a_textured_exponent_beside_a_textured_roughness_is_refused_unless_normalised(rgb):
-    phong = PHONG | {"n": GREY_CHECKS}
-    blend = {"type": "blendbsdf", "a": phong, "b": TEXTURED_LOBE}
-    with pytest.raises(InputError, match="single n, or make it normalised"):
-        material(blend)
-    assert material(blend | {"a": phong | {"normalised": True}}).normalised
-    assert material(blend | {"a": phong | {"k_s": 0.0}}).normalised
 
 
 def wrap(name, given, **instead):
@@ -390,15 +313,6 @@ def test_ambient_light_is_the_mean_of_the_map_over_the_sphere(rgb):
     np.testing.assert_allclose(mean_radiance(graph, emitter), [1, 2, 3], rtol=2e-3)
 
 
-def test_an_even_spot_is_its_own_nearest_beam(rgb):
-    look = mi.ScalarTransform4f().look_at([1, 2, 3], [1, 2, 0], [0, 1, 0])
-    spot = {"type": "spot", "to_world": look, "intensity": 5.0, "cutoff_angle": 12.0}
-    graph, emitter = lone(spot | {"beam_width": 11.999})
-    cutoff, intensity = beam(graph, emitter, [1, 2, 3], [0, 0, -1])
-    assert cutoff == pytest.approx(12, rel=2e-3)
-    assert intensity == pytest.approx(5, rel=2e-3)
-
-
 def test_a_beam_keeps_the_flux_of_a_spot_that_falls_off(rgb):
     """A linear fall-off of the angle from the axis on, integrated in closed form."""
     edge = radians(30)
@@ -409,6 +323,3 @@ def test_a_beam_keeps_the_flux_of_a_spot_that_falls_off(rgb):
     cutoff, intensity = beam(graph, emitter, [0, 0, 0], [0, 0, 1])
     cone = 2 * pi * (1 - cos(radians(cutoff)))
     assert intensity * cone == pytest.approx(flux, rel=2e-3)
-
-
-# --- Planning --------------------------------------------------------------------------------

@@ -126,24 +126,6 @@ def test_the_albedo_of_the_lobe():
             np.testing.assert_allclose(factors.specular_albedo(normalised), 0.7, rtol=1e-9)
 
 
-def test_there_and_back_gives_the_same_phong(rgb):
-    for phong in REACHABLE:
-        plastic, _ = albedo.to_roughplastic(phong, MATCHED)
-        back = albedo.to_phong(plastic, MATCHED)
-        np.testing.assert_allclose(back.k_d, phong.k_d, rtol=2e-5)
-        np.testing.assert_allclose(back.k_s, phong.k_s, rtol=2e-5)
-        assert back.n == pytest.approx(phong.n, rel=1e-9)
-
-
-def test_roughness_and_exponent_are_inverse_to_each_other():
-    for form in ("phong", "blinn"):
-        for n in (0.0, 1.0, 9.0, 1000.0):
-            found = factors.exponent_of(factors.alpha_of(n, form), form)
-            assert found == pytest.approx(n, abs=1e-9)
-        assert factors.alpha_of(0, form) == 1
-        assert factors.exponent_of(2.0, form) == 0
-
-
 def half_width(plastic):
     """Return the angle at which a roughplastic's lobe has fallen to a half, in degrees."""
     bsdf = mi.load_dict(
@@ -170,26 +152,6 @@ def test_a_matched_highlight_is_wider_by_what_the_documents_say(rgb):
     phong = Phong((0.1,) * 3, (2.0,) * 3, 400, form="blinn")
     own = 2 * np.degrees(np.arccos(0.5 ** (1 / 400)))
     assert half_width(albedo.to_roughplastic(phong, MATCHED)[0]) == pytest.approx(own, rel=0.02)
-
-
-def test_an_index_that_no_real_plastic_has_is_named(rgb):
-    for name in ("fig-8-7a", "fig-8-9"):
-        (record,) = halves.pair(SCENES[name].source(), resolution=(8, 8)).pairing.bsdfs
-        assert record.parameters["int_ior"] > 1.8
-        assert f"{record.parameters['int_ior']:.3g}" in record.note
-    (record,) = pair_of({"type": "phong", "k_d": 0.3, "k_s": 1.0, "n": 48}).pairing.bsdfs
-    assert 1.3 < record.parameters["int_ior"] < 1.8
-    assert not record.note
-
-
-def test_a_faint_lobe_is_paired_with_an_ior_near_1(rgb):
-    """A smooth surface reflects ``((ior - 1) / (ior + 1))^2``, here ``2 k_s / (n + 2)``."""
-    for k_s in (1e-6, 1e-8, 1e-12):
-        plastic, misses = albedo.to_roughplastic(Phong((0.5,) * 3, (k_s,) * 3, 100), MATCHED)
-        reflected = ((plastic.int_ior - 1) / (plastic.int_ior + 1)) ** 2
-        faintest = 2.5e-9
-        assert reflected == pytest.approx(max(2 * k_s / 102, faintest), rel=0.05)
-        assert not misses
 
 
 def test_what_no_plastic_reaches_is_missed_and_said_so(rgb):
@@ -316,14 +278,6 @@ def test_diffuse_pairs_exactly(rgb):
     assert tuple(back["reflectance"]) == pytest.approx((0.1, 0.2, 0.3))
 
 
-def test_a_shape_without_a_bsdf_gets_the_default_in_both_halves(rgb):
-    description = scene({"type": "diffuse"})
-    del description["shape"]["bsdf"]
-    pair = halves.pair(Source("a test", description))
-    assert only(pair.heuristic, BSDF)["k_d"] == pytest.approx(0.5)
-    assert only(pair.physical, BSDF)["reflectance"] == pytest.approx(0.5)
-
-
 def test_two_sided_surfaces_stay_so_both_ways(rgb):
     pair = pair_of({"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": 0.5}})
     assert only(pair.heuristic, BSDF)["twosided"]
@@ -360,10 +314,3 @@ def test_a_coefficient_that_is_no_reflectance_and_a_missing_camera_are_named(rgb
     del description["sensor"]
     with pytest.raises(InputError, match="no sensor"):
         halves.pair(Source("a test", description))
-
-
-def test_the_heuristic_keeps_the_shadows_that_its_scene_asks_for(rgb):
-    for occlusion in (False, True):
-        integrator = {"type": "heuristic", "occlusion": occlusion}
-        pair = pair_of({"type": "phong", "k_d": 0.5}, integrator=integrator)
-        assert pair.heuristic.instantiate().integrator().occlusion is occlusion

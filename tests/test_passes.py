@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons.compare import compare, is_checked
+from comparisons.compare import compare
 from comparisons.departure.metrics import METRICS
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
@@ -35,13 +35,6 @@ def test_a_limit_on_samples_stops_first_and_says_so(rgb):
     assert stop.reached > 0.01
     assert plan.spp <= 40
     assert plan.spp == stop.limit_spp
-
-
-def test_the_noise_is_looked_at_in_steps_of_a_half_at_most():
-    looked = [done for done in range(2, 1000, 2) if is_checked(done, 10_000)]
-    assert looked[:8] == [4, 6, 8, 12, 16, 24, 32, 48]
-    assert not any(is_checked(done, 10_000) for done in range(3, 1000, 2))
-    assert is_checked(10_000, 10_000)
 
 
 def test_a_pass_holds_no_more_samples_than_the_wavefront(rgb):

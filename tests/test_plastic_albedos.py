@@ -76,26 +76,3 @@ def test_the_albedos_of_a_roughplastic_are_what_its_plugin_reflects(variant, num
     """The plugin's own sums, in single precision, are off by up to 1e-5."""
     for plastic in drawn(number, number):
         assert_as_by_plugin(plastic)
-
-
-def test_the_albedos_of_a_smooth_plastic_are_what_its_plugin_reflects(rgb):
-    for nonlinear in (False, True):
-        for ratio in (0.4, 1.01, 1.5, 2.5, 6.0):
-            indices = {"int_ior": 1.2 * ratio, "ext_ior": 1.2}
-            bsdf = mi.load_dict(
-                {"type": "plastic", "diffuse_reflectance": 0.6, "nonlinear": nonlinear} | indices
-            )
-            expected = evaluated(bsdf, 1.0, mi.BSDFFlags.DiffuseReflection)
-            diffuse, mirror = albedo.of_smooth_plastic(0.6, 1.2 * ratio, 1.2, nonlinear)
-            assert diffuse == pytest.approx(max(expected, 0), abs=1e-5)
-            assert mirror == pytest.approx(((ratio - 1) / (ratio + 1)) ** 2)
-
-
-def test_many_surfaces_share_two_kernels(rgb, kernel_history):
-    """Into the surface and out of it: their parameters are no literals."""
-
-    def several():
-        for k in range(4):
-            albedo.coat("beckmann", 0.05 + 0.0123 * k, 1.31 + 0.01 * k)
-
-    assert len({kernel["hash"] for kernel in kernel_history(several)}) <= 6

@@ -1,6 +1,5 @@
 """The rules of pruning: each is refused where a premise does not hold, and the images show why."""
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -69,35 +68,6 @@ def test_principled_only_reflects_unless_it_says_otherwise(rgb):
             scene(one=sphere(PRINCIPLED | {"spec_trans": clear}), light=light)
         ).shapes
         assert (found.opaque, found.outer, found.inner) == (False, True, True)
-
-
-def test_what_principled_reflects_never_comes_from_below(rgb):
-    """The premise of the rule, at random parameters, directions and samples."""
-    rng, size, reflecting = np.random.default_rng(5), 4096, 0
-    for _ in range(12):
-        given = {name: float(rng.choice([0, 1, rng.random()])) for name in OF_PRINCIPLED}
-        bsdf = mi.load_dict(PRINCIPLED | given)
-        si = dr.zeros(mi.SurfaceInteraction3f, size)
-        si.sh_frame, si.n = mi.Frame3f(mi.Vector3f(0, 0, 1)), mi.Normal3f(0, 0, 1)
-        si.wi, wo = (mi.warp.square_to_uniform_sphere(points(rng, size)) for _ in range(2))
-        below = np.array((si.wi.z < 0) | (wo.z < 0))
-        value = np.array(bsdf.eval(mi.BSDFContext(), si, wo))
-        assert (value[:, below] == 0).all()
-        reflecting += (value[:, ~below] > 0).any()
-        sample = mi.Float(rng.random(size))
-        bs, weight = bsdf.sample(mi.BSDFContext(), si, sample, points(rng, size))
-        assert (np.array(weight)[:, np.array((si.wi.z < 0) | (bs.wo.z < 0))] == 0).all()
-    assert reflecting > 8  # others are mirrors, which no random direction meets
-
-
-OF_PRINCIPLED = (
-    "roughness", "metallic", "anisotropic", "specular", "spec_tint", "clearcoat",
-    "clearcoat_gloss", "sheen", "sheen_tint", "flatness",
-)  # fmt: skip
-
-
-def points(rng, size):
-    return mi.Point2f(*(mi.Float(row) for row in rng.random((2, size))))
 
 
 def test_with_every_premise_taken_for_true_it_is_wrong(rgb, monkeypatch):
@@ -177,32 +147,6 @@ def test_a_mirrored_transform_turns_the_sides_round(rgb):
     assert found["ball"].form is Form.CLOSED
 
 
-def test_a_mesh_whose_normals_disagree_is_of_no_known_form(rgb):
-    """Of a mirrored cube Mitsuba's shading normals point outwards, and the geometric ones in."""
-    mirrored = mi.ScalarTransform4f().scale((-1, 1, 1))
-    box = {"type": "cube", "to_world": mirrored, "bsdf": DIFFUSE}
-    facts = facts_of(scene(box=box, light=lamp((9, 9, 9))))
-    assert facts.by_name["box"].form is Form.OTHER
-
-
-def test_camera_rays_begin_where_mitsuba_lets_them(rgb):
-    """The set of origins holds those of random rays, for each kind of camera."""
-    rng = np.random.default_rng(0)
-    for kind in ("perspective", "thinlens", "orthographic"):
-        more = {"aperture_radius": 0.7, "focus_distance": 4.0} if kind == "thinlens" else {}
-        description = scene(ball=sphere(), light=lamp((9, 9, 9)), camera=camera(kind, **more))
-        description["sensor"] |= {"near_clip": 0.5}
-        ready = prepare(Source("rays", description))
-        found = Facts.of(ready.pair, ready.scene).camera
-        film, lens = (mi.Point2f(rng.random((2, 4096)).astype(np.float32)) for _ in range(2))
-        ray, _ = ready.scene.sensors()[0].sample_ray(0.0, 0.5, film, lens)
-        origins = np.array(ray.o).T
-        low, high = found.origins.min(axis=0), found.origins.max(axis=0)
-        assert np.all(origins > low - 1e-5)
-        assert np.all(origins < high + 1e-5)
-        assert np.ptp(origins @ found.axis) < 1e-4
-
-
 def test_a_table_over_cosines_is_for_one_isotropic_material(rgb):
     sky, sides = {"type": "constant"}, {"type": "twosided", "front": DIFFUSE}
     sides["back"] = {"type": "roughplastic"}
@@ -218,26 +162,17 @@ def test_a_table_over_cosines_is_for_one_isotropic_material(rgb):
 
 
 TUBES = {
-    "round": ((0.5, 0.5, 0.9), {}, True),
-    "round, between points": (0.5, {"p1": (0, 1, 1)}, True),
-    "mirrored": ((0.5, 0.5, -0.5), {}, False),
-    "turned twice": ((-0.5, -0.5, 0.5), {}, True),
-    "an ellipse": ((0.7, 0.3, 0.5), {}, False),
-    "an ellipse, between points": ((1, 1, 2), {"p1": (0, 1, 0)}, False),
+    "round": ((0.5, 0.5, 0.9), True),
+    "mirrored": ((0.5, 0.5, -0.5), False),
+    "an ellipse": ((0.7, 0.3, 0.5), False),
 }
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=() if name == "mirrored" else pytest.mark.thorough)
-        for name in TUBES
-    ],
-)
+@pytest.mark.parametrize("name", TUBES)
 def test_a_cylinder_that_shines_is_sampled_where_rays_hit_it_if_the_plan_says_so(rgb, name):
     """By Mitsuba's own estimates: from samples of the lamp alone, and from its hits alone."""
-    scale, ends, is_right = TUBES[name]
-    lit = tube(scale, **ends)
+    scale, is_right = TUBES[name]
+    lit = tube(scale)
     assert LIGHT_BY_LIGHT.check(facts_of(lit)).applies is is_right
     found = []
     for ways in ({"bsdf_samples": 0}, {"emitter_samples": 0}):
@@ -256,20 +191,6 @@ def test_a_lamp_whose_samples_are_not_its_hits_is_warned_of(rgb):
     assert said.startswith("tube: samples of it may not be what rays hit")
     again = compare(Source("sky", SCENES["an anisotropic sphere"]()), few)
     assert not any("weights" in line for line in again.record.warnings)
-
-
-def test_a_lamp_that_is_seen_from_inside_is_left_to_mitsuba(rgb):
-    """Its own integrators do not agree there on how much light it sends to itself."""
-    ball = sphere(TWO_SIDED, emitter={"type": "area", "radiance": 1.0})
-    inside = scene((0, 0, 0), (0, 1, 0), "direct", ball=ball)
-    result = LIGHT_BY_LIGHT.check(facts_of(inside))
-    assert (result.applies, result.evidence) == (False, "ball: shines, and may be seen from inside")
-    assert LIGHT_BY_LIGHT.check(facts_of(scene(ball=ball))).applies
-    images = []
-    for settings in ({"bsdf_samples": 0}, {"emitter_samples": 0}):
-        stock = mi.load_dict(inside | {"integrator": {"type": "direct", **settings}})
-        images.append(np.array(mi.render(stock, spp=16)).mean())
-    assert abs(images[0] - images[1]) > 0.01
 
 
 @pytest.mark.parametrize(

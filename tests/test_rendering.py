@@ -164,18 +164,6 @@ def test_indirect_light_is_that_of_mitsubas_path(rgb, max_depth):
     check_same_means(made, *integrators, passes=32)
 
 
-def test_direct_light_of_one_point_is_mitsubas_to_rounding(rgb):
-    made = mi.load_dict(scene(one=POINT))
-    ours, theirs = (
-        np.array(mi.render(made, integrator=mi.load_dict(integrator), spp=4, seed=3), float)
-        for integrator in (
-            {"type": "direct_all"},
-            {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0},
-        )
-    )
-    np.testing.assert_allclose(ours, theirs, rtol=1e-5, atol=1e-7)
-
-
 # --- Standard errors -------------------------------------------------------------------------
 
 
@@ -245,14 +233,3 @@ def test_all_passes_share_one_kernel_whatever_their_seed(rgb, monkeypatch):
     assert first
     assert others == [first, first]
     assert all(kernel["cache_hit"] for kernels in histories[1:] for kernel in kernels)
-
-
-def test_switching_the_variant_transforms_the_same_code_once():
-    def counted(number):
-        while number < 3:
-            number += 1
-        return number
-
-    first, again = dr.syntax(counted), dr.syntax(counted)
-    assert first.__code__ is again.__code__ is not counted.__code__
-    assert again(mi.Int(1)) == first(mi.Int(1)) == 3

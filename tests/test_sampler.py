@@ -9,7 +9,7 @@ from scipy import stats
 from comparisons.case import open_case
 from comparisons.compare import compare
 from comparisons.options import Options
-from reference.rendering.sampler import SAMPLER, cells, register, turned
+from reference.rendering.sampler import SAMPLER, cells, register
 
 COUNTS = (1, 2, 3, 4, 7, 16, 48, 64)
 
@@ -75,28 +75,6 @@ def test_one_sample_is_uniform_in_all_dimensions_together(make, count):
         joint = joint * bins + np.minimum((each * bins).astype(int), bins - 1)
     counts = np.bincount(joint, minlength=bins ** len(numbers))
     assert stats.chisquare(counts).pvalue > 1e-4
-
-
-@pytest.mark.parametrize("count", [4, 16])
-def test_a_product_of_many_dimensions_has_the_right_mean(make, count):
-    """The mean of the product of 12 numbers 2u is 1; what long paths multiply is no different."""
-    pixels = 400_000 // count
-    sampler = make(count, pixels, seed=9)
-    product = np.ones(pixels * count)
-    for _ in range(12):
-        product *= 0.75 + 0.5 * np.array(sampler.next_1d())
-    means = product.reshape(pixels, count).mean(axis=1)
-    error = means.std(ddof=1) / np.sqrt(pixels)
-    assert abs(means.mean() - 1) < 4 * error
-    assert error < 1e-3
-
-
-@pytest.mark.parametrize("count", [3, 36])
-def test_a_stratum_is_uniform_whatever_the_permutation(rgb, count):
-    """χ² over 4 million hashes; the permutation of 36 alone fails it."""
-    hashes = mi.sample_tea_32(mi.UInt32(3), dr.arange(mi.UInt32, 4_000_000))
-    found = np.array(turned(mi.UInt32(1), count, *hashes, mi.Bool(True)))
-    assert stats.chisquare(np.bincount(found, minlength=count)).pvalue > 1e-4
 
 
 def test_seeds_and_pixels_do_not_share_numbers(make):

@@ -54,20 +54,6 @@ def test_a_value_and_a_sensor_are_used_and_recorded(run, scene, tmp_path):
     assert records["0.6", 1]["resolution"] == [40, 20]
 
 
-def test_a_baseline_keeps_them(run, scene, tmp_path):
-    baseline = tmp_path / "grey.json"
-    words = ("--update", "--scene", scene, "-D", "grey=0.5", "--sensor", 1, "--spp", 64)
-    assert run("check", baseline, *words)[0] == 0
-    options = json.loads(baseline.read_text(encoding="utf-8"))["options"]
-    assert (options["define"], options["sensor"]) == ({"grey": "0.5"}, 1)
-    assert options["resolution"] == [40, 20]
-    changed = baseline.read_text(encoding="utf-8").replace('"0.5"', '"0.6"')
-    baseline.write_text(changed, encoding="utf-8")
-    code, printed, _ = run("check", baseline, "-q", "-o", tmp_path)
-    assert code == 1
-    assert "1 of 1" in printed
-
-
 SPECTRAL_FILM = """<film type="specfilm">
   <integer name="width" value="24"/><integer name="height" value="16"/>
   <integer name="crop_offset_x" value="3"/><integer name="crop_width" value="8"/>
