@@ -34,8 +34,6 @@ from reference.planning.effects import (
     POLYGONS,
     SPECTRAL,
     Effect,
-    PrunedEffect,
-    ReplacedEffect,
 )
 from reference.planning.facts import SHAPE
 from reference.planning.plan import physical_integrator
@@ -111,10 +109,7 @@ def declare(method: Method) -> Method:
             f"method {method.name!r} is already declared by fotismos: give another name."
         )
     allowed = [
-        effect.label
-        for effect in EFFECTS
-        if isinstance(effect, PrunedEffect)
-        or (isinstance(effect, ReplacedEffect) and not effect.emission)
+        effect.label for effect in EFFECTS if effect.pruning or (effect.put and not effect.emission)
     ]
     for effect in method.without:
         if effect not in allowed:

@@ -34,7 +34,6 @@ from reference.planning.effects import (
     POLYGONS,
     SPECTRAL,
     Effect,
-    ReplacedEffect,
 )
 from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
 from reference.planning.plan import Plan, physical_integrator
@@ -44,7 +43,7 @@ from reference.rendering.sampler import with_sampler
 from reference.scene.graph import Graph, properties
 from reference.scene.source import Source
 
-REPLACED = tuple(effect for effect in EFFECTS if isinstance(effect, ReplacedEffect))
+REPLACED = tuple(effect for effect in EFFECTS if effect.put)
 IN_SCENE: frozenset[Effect] = frozenset(REPLACED)
 """Effects that change the scene; the others change only what the integrator does."""
 
@@ -152,7 +151,8 @@ class HybridScenes:
         graph = self.pair.physical.copy()
         for effect in REPLACED:
             if effect not in simulated:
-                effect.replace(graph, self.facts)
+                assert effect.put, "REPLACED has only such effects"
+                effect.put(graph, self.facts, effect.sites(self.facts))
         return graph
 
     def transport(self, simulated: Set[Effect], spp: int) -> Renderer:

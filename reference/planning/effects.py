@@ -5,7 +5,7 @@ a study, charts and pages.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import mitsuba as mi
@@ -48,6 +48,13 @@ class Effect:
     ``undecided`` a yes only means that it is not ruled out. ``part`` is one of :data:`PARTS`, and
     ``colour`` a CSS colour; None for effects equal in both halves. ``sampled`` is whether its
     direct light needs random numbers.
+
+    The integrator leaves an effect with a ``pruning`` rule out, with the parameters ``without`` of
+    `direct_all`; ``is_alike(facts)``: both halves treat it alike. Other effects are left out by
+    giving the physical half the heuristic half's form: ``sites(facts)`` returns the nodes or keys
+    of the physical half's graph that have it, and ``put(graph, facts, sites)`` replaces them in a
+    copy of that graph. ``emission(phong, facts)`` returns the light of a heuristic material that a
+    camera ray sees without the effect, as parameters of ``heuristic_glow``.
     """
 
     label: str
@@ -61,9 +68,19 @@ class Effect:
     colour: str | None = None
     sampled: bool = False
     step: str = ""
+    pruning: PruningRule | None = None
+    without: dict[str, Any] = field(default_factory=dict)
+    is_alike: Callable[[Facts], bool] = lambda facts: True
+    sites: Callable[[Facts], Sequence[Any]] = lambda facts: ()
+    put: Callable[[Graph, Facts, Sequence[Any]], None] | None = None
+    emission: Callable[[mi.Properties, Facts], dict] | None = None
 
     def decide(self, facts: Facts) -> Decision:
-        """Apply the rule."""
+        """Apply the rule, or the rule of pruning."""
+        if self.pruning:
+            result = self.pruning.check(facts)
+            kind = "structural" if result.applies else "simulated"
+            return self.decision(not result.applies, kind, result.evidence)
         assert self.rule, "an effect has a rule or a way to be pruned"
         called_for, evidence = self.rule(facts)
         kind = "simulated" if called_for and self.undecided else "structural"
@@ -75,7 +92,7 @@ class Effect:
 
     def differs(self, facts: Facts, called_for: bool) -> bool:
         """Return whether the two halves differ in it, given whether the scene calls for it."""
-        return False
+        return bool(self.sites(facts)) or (called_for and not self.is_alike(facts))
 
     def __repr__(self) -> str:
         return f"<effect {self.label}>"
@@ -83,51 +100,6 @@ class Effect:
     def __reduce__(self) -> tuple:
         # A copy in another process must be the same effect, for sets and `is`.
         return labelled, (self.label,)
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class PrunedEffect(Effect):
-    """An effect that the integrator simulates, unless its rule of pruning applies.
-
-    ``is_alike(facts)``: both halves treat it alike. ``without``: what leaves it out (`direct_all`).
-    """
-
-    pruning: PruningRule
-    is_alike: Callable[[Facts], bool]
-    without: dict[str, Any]
-
-    def decide(self, facts: Facts) -> Decision:
-        """Apply the rule of pruning."""
-        result = self.pruning.check(facts)
-        kind = "structural" if result.applies else "simulated"
-        return self.decision(not result.applies, kind, result.evidence)
-
-    def differs(self, facts: Facts, called_for: bool) -> bool:
-        """Return whether it is present, and not alike in both halves."""
-        return called_for and not self.is_alike(facts)
-
-
-@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class ReplacedEffect(Effect):
-    """An effect that is left out by giving the physical half the heuristic half's form.
-
-    ``sites(facts)`` returns the nodes or keys of the physical half's graph that have it, and
-    ``put(graph, facts, sites)`` replaces them in a copy of that graph. ``emission(phong, facts)``
-    returns the light of a heuristic material that a camera ray sees without the effect, as
-    parameters of ``heuristic_glow``; None if it is none.
-    """
-
-    sites: Callable[[Facts], Sequence[Any]]
-    put: Callable[[Graph, Facts, Sequence[Any]], None]
-    emission: Callable[[mi.Properties, Facts], dict] | None = None
-
-    def differs(self, facts: Facts, called_for: bool) -> bool:
-        """Return whether anything has another form in the physical half."""
-        return bool(self.sites(facts))
-
-    def replace(self, graph: Graph, facts: Facts) -> None:
-        """Leave the effect out of a copy of the physical half's graph."""
-        self.put(graph, facts, self.sites(facts))
 
 
 # --- Terms of the heuristic kernel -----------------------------------------------------------
@@ -295,7 +267,7 @@ def _ambient_light(phong: mi.Properties, facts: Facts) -> dict:
     return {"k_a": phong["k_a"], "ambient": facts.kernel["ambient"]}
 
 
-ATTENUATION = ReplacedEffect(
+ATTENUATION = Effect(
     label="distance attenuation",
     heuristic="f_att (6.1, 8.6)",
     reference="1 / d^2",
@@ -307,7 +279,7 @@ ATTENUATION = ReplacedEffect(
     put=_put_lights,
 )
 
-CONE = ReplacedEffect(
+CONE = Effect(
     label="spot cone",
     heuristic="6.2-6.4",
     reference="spot",
@@ -319,7 +291,7 @@ CONE = ReplacedEffect(
     put=_put_lights,
 )
 
-EXTENDED = ReplacedEffect(
+EXTENDED = Effect(
     label="extended lights",
     heuristic="a spot or point",
     reference="sampled area lights",
@@ -333,7 +305,7 @@ EXTENDED = ReplacedEffect(
     emission=_emitted,
 )
 
-ENVIRONMENT = ReplacedEffect(
+ENVIRONMENT = Effect(
     label="environment",
     heuristic="ambient light",
     reference="light from everywhere",
@@ -385,7 +357,7 @@ def _reflected(facts: Facts) -> tuple[bool, str]:
     return bool(plugins - {"diffuse", "null", *WRAPPERS}), f"BSDFs: {', '.join(sorted(plugins))}"
 
 
-MICROFACETS = ReplacedEffect(
+MICROFACETS = Effect(
     label="microfacets and Fresnel",
     heuristic="none",
     reference="roughplastic",
@@ -397,7 +369,7 @@ MICROFACETS = ReplacedEffect(
     put=_put_materials,
 )
 
-TRANSMISSION = ReplacedEffect(
+TRANSMISSION = Effect(
     label="transmission",
     heuristic="none",
     reference="refraction and media",
@@ -416,7 +388,7 @@ TRANSMISSION = ReplacedEffect(
 
 # --- Obstacles of light ----------------------------------------------------------------------
 
-OCCLUSION = PrunedEffect(
+OCCLUSION = Effect(
     label="occlusion",
     heuristic="none, or if requested",
     reference="shadow rays",
@@ -430,7 +402,7 @@ OCCLUSION = PrunedEffect(
     step="shadows",
 )
 
-INTERREFLECTION = PrunedEffect(
+INTERREFLECTION = Effect(
     label="interreflection",
     heuristic="none",
     reference="paths",

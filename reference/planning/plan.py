@@ -42,7 +42,6 @@ from reference.planning.effects import (
     OCCLUSION,
     Decision,
     Effect,
-    PrunedEffect,
 )
 from reference.planning.facts import BSDF, Facts
 from reference.planning.rules import LIGHT_BY_LIGHT, RULES, TABULATED_ENVIRONMENT, RuleResult
@@ -159,7 +158,7 @@ class Plan(Record):
         omitted = [
             effect
             for effect in EFFECTS
-            if isinstance(effect, PrunedEffect) and effect not in effects and self.calls_for(effect)
+            if effect.pruning and effect not in effects and self.calls_for(effect)
         ]
         plan = self.directly() if omitted else self
         for effect in omitted:
