@@ -100,7 +100,7 @@ def file_of(scene: str | Path) -> Path | None:
     if not path.is_file():
         raise InputError(
             f"{scene}: there is no such file. Give a Mitsuba scene (.xml), a Python file"
-            " that makes one (.py), a folder of them, or the name of a built-in scene"
+            " that makes one (.py), or the name of a built-in scene"
             f" (listed by `{program.command('scenes')}`)."
         )
     try:

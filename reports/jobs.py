@@ -83,7 +83,7 @@ def require_known(names: Iterable[str]) -> None:
 
 RESULTS = "Results"
 GROUPS = {
-    "What is rendered": {*Options.__struct_fields__, "scripts"},
+    "What is rendered": set(Options.__struct_fields__),
     RESULTS: {"output", "as_json", "figures", "fresh", "is_opened", "quiet", "verbose"},
     "Bounds and CI": {"max_visible", "within", "junit", "summary"},
     "Processes": {"timeout", "workers", "scheduler"},
@@ -235,10 +235,6 @@ rendering_options = with_options(
     )
 )  # fmt: skip
 scene_options = with_options(option("define"), option("sensor"))
-
-scripts_option = click.option(
-    "--scripts", is_flag=True, help="Run the Python files in folders, too; they are code."
-)
 
 
 timeout_option = click.option(
@@ -409,32 +405,6 @@ class Job:
 def command_line() -> str:
     """Return the command that the user gave, as a shell takes it."""
     return program.command(*sys.argv[1:])
-
-
-def expand(names: Iterable[str], with_scripts: bool = False) -> list[str]:
-    """Return the names of scenes, each folder replaced by the scenes in it.
-
-    A folder's scripts are included only ``with_scripts``; a named script always is.
-    """
-    return [scene for name in names for scene in _within(Path(name), with_scripts) or [name]]
-
-
-def _within(folder: Path, with_scripts: bool) -> list[str]:
-    """Return the scenes in a folder; none if the path is not a folder."""
-    if not folder.is_dir():
-        return []
-    from reference.scene.files import scenes_in
-
-    written, scripts = scenes_in(folder)
-    if with_scripts:
-        return list(map(str, sorted((*written, *scripts))))
-    if scripts:
-        names = ", ".join(str(path.relative_to(folder)) for path in scripts)
-        note = f"{folder}: {names}: scripts are code, run only with --scripts"
-        if not written:
-            raise InputError(f"{note}. The folder has no other scene.")
-        echo(f"fotismos: {note}.", err=True)
-    return list(map(str, written))
 
 
 def requests(whole: Options, scenes: Sequence[str]) -> list[Options]:

@@ -51,18 +51,17 @@ def folder(tmp_path):
     return place
 
 
+def scenes_in(folder):
+    return sorted(folder.iterdir())
+
+
 @pytest.mark.guarantee("runs", "A scene that kills its process does not affect the others.")
 @pytest.mark.thorough
 def test_a_scene_that_kills_its_process_takes_no_other_along(run, apart, folder, tmp_path):
     (folder / "aa.py").write_text(ABORTS)
     (folder / "c.py").write_text(GOOD)
-    (folder / "notes.py").write_text("raise SystemExit('this is no scene')")
-    (folder / "part.xml").write_text('<scene version="3.0.0"/>')
-    (folder / "b.xml").write_text(
-        SCENE.replace("</scene>", '<include filename="part.xml"/></scene>')
-    )
     out = tmp_path / "out"
-    words = ("compare", folder, "-o", out, "--spp", 2, "--resolution", "16x16", "--scripts")
+    words = ("compare", *scenes_in(folder), "-o", out, "--spp", 2, "--resolution", "16x16")
     code, _, messages = run(*words)
     assert code == 1
     assert "1 of 4 scenes failed" in messages
@@ -132,7 +131,7 @@ def test_a_hostile_scene_is_refused_in_one_message(run, tmp_path):
         assert not list((tmp_path / "out").iterdir())
 
 
-def test_a_pipe_and_an_empty_folder_are_no_scenes(run, tmp_path):
+def test_a_pipe_and_a_folder_are_no_scenes(run, tmp_path):
     os.mkfifo(tmp_path / "pipe.xml")
     for path in (tmp_path / "pipe.xml", tmp_path):
         code, _, messages = run("compare", path, "-o", tmp_path / "out")
@@ -150,7 +149,7 @@ def test_a_name_with_markup_stays_text_and_inside_the_output(run, tmp_path):
 
 
 def _start(folder, out):
-    words = [sys.executable, "-m", "reports", "compare", folder, "-o", out, "--scripts"]
+    words = [sys.executable, "-m", "reports", "compare", *scenes_in(folder), "-o", out]
     words += ["--spp", "8", "--resolution", "16x16", "--no-why", "--workers", "1"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     return subprocess.Popen(
@@ -224,7 +223,8 @@ def test_an_interrupted_batch_shows_what_is_finished_and_says_how_to_go_on(folde
 def test_values_for_placeholders_go_to_the_scenes_that_have_them(run, folder, tmp_path):
     with_one = SCENE.replace('name="alpha" value="0.2"', 'name="alpha" value="$roughness"')
     (folder / "b.xml").write_text(with_one, encoding="utf-8")
-    words = ("compare", folder, "-o", tmp_path / "out", "--spp", 4, "--resolution", "8x8")
+    size = ("--spp", 4, "--resolution", "8x8")
+    words = ("compare", *scenes_in(folder), "-o", tmp_path / "out", *size)
     assert run(*words)[0] == 2
     assert run(*words, "-D", "roughness=0.3")[0] == 0
     commands = {
@@ -236,26 +236,6 @@ def test_values_for_placeholders_go_to_the_scenes_that_have_them(run, folder, tm
     code, _, messages = run(*words, "-D", "roughness=0.3", "-D", "rougness=0.3")
     assert code == 2
     assert "-D rougness: no scene has such a placeholder" in messages
-
-
-def test_scenes_in_subfolders_are_found_and_scripts_only_where_asked(run, folder, tmp_path):
-    inner = folder / "inner" / "most"
-    inner.mkdir(parents=True)
-    (folder / ".hidden").mkdir()
-    (folder / "b.xml").rename(inner / "a.xml")
-    (folder / ".hidden" / "c.xml").write_text(SCENE, encoding="utf-8")
-    (inner / "deed.py").write_text(
-        f"from pathlib import Path; Path({str(tmp_path / 'done')!r}).touch(); scene = None"
-    )
-    words = ("compare", folder, "-o", tmp_path / "out", "--spp", 4, "--resolution", "8x8")
-    code, _, messages = run(*words)
-    assert code == 0
-    assert "inner/most/deed.py: scripts are code, run only with --scripts" in messages
-    assert not (tmp_path / "done").exists()
-    found = {path.parent.name for path in (tmp_path / "out").glob("*/comparison.json")}
-    assert found == {"a", "a-2"}
-    assert run(*words, "--scripts")[0] == 2
-    assert (tmp_path / "done").exists()
 
 
 def test_printed_commands_begin_as_the_program_was_started(run, folder, tmp_path, monkeypatch):

@@ -54,7 +54,8 @@ def test_what_scripts_do_reaches_no_other_scene(run, apart, tmp_path):
     for number, deed in enumerate(DEEDS.values()):
         (folder / f"{number:02}.py").write_text(SCENE_OF.format(deed), encoding="utf-8")
         (folder / f"{number:02}-next.xml").write_text(SCENE, encoding="utf-8")
-    words = ("compare", folder, "--scripts", "-o", out, "--spp", 4, "--resolution", "8x8", "-q")
+    size = ("--spp", 4, "--resolution", "8x8", "-q")
+    words = ("compare", *sorted(folder.iterdir()), "-o", out, *size)
     here, mask, environment = Path.cwd(), os.umask(0o022), dict(os.environ)
     code, _, messages = run(*words)
     assert (Path.cwd(), os.umask(mask), dict(os.environ)) == (here, 0o022, environment)

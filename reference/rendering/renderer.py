@@ -346,22 +346,9 @@ def require_memory(name: str, width: int, height: int) -> None:
 
 
 def available_memory() -> int | None:
-    """Return the bytes that this process may take: of the machine, and of its control group."""
-    found = []
+    """Return the bytes that are free on the machine; None if it does not say."""
     with suppress(OSError, ValueError, KeyError):
-        found.append(1024 * _numbers(Path("/proc/meminfo"))["MemAvailable:"])
-    with suppress(OSError, ValueError, KeyError):  # no group of version 2, or the word "max"
-        own = Path("/proc/self/cgroup").read_text(encoding="utf-8").split("0::/", 1)[1]
-        group = Path("/sys/fs/cgroup") / own.splitlines()[0]
-        allowed, used = (
-            int((group / f"memory.{kind}").read_text(encoding="utf-8"))
-            for kind in ("max", "current")
-        )
-        cached = _numbers(group / "memory.stat")["inactive_file"]
-        found.append(max(allowed - used + cached, 0))
-    return min(found, default=None)
-
-
-def _numbers(file: Path) -> dict[str, int]:
-    lines = (line.split() for line in file.read_text(encoding="utf-8").splitlines())
-    return {words[0]: int(words[1]) for words in lines if len(words) > 1}
+        lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
+        words = dict(line.split()[:2] for line in lines)
+        return 1024 * int(words["MemAvailable:"])
+    return None

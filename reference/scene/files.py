@@ -1,4 +1,4 @@
-"""The files of a scene, checked before Mitsuba opens them, and the scenes of a folder.
+"""The files of a scene, checked before Mitsuba opens them.
 
 Mitsuba's parser recurses and can crash, a pipe blocks whoever opens it, and includes can fan out
 forever. So another parser of XML reads a scene's files first, and names files by Mitsuba's rules:
@@ -7,11 +7,9 @@ hang the process are rejected here, and text that is not XML, which the two pars
 differently; Mitsuba rejects the others.
 """
 
-import ast
-import os
 import re
 import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from math import prod
@@ -23,7 +21,7 @@ import numpy as np
 
 from heuristic import meshes
 from heuristic.errors import InputError
-from reference.scene.graph import DEEPEST, FILENAME, SCRIPT, Graph, find_file, require_file
+from reference.scene.graph import DEEPEST, FILENAME, Graph, find_file, require_file
 
 MOST_INCLUDES = 1000
 """Files that a scene includes, each as often as it is included."""
@@ -33,7 +31,6 @@ LONGEST = 2**26
 
 PLACEHOLDER = re.compile(r"\$(\w+)")
 COMMENT = re.compile(rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)|<!--(.*?)(?:-->|\Z)", re.DOTALL)
-ROOT = re.compile(r"<scene\b")
 
 Element = tuple[str, dict[str, str]]
 
@@ -168,69 +165,6 @@ def _without_hyphens(comment: re.Match[bytes]) -> bytes:
         return text
     begin, end = begin - comment.start(), end - comment.start()
     return text[:begin] + text[begin:end].replace(b"-", b"=") + text[end:]
-
-
-def scenes_in(folder: Path) -> tuple[list[Path], list[Path]]:
-    """Return the scenes in a folder and its subfolders: Mitsuba's files, and Python's, sorted.
-
-    Hidden files and links are skipped. Scenes are the files ``*.xml`` that have a scene element,
-    but not those that others include, and the files ``*.py`` that define ``scene``. Nothing is run.
-    """
-    files = list(_files(folder))
-    texts = [path for path in files if path.suffix == ".xml"]
-    parts = {
-        inner
-        for path in texts
-        for name in _includes(path)
-        if (inner := (path.parent / name).resolve()) != path.resolve()
-    }
-    written = [path for path in texts if path.resolve() not in parts and _may_be_scene(path)]
-    scripts = [path for path in files if path.suffix == ".py" and _defines_scene(path)]
-    if not (written or scripts):
-        raise InputError(
-            f"{folder}: there is no scene in this folder: no .xml file that has a <scene>, and no"
-            f" .py file that defines `{SCRIPT}`."
-        )
-    return written, scripts
-
-
-def _files(folder: Path) -> Iterator[Path]:
-    for place, inner, names in os.walk(folder):
-        inner[:] = sorted(name for name in inner if not name.startswith("."))
-        yield from (path for name in sorted(names) if (path := Path(place, name)).is_file())
-
-
-def _includes(path: Path) -> list[str]:
-    """Return the files that a scene file includes; none of one that cannot be read."""
-    try:
-        elements = _elements(path, _content(path, 0))
-    except InputError:
-        return []
-    return [given.get(FILENAME, "") for tag, given in elements if tag == "include"]
-
-
-def _may_be_scene(path: Path) -> bool:
-    """Return whether a file has a scene; an unreadable one counts, and fails later."""
-    return not os.access(path, os.R_OK) or ROOT.search(_text(path)) is not None
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return ""
-
-
-def _defines_scene(path: Path) -> bool:
-    try:
-        body = ast.parse(_text(path)).body
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return False
-    names = set()
-    for node in body:
-        names |= {node.name} if isinstance(node, ast.FunctionDef) else set()
-        names |= {t.id for t in getattr(node, "targets", ()) if isinstance(t, ast.Name)}
-    return SCRIPT in names
 
 
 def damage(graph: Graph, index: int) -> str:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 @jobs.output_option("out")
 @jobs.figures_option
 @jobs.fresh_option
-@jobs.scripts_option
 @jobs.timeout_option
 @jobs.workers_option
 @jobs.scheduler_option
@@ -55,7 +54,6 @@ def compare(
     figures: bool,
     fresh: bool,
     with_cost: bool,
-    scripts: bool,
     timeout: float,
     workers: int | None,
     scheduler: str | None,
@@ -68,12 +66,10 @@ def compare(
 ) -> None:
     """Measure how far textbook shading is from physics, where, and whether it is more than noise.
 
-    SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), a Python file (.py) in
-    which `scene` is a dictionary or returns one, or a folder: the Mitsuba files in it and its
-    subfolders that no other file includes. Python files in a folder are code, and run only with
-    --scripts. Writes OUTPUT/index.html and tables of all scenes, and for each scene
-    comparison.json, comparison.exr and pictures. If one scene fails, the others are still
-    compared. An interrupted run keeps its finished scenes: the same command
+    SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), or a Python file (.py) in
+    which `scene` is a dictionary or returns one. Writes OUTPUT/index.html and tables of all
+    scenes, and for each scene comparison.json, comparison.exr and pictures. If one scene fails,
+    the others are still compared. An interrupted run keeps its finished scenes: the same command
     resumes it.
 
     \b
@@ -84,10 +80,10 @@ def compare(
       fotismos compare fig-8-8a fig-8-9 --figures -q
       fotismos compare my_scene.xml -D roughness=0.2 --sensor 1
       fotismos compare plastic-spheres --no-why
-      fotismos compare my_scenes/
+      fotismos compare my_scenes/*.xml
       fotismos compare my_scene.xml --heuristic my_shader.py
       fotismos compare my_scene.xml --image theirs.exr
-      fotismos compare my_scenes/ --max-visible 5% --summary summary.md
+      fotismos compare my_scenes/*.xml --max-visible 5% --summary summary.md
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.require_known(scenes)
     if rendering["image"] and len(scenes) > 1:
@@ -116,7 +112,6 @@ def compare(
         page = str(folder / "index.html")
         ci.append(summary, lambda: ci.of_comparison(studied, gates, page, within))
 
-    scenes = tuple(jobs.expand(scenes, scripts))
     batch.run(
         scenes,
         output,
