@@ -196,7 +196,8 @@ def test_several_workers_write_what_one_writes(run, apart, box_filtered, tmp_pat
     (box_filtered / "0-slow.xml").write_text(slow, encoding="utf-8")
     for workers in (1, 2):
         out = tmp_path / str(workers)
-        assert run("compare", box_filtered, "-o", out, "--spp", 8, "--workers", workers)[0] == 0
+        words = ("-o", out, "--spp", 8, "--workers", workers)
+        assert run("compare", *scenes_in(box_filtered), *words)[0] == 0
     assert results(tmp_path / "1") == results(tmp_path / "2")
     tables = [(tmp_path / workers / "tables/metrics.csv").read_text() for workers in "12"]
     names = [[line.split(",")[0] for line in table.splitlines()] for table in tables]
