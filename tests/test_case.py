@@ -54,19 +54,9 @@ def parses(monkeypatch):
     return read
 
 
-@pytest.mark.parametrize(
-    "command",
-    [
-        "compare",
-        "plan",
-        *(pytest.param(each, marks=pytest.mark.thorough) for each in ("cost", "fit")),
-    ],
-)
-def test_a_file_is_parsed_once(run, scene_file, tmp_path, parses, command):
+def test_a_file_is_parsed_once(run, scene_file, tmp_path, parses):
     scene_file.write_text(PLAIN, encoding="utf-8")
-    words = {"plan": (), "cost": ("--rounds", 2)}.get(command, ())
-    folder = () if command == "plan" else ("-o", tmp_path / "out")
-    assert run(command, scene_file, *words, *folder, *SMALL)[0] == 0
+    assert run("compare", scene_file, "-o", tmp_path / "out", *SMALL)[0] == 0
     assert parses == [str(scene_file)]
 
 

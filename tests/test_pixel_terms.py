@@ -12,7 +12,6 @@ from comparisons.case import open_case
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.prepared import prepare
-from heuristic.errors import InputError
 from reference.rendering.gbuffer import pixel_rays
 from reference.rendering.renderer import variant
 from reports.page import terms_view
@@ -193,10 +192,3 @@ def test_other_shading_has_no_terms_and_says_why():
         grid, missing = pixel_terms.trace(ready.heuristic, given)
         assert grid is None
         assert reason in missing
-
-
-def test_a_pixel_on_the_background_has_no_terms_and_one_outside_is_refused():
-    grid, _ = traced("fig-8-9", resolution=(16, 16))
-    assert grid.at(0, 0) is None
-    with pytest.raises(InputError, match="outside the image"):
-        grid.at(16, 0)

@@ -13,7 +13,6 @@ import pytest
 from comparisons.processes import cluster
 from comparisons.processes.pool import Pool, Task, end_after_task
 from heuristic.errors import InputError, LostProcessError
-from reports import jobs
 from tests import dask_cluster
 from tests.programs import ROOT
 from tests.small_baselines import change
@@ -296,10 +295,3 @@ def test_a_cluster_that_is_not_there_is_one_message(run, scene_file, tmp_path, m
     monkeypatch.setitem(sys.modules, "distributed", None)
     code, _, messages = run(*words)
     assert (code, messages.endswith("-m pip install dask distributed\n")) == (2, True)
-
-
-def test_a_worker_without_the_folder_says_so(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    ready = jobs.Ready(0, folder=str(tmp_path / "gone"))
-    with pytest.raises(InputError, match=r"gone: No such file or directory, on a worker"):
-        ready()

@@ -58,17 +58,6 @@ def test_error_that_stands_out_nowhere_has_no_region(error):
     assert regions.find(error, ALL) == ()
 
 
-def test_pixels_that_do_not_count_are_not_looked_at():
-    error = blank()
-    error[10:30, 10:30] = 5.0
-    error[50:90, 50:90] = 100.0
-    counted = ALL.copy()
-    counted[48:, 48:] = False
-    (found,) = regions.find(error, counted)
-    assert (found.x, found.y) == (10, 10)
-    assert regions.find(error, np.zeros_like(counted)) == ()
-
-
 def test_a_box_is_drawn_in_to_the_counted_pixels():
     error, counted = np.zeros((480, 480)), np.ones((480, 480), bool)
     error[103:148, 207:251] = 5.0
