@@ -86,19 +86,6 @@ def test_commands_tell_it(run, tmp_path):
     assert "the exponent is 4 times" in (out / "index.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.thorough
-@opengl
-def test_two_mistakes_are_both_told(rgb, tmp_path):
-    text = (SHADERS / "phong.glsl").read_text(encoding="utf-8")
-    text = text.replace("return value;", "return 3.14159 * value.bgr;")
-    path = tmp_path / "two.glsl"
-    twice = "light.intensity / light.distance / light.distance *"
-    path.write_text(text.replace("light.intensity *", twice), encoding="utf-8")
-    said = " ".join(mistakes_of(path))
-    for part in ("a second time", "blue, green, red", "missing division by pi"):
-        assert part in said
-
-
 def test_values_that_end_at_1_are_told(rgb, tmp_path):
     path = tmp_path / "cut.py"
     text = (SHADERS / "phong.py").read_text(encoding="utf-8")

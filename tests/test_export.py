@@ -2,6 +2,7 @@
 
 import base64
 import json
+from dataclasses import fields
 from math import pi
 
 import mitsuba as mi
@@ -28,45 +29,21 @@ def exported_of(scene, **more):
 
 
 def shaded(found):
-    """Return the chapters' model (8.10) at the pixel centres, in NumPy, from the export alone."""
+    """Return the chapters' model (8.10) at the pixel centres, by the oracle, from the export."""
     p, n, number = (found.layers[name].astype(float) for name in ("P", "N", "shape"))
-    hit = number > 0
-    p, n = p[hit], n[hit]
-    view = np.array(found.camera["view"])
-    v = oracle.unit(np.linalg.inv(view)[:3, 3] - p)
-    place = np.array([shape.material for shape in found.shapes])[number[hit].astype(int) - 1]
-
-    def of(name):
-        return np.array([material[name] for material in found.materials], float)[place]
-
-    value = of("k_i") + of("k_a") * found.ambient
-    for light in found.lights:
-        toward, factor = arriving(light, p)
-        cosine = np.sum(n * toward, axis=1)
-        mirrored = 2 * cosine[:, None] * n - toward
-        lobe = np.maximum(np.sum(mirrored * v, axis=1), 0) ** of("n")
-        reflected = of("k_d") * cosine[:, None] + of("k_s") * lobe[:, None]
-        value += np.where(cosine > 0, factor, 0)[:, None] * light["intensity"] * reflected
-    image = np.zeros((*hit.shape, 3))
-    image[hit] = value
+    view = np.linalg.inv(np.array(found.camera["view"]))[:3, 3] - p
+    names = {field.name for field in fields(oracle.Light)}
+    lights = [
+        oracle.Light(kind=light["type"], **{key: light[key] for key in names & light.keys()})
+        for light in found.lights
+    ]
+    image = np.zeros_like(p)
+    for place, shape in enumerate(found.shapes, start=1):
+        given, on = found.materials[shape.material], number == place
+        material = oracle.Material(**{name: given[name] for name in ("k_i", "k_a", "k_d", "k_s")},
+                                   n=given["n"])  # fmt: skip
+        image[on] = oracle.shade(p[on], n[on], view[on], material, lights, found.ambient)
     return image
-
-
-def arriving(light, p):
-    if light["type"] == "directional":
-        toward = -oracle.unit(np.array([light["direction"]]))
-        return np.broadcast_to(toward, p.shape), np.ones(len(p))
-    offset = light["position"] - p
-    distance = np.linalg.norm(offset, axis=1)
-    toward = offset / distance[:, None]
-    k0, k1, k2 = light["attenuation"]
-    factor = 1 / (k0 + k1 * distance + k2 * distance**2)
-    if light["type"] == "spot":
-        axis = np.array(light["direction"]) / np.linalg.norm(light["direction"])
-        cosine = -toward @ axis
-        inside = cosine >= np.cos(np.radians(light["cutoff"])) - 1e-7
-        factor = factor * np.where(inside, np.maximum(cosine, 0) ** light["exponent"], 0)
-    return toward, factor
 
 
 def test_the_files_hold_all_that_the_textbooks_picture_is_made_of(rgb):

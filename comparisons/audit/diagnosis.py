@@ -6,7 +6,7 @@ sum of a *changed* model has made that mistake, whatever its coefficients; each 
 not 1 is a further mistake. A shader that equals neither is another model, and nothing is reported.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import permutations, product
 from typing import Any
@@ -114,22 +114,15 @@ def _explain(model: Model, seen: Array, counts: Array) -> tuple[str, TermFit] | 
     changed = [(words, model.terms(**change(model))) for words, change in MISTAKES]
     encoded = [(f"its {each.symptom}", each.undo(seen)) for each in ENCODINGS]
 
-    def first(candidates: Iterable[tuple[str, Array, Array]]) -> tuple[str, TermFit] | None:
-        fits = ((words, _fit(terms, values, counts)) for words, terms, values in candidates)
-        return next((pair for pair in fits if pair[1][1] < ALIKE), None)
-
-    single = [("", right, seen), *((words, right, values) for words, values in encoded)]
-    single += [(words, terms, seen) for words, terms in changed]
-    if explanation := first(single):  # one mistake before two
-        return explanation
+    candidates = [("", right, seen), *((words, right, values) for words, values in encoded)]
+    candidates += [(words, terms, seen) for words, terms in changed]
+    for words, terms, values in candidates:
+        fit = _fit(terms, values, counts)
+        if fit[1] < ALIKE:
+            return words, fit
     scaled = [_best(each, model, seen, counts) for each in SCALED]
-    if alike := [pair for pair in scaled if pair[1][1] < ALIKE]:
-        return min(alike, key=lambda pair: len(list(_factors(pair[1], 0))))
-    return first(
-        (f"{words}; and {read}", terms, values)
-        for read, values in encoded
-        for words, terms in changed
-    )
+    alike = [pair for pair in scaled if pair[1][1] < ALIKE]
+    return min(alike, key=lambda pair: len(list(_factors(pair[1], 0))), default=None)
 
 
 def _best(mistake: Mistake, model: Model, seen: Array, counts: Array) -> tuple[str, TermFit]:

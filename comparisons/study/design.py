@@ -7,7 +7,7 @@
     [[part]]
     name = "lobe"
     scene = "lobe"                 # a study scene, a built-in scene, or a Mitsuba file
-    design = "grid"                # or "random", or "sobol", with points = 256
+    design = "grid"                # or "sobol", with points = 256
     pairing = "matched"            # or "literal"
     heuristic = "phong"            # or another, "FILE.py:function" or "FILE.glsl"
 
@@ -71,7 +71,7 @@ DEFAULTS = Options(resolution=(64, 64), spp=64)
 OWN = "heuristic."
 """Prefix of the names of a heuristic's own parameters."""
 
-Design = Literal["grid", "random", "sobol"]
+Design = Literal["grid", "sobol"]
 
 Steps = Annotated[int, msgspec.Meta(ge=2, le=LARGEST)]
 
@@ -96,8 +96,8 @@ class Levels:
 class StudyPart:
     """One design over one scene.
 
-    ``grid`` has all combinations of the levels, the first varying slowest; ``random`` is uniform
-    (in the logarithm if the scale is ``log``); ``sobol`` is the scrambled Sobol sequence.
+    ``grid`` has all combinations of the levels, the first varying slowest; ``sobol`` is the
+    scrambled Sobol sequence, uniform (in the logarithm if the scale is ``log``).
     """
 
     name: str
@@ -114,10 +114,7 @@ class StudyPart:
             rows: Any = product(*(each.values for each in levels))
         else:
             rng = np.random.default_rng(self.options.seed)
-            if self.design == "sobol":
-                unit = qmc.Sobol(len(levels), rng=rng).random(self.count)
-            else:
-                unit = rng.random((self.count, len(levels)))
+            unit = qmc.Sobol(len(levels), rng=rng).random(self.count)
             # The last digits of a power depend on where an array begins in memory.
             drawn = np.stack([each.at(u) for each, u in zip(levels, unit.T, strict=True)], axis=1)
             rows = [[f"{value:.12g}" for value in row] for row in drawn]
@@ -316,15 +313,17 @@ def _check_size(part: StudyPart, where: str) -> None:
     if not 1 <= size <= LARGEST:
         raise InputError(
             f"{where}: the design {part.design!r} has {size} points: give 1 to {LARGEST}."
-            " Random and Sobol designs take the number from `points`."
+            " A Sobol design takes the number from `points`."
         )
-    if part.design == "sobol" and size & (size - 1):
+    if part.design == "grid":
+        return
+    if size & (size - 1):
         lower = 1 << (size.bit_length() - 1)
         raise InputError(
             f"{where}: points = {size}: give a Sobol design a power of 2, such as {lower}"
             f" or {2 * lower}."
         )
-    if part.design != "grid" and not any(each.is_range for each in part.levels.values()):
+    if not any(each.is_range for each in part.levels.values()):
         raise InputError(f"{where}: no parameter has a range (from, to) to draw from.")
 
 

@@ -20,7 +20,7 @@ from reports.terminal.words import quiet_option, tell, verbose_option
 def study(
     file: Path, output: Path, workers: int | None, scheduler: str | None, timeout: float
 ) -> None:
-    """Compare over a grid or a random design of scenes: one dataset, and maps.
+    """Compare over a grid or a Sobol design of scenes: one dataset, and maps.
 
     FILE.toml says which parameters of which scenes vary. Writes NAME.parquet and figures/*.svg to
     OUTPUT/study/NAME. Finished points are kept: the same command resumes a study that ended early.
