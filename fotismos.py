@@ -22,26 +22,14 @@ if TYPE_CHECKING:
 __version__ = heuristic.__version__
 register = heuristic.register
 
-HOMES = {
-    "DirectionalLight": "heuristic.lights",
+HOMES = heuristic.HOMES | {
     "FotismosError": "heuristic.errors",
-    "Heuristic": "heuristic.heuristics",
     "InputError": "heuristic.errors",
-    "Material": "heuristic.materials",
     "Method": "comparisons.cost.cost_record",
     "Metric": "comparisons.departure.metrics",
-    "Parameter": "heuristic.heuristics",
-    "PointLight": "heuristic.lights",
-    "Range": "heuristic.heuristics",
-    "SpotLight": "heuristic.lights",
-    "audit": "reports.notebook",
-    "check": "reports.notebook",
-    "compare": "reports.notebook",
-    "cost": "reports.notebook",
-    "declare": "reports.notebook",
-    "fit": "reports.notebook",
-    "plan": "reports.notebook",
-    "shade": "heuristic.kernel",
+    **dict.fromkeys(
+        ("audit", "check", "compare", "cost", "declare", "fit", "plan"), "reports.notebook"
+    ),
 }
 """Where names come from when they are first used."""
 

@@ -15,10 +15,14 @@ if TYPE_CHECKING:
 llvm.configure()  # Dr.Jit looks for LLVM once, at its first import
 
 HOMES = {
-    "heuristics": ("Heuristic", "Parameter", "Range"),
-    "kernel": ("shade",),
-    "lights": ("DirectionalLight", "PointLight", "SpotLight"),
-    "materials": ("Material",),
+    "DirectionalLight": "heuristic.lights",
+    "Heuristic": "heuristic.heuristics",
+    "Material": "heuristic.materials",
+    "Parameter": "heuristic.heuristics",
+    "PointLight": "heuristic.lights",
+    "Range": "heuristic.heuristics",
+    "SpotLight": "heuristic.lights",
+    "shade": "heuristic.kernel",
 }
 """Where names come from when they are asked for: errors and options need no Dr.Jit."""
 
@@ -29,10 +33,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    for home, names in HOMES.items():
-        if name in names:
-            return getattr(import_module(f"heuristic.{home}"), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    if name not in HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(HOMES[name]), name)
 
 
 def register() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from tests.programs import ROOT, python
+from tests.programs import python
 
 LAZY = """
 import sys, fotismos
@@ -46,4 +46,3 @@ def test_what_comes_through_the_door_works(made_baselines):
     assert done.stdout.splitlines() == [
         "[0.8]", "direct_all", "box", "grey", "fig-8-9", "passed",
     ]  # fmt: skip
-    assert (ROOT / "fotismos.py").read_text(encoding="utf-8").count("\n") < 80

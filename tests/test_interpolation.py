@@ -419,10 +419,9 @@ def test_meshes_with_the_normals_of_faces_keep_them(rgb, tmp_path):
         np.testing.assert_allclose(picture, expected, atol=1e-5, err_msg=name)
 
 
-@pytest.mark.parametrize("interpolation", [FLAT, GOURAUD], ids=lambda i: i.value)
-def test_instances_are_refused_by_name(rgb, interpolation):
+def test_instances_are_refused_by_name(rgb):
     group = {"type": "shapegroup", "ball": {"type": "sphere"}}
     copy = {"type": "instance", "group": {"type": "ref", "id": "group"}}
     source = seen(group=group, left=copy)
     with pytest.raises(InputError, match=r"instances and their groups .* --interpolation phong"):
-        half(source, interpolation)
+        half(source, FLAT)

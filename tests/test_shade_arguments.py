@@ -123,22 +123,6 @@ def test_odd_values_are_refused_where_a_material_or_light_is_made():
                 make(odd)
 
 
-MATERIALS = [
-    Material(k_d=0.5),
-    Material(k_d=(0.1, 0.2, 0.3)),
-    Material(k_a=(0.1, 0.2, 0.3), k_d=0.5),
-    Material(k_d=(0.1,) * 5),
-    Material(k_d=Array3f(0.1, 0.2, 0.3)),
-    Material(k_d=Float([0.1, 0.2, 0.3])),
-    Material(),
-]
-
-
-def test_without_lights_the_type_is_the_same():
-    for material in MATERIALS:
-        assert type(shaded(material=material, lights=[])) is type(shaded(material=material))
-
-
 # -- Gradients -------------------------------------------------------------------------------------
 
 WHERE = {
