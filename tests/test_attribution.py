@@ -18,7 +18,6 @@ from comparisons.hybrids.attribution import (
     shares,
 )
 from comparisons.hybrids.hybrids import subsets
-from reference.rendering.sums import Estimate
 
 # -- Shapley values --------------------------------------------------------------------------------
 
@@ -89,11 +88,10 @@ def without_noise(rng, draw, value):
         return np.broadcast_to(value, (SIZE, SIZE, 3)) + NOISE * noise * np.ones(3)
 
     groups = noisy(0.3)
-    error = groups.std(axis=0, ddof=1) / np.sqrt(REPLICATES)
-    reference = Estimate(groups.mean(axis=0), error, error, REPLICATES)
-    everywhere = np.ones((SIZE, SIZE), bool)
-    meter = ErrorMeter(reference, everywhere, DEFAULT_VIEWING, groups=groups)
-    return meter.without_noise(noisy(value)).mean(axis=1), meter.floor
+    mean, error = groups.mean(axis=0), groups.std(axis=0, ddof=1) / np.sqrt(REPLICATES)
+    floor = LEADING(mean, mean + error, DEFAULT_VIEWING).mean()
+    meter = ErrorMeter(groups, np.ones((SIZE, SIZE), bool), DEFAULT_VIEWING)
+    return meter.without_noise(noisy(value)).mean(axis=1), floor
 
 
 def true(value):

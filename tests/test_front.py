@@ -4,10 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from msgspec import structs
 
 from comparisons.cost import times
-from comparisons.cost.cost import Choice
 from comparisons.cost.cost_record import Method, Point
 from comparisons.cost.front import at_size, beats, fronted, sufficient
 from comparisons.cost.measure import QUICK, Effort, timed, tried
@@ -15,7 +13,6 @@ from comparisons.hybrids.why import MeanError
 from heuristic.errors import InputError
 from reference.records import Estimated
 from reference.rendering.renderer import passes
-from reports.terminal import cost_tables
 from tests import cost_records
 
 PIXELS = 64 * 64
@@ -212,39 +209,6 @@ def test_the_time_at_another_size_follows_from_overhead_and_time_per_sample():
             expected = getattr(method.overhead_s, end) + samples * getattr(method.per_sample_s, end)
             assert getattr(one.seconds, end) == pytest.approx(expected)
         assert one.error == point.error
-
-
-def sentence(chosen, **more):
-    choice = Choice(
-        scene="box",
-        resolution=(512, 512),
-        measured=(128, 128),
-        within=3.0,
-        chosen=chosen,
-        best=made("path 5", 16, 0.3, 0.5),
-        full=made("full plan", 16, 0.21, 0.75),
-        left_out={},
-    )
-    return " ".join(cost_tables.choice_lines(structs.replace(choice, **more)))
-
-
-def test_the_choice_says_time_and_tolerance_and_what_it_is_in_place_of():
-    point = structs.replace(made("constant ambient", 16, 0.004, 0.9), ties=("shadow map",))
-    said = sentence(point)
-    assert said.startswith(
-        "At 512x512: constant ambient with 16 samples per pixel in 4.00 ms: 5 % of the pixels"
-        " exceed ΔE2000 2.70, in place of full plan with 16 samples per pixel in 210 ms: 5 % of the"
-        " pixels exceed ΔE2000 2.25. Too close to call: shadow map."
-    )
-    assert "Errors were measured at 128x128." in said
-    assert "constant ambient: Ambient light" in said
-    assert said.endswith("full plan: Everything that the scene calls for.")
-    same = sentence(made("full plan", 16, 0.21, 0.75), measured=(512, 512))
-    assert "Nothing faster suffices at ΔE2000 3." in same
-    assert "Errors were" not in same
-    assert same.count("full plan: ") == 1
-    none = "At 512x512 no measured method suffices at ΔE2000 3. The nearest is path 5"
-    assert sentence(None).startswith(none)
 
 
 def test_errors_are_measured_at_powers_of_four():

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from math import comb
 from time import perf_counter
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from msgspec import structs
@@ -28,7 +28,7 @@ from comparisons import intervals
 from comparisons.comparison import CAUSES, Comparison, ComparisonRecord
 from comparisons.departure.blocks import ratio
 from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import LEADING, Metric, Pixelwise, delta_e_2000
+from comparisons.departure.metrics import LEADING, delta_e_2000
 from comparisons.departure.noise import contrasts, without_noise
 from comparisons.departure.regions import Region, find_objects, means
 from comparisons.hybrids.hybrids import (
@@ -46,7 +46,7 @@ from heuristic.errors import FotismosError
 from reference.planning.effects import Effect
 from reference.rendering.gbuffer import ObjectIds, gbuffer, image_size, require_surface, resize
 from reference.rendering.renderer import Progress, Renderer, Stream, passes
-from reference.rendering.sums import MEAN, Accumulator, Estimate, block_numbers
+from reference.rendering.sums import MEAN, Accumulator, block_numbers
 from reference.scene.source import Source
 
 WIDTH = 48
@@ -99,8 +99,8 @@ def find(
     size = min(WIDTH, width), max(1, round(height * min(1, WIDTH / width)))
     surface = gbuffer(ready.scene, *size)
     require_surface(surface.hit, source.name)
-    reference, groups = converged(ready, size, options.seed, progress)
-    meter = ErrorMeter(reference, surface.hit, options.viewing, groups=groups)
+    groups = converged(ready, size, options.seed, progress)
+    meter = ErrorMeter(groups, surface.hit, options.viewing)
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
     images = HybridImages(pairs, scenes, REPLICATES, SPP, options.seed, size)
@@ -115,58 +115,33 @@ def find(
 
 def converged(
     ready: Prepared, size: tuple[int, int], seed: int, progress: Progress | None
-) -> tuple[Estimate, NDArray]:
+) -> NDArray:
     """Render the reference, with seeds that no hybrid has.
 
-    Returns its estimate, and the means (R, H, W, 3) of as many groups of its passes as a hybrid has
-    replicates, with an even number of passes each.
+    Returns the means (R, H, W, 3) of as many groups of its passes as a hybrid has replicates, with
+    an even number of passes each.
     """
     renderer = Renderer(ready.scene, ready.reference.integrator, SPP, "reference image", size)
-    total, groups = Accumulator(), [Accumulator(MEAN) for _ in range(REPLICATES)]
+    groups = [Accumulator(MEAN) for _ in range(REPLICATES)]
     count = 2 * REPLICATES * -(-ready.plan.passes // (2 * REPLICATES))
     for one in passes(
         [renderer], seed, count, stream=Stream.OTHER_SIDE, progress=progress, stage="reference"
     ):
-        total.add(one.images[0])
         groups[one.number % REPLICATES].add(one.images[0])
-    return total.estimate(), np.stack([group.mean() for group in groups])
+    return np.stack([group.mean() for group in groups])
 
 
 class ErrorMeter:
-    """Errors against a converged reference whose own noise is known.
+    """Errors in ΔE2000 against a reference, without the noise of both.
 
-    ``counted`` (H, W) are the pixels that count, and the error is the mean of ``metric``.
     ``groups`` (R, H, W, 3) are means of groups of the reference's passes, one per replicate of an
-    image; only :meth:`without_noise` needs them.
+    image. ``counted`` (H, W) are the pixels that count.
     """
 
-    def __init__(
-        self,
-        reference: Estimate,
-        counted: NDArray[np.bool_],
-        viewing: Viewing,
-        metric: Metric = LEADING,
-        groups: NDArray | None = None,
-    ) -> None:
-        self.metric, self.viewing, self.counted = metric, viewing, counted
-        self._reference = reference.mean[counted]
-        self._distances = metric.against(reference.mean, counted, viewing)
-        self.variance = float(np.mean(reference.standard_error[counted] ** 2))
-        """Mean variance of the reference, which adds to each mean squared error."""
-        self.floor = metric.mean(self._distances(reference.mean + reference.noise))
-        """Error from the reference's noise alone."""
-        if groups is not None:
-            self._groups = np.asarray(groups)[:, counted].astype(float)
-            _, self._blocks = np.unique(block_numbers(counted), return_inverse=True)
-
-    def errors(self, image: NDArray) -> tuple[float, float]:
-        """Return the metric's mean, and the linear MSE less the reference's variance (may be < 0).
-
-        ``image`` is (H, W, 3).
-        """
-        image = np.asarray(image, float)
-        mse = float(np.mean((image[self.counted] - self._reference) ** 2)) - self.variance
-        return self.metric.mean(self._distances(image)), mse
+    def __init__(self, groups: NDArray, counted: NDArray[np.bool_], viewing: Viewing) -> None:
+        self.viewing, self.counted = viewing, counted
+        self._groups = np.asarray(groups)[:, counted].astype(float)
+        _, self._blocks = np.unique(block_numbers(counted), return_inverse=True)
 
     def without_noise(self, images: NDArray) -> NDArray[np.float64]:
         """Return the error (R + 1, N) of each counted pixel, without the noise of both images.
@@ -182,11 +157,10 @@ class ErrorMeter:
         remains there, and two fifths where a departure is near the size of the noise.
         """
         images = np.asarray(images)[:, self.counted].astype(float)
-        metric = cast(Pixelwise, self.metric)  # the leading one is
         found = []
         for chosen, references in self._references:
             plain, *noisy = (
-                metric.difference(reference, shown)
+                LEADING.difference(reference, shown)
                 for reference, shown in zip(references, self._noisier(images[chosen]), strict=True)
             )
             before, after = (
@@ -211,8 +185,7 @@ class ErrorMeter:
         """Return the coordinates of the mean of images (n, N, 3), and of it with added noise."""
         mean, noise = images.mean(axis=0), np.tensordot(contrasts(np.ones(len(images))), images, 1)
         shown = (mean, *(mean + sign * each for each in noise))
-        metric = cast(Pixelwise, self.metric)
-        return [metric.coordinates(pixels, self.viewing) for pixels in shown]
+        return [LEADING.coordinates(pixels, self.viewing) for pixels in shown]
 
 
 @dataclass(frozen=True)
@@ -237,16 +210,14 @@ def attribute(
     meter: ErrorMeter,
     shapes: ObjectIds,
     seed: int,
-    exact_effects: int = EXACT_EFFECTS,
-    orders: int = ORDERS,
 ) -> Causes:
     """Attribute the departure to the effects, as a whole, on each shape, and in each pixel.
 
-    ``shapes`` are what each pixel sees; for the last three arguments see `shares`.
+    ``shapes`` are what each pixel sees; ``seed`` draws the orders.
     """
     effects, everything = images.effects, frozenset(images.effects)
     nothing: frozenset[Effect] = frozenset()
-    if len(effects) <= exact_effects:
+    if len(effects) <= EXACT_EFFECTS:
         images.render(key for each in subsets(effects) for key in images.needed(each))
     errors: dict[frozenset[Effect], NDArray] = {}
 
@@ -256,7 +227,7 @@ def attribute(
             errors[simulated] = meter.without_noise(images.simulating(simulated).images)
         return errors[simulated]
 
-    gains, sampling_errors, drawn = shares(effects, error, seed, exact_effects, orders)
+    gains, sampling_errors, drawn = shares(effects, error, seed, EXACT_EFFECTS, ORDERS)
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
     contributions = tuple(
         Contribution(
