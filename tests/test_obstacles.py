@@ -129,13 +129,3 @@ def test_obstacles_are_those_of_a_loop_over_all_pairs():
         said["clear" if hidden is None else "hidden"] += 1
         said["apart" if seen is None else "facing"] += 1
     assert min(said.values()) > 60, said
-
-
-def test_a_shape_without_faces_is_nowhere(recwarn):
-    rng = np.random.default_rng(0)
-    empty = random_shape("empty", rng, "anywhere")
-    object.__setattr__(empty, "low", np.full(3, np.inf))
-    object.__setattr__(empty, "high", np.full(3, -np.inf))
-    shapes, light = (empty, random_shape("other", rng, "tiles")), LightFacts("sky", "constant")
-    assert occluder(Facts(None, shapes, (light,), camera=None)) is None
-    assert not recwarn.list
