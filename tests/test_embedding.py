@@ -82,10 +82,3 @@ def test_a_large_image_is_averaged_over_blocks(monkeypatch):
     for y, x in ((0, 0), (1, 2), (2, 3)):  # the last is a single pixel, at the corner
         mean = image[2 * y : 2 * y + 2, 2 * x : 2 * x + 2].mean()
         np.testing.assert_allclose(found[y, x], mean, ROUNDING)
-
-
-def test_smooth_images_take_little_room():
-    y, x = np.mgrid[:64, :64] / 64
-    smooth = {name: np.float32(1 + x + y) for name in channels(1, 1)}
-    embedded = embedding.embed(smooth, np.ones((64, 64), bool))
-    assert len(embedded.data) < 0.15 * 2 * 64 * 64 * len(embedded.names)

@@ -12,7 +12,6 @@ from comparisons.hybrids.why import MeanError
 from heuristic.heuristics import HEURISTICS, Interpolation, Point
 from reference.records import Estimated
 from reports import verdict
-from reports.terminal import tables
 from tests import records
 from tests.small_scene import PLAIN
 
@@ -148,16 +147,6 @@ def test_a_run_counts_scenes_and_names_what_those_that_fail_lack_by_pixels():
     assert lines[0].startswith("a: Mostly missing: light between surfaces. None of the ")
 
 
-def test_one_scene_is_described_in_a_few_sentences():
-    about = verdict.about(scene(0.42, why=why(occlusion=4.0)), study(AMBIENT))
-    assert about == (
-        "Textbook shading is visibly wrong in 42.0 % of the pixels of a. Mostly missing: shadows."
-        " Hemisphere ambient passes: 4.60 ms, kernel 3.90 ms at 64x48."
-    )
-    assert verdict.about(scene(0.0)) == "Textbook shading looks right in a."
-    assert verdict.about(scene(0.04, 0.06)).startswith("Textbook shading may look right in a. Too")
-
-
 def test_a_run_ends_with_its_verdict_and_finds_causes_unless_told_not_to(
     run, causes, scene_file, tmp_path
 ):
@@ -177,12 +166,6 @@ def test_the_heuristics_called_textbook_are_those_of_the_package_that_shade_as_t
         record = structs.replace(records.record(), heuristic=heuristic)
         assert set(vars(verdict.judged(record)).values()) == {name}
         assert verdict.headline([record]).startswith(f"{name} ")
-
-
-def test_verbose_lines_name_losses_and_settings_that_are_not_used():
-    lines = "\n".join(tables.details(records.record()))
-    assert "  lost: pane (dielectric): refraction; seen straight through" in lines
-    assert "  not used: sampler independent, but multijitter" in lines
 
 
 def test_a_chosen_threshold_decides_on_the_terminal_and_where_the_page_begins(run, tmp_path):
