@@ -127,13 +127,6 @@ def test_200_checks_of_an_unchanged_scene_alarm_no_more_than_stated(rgb, name):
     check_alarms(SCENES[name].make, (32, 32), 200, (0.01, 0.05, 0.2))
 
 
-def test_the_same_seed_gives_the_same_numbers(rgb):
-    options = SMALL.changed(spp=32, resolution=(16, 16))
-    result = check(Source("box", box), options, measured(box, 0, (16, 16), 32))
-    assert result.passed
-    assert all(move.p == 1 for move in result.moves)
-
-
 # --- The file --------------------------------------------------------------------------------
 
 
@@ -197,10 +190,3 @@ def test_a_metric_that_was_declared_later_is_not_tested(rgb):
     assert result.passed
     assert len(result.moves) == len(whole.moves) - 1
     assert "dE_ITP" in result.now.measurement.metrics
-
-
-def test_other_blocks_are_refused(rgb):
-    options = Options(resolution=(3, 3), spp=32)
-    before = measured(SCENES["fig-8-9"].make, 0, (3, 3), 32)
-    with pytest.raises(InputError, match="3 by 3 blocks, but the scene 4 by 4"):
-        check(SCENES["fig-8-9"].source(), options.changed(resolution=(8, 8)), before)

@@ -160,12 +160,6 @@ def test_without_noise_what_exceeds_rounding_moved(after, moves):
     assert all(move.p == 0 and move.standard_errors is None for move in found)
 
 
-def test_noise_below_rounding_is_no_reason_to_alarm():
-    rng = np.random.default_rng(4)
-    sides = [measured(value + 1e-9 * rng.normal(size=(16, 102))) for value in (1.0, 1.0 + 1e-6)]
-    assert not moving.moved(moving.differences(*sides))
-
-
 def test_the_surest_of_the_widest_comes_first():
     before = exact(1.0)
     mean = np.ones(51)
@@ -211,18 +205,3 @@ def test_metrics_are_those_of_the_mean_image_over_counted_pixels():
     ]
     error = np.sqrt(3 / 4 * np.sum((left_out - np.mean(left_out)) ** 2))
     assert found.metrics["rmse"].error == pytest.approx(error)
-
-
-@pytest.mark.parametrize(("height", "width"), [(64, 64), (7, 10), (2, 3)])
-def test_blocks_tile_the_image(height, width):
-    rng = np.random.default_rng(8)
-    image = rng.random((height, width, 3))
-    blocks = measuring.block_means(image)
-    rows, columns = min(4, height), min(4, width)
-    assert blocks.shape == (rows, columns, 3)
-    for row, column in np.ndindex(rows, columns):
-        part = image[
-            row * height // rows : (row + 1) * height // rows,
-            column * width // columns : (column + 1) * width // columns,
-        ]
-        np.testing.assert_allclose(blocks[row, column], part.mean(axis=(0, 1)))

@@ -137,12 +137,6 @@ def test_shifts_are_measured_to_a_fraction_of_a_pixel(cornell):
         assert shift == pytest.approx((part, 0), abs=0.2)
 
 
-def test_edges_that_tell_nothing_are_said_to(cornell):
-    even = np.full((SIDE, SIDE, 3), 0.5)
-    assert picture_warnings.measure(even, cornell[2])[0] is None
-    assert "do not show whether it is aligned" in odd(even, cornell)[0]
-
-
 def test_a_picture_that_is_turned_over_is_refused_by_its_edges(rgb):
     case = open_case("fig-6-14", Options(resolution=(SIDE, SIDE), spp=64))
     ready = prepare(case.source, case.options)
@@ -272,14 +266,6 @@ def test_sizes_and_repeats_must_fit(rgb, tmp_path):
     ):
         with pytest.raises(InputError, match=message):
             picture_of("fig-8-9", files, **more)
-
-
-def test_a_picture_excludes_what_renders_again(run, tmp_path):
-    file = write(tmp_path / "x.exr", GREY)
-    with pytest.raises(InputError, match="heuristic blinn and image"):
-        Options(heuristic="blinn", image=(file,))
-    code, _, said = run("compare", "fig-8-9", "fig-8-8a", "--image", file)
-    assert (code, "one scene" in said) == (2, True)
 
 
 def test_a_changed_picture_is_compared_again(run, tmp_path, monkeypatch):
