@@ -29,7 +29,7 @@ from tests.test_normals import rows
 FLAT, GOURAUD, PHONG = Interpolation.FLAT, Interpolation.GOURAUD, Interpolation.PHONG
 Float64, Array3f64 = drjit.llvm.ad.Float64, drjit.llvm.ad.Array3f64
 
-# --- On a triangle: scan lines and barycentric coordinates ---------------------------------------
+# --- On a triangle: scan lines -------------------------------------------------------------------
 
 TRIANGLE = ((0.0, 4.0), (-3.0, 0.5), (2.0, -1.0))  # A, B, C, from top to bottom
 place = st.floats(0.05, 0.95)
