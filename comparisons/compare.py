@@ -25,7 +25,7 @@ from comparisons.comparison import (
 from comparisons.departure import marks, regions, statistics
 from comparisons.departure.blocks import bands
 from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn, leading_distance
+from comparisons.departure.metrics import LEADING, METRICS, RATIO, leading_distance
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded, require_light
 from heuristic import heuristics
@@ -148,9 +148,6 @@ def _compare(
         viewing=options.viewing,
         pixels=Pixels(counted=int(images.counted.sum()), total=width * height),
         regions=regions.find(images.maps[LEADING.name], images.counted),
-        histograms={
-            name: statistics.histogram(images.maps[name][images.counted]) for name in drawn()
-        },
         pairing=ready.pair.pairing,
         time=TimeSpent(
             heuristic=heuristic.pass_times(),

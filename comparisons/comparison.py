@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from comparisons.departure.colour import Viewing
 from comparisons.departure.regions import ObjectShare, Region
-from comparisons.departure.statistics import Histogram, RatioSummary, Summary
+from comparisons.departure.statistics import RatioSummary, Summary
 from comparisons.hybrids.why import Attribution
 from reference.pairing.factors import Unrepresentable
 from reference.pairing.halves import Pairing
@@ -148,9 +148,6 @@ class ComparisonRecord(Record, kw_only=True):
     materials: Annotated[
         tuple[ObjectShare, ...], Meta(description="The same for their BSDFs.")
     ] = ()
-    histograms: Annotated[
-        dict[str, Histogram], Meta(description="Counted pixels by metric, in bins of equal ratios.")
-    ]
     pairing: Pairing
     time: TimeSpent
     unrepresentable: tuple[Unrepresentable, ...]

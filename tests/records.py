@@ -49,10 +49,6 @@ def visible(shares):
     )
 
 
-def histogram(counts):
-    return {"low": 0.01, "high": 1000.0, "counts": counts, "below": 2, "above": 0}
-
-
 def of(content):
     """Return the record with such content."""
     return msgspec.convert(content, ComparisonRecord)
@@ -148,7 +144,6 @@ def data():
                 "effect": "occlusion",
             },
         ],
-        "histograms": {"dE2000": histogram([0] * 20 + [5, 9, 4] + [0] * 37)},
         "pairing": {
             "convention": "matched",
             "bsdfs": [

@@ -369,7 +369,6 @@ def test_hostile_names_are_printed_as_text(run, tmp_path, monkeypatch):
             assert not line.lstrip().startswith("::")
             assert "\x9b" not in line
     assert "stop-commands" in messages
-    assert "\\*a\\*\\|b" in (tmp_path / "out/tables/metrics.md").read_text()
     assert "\\*a\\*\\|b" in (tmp_path / "s.md").read_text()
     csv = (tmp_path / "out/tables/carriers.csv").read_text()
     assert "=1+1" in csv

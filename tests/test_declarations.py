@@ -109,9 +109,7 @@ def test_a_metric_from_outside_is_in_every_output(results):
     assert share["low"] - 0.01 <= (image[seen] > share["threshold"]).mean() <= share["high"] + 0.01
     assert 0 < found["noise_floor"] < found["mean"]
     assert found["after_exposure"]["mean"] <= found["mean"]
-    assert sum(record["histograms"]["blurred"]["counts"]) > 0
     assert (results / "my-scene/blurred.png").stat().st_size > 0
-    assert (results / "figures/my-scene-histogram-blurred.svg").stat().st_size > 0
     rows = list(csv.DictReader(StringIO((results / "tables/metrics.csv").read_text("utf-8"))))
     assert [row["metric"] for row in rows] == [*METRICS]
     assert float(rows[-1]["mean"]) == pytest.approx(found["mean"], rel=1e-3)

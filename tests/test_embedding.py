@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from comparisons.departure.metrics import drawn
-from reports.files import exr
+from reports.files import images
 from reports.page import embedding
 
 ROUNDING, ERROR_ROUNDING = 0.0025, 2**-4
@@ -44,7 +44,7 @@ def channels(width, height):
         **{name: image() for name in drawn()},
         "significant": rng.choice([0.0, 0.5, 1.0], (height, width)),
     }
-    return exr.channels(layers)
+    return images.channels(layers)
 
 
 def test_the_page_holds_what_the_exr_holds():

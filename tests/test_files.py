@@ -8,7 +8,6 @@ import mitsuba as mi
 import numpy as np
 import OpenEXR
 import pytest
-from markdown_it import MarkdownIt
 from msgspec import structs
 from PIL import Image
 
@@ -17,7 +16,7 @@ from comparisons.departure.metrics import METRICS, RATIO, drawn
 from comparisons.hybrids.why import MeanError
 from heuristic.errors import InputError
 from reference.records import Estimated, plain
-from reports.files import exr, images
+from reports.files import images
 from reports.terminal import tables
 from tests import cost_records, records
 
@@ -34,9 +33,9 @@ CONTRACT = {
 @pytest.fixture
 def layers():
     rng = np.random.default_rng(0)
-    images = {name: rng.normal(0, 3, (5, 7, 3)) for name in sorted(exr.FULL_PRECISION)}
+    colours = {name: rng.normal(0, 3, (5, 7, 3)) for name in sorted(images.FULL_PRECISION)}
     maps = {name: 40 * rng.random((5, 7)) for name in ("dE2000", "dE_ITP", "dE_CAM16UCS")}
-    return images | maps | {"significant": rng.random((5, 7)) > 0.5}
+    return colours | maps | {"significant": rng.random((5, 7)) > 0.5}
 
 
 def read(path):
@@ -46,38 +45,38 @@ def read(path):
 
 def test_openexr_reads_back_what_was_written(tmp_path, layers):
     path = tmp_path / "comparison.exr"
-    exr.write(path, layers, {"seed": "3", "fotismos": "1.0", "scene": "fig-8-9 <φ>"})
+    images.write_exr(path, layers, {"seed": "3", "fotismos": "1.0", "scene": "fig-8-9 <φ>"})
     header, channels = read(path)
     assert set(channels) == CONTRACT
     for name, image in layers.items():
-        suffixes = "Y" if image.ndim == 2 else "XYZ" if name in exr.VECTORS else "RGB"
+        suffixes = "Y" if image.ndim == 2 else "XYZ" if name in images.VECTORS else "RGB"
         for index, suffix in enumerate(suffixes):
             got = channels[f"{name}.{suffix}"]
             expected = image[..., index] if image.ndim == 3 else image
-            if name in exr.FULL_PRECISION:
+            if name in images.FULL_PRECISION:
                 assert got.dtype == np.float32
                 np.testing.assert_array_equal(got, expected.astype(np.float32))
             else:
                 assert got.dtype == np.float16
                 np.testing.assert_allclose(got, expected, rtol=2**-11)
     assert header["compression"] == OpenEXR.ZIP_COMPRESSION
-    np.testing.assert_allclose(header["chromaticities"], exr.BT709, rtol=1e-6)
+    np.testing.assert_allclose(header["chromaticities"], images.BT709, rtol=1e-6)
     assert (header["seed"], header["fotismos"]) == ("3", "1.0")
     assert header["scene"] == "fig-8-9 <φ>"
     # tev and Blender split a name at its last dot, and take a second one for a group.
     assert {name.count(".") for name in channels} == {1}
     earlier = path.read_bytes()
     with pytest.raises(InputError, match="shape"):
-        exr.write(path, {"a": np.zeros((2, 2, 4))}, {})
+        images.write_exr(path, {"a": np.zeros((2, 2, 4))}, {})
     with pytest.raises(InputError, match=r"\(3, 3\)"):
-        exr.write(path, {"a": np.zeros((2, 2)), "b": np.zeros((3, 3))}, {})
+        images.write_exr(path, {"a": np.zeros((2, 2)), "b": np.zeros((3, 3))}, {})
     assert path.read_bytes() == earlier
     assert [file.name for file in tmp_path.iterdir()] == ["comparison.exr"]
 
 
 def test_mitsuba_splits_it_into_layers(tmp_path, layers):
     path = tmp_path / "comparison.exr"
-    exr.write(path, layers, {})
+    images.write_exr(path, layers, {})
     formats = {
         **dict.fromkeys(("heuristic", "reference", "reference_stderr"), mi.Bitmap.PixelFormat.RGB),
         **dict.fromkeys(("P", "N"), mi.Bitmap.PixelFormat.XYZ),
@@ -86,7 +85,7 @@ def test_mitsuba_splits_it_into_layers(tmp_path, layers):
     }
     split = dict(mi.Bitmap(str(path)).split())
     assert {name: part.pixel_format() for name, part in split.items()} == formats
-    for name in sorted(exr.FULL_PRECISION):
+    for name in sorted(images.FULL_PRECISION):
         np.testing.assert_array_equal(np.array(split[name]), layers[name].astype(np.float32))
     for name in ("dE2000", "dE_ITP", "dE_CAM16UCS"):
         np.testing.assert_allclose(np.array(split[name]).squeeze(), layers[name], rtol=2**-11)
@@ -94,7 +93,7 @@ def test_mitsuba_splits_it_into_layers(tmp_path, layers):
 
 def test_a_value_beyond_half_stays_finite(tmp_path):
     path = tmp_path / "large.exr"
-    exr.write(path, {"a": np.full((2, 2), 70_000.0), "b": np.full((2, 2), -65_504.0)}, {})
+    images.write_exr(path, {"a": np.full((2, 2), 70_000.0), "b": np.full((2, 2), -65_504.0)}, {})
     channels = read(path)[1]
     assert channels["a.Y"].dtype == np.float32
     assert channels["b.Y"].dtype == np.float16
@@ -203,14 +202,6 @@ def test_csv_holds_every_number_in_full():
     assert {row["visible.5"] for row in rows if row["metric"] == "rmse"} == {""}
 
 
-def test_markdown_is_a_table_with_a_row_a_scene():
-    text = "\n".join(tables.metrics_markdown(two_records()))
-    page = MarkdownIt().enable("table").render(text)
-    assert page.count("<tr>") == 3
-    assert "a &quot;b&quot;, c | d" in page
-    assert "4.33 (3.07; 0.0532)" in page
-
-
 def test_a_study_of_cost_is_written_with_its_methods_and_attribution(tmp_path):
     amount = Estimated(1.5, 1.25, 1.75)
     one = EffectCost("occlusion", amount, -0.5, 3.0, 0.0, adds_s=amount)
@@ -223,11 +214,10 @@ def test_a_study_of_cost_is_written_with_its_methods_and_attribution(tmp_path):
     tables.write_cost(tmp_path / "tables", "box", shown)
     read = {path.name: path.read_text("utf-8") for path in (tmp_path / "tables").glob("box*")}
     parts = ("attribution", "cost", "methods")
-    assert sorted(read) == [f"box-{part}.{kind}" for part in parts for kind in ("csv", "md")]
+    assert sorted(read) == [f"box-{part}.csv" for part in parts]
     assert "\ndirect,4,0.25,0.125,0.5,12.75,12.5,13.0,12.75,12.5,13.0\n" in read["box-cost.csv"]
     assert "\nfull plan,6.78" in read["box-methods.csv"]
     assert "\nocclusion,-0.5,3.0,1.5,1.25,1.75,1.5,1.25,1.75\n" in read["box-attribution.csv"]
-    assert "| occlusion | −0.500 | 3.00 | 1.50 | 1.25 | 1.75 |" in read["box-attribution.md"]
 
 
 @pytest.mark.parametrize("colour", ["", "1"])

@@ -1,16 +1,12 @@
 """Figures for print: their formats and scales, and colours that survive print and eyes."""
 
-import json
 import re
-from dataclasses import replace
 
 import colour
 import numpy as np
 import pytest
-from msgspec import structs
 
-from comparisons.departure.metrics import METRICS, drawn
-from comparisons.departure.statistics import histogram
+from comparisons.departure.metrics import METRICS
 from reports.charts import figures
 from reports.files import images
 from reports.run import results
@@ -62,33 +58,26 @@ def test_a_signed_map_tells_size_by_lightness_and_sign_by_hue(seen):
     assert np.all(apart[16:] > 10)
 
 
-def comparison():
-    made = records.comparison()
-    histograms = {name: histogram(made.images.maps[name]) for name in drawn()}
-    return replace(made, record=structs.replace(made.record, histograms=histograms))
-
-
 def test_a_scene_is_written_as_svg_and_pdf_with_its_number(tmp_path):
-    figures.write_scene(tmp_path / "figures", "ball", comparison())
-    names = ["ball", *(f"ball-histogram-{metric}" for metric in drawn())]
+    figures.write_scene(tmp_path / "figures", "ball", records.comparison())
     found = {path.name: path for path in (tmp_path / "figures").iterdir()}
     found.pop(results.MARK)
-    assert set(found) == {f"{name}.{kind}" for name in names for kind in ("svg", "pdf")}
+    assert set(found) == {"ball.svg", "ball.pdf"}
     for path in found.values():
         content = path.read_bytes()
         assert content.startswith(b"%PDF") if path.suffix == ".pdf" else b"<svg" in content
-    titles = [axes.get_title() for axes in figures.strip(comparison()).axes]
+    titles = [axes.get_title() for axes in figures.strip(records.comparison()).axes]
     assert titles[:3] == ["heuristic", "reference", "ΔE2000: mean 4.33 (noise 0.0532)"]
 
 
 def test_every_strip_has_the_metrics_own_range():
-    bar = figures.strip(comparison()).axes[-1]
+    bar = figures.strip(records.comparison()).axes[-1]
     assert bar.get_ylim() == METRICS["dE2000"].map_range
     assert [label.get_text() for label in bar.get_yticklabels()] == ["0", "10", "≥ 20"]
 
 
 def test_a_strip_keeps_every_pixel():
-    made = comparison()
+    made = records.comparison()
     first = figures.strip(made).axes[0].images[0].get_array()
     expected = np.asarray(images.tonemap(made.images.heuristic, 0.5).convert("RGB"))
     np.testing.assert_array_equal(first, expected)
@@ -96,21 +85,7 @@ def test_a_strip_keeps_every_pixel():
 
 @pytest.mark.parametrize("kind", figures.FORMATS)
 def test_files_hold_no_date_and_repeat(kind):
-    made = comparison()
+    made = records.comparison()
     first, second = (figures.drawn(figures.strip(made), kind) for _ in range(2))
     assert first == second
     assert not re.search(rb"20\d\d-\d\d-\d\d|CreationDate", first)
-
-
-def test_departures_share_one_axis_whatever_the_scenes():
-    one, other = records.record(), records.data()
-    other["scene"] = "far"
-    other["metrics"]["dE2000"] |= {"mean": 250.0, "noise_floor": 0.0}
-    other = records.of(other)
-    first, second = figures.departures([one]), figures.departures([one, other])
-    assert first["encoding"]["x"] == second["encoding"]["x"]
-    values = {(row["scene"], row["what"]): row["value"] for row in second["data"]["values"]}
-    assert values["fig-8-9", "as it is"] == one.metrics["dE2000"].mean
-    assert values["far", "as it is"] == 100
-    assert values["far", "noise floor"] == 0.001
-    json.dumps(second)

@@ -1,4 +1,4 @@
-"""Statistics over an image: summaries, the best exposure, the noise floor and histograms.
+"""Statistics over an image: summaries, the best exposure and the noise floor.
 
 "How far" has two meanings, and both are reported: the plain distance, and the smallest distance
 with an exposure factor on the test image. The second is the *shape* of the departure; the
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from comparisons.departure.colour import DEFAULT_VIEWING, Array, Viewing
 from comparisons.departure.metrics import Metric, Pixelwise, checked_pair, log2_luminance_ratio
 from comparisons.departure.noise import VisibleShare, debiased, exactly, roughly
-from reference.records import Amount, Count, Positive, Record
+from reference.records import Amount, Positive, Record
 from reference.rendering.sums import Grouped
 
 # Pixels measured at a time, to keep temporaries small.
@@ -261,38 +261,3 @@ def least_squares_factor(test: Array, reference: Array) -> float:
         energy += float(np.vdot(shown, shown))
         overlap += float(np.vdot(shown, truth))
     return overlap / energy if energy > 0.0 and overlap > 0.0 else 1.0
-
-
-DECADES, BINS_A_DECADE = (-2, 3), 12
-"""Range of the bins, log10 of the metric's unit, and bins per decade."""
-
-
-class Histogram(Record):
-    """Counts of pixels in bins of equal ratio.
-
-    Bin i of n holds ``low·(high/low)^(i/n) <= value < low·…^((i+1)/n)``.
-    """
-
-    low: Positive
-    high: Positive
-    counts: tuple[Count, ...]
-    below: Annotated[Count, Meta(description="Pixels below `low`, including zeros.")]
-    above: Annotated[Count, Meta(description="Pixels at `high` or more.")]
-
-
-def histogram(values: ArrayLike) -> Histogram:
-    """Return the histogram of values ≥ 0, of any shape."""
-    values = np.asarray(values).ravel()
-    first, last = DECADES
-    edges = np.logspace(first, last, (last - first) * BINS_A_DECADE + 1)
-    counts = np.zeros(len(edges) + 1, int)
-    for start in range(0, len(values), _BLOCK_PIXELS):
-        some = values[start : start + _BLOCK_PIXELS].astype(np.float64)
-        counts += np.bincount(np.searchsorted(edges, some, side="right"), minlength=len(counts))
-    return Histogram(
-        low=float(edges[0]),
-        high=float(edges[-1]),
-        counts=tuple(int(count) for count in counts[1:-1]),
-        below=int(counts[0]),
-        above=int(counts[-1]),
-    )

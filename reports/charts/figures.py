@@ -1,29 +1,23 @@
-"""Figures for print, each as SVG and PDF: a strip of pictures, histograms, and a run's departures.
+"""The strip of a comparison for print, as SVG and PDF.
 
-Maps have the fixed ranges of their metrics, and figures of a kind share an axis, so figures of
-different scenes can be compared. Text is black on white. Pictures are kept pixel for pixel. The
-files are reproducible: they hold no date.
+The map has the fixed range of its metric, so that strips of different scenes can be compared.
+Pictures are kept pixel for pixel. The files are reproducible: they hold no date.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import altair as alt
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from comparisons.comparison import Comparison, ComparisonRecord
-from comparisons.cost.cost_record import Cost
+from comparisons.comparison import Comparison
 from comparisons.departure.metrics import LEADING
-from reports.charts import cost_charts, histograms, vega
-from reports.charts.theme import Spec
 from reports.files import images
 from reports.run import results
 from reports.terminal.words import number
@@ -39,42 +33,13 @@ GAP, BAR, HEADING = 0.08, 0.55, 0.22
 #: Points, printed at that width.
 FONT_SIZE = 8
 
-#: Smaller departures are drawn at the left border, since a logarithmic axis has no 0.
-LEAST, LARGEST = 1e-3, 100.0
-
-#: Colour and shape of each quantity of a scene.
-MARKS = {
-    "as it is": ("#08519c", "circle"),
-    "after exposure": ("#b3450b", "diamond"),
-    "noise floor": ("#6b6b6b", "triangle-up"),
-}
-
 
 def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
-    """Write the strip and the histograms of a comparison as ``folder/name...`` in each format."""
+    """Write the strip of a comparison as ``folder/name`` in each format."""
     results.own(folder)
     figure = strip(comparison)
     for kind in FORMATS:
         results.write(folder / f"{name}.{kind}", drawn(figure, kind))
-    for metric, spec in histograms.specs(comparison.record).items():
-        write_chart(folder, f"{name}-histogram-{metric}", spec)
-
-
-def write_run(folder: Path, records: Iterable[ComparisonRecord]) -> None:
-    """Write the departures of a run's scenes as ``folder/departures`` in each format."""
-    write_chart(folder, "departures", departures(list(records)))
-
-
-def write_cost(folder: Path, name: str, record: Cost) -> None:
-    """Write the chart of a study of cost as ``folder/name-cost`` in each format."""
-    write_chart(folder, f"{name}-cost", cost_charts.titled(record))
-
-
-def write_chart(folder: Path, name: str, spec: Mapping[str, Any]) -> None:
-    """Write a Vega-Lite specification as ``folder/name`` in each format."""
-    results.own(folder)
-    for kind in FORMATS:
-        results.write(folder / f"{name}.{kind}", vega.paper(spec, kind))
 
 
 def strip(comparison: Comparison) -> Figure:
@@ -130,36 +95,3 @@ def drawn(figure: Figure, kind: str, dots_per_inch: float = 300) -> bytes:
     with rc_context(settings):
         figure.savefig(buffer, format=kind, dpi=dots_per_inch, metadata=undated.get(kind))
     return buffer.getvalue()
-
-
-def departures(records: Sequence[ComparisonRecord]) -> Spec:
-    """Return the chart of means by scene: as it is, after exposure, and the noise floor.
-
-    The axis is logarithmic, always from 0.001 to 100; values beyond are drawn at its ends.
-    """
-    rows = []
-    for record in records:
-        metric = record.metrics[LEADING.name]
-        values = {
-            "as it is": metric.mean,
-            "after exposure": metric.after_exposure.mean,
-            "noise floor": metric.noise_floor,
-        }
-        rows += [
-            {"scene": record.scene, "what": what, "value": min(max(value, LEAST), LARGEST)}
-            for what, value in values.items()
-        ]
-    title = f"mean {LEADING.label} (0.001 and less at the left border)"
-    colours, shapes = (
-        alt.Scale(domain=list(MARKS), range=style) for style in zip(*MARKS.values(), strict=True)
-    )
-    chart = alt.Chart(alt.Data(values=rows), width=360, height=alt.Step(18))
-    chart = chart.mark_point(size=60, strokeWidth=1.6, opacity=1).encode(
-        x=alt.X("value:Q", title=title)
-        .scale(type="log", domain=[LEAST, LARGEST], nice=False)
-        .axis(values=[0.001, 0.01, 0.1, 1, 10, 100], format="~g"),
-        y=alt.Y("scene:N", sort=None, title=None).axis(grid=True, labelLimit=260),
-        color=alt.Color("what:N", scale=colours, title=None).legend(orient="top"),
-        shape=alt.Shape("what:N", scale=shapes),
-    )
-    return vega.specification(chart)

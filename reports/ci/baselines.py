@@ -19,7 +19,7 @@ from comparisons.options import Options
 from heuristic import program
 from heuristic.errors import InputError
 from heuristic.heuristics import in_file
-from reports.files import exr
+from reports.files import images
 
 Kept = Mapping[str, NDArray[np.floating]]
 """The halves' small pictures, ``{half: (H, W, 3) linear RGB}``."""
@@ -114,15 +114,15 @@ def write(path: Path, baseline: Baseline, pictures: Kept | None = None) -> None:
         if path.exists():
             require_regular(path)
         if pictures is not None:
-            images = path.with_suffix(".exr")
+            place = path.with_suffix(".exr")
             require_own_pictures(path)
             # "baseline." keeps the layers at half precision, which is enough for pictures.
             size = pictures[HALVES[0]].shape
             scale = min(1.0, LONGEST_KEPT / max(size[:2]))
             small = [max(1, round(side * scale)) for side in size[:2]]
             layers = {f"baseline.{half}": reduced(pictures[half], small) for half in HALVES}
-            exr.write(images, layers, {"scene": baseline.scene})
-            baseline = structs.replace(baseline, images=images.name)
+            images.write_exr(place, layers, {"scene": baseline.scene})
+            baseline = structs.replace(baseline, images=place.name)
         atomic.write(path, baseline.text())
     except OSError as error:
         raise InputError(

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 @jobs.command()
 @jobs.scene_argument
 @jobs.output_option("out", "cost/SCENE")
-@jobs.figures_option
 @jobs.timeout_option
 @jobs.rendering_options
 @jobs.scene_options
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
 def cost(
     scene: str,
     output: Path,
-    figures: bool,
     rounds: int | None,
     at: tuple[int, int] | None,
     is_measured: bool,
@@ -54,7 +52,7 @@ def cost(
     \b
     Examples:
       fotismos cost cornell-box
-      fotismos cost my_scene.xml --resolution 256x256 --rounds 11 --figures
+      fotismos cost my_scene.xml --resolution 256x256 --rounds 11
       fotismos cost cornell-box --at 1920x1080
     """  # noqa: D301 click reads the \b as: keep these lines
     if is_measured and at is None:
@@ -63,19 +61,16 @@ def cost(
     with jobs.pool(timeout) as pool:
         pool.start()
         from reference.records import to_json
-        from reports.run.results import FIGURES, PAGE, TABLES, hold, own, places
+        from reports.run.results import PAGE, TABLES, hold, own, places
         from reports.terminal import cost_tables, progress, tables
 
         with hold(output, jobs.command_line()) as top:
             folder = own(top / "cost")
             (place,) = places(folder, [scene])
-            for name in (TABLES, FIGURES) if figures else (TABLES,):
-                own(folder / name)
-            for_print = folder / FIGURES if figures else None
+            own(folder / TABLES)
             with progress.shown() as bar:
                 asked = (scene, jobs.request(rendering), rounds, at, is_measured)
-                words = (*asked, folder / place, for_print)
-                record = pool.do(Task(place, measured, words, bar.of(place)))
+                record = pool.do(Task(place, measured, (*asked, folder / place), bar.of(place)))
             tables.write_cost(folder / TABLES, place, record)
     if as_json:
         click.echo(to_json(record), nl=False)
@@ -91,14 +86,12 @@ def measured(
     at: tuple[int, int] | None,
     is_measured: bool,
     place: Path,
-    figures: Path | None,
     progress: Any,
 ) -> Cost:
     """Study what each step of accuracy costs, and write its files."""
     from comparisons.case import open_case
     from comparisons.cost.cost import cost
     from comparisons.cost.measure import Effort
-    from reports.charts.figures import write_cost
     from reports.run import cost_files
 
     case = open_case(name, request)
@@ -107,6 +100,4 @@ def measured(
     words = case.command("cost", rounds=rounds, at=size, measure=is_measured or None)
     study = cost(case.source, case.options, effort, progress, words, at, is_measured)
     cost_files.write(place, study)
-    if figures is not None:
-        write_cost(figures, place.name, study.record)
     return study.record

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.plain_scene import PlainScene, Triangles
-from reports.files import exr
+from reports.files import images
 from reports.run import results
 
 README = """# {name}, for another program
@@ -58,7 +58,7 @@ def write(folder: Path, scene: PlainScene, command: str) -> None:
     for name, text in texts.items():
         results.write(folder / name, text)
     with results.replacing(folder / "gbuffer.exr") as partial:
-        exr.write(partial, scene.layers, {"scene": scene.name})
+        images.write_exr(partial, scene.layers, {"scene": scene.name})
 
 
 def _json(content: object) -> str:

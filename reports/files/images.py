@@ -1,4 +1,4 @@
-"""8-bit pictures (Pillow) of linear images and maps, their colour bars, and small WebP pictures.
+"""Pictures of linear images and maps: OpenEXR, 8 bits (Pillow) with colour bars, small WebP.
 
 Colour maps are Matplotlib's tables, read without pyplot: magma for errors, RdBu for signed values
 (both readable with common colour-vision deficiencies). The caller fixes the ranges, which are
@@ -8,18 +8,21 @@ printed next to the picture; values beyond them take the end's colour.
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from io import BytesIO
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
+from comparisons import atomic
 from comparisons.comparison import Images
 from comparisons.departure import marks
 from comparisons.departure.colour import to_srgb
 from comparisons.departure.metrics import LEADING, RATIO, drawn
+from heuristic.errors import InputError
 from reference.records import Record
 
 Bytes = NDArray[np.uint8]
@@ -185,3 +188,77 @@ def webp_of(png: bytes) -> bytes:
 def webp_uri(file: bytes) -> str:
     """Return a WebP file as an address that holds it."""
     return "data:image/webp;base64," + base64.b64encode(file).decode("ascii")
+
+
+# --- OpenEXR ----------------------------------------------------------------------------------
+
+#: Layers that keep float32; the others are maps, for which half's 11 bits are enough.
+FULL_PRECISION = frozenset({"heuristic", "reference", "reference_stderr", "P", "N"})
+
+#: Layers with X, Y, Z instead of R, G, B.
+VECTORS = frozenset({"P", "N"})
+
+#: CIE x, y of red, green, blue and white of ITU-R BT.709.
+BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+
+#: The largest finite half.
+HALF_MAX = 65_504.0
+
+
+def write_exr(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str, str]) -> None:
+    """Write images by name to a file atomically, as one scanline part, ZIP-compressed.
+
+    See :func:`channels`. The header is metadata, e.g. seed, samples and versions; BT.709's
+    chromaticities are added.
+    """
+    import OpenEXR
+
+    path = Path(path)
+    attributes = {
+        **{name: str(value) for name, value in header.items()},
+        "type": OpenEXR.scanlineimage,
+        "compression": OpenEXR.ZIP_COMPRESSION,
+        "chromaticities": BT709,
+    }
+    file = OpenEXR.File(attributes, channels(layers))
+    # Given a path, the bindings do not report that its end could not be written.
+    with file, atomic.replacing(path) as partial, partial.open("wb") as stream:
+        file.write(stream)
+
+
+def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
+    """Return images of one size as OpenEXR channels: contiguous (H, W) half or float32.
+
+    (H, W, 3) becomes ``name.R``, ``name.G``, ``name.B``, or ``.X``, ``.Y``, ``.Z`` for "P" and "N";
+    (H, W), also boolean, becomes ``name.Y``. `FULL_PRECISION`, and values beyond half, are float32.
+    """
+    result: dict[str, np.ndarray] = {}
+    size = None
+    for name, values in layers.items():
+        image = np.asarray(values)
+        suffixes = _suffixes(name, image)
+        size = size or image.shape[:2]
+        if image.shape[:2] != size:
+            raise InputError(
+                f"EXR layer {name} is {image.shape[:2]}, the first {size}: make all the same size."
+            )
+        precision = _precision(name, image)
+        planes = image[..., None] if image.ndim == 2 else image
+        for index, suffix in enumerate(suffixes):
+            plane = np.ascontiguousarray(planes[..., index], precision)
+            result[f"{name}.{suffix}"] = plane
+    return result
+
+
+def _suffixes(name: str, image: np.ndarray) -> str:
+    if image.ndim == 2:
+        return "Y"
+    if image.ndim == 3 and image.shape[2] == 3:
+        return "XYZ" if name in VECTORS else "RGB"
+    raise InputError(f"EXR layer {name} has shape {image.shape}: make it (H, W) or (H, W, 3).")
+
+
+def _precision(name: str, image: np.ndarray) -> type[np.floating]:
+    if name in FULL_PRECISION or (image.size and np.abs(image).max() > HALF_MAX):
+        return np.float32
+    return np.float16

@@ -54,7 +54,7 @@ class Embedded(Record):
 
 
 def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
-    """Encode the channels (H, W) of :func:`reports.files.exr.channels`, so page and file agree.
+    """Encode the channels (H, W) of :func:`reports.files.images.channels`, so page and file agree.
 
     ``counted`` are the pixels in the statistics. Of the standard error, the largest channel stays.
     """

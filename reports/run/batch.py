@@ -246,10 +246,6 @@ def _write(
     ]
     if views:
         steps.append(lambda: tables.write(folder / results.TABLES, records))
-    if views and job.figures:
-        from reports.charts import figures
-
-        steps.append(lambda: figures.write_run(folder / results.FIGURES, records))
     for step in steps:
         try:
             step()

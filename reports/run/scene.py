@@ -19,7 +19,7 @@ from comparisons.processes.turns import Turn
 from heuristic import program
 from heuristic.heuristics import named
 from reference.records import VERSION, Record, plain, to_json
-from reports.files import exr, images
+from reports.files import images
 from reports.page import embedding, terms_view
 from reports.page.scene_view import SceneView
 from reports.run import results
@@ -208,7 +208,7 @@ def write(
     view = structs.replace(view, files={file: f"{name}/{file}" for file in linked})
     for file, content in made.items():
         results.write(place / file, content)
-    exr.write(place / PICTURE, layers, _header(record))
+    images.write_exr(place / PICTURE, layers, _header(record))
     made[RECORD] = atomic.encoded(to_json(record))
     digests = {file: _digest(content) for file, content in made.items()}
     digests[PICTURE] = _digest_of(place / PICTURE)
@@ -233,7 +233,7 @@ def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> 
     return SceneView(
         record=record,
         thumbnails={name: images.webp_of(png) for name, png in small.items()},
-        embedded=embedding.embed(exr.channels(layers or _layers(shown)), shown.counted),
+        embedded=embedding.embed(images.channels(layers or _layers(shown)), shown.counted),
         terms=terms_view.view(comparison.terms, comparison.no_terms, picked),
         why=_why(comparison),
     )

@@ -16,7 +16,7 @@ from rich.text import Text
 
 from comparisons.comparison import ComparisonRecord, NoiseTarget, PictureRecord
 from comparisons.departure.criterion import TOLERANCE, share_above
-from comparisons.departure.metrics import LEADING, METRICS
+from comparisons.departure.metrics import LEADING
 from heuristic.heuristics import PHONG
 from reference.records import plain
 from reports.run import results
@@ -64,9 +64,8 @@ def markdown(rows: Iterable[Sequence[str]], right: int = 1) -> Iterator[str]:
 
 
 def write(folder: Path, records: Sequence[ComparisonRecord]) -> None:
-    """Write a run's ``metrics.csv``, ``metrics.md`` and ``carriers.csv`` to a folder of ours."""
+    """Write a run's ``metrics.csv`` and ``carriers.csv`` to a folder of ours."""
     results.write(folder / "metrics.csv", metrics_csv(records))
-    results.write(folder / "metrics.md", "\n".join(metrics_markdown(records)) + "\n")
     results.write(folder / "carriers.csv", comma_separated(_shares(records)))
 
 
@@ -84,8 +83,6 @@ def write_cost(folder: Path, name: str, record: Cost) -> None:
     }
     for part, rows in made.items():
         results.write(folder / f"{name}-{part}.csv", comma_separated(rows))
-        shown = ([_shown(cell) for cell in row] for row in rows)
-        results.write(folder / f"{name}-{part}.md", "\n".join(markdown(shown)) + "\n")
 
 
 def _interval_rows(
@@ -155,32 +152,8 @@ def escaped(text: str) -> str:
     return re.sub(r"([\\`*_\[\]])", r"\\\1", text)
 
 
-def metrics_markdown(records: Iterable[ComparisonRecord]) -> Iterator[str]:
-    """Yield the lines of a run's table: each metric's mean, its shape and its noise floor."""
-    yield from markdown(_metrics(records))
-    yield ""
-    yield "Mean over the pixels that see a surface; in brackets the mean after the one exposure"
-    yield "that makes it smallest, and the mean that the reference's noise alone would give."
-
-
-def _metrics(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[str]]:
-    labels = [metric.label for metric in METRICS.values()]
-    yield "scene", *labels, "significant", "samples per pixel"
-    for record in records:
-        means = (
-            f"{number(m.mean)} ({number(m.after_exposure.mean)}; {number(m.noise_floor)})"
-            for m in (record.metrics[name] for name in METRICS)
-        )
-        significant = percent(record.significant.fraction)
-        yield escaped(record.scene), *means, significant, f"{record.plan.spp}"
-
-
 def _row(cells: Sequence[str]) -> str:
     return f"| {' | '.join(cells)} |"
-
-
-def _shown(cell: Any) -> str:
-    return number(cell) if isinstance(cell, float) else escaped(str(cell))
 
 
 # --- Lines on a run ----------------------------------------------------------------------------

@@ -15,7 +15,6 @@ from comparisons.cost.cost import Study
 from comparisons.departure import regions
 from comparisons.departure.metrics import THRESHOLDS, drawn, log2_luminance_ratio
 from comparisons.departure.regions import Region
-from comparisons.departure.statistics import histogram
 from reference.records import Machine, Pixels, plain
 from reference.rendering.gbuffer import ObjectIds
 from reports.page import page
@@ -126,7 +125,6 @@ def comparison(name, heuristic, reference, maps, significant):
         regions=tuple(filter(None, (first, *others))),
         objects=tuple(structs.replace(each, effect="occlusion") for each in carriers),
         materials=carriers,
-        histograms={key: histogram(maps[key][counted]) for key in drawn()},
     )
     images = records.images(
         HEIGHT,
