@@ -300,17 +300,6 @@ def test_a_file_of_others_is_not_replaced_by_compare(option, name, run, tmp_path
     assert not (tmp_path / "out").exists(), "refused before anything is rendered"
 
 
-def test_a_baseline_is_not_replaced_by_its_report(run, made_baselines, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    shutil.copy(made_baselines / "fig-8-6b.json", "b.json")
-    before = (tmp_path / "b.json").read_bytes()
-    for option in ("--junit", "--summary"):
-        code, _, messages = run("check", "b.json", option, "b.json")
-        assert code == 2
-        assert f"{option} b.json: " in messages
-        assert (tmp_path / "b.json").read_bytes() == before
-
-
 def test_a_picture_of_others_is_not_replaced_by_a_baselines(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "b.exr").write_bytes(b"mine")

@@ -15,7 +15,7 @@ import jsonschema
 import pytest
 
 from heuristic.errors import InputError
-from reports import cli, jobs
+from reports import cli
 from reports.terminal import progress
 from tests.programs import ROOT, python
 from tests.schemas import schema
@@ -79,14 +79,6 @@ def test_bad_words_are_refused(run, tmp_path):
     }.items():
         code, _, messages = run("compare", *words, "-o", tmp_path / "out")
         assert (code, bool(re.search(expected, messages))) == (2, True), (words, messages)
-
-
-def test_a_folder_that_cannot_be_written_is_refused_before_rendering(run, tmp_path):
-    (tmp_path / "file").write_text("")
-    code, _, messages = run("compare", "fig-8-9", "-o", tmp_path / "file" / "out")
-    assert code == 2
-    assert "Not a directory" in messages
-    assert str(tmp_path / "file/out") in messages
 
 
 def test_causes_that_cannot_be_found_leave_the_comparison_and_a_warning(
@@ -203,14 +195,6 @@ def test_an_output_that_is_full_or_closed_is_no_traceback(shell, code, said):
 # --- Surroundings ----------------------------------------------------------------------------
 
 
-def test_a_worker_is_started_for_a_scene_only(monkeypatch):
-    monkeypatch.setattr(jobs, "IN_PROCESSES", True)
-    monkeypatch.setattr(jobs, "cores", lambda: 4)
-    monkeypatch.setattr(jobs, "Pool", lambda count, ready, limit: (count, ready.threads))
-    counts = [jobs.pool(9.0, tasks, n) for tasks, n in ((3, 10**9), (1, 8), (9, None), (9, 2))]
-    assert counts == [(3, 1), (1, None), (4, 1), (2, 2)]
-
-
 @pytest.mark.parametrize(
     ("shell", "expected"),
     [
@@ -241,14 +225,6 @@ def test_help_only_helps(command, tmp_path):
     assert done.returncode == 0
     assert "./run docs" in done.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["run"]
-
-
-def test_the_scripts_of_documents_and_schemas_have_help():
-    for words in (("docs/make.py", "--help"), ("-m", "reports.schemas", "--help")):
-        done = python(*words)
-        assert done.returncode == 1
-        assert "Traceback" not in done.stderr
-        assert "``" in done.stderr
 
 
 # --- Manners ---------------------------------------------------------------------------------
@@ -330,21 +306,6 @@ def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(
     assert "cornell-box: rendering 5 of 10 passes, causes next" in shown
     assert re.search(r"about \d+ s", shown)
     assert ("\x1b[38;5;" in shown or "\x1b[3" in shown) is coloured
-
-
-def test_the_line_of_the_run_counts_to_its_end(monkeypatch):
-    monkeypatch.setenv("TERM", "xterm-256color")
-    monkeypatch.setattr(sys, "stderr", Terminal())
-    with progress.shown(total=4) as bar:
-        for stage in ("scenes", "the rest"):
-            bar.begin(stage, 2, weight=1)
-            for scene in "ab":
-                update = bar.of(scene)
-                update("rendering", 1, 2)
-                bar.over(update)
-    last = sys.stderr.getvalue().rpartition("scenes, ")[2]
-    assert "the rest, 2 of 2" in last
-    assert "rendering" not in last.rpartition("the rest, 2")[2]
 
 
 def test_completion_prints_what_the_shell_sources(run):

@@ -34,12 +34,6 @@ def test_map_and_inspector_name_the_effect_that_dominates(visitor, pixel):
     np.testing.assert_allclose(visitor.colour_of(x, y), bytes_of(colours[known]), atol=1)
 
 
-def test_the_legend_names_every_effect_of_the_scene(visitor):
-    page = visitor.open(f"{SCENE}&map=effects")
-    keys = page.locator(".legend .key").all_text_contents()
-    assert keys == [*causes().maps, "none visible"]
-
-
 def test_a_scene_without_causes_has_no_map_of_effects(visitor):
     page = visitor.open(f"#scene={EXACT}&mode=error&map=effects")
     assert page.get_by_label("Map of the error").input_value() == "dE2000"

@@ -78,17 +78,6 @@ def test_a_narrow_screen_scrolls_in_one_direction_only(visitor):
         assert width <= 0, fragment
 
 
-@pytest.mark.parametrize("visitor", [{"viewport": {"width": 320, "height": 640}}], indirect=True)
-def test_side_by_side_is_stacked_on_a_small_phone(visitor):
-    visitor.open(f"#scene={NOISY_ID}&mode=error")
-    single = visitor.canvas().bounding_box()
-    visitor.page.get_by_role("button", name="Side by side").click()
-    visitor.settle()
-    stacked = visitor.canvas().bounding_box()
-    assert stacked["width"] == single["width"]
-    assert stacked["height"] == pytest.approx(3 * single["height"] + 8, abs=2)
-
-
 @pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)
 def test_without_scripts_all_scenes_have_small_pictures_numbers_and_charts(visitor):
     page = visitor.page
@@ -113,12 +102,3 @@ def test_paper_gets_the_pictures_of_the_open_scene_and_no_controls(visitor):
     visitor.open()
     assert page.locator(".scene:visible").count() == 0
     assert page.locator(".worst img:visible").count() == 6
-
-
-def test_scenes_are_made_when_they_are_opened(visitor):
-    page = visitor.open()
-    assert page.locator(".scene").count() == 0
-    for scene in (NOISY_ID, "exact", NOISY_ID):
-        visitor.open(f"#scene={scene}")
-        assert page.locator(".scene:visible h1").count() == 1
-    assert page.locator(".scene").count() == 2

@@ -2,8 +2,8 @@
 
 import pytest
 
-from tests.browser.conftest import EXACT, NOISY_ID
-from tests.browser.test_page_at_large import PHONE, violations
+from tests.browser.conftest import NOISY_ID
+from tests.browser.test_page_at_large import PHONE
 from tests.cost_records import EFFECTS, HYBRIDS
 
 SCENE = f"#scene={NOISY_ID}"
@@ -89,15 +89,3 @@ def test_a_combination_that_was_not_rendered_is_refused_in_words(visitor, way):
     press(visitor, "occlusion", way)
     press(visitor, "interreflection", way)
     assert switch(page, NEVER).get_attribute("aria-disabled") == "false"
-
-
-def test_a_scene_without_causes_has_no_switches(visitor):
-    page = visitor.open(f"#scene={EXACT}")
-    assert not page.locator(".switches").is_visible()
-
-
-@pytest.mark.parametrize("visitor", [{}, {"color_scheme": "dark"}, PHONE], indirect=True)
-def test_axe_finds_no_violation_while_effects_are_on(visitor):
-    page = visitor.open(SCENE)
-    press(visitor, "occlusion")
-    assert not violations(page)

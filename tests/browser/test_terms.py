@@ -96,16 +96,6 @@ def test_numbers_multiply_to_their_term(visitor):
     assert product == pytest.approx(values(rows["key diffuse"]), rel=0.02)
 
 
-def test_a_light_behind_the_surface_has_neither_lobe_nor_term(visitor):
-    page = visitor.open(SCENE)
-    pick(visitor, 30, 30, "click")
-    expected = GRID.at(30, 30)
-    behind = expected.lights[1]
-    assert behind.cos_incidence < 0
-    assert "behind the surface" in shown_rows(page)["fill diffuse"][0]
-    assert values(shown_rows(page)["fill diffuse"]) == [0, 0, 0]
-
-
 def test_the_background_and_other_shading_say_that_there_are_no_terms(visitor):
     page = visitor.open(SCENE)
     pick(visitor, 20, 1, "click")
@@ -114,12 +104,6 @@ def test_the_background_and_other_shading_say_that_there_are_no_terms(visitor):
     visitor.open(f"#scene={EXACT}")
     assert "Flat shading" in page.locator("#terms .note").text_content()
     assert not page.locator("#terms table").is_visible()
-
-
-def test_a_scene_opens_at_a_point_that_has_terms(visitor):
-    page = visitor.open(SCENE)
-    visitor.settle()
-    assert "textbook" in shown_rows(page)
 
 
 @pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)

@@ -4,7 +4,6 @@ import copy
 
 import pytest
 
-from comparisons.departure.metrics import THRESHOLDS
 from reports.page import page as pages
 from tests import records
 from tests.browser.conftest import EXACT, FAILED, NOISY, NOISY_ID, Report, Visitor
@@ -92,18 +91,6 @@ def test_a_threshold_may_turn_the_order(chromium, tmp_path):
     assert not visitor.complaints
 
 
-@pytest.mark.parametrize(("visitor", "most"), [(DESK, 6000), (PHONE, 9000)], indirect=["visitor"])
-def test_24_scenes_take_little_height(visitor, tmp_path, most):
-    views = [records.view(records.data() | {"scene": f"scene-{n}"}) for n in range(24)]
-    path = tmp_path / "index.html"
-    path.write_text(pages.render(views), encoding="utf-8")
-    visitor.page.goto(path.as_uri())
-    assert visitor.page.locator(".bars li").count() == 24
-    assert visitor.page.evaluate("document.documentElement.scrollHeight") <= most
-    assert visitor.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
-    visitor.requests.clear()
-
-
 @pytest.mark.parametrize("visitor", [{"viewport": {"width": 1200, "height": 300}}], indirect=True)
 def test_back_leads_to_the_place_that_was_left(visitor):
     page = visitor.open("#t=3")
@@ -132,10 +119,3 @@ def test_the_navigation_stays_and_leads_to_scenes_and_details(visitor):
     page.get_by_role("link", name="Details").click()
     assert page.get_by_role("heading", level=1).text_content() == "Details"
     assert page.locator("#glossary").count() == 1
-
-
-def test_every_threshold_of_the_slider_is_one_of_the_record(visitor):
-    slider = visitor.open().locator("#overview [data-threshold]")
-    low, high, step = (float(slider.get_attribute(name)) for name in ("min", "max", "step"))
-    count = round((high - low) / step) + 1
-    assert tuple(low + step * place for place in range(count)) == THRESHOLDS

@@ -212,28 +212,6 @@ def test_dragging_pans_where_it_is_zoomed(visitor):
     assert "pixel" not in state  # a drag marks nothing
 
 
-@pytest.mark.parametrize("visitor", [{"has_touch": True}], indirect=True)
-def test_two_fingers_zoom(visitor):
-    page = visitor.open(f"{SCENE}&mode=error")
-    page.evaluate("""() => {
-      const canvas = document.querySelector("#viewer > canvas");
-      canvas.setPointerCapture = () => {};
-      const box = canvas.getBoundingClientRect();
-      const send = (type, pointerId, x, y) => canvas.dispatchEvent(new PointerEvent(type, {
-        pointerId, pointerType: "touch", bubbles: true,
-        clientX: box.left + x, clientY: box.top + y }));
-      send("pointerdown", 1, 300, 200);
-      send("pointerdown", 2, 400, 200);
-      send("pointermove", 2, 500, 200);
-      send("pointermove", 1, 200, 200);
-      send("pointerup", 1, 200, 200);
-      send("pointerup", 2, 500, 200);
-    }""")
-    fit = visitor.canvas().bounding_box()["height"] / HEIGHT
-    assert float(visitor.state()["zoom"]) == pytest.approx(3 * fit, rel=0.05)
-    assert "pixel" not in visitor.state()
-
-
 def test_every_key_does_what_the_help_says(visitor):
     page = visitor.open(SCENE)
     keyboard = page.keyboard
