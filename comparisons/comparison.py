@@ -11,7 +11,7 @@ from msgspec import Meta
 from comparisons.departure.colour import Viewing
 from comparisons.departure.regions import ObjectShare, Region
 from comparisons.departure.statistics import RatioSummary, Summary
-from comparisons.hybrids.why import Attribution
+from comparisons.why import Attribution, Causes
 from reference.pairing.factors import Unrepresentable
 from reference.pairing.halves import Pairing
 from reference.pairing.prepare import Override
@@ -31,7 +31,6 @@ from reference.records import (
 from reference.rendering.renderer import Times
 
 if TYPE_CHECKING:
-    from comparisons.hybrids.attribution import Causes
     from comparisons.pixel_terms import TermGrid
 
 
@@ -169,23 +168,6 @@ class ComparisonRecord(Record, kw_only=True):
         tuple[str, ...], Meta(description="Mistakes that the heuristic seems to make, in words.")
     ] = ()
     record_version: int = VERSION
-
-
-Colour = tuple[float, float, float]
-"""Linear RGB."""
-
-
-class TermMaterial(Record):
-    """The kernel's material at some points; a lobe's normalisation is part of ``k_s``."""
-
-    name: str
-    k_i: Colour
-    k_a: Colour
-    k_d: Colour
-    k_s: Colour
-    n: float
-    form: str
-    ambient: Colour
 
 
 @dataclass(frozen=True)

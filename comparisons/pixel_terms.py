@@ -12,8 +12,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.comparison import Colour, TermMaterial
 from comparisons.options import Options
+from comparisons.why import Colour, TermMaterial
 from heuristic import kernel, materials, terms, vectors
 from heuristic.convention import Scene
 from heuristic.errors import InputError

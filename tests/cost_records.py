@@ -8,7 +8,7 @@ from msgspec import convert, structs
 from comparisons.cost.cost import Study
 from comparisons.cost.cost_record import Cost
 from comparisons.hybrids.attribution import Causes
-from comparisons.hybrids.why import Attribution
+from comparisons.why import Attribution
 from reference.records import VERSION
 from tests import records
 

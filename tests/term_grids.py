@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from comparisons.comparison import TermMaterial
 from comparisons.pixel_terms import GridLight, TermGrid
+from comparisons.why import TermMaterial
 
 CELL = 4
 """Pixels along the sides of a cell."""

@@ -17,9 +17,9 @@ from comparisons.cost.cost_record import Method
 from comparisons.cost.measure import WIDTH, Effort, measure_ladder, reduced
 from comparisons.cost.methods import BUILT_IN, Ladder, declare
 from comparisons.gallery.builtin import SCENES
-from comparisons.hybrids.why import MeanError
 from comparisons.options import Options
 from comparisons.prepared import prepare
+from comparisons.why import MeanError
 from heuristic.errors import InputError
 from heuristic.heuristics import Interpolation
 from reference.rendering.sums import Accumulator

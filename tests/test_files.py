@@ -12,7 +12,7 @@ from PIL import Image
 
 from comparisons.cost.cost_record import EffectCost
 from comparisons.departure.metrics import METRICS, RATIO, drawn
-from comparisons.hybrids.why import MeanError
+from comparisons.why import MeanError
 from heuristic.errors import InputError
 from reference.records import Estimated, plain
 from reports.files import images

@@ -14,8 +14,8 @@ from comparisons.departure.metrics import METRICS, THRESHOLDS, drawn
 from comparisons.verification import Verification
 from reference.records import Estimated, Machine
 from reports import verdict
+from reports.files.results import Failure, RunRecord
 from reports.page import embedding, page, templating
-from reports.run.results import Failure, RunRecord
 from reports.terminal import words
 from tests import records
 from tests.schemas import schema

@@ -8,8 +8,7 @@ import pytest
 
 from comparisons.departure.metrics import METRICS
 from reports.charts import figures
-from reports.files import images
-from reports.run import results
+from reports.files import images, results
 from tests import records
 
 SRGB_VIEWING = (64 / np.pi * 0.2, 20.0)

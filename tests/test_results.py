@@ -12,7 +12,8 @@ import pytest
 import heuristic.program
 from comparisons import atomic
 from heuristic.errors import InputError, OutputError
-from reports.run import results, scene
+from reports.files import results
+from reports.run import scene
 from tests import records
 from tests.programs import ROOT
 from tests.small_scene import SCENE
@@ -204,7 +205,7 @@ def test_what_killed_commands_left_is_cleared_away(tmp_path):
 
 HOLD = """
 import sys
-from reports.run import results
+from reports.files import results
 with results.hold(sys.argv[1], "fotismos compare mine.xml"):
     print("held", flush=True)
     sys.stdin.read()

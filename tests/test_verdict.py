@@ -8,7 +8,7 @@ from msgspec import structs
 from comparisons.cost import cost_record
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import VisibleShare
-from comparisons.hybrids.why import MeanError
+from comparisons.why import MeanError
 from heuristic.heuristics import HEURISTICS, Interpolation, Point
 from reference.records import Estimated
 from reports import verdict

@@ -27,8 +27,9 @@ from comparisons.cost.measure import (
 )
 from comparisons.cost.methods import FULL_PLAN
 from comparisons.departure.criterion import checked_threshold
-from comparisons.hybrids.attribution import Causes, find
+from comparisons.hybrids.attribution import find
 from comparisons.options import Options
+from comparisons.why import Causes
 from heuristic.errors import InputError
 from reference.pairing.prepare import film_size
 from reference.planning.plan import Guard

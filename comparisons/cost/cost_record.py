@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from comparisons.departure.colour import Viewing
-from comparisons.hybrids.why import Contribution, MeanError
+from comparisons.why import Contribution, MeanError
 from heuristic.heuristics import Interpolation
 from reference.planning.plan import Guard
 from reference.records import (

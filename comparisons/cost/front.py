@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from msgspec import structs
 
 from comparisons.cost.cost_record import Point, TimedMethod
-from comparisons.hybrids.why import MeanError
+from comparisons.why import MeanError
 from reference.records import Estimated
 
 Interval = Estimated | MeanError

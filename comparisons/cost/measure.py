@@ -26,9 +26,9 @@ from comparisons.cost.methods import Ladder, Step
 from comparisons.departure.colour import Viewing
 from comparisons.departure.criterion import LIMIT
 from comparisons.departure.metrics import LEADING
-from comparisons.hybrids.why import MeanError
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
+from comparisons.why import MeanError
 from heuristic.errors import InputError
 from reference.pairing.prepare import film_size
 from reference.records import Estimated

@@ -14,7 +14,7 @@ Source: L. S. Shapley, *A value for n-person games*, 1953.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from math import comb
 from time import perf_counter
@@ -39,9 +39,9 @@ from comparisons.hybrids.hybrids import (
     labels,
     subsets,
 )
-from comparisons.hybrids.why import Attribution, Contribution, Hybrid, MeanError, ObjectContribution
 from comparisons.options import Options
 from comparisons.prepared import Prepared
+from comparisons.why import Attribution, Causes, Contribution, Hybrid, MeanError, ObjectContribution
 from heuristic.errors import FotismosError
 from reference.planning.effects import Effect
 from reference.rendering.gbuffer import ObjectIds, gbuffer, image_size, require_surface, resize
@@ -186,23 +186,6 @@ class ErrorMeter:
         mean, noise = images.mean(axis=0), np.tensordot(contrasts(np.ones(len(images))), images, 1)
         shown = (mean, *(mean + sign * each for each in noise))
         return [LEADING.coordinates(pixels, self.viewing) for pixels in shown]
-
-
-@dataclass(frozen=True)
-class Causes:
-    """The attribution of a departure, and where in the image the effects remove what.
-
-    ``maps`` are ``{effect: (H, W)}``, the ΔE2000 that each removes; with ``left``, what remains
-    when all are simulated, they add up to ``departure``. ``counted`` (H, W) are the pixels that
-    count. ``previews`` are ``{labels of the simulated effects: (f H, f W, 3)}``, linear.
-    """
-
-    record: Attribution
-    maps: dict[str, NDArray]
-    departure: NDArray
-    left: NDArray
-    counted: NDArray[np.bool_]
-    previews: dict[tuple[str, ...], NDArray]
 
 
 def attribute(

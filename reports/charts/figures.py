@@ -18,8 +18,7 @@ from matplotlib.figure import Figure
 
 from comparisons.comparison import Comparison
 from comparisons.departure.metrics import LEADING
-from reports.files import images
-from reports.run import results
+from reports.files import images, results
 from reports.terminal.words import number
 
 FORMATS = ("svg", "pdf")

@@ -23,9 +23,9 @@ from reference.rendering.renderer import Progress
 from reference.scene.graph import set_variant
 from reports.ci import baselines
 from reports.ci.baselines import BaselineFile
-from reports.files import images
+from reports.files import images, results
 from reports.page.scene_view import Before, SceneView
-from reports.run import results, scene
+from reports.run import scene
 from reports.terminal import progress
 from reports.terminal.words import percent
 

@@ -66,8 +66,8 @@ def audit(
     with jobs.pool(timeout) as pool:
         pool.start()
         from reference.records import to_json
+        from reports.files.results import PAGE, assigned, hold, own
         from reports.run import audit_files
-        from reports.run.results import PAGE, assigned, hold, own
 
         command = jobs.command_line()
         with hold(output, command) as top:

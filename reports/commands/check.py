@@ -92,8 +92,8 @@ def check(
         pool.start()
         from reference.records import to_json
         from reports.ci import checks
+        from reports.files import results
         from reports.page import page
-        from reports.run import results
 
         views: list[Any] = []
         if update:

@@ -61,7 +61,7 @@ def cost(
     with jobs.pool(timeout) as pool:
         pool.start()
         from reference.records import to_json
-        from reports.run.results import PAGE, TABLES, hold, own, places
+        from reports.files.results import PAGE, TABLES, hold, own, places
         from reports.terminal import cost_tables, progress, tables
 
         with hold(output, jobs.command_line()) as top:

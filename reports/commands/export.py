@@ -31,7 +31,7 @@ def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
     jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
-        from reports.run.results import hold, own, places
+        from reports.files.results import hold, own, places
 
         with hold(output, jobs.command_line()) as top:
             folder = own(top / "export")

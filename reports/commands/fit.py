@@ -68,8 +68,8 @@ def fit(
         from comparisons.fit.fit import FitOptions
         from heuristic.materials import FORMS
         from reference.records import plain
+        from reports.files.results import hold, own, places
         from reports.run import fit_files
-        from reports.run.results import hold, own, places
         from reports.terminal import progress
 
         chosen = FitOptions(loss, FORMS if form == "all" else (form,))

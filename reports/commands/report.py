@@ -110,7 +110,7 @@ def _shown(names: Sequence[str], found: Mapping[str, Any]) -> dict[str, Any]:
 
 def timed(folder: Path, function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:
     """Return what a task returns, and the seconds that it took in its turn."""
-    from reports.run import results
+    from reports.files import results
 
     with Turn(folder, folder / results.TABLES):
         begin = perf_counter()

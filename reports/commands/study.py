@@ -34,8 +34,8 @@ def study(
     # Here, because start-up needs neither Mitsuba nor SciPy.
     from comparisons.processes.pool import Task
     from comparisons.study import design, running
+    from reports.files.results import assigned, hold, own
     from reports.run import study_files
-    from reports.run.results import assigned, hold, own
     from reports.terminal import progress
 
     chosen = design.read(file)

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from comparisons.plain_scene import PlainScene, Triangles
-from reports.files import images
-from reports.run import results
+from reports.files import images, results
 
 README = """# {name}, for another program
 

@@ -24,16 +24,16 @@ from reference.records import plain
 from reports import glossary, verdict
 from reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT
 from reports.files import images
+from reports.files.results import Failure, RunRecord
 from reports.page import templating
 from reports.page.scene_view import Making, SceneView, WhyView
-from reports.run.results import Failure, RunRecord
 from reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
     from comparisons.cost.cost_record import Cost
     from comparisons.hard_cases import HardCases
-    from comparisons.hybrids.why import Attribution
     from comparisons.verification import Verification
+    from comparisons.why import Attribution
 
 TITLE = "Textbook shading against physically based rendering"
 

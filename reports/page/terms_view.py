@@ -14,8 +14,8 @@ import numpy as np
 from msgspec import field
 from numpy.typing import NDArray
 
-from comparisons.comparison import TermMaterial
 from comparisons.departure.regions import Region
+from comparisons.why import TermMaterial
 from reference.records import Record, plain
 from reports.page.embedding import Embedded, packed
 

@@ -12,9 +12,9 @@ from heuristic.heuristics import in_file
 from reference import records
 from reports.charts import vega
 from reports.charts.theme import FAINT, Spec
+from reports.files import results
+from reports.files.results import PAGE
 from reports.page.templating import templates
-from reports.run import results
-from reports.run.results import PAGE
 from reports.terminal import tables
 from reports.terminal.words import number
 

@@ -21,8 +21,8 @@ from reports.jobs import Job
 from reports.terminal.words import remark, tell, tell_where
 
 if TYPE_CHECKING:
+    from reports.files.results import Failure, RunRecord
     from reports.page.scene_view import SceneView
-    from reports.run.results import Failure, RunRecord
     from reports.terminal.progress import Bar
 
 SCENE, FURTHER = 8.0, 1.0
@@ -74,7 +74,7 @@ class Batch:
 
     def failures(self) -> list[Failure]:
         """The scenes that could not be compared, in order."""
-        from reports.run.results import Failure
+        from reports.files.results import Failure
 
         errors = self.errors
         return [Failure(place, str(errors[place])) for place in self.places if place in errors]
@@ -82,7 +82,7 @@ class Batch:
     def record(self) -> RunRecord:
         """The record of the run, with its stages until now."""
         from comparisons import record
-        from reports.run.results import START, RunRecord
+        from reports.files.results import START, RunRecord
 
         other = perf_counter() - START - sum(self.stages.values())
         return RunRecord(
@@ -95,9 +95,9 @@ class Batch:
 
     def write_page(self, is_interrupted: bool = False, **content: Any) -> None:
         """Write the page and its details, with further arguments of both."""
+        from reports.files import results
         from reports.page import page
         from reports.page.scene_view import Making
-        from reports.run import results
 
         begin, path = perf_counter(), self.folder / results.PAGE
         making = None
@@ -141,8 +141,8 @@ def run(
     with pool as pool:
         pool.start()
         from comparisons.departure.criterion import checked_threshold
-        from reports.run import results
-        from reports.run.results import FIGURES, START, TABLES
+        from reports.files import results
+        from reports.files.results import FIGURES, START, TABLES
         from reports.terminal import progress
 
         checked_threshold(job.within)
@@ -234,7 +234,7 @@ def _write(
 ) -> None:
     """Write the page, record and tables of all scenes as far as possible, and print the results."""
     from reference.records import to_json
-    from reports.run import results
+    from reports.files import results
     from reports.terminal import tables
 
     views, folder = batch.ordered, batch.folder

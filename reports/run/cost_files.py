@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING
 from reference import records
 from reports import glossary
 from reports.charts import theme, vega
-from reports.files import images
+from reports.files import images, results
+from reports.files.results import PAGE
 from reports.page import templating
 from reports.page.scene_view import CostView, picture_name
-from reports.run import results
-from reports.run.results import PAGE
 from reports.terminal.cost_tables import busy, closure, together
 
 if TYPE_CHECKING:

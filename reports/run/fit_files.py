@@ -12,8 +12,7 @@ from comparisons.departure.metrics import LEADING, drawn
 from comparisons.fit.fit import Fit
 from comparisons.fit.fit_record import FitRecord, FittedParameter, FormFit
 from reference.records import to_json
-from reports.files import images
-from reports.run import results
+from reports.files import images, results
 from reports.terminal import tables
 
 Cells = Sequence[str]

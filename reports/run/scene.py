@@ -19,10 +19,9 @@ from comparisons.processes.turns import Turn
 from heuristic import program
 from heuristic.heuristics import named
 from reference.records import VERSION, Record, plain, to_json
-from reports.files import images
+from reports.files import images, results
 from reports.page import embedding, terms_view
 from reports.page.scene_view import SceneView
-from reports.run import results
 
 if TYPE_CHECKING:
     from comparisons.case import Case

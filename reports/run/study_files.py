@@ -9,7 +9,7 @@ from comparisons.study import dataset
 from comparisons.study.design import StudyFile
 from comparisons.study.running import POINTS
 from reports.charts import study_charts, vega
-from reports.run import results
+from reports.files import results
 
 FIGURES = "figures"
 

@@ -12,7 +12,7 @@ from comparisons.fit.fit_record import FitRecord
 from reference import records
 from reference.records import laid_out
 from reports.ci.checks import Checks
-from reports.run.results import RunRecord
+from reports.files.results import RunRecord
 
 FOLDER = Path(__file__).parent
 

@@ -13,7 +13,7 @@ from reports.terminal.words import number, parameter, seconds
 if TYPE_CHECKING:
     from comparisons.cost.cost import Choice
     from comparisons.cost.cost_record import Cost, Point
-    from comparisons.hybrids.why import MeanError
+    from comparisons.why import MeanError
     from reference.records import Estimated
 
 Rows: TypeAlias = Iterator[Sequence[str]]

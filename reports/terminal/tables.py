@@ -19,7 +19,7 @@ from comparisons.departure.criterion import TOLERANCE, share_above
 from comparisons.departure.metrics import LEADING
 from heuristic.heuristics import PHONG
 from reference.records import plain
-from reports.run import results
+from reports.files import results
 from reports.terminal.words import number, percent, seconds, visible
 
 if TYPE_CHECKING:

@@ -17,9 +17,10 @@ from comparisons.departure.metrics import THRESHOLDS, drawn, log2_luminance_rati
 from comparisons.departure.regions import Region
 from reference.records import Machine, Pixels, plain
 from reference.rendering.gbuffer import ObjectIds
+from reports.files import results
+from reports.files.results import Failure, RunRecord
 from reports.page import page
-from reports.run import results, scene
-from reports.run.results import Failure, RunRecord
+from reports.run import scene
 from tests import cost_records, records, term_grids
 
 WIDTH, HEIGHT = 48, 32

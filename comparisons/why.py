@@ -1,4 +1,9 @@
-"""The records of causes, which every comparison names; it loads nothing that finds them."""
+"""The records of causes and terms, named by every comparison; nothing here finds them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
 
 from reference.records import Amount, Estimated, Record, Resolution, Size
 
@@ -105,3 +110,37 @@ class Attribution(Record):
     orders: int
     hybrids: tuple[Hybrid, ...] = ()
     objects: tuple[ObjectContribution, ...] = ()
+
+
+@dataclass(frozen=True)
+class Causes:
+    """The attribution of a departure, and where in the image the effects remove what.
+
+    ``maps`` are ``{effect: (H, W)}``, the ΔE2000 that each removes; with ``left``, what remains
+    when all are simulated, they add up to ``departure``. ``counted`` (H, W) are the pixels that
+    count. ``previews`` are ``{labels of the simulated effects: (f H, f W, 3)}``, linear.
+    """
+
+    record: Attribution
+    maps: dict[str, NDArray]
+    departure: NDArray
+    left: NDArray
+    counted: NDArray[np.bool_]
+    previews: dict[tuple[str, ...], NDArray]
+
+
+Colour = tuple[float, float, float]
+"""Linear RGB."""
+
+
+class TermMaterial(Record):
+    """The kernel's material at some points; a lobe's normalisation is part of ``k_s``."""
+
+    name: str
+    k_i: Colour
+    k_a: Colour
+    k_d: Colour
+    k_s: Colour
+    n: float
+    form: str
+    ambient: Colour
