@@ -86,7 +86,7 @@ def test_without_scripts_all_scenes_have_small_pictures_numbers_and_charts(visit
     assert page.locator(".worst img:visible").count() == 6
     assert page.locator(".scene img:visible").count() >= 6
     assert page.locator(":is(canvas, .controls, .threshold):visible").count() == 0
-    assert page.locator(".scene .chart svg:visible").count() == 2
+    assert page.locator(".scene .chart svg:visible").count() == 1
     visitor.unfold()
     assert page.locator(".scene .effects:visible").count() == 2
 
