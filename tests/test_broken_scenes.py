@@ -18,7 +18,7 @@ from comparisons.cost.cost import cost
 from comparisons.fit.fit import fit
 from comparisons.options import LARGEST_SPP, Options
 from comparisons.prepared import require_light
-from heuristic.errors import InputError
+from heuristic.errors import FotismosError, InputError
 from reference.rendering.renderer import LARGEST_PASS
 from reference.scene import files
 from reports import verdict
@@ -143,6 +143,15 @@ def ply(points=POINTS, corners=CORNERS, vertices=None):
     return "\n".join(head).encode() + points.tobytes() + faces
 
 
+def ply_in_words(vertices=4, faces=4):
+    head = ["ply", "format ascii 1.0", "comment - 1 - 2", f"element vertex {vertices}"]
+    head += [f"property float {axis}" for axis in "xyz"] + [f"element face {faces}"]
+    head += ["property list uchar int vertex_indices", "end_header"]
+    lines = [" ".join(map(str, point)) for point in POINTS.tolist()]
+    lines += [" ".join(map(str, (3, *face))) for face in CORNERS.tolist()]
+    return "\n".join([*head, *lines, ""]).encode()
+
+
 def with_index(index):
     corners = CORNERS.copy()
     corners[1, 1] = index
@@ -153,6 +162,8 @@ MESHES = (
     (ply(corners=with_index(9)), "names vertex 9, and there are 4"),
     (ply(corners=with_index(10**8)), "names vertex 100000000"),
     (ply(np.where(POINTS > 0, POINTS, np.nan)), "invalid vertex"),
+    (ply_in_words(vertices=10**12), "mesh.ply"),
+    (ply_in_words(faces=10**12), "mesh.ply"),
     (ply()[:-9], "read"),
     (b"", "mesh.ply"),
     (np.random.default_rng(0).bytes(500), "mesh.ply"),
@@ -167,8 +178,9 @@ def test_a_damaged_mesh_is_named_and_a_sound_one_compared(rgb, tmp_path):
         with pytest.raises(InputError, match=message) as refusal:
             compared(tmp_path, text)
         assert "mesh.ply" in str(refusal.value)
-    (tmp_path / "mesh.ply").write_bytes(ply())
-    assert compared(tmp_path, text).record.pixels.counted
+    for content in (ply(), ply_in_words()):
+        (tmp_path / "mesh.ply").write_bytes(content)
+        assert compared(tmp_path, text).record.pixels.counted
 
 
 def test_a_measured_material_is_refused_wherever_it_is_cut(rgb, corpus):
@@ -258,6 +270,29 @@ def test_numbers_and_depths_without_end_are_refused_in_short(rgb, tmp_path):
         assert len(str(refusal.value)) < 300
 
 
+def test_comments_may_have_hyphens(rgb, tmp_path):
+    assert case_of(tmp_path, SCENE.replace(END, f"<!-- -- Lights --- -->{END}")).source.parse()
+
+
+def test_text_without_end_is_refused(rgb, tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "LONGEST", 4200)
+    (tmp_path / "part.xml").write_text(f'<scene version="3.0.0"><!--{4000 * "x"}--></scene>')
+    with pytest.raises(InputError, match=r"part.xml: .*4200 are allowed"):
+        compared(tmp_path, SCENE.replace(END, '<include filename="part.xml"/>' + END))
+
+
+def test_a_chain_of_includes_ends(rgb, tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "DEEPEST", 5)
+    for place in range(6):
+        inner = f'<include filename="{place + 1}.xml"/>'
+        (tmp_path / f"{place}.xml").write_text(f'<scene version="3.0.0">{inner}</scene>')
+    (tmp_path / "6.xml").write_text('<scene version="3.0.0"/>')
+    with pytest.raises(InputError, match=r"4.xml: more than 5 files include each other"):
+        compared(tmp_path, SCENE.replace(END, '<include filename="0.xml"/>' + END))
+    included = files.included(tmp_path / "4.xml")
+    assert [path.name for path in included.paths] == ["4.xml", "5.xml", "6.xml"]
+
+
 def test_includes_that_fan_out_end(rgb, tmp_path):
     for depth in range(10):
         inner = f'<include filename="{depth + 1}.xml"/>' * 6
@@ -305,3 +340,80 @@ def corpus(tmp_path):
     corpus_files.write(tmp_path)
     yield tmp_path
     mi.set_log_level(level)
+
+
+NUMBER = re.compile(r"(?<![\w.$])[-+]?\d+\.?\d*(?:e[-+]?\d+)?(?![\w.])")
+VALUE = re.compile(r'\b(?:value|x|y|z|origin|target|up|matrix|angle)="([^"]*)"')
+VALUES = ("nan", "inf", "-inf", "0", "-1", "1e308", "-1e308", "1e38", "1e-40", "-0.0", "1e19", "2")
+WORDS = ("", "abc", "true", "$", "\u00e9", "1,2", "0 0 0", "99999999999999999999")
+SLOW = ("bsdf-hair", "emitter-sunsky", "emitter-timed-sunsky", "medium-", "integrator-volpath")
+
+
+def broken(seed, folder):
+    """Return a scene of the corpus with one thing broken: a number, a word, an element, a file."""
+    draw = np.random.default_rng(seed)
+    names = sorted(p.stem for p in CORPUS.glob("*.xml") if not p.stem.startswith(SLOW))
+    text = (CORPUS / f"{draw.choice(names)}.xml").read_text(encoding="utf-8")
+    numbers = [
+        found.span()
+        for value in VALUE.finditer(text)
+        for found in NUMBER.finditer(text, value.start(1), value.end(1))
+    ]
+    words = [m.span(1) for m in re.finditer(r'\b(?!version)\w+="([^"]*)"', text)]
+    elements = [m.span() for m in re.finditer(r"<(\w+)[^<>]*/>", text)]
+    named = [
+        m.span(1) for m in re.finditer(r'value="([\w-]+\.\w+)"', text) if (folder / m[1]).exists()
+    ]
+    kind = draw.integers(6)
+    places = (numbers, numbers, numbers, words, elements, named or words)[kind] or words
+    begin, end = places[draw.integers(len(places))]
+    if places is named:
+        new = f"{seed}-{text[begin:end]}"
+        (folder / new).write_bytes(damaged(draw, (folder / text[begin:end]).read_bytes()))
+    else:
+        new = "" if places is elements else str(draw.choice(VALUES if places is numbers else WORDS))
+    return text[:begin] + new + text[end:]
+
+
+def damaged(draw, content):
+    """Cut a file, change three bytes of it, or return noise."""
+    how, content = draw.integers(3), bytearray(content)
+    if how == 0:
+        return content[: draw.integers(len(content))]
+    for place in draw.integers(len(content), size=3):
+        content[place] = draw.integers(256)
+    return content if how == 1 else draw.bytes(200)
+
+
+def outcome(seed, folder):
+    """Compare a broken scene: finite pictures of something, or a message."""
+    mi.set_variant("llvm_ad_rgb")
+    path = folder / f"{seed}.xml"
+    path.write_text(broken(seed, folder), encoding="utf-8")
+    try:
+        case = open_case(path, Options(spp=4, resolution=(16, 12)))
+        made = compare(case.source, case.options)
+    except FotismosError as error:
+        return "refused" if str(error).strip() else "no message"
+    except Exception as error:
+        return f"{seed}: {type(error).__name__}: {error}"
+    images = made.images
+    is_sound = np.isfinite(images.heuristic).all() and np.isfinite(images.reference).all()
+    return "rendered" if is_sound and made.record.pixels.counted else f"{seed}: not a picture"
+
+
+def test_a_scene_broken_at_random_is_rendered_or_refused(rgb, corpus):
+    assert {outcome(seed, corpus) for seed in range(20)} == {"rendered", "refused"}
+
+
+def test_an_error_of_another_kind_is_found_out(rgb, corpus, monkeypatch):
+    def fails(*_):
+        raise ZeroDivisionError("float division by zero")
+
+    monkeypatch.setattr(f"{__name__}.compare", fails)
+    assert any("ZeroDivisionError" in outcome(seed, corpus) for seed in range(4))
+
+
+@pytest.mark.slow
+def test_any_scene_broken_at_random_is(rgb, corpus):
+    assert {outcome(seed, corpus) for seed in range(20, 400)} == {"rendered", "refused"}

@@ -1,18 +1,21 @@
 """Planning: what is left out is not there. Scenes on which a careless rule would prune wrongly."""
 
+import drjit as dr
 import mitsuba as mi
+import numpy as np
 import pytest
 
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.prepared import prepare
 from comparisons.verification import verify
+from reference.pairing.probe import AlbedoTable
 from reference.planning.effects import EFFECTS, INTERREFLECTION, OCCLUSION
 from reference.planning.facts import Facts
 from reference.planning.plan import wants_spectra
 from reference.scene.source import Source
 from tests import misplanned
-from tests.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron
+from tests.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron, prune_blindly
 
 WHITE = DIFFUSE
 VIEWER = (0, -6, 3)
@@ -198,3 +201,25 @@ def test_a_plan_that_is_not_pruned_is_the_one_for_everything(rgb, name):
         for choice in (False, True)
     )
     assert pruned.unpruned() == whole != pruned
+
+
+def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
+    """The verification can fail: with shadows left out it marks the shadow."""
+    prune_blindly(monkeypatch)
+    parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
+    assert verify(Source("wrong", scene(**parts)), Options(spp=512)).significant > 0
+
+
+def test_the_table_of_the_environment_agrees_with_sampling(rgb):
+    """The albedo over view angles against plain Monte Carlo of another size and generator."""
+    bsdf = mi.load_dict({"type": "roughplastic", "alpha": 0.3, "int_ior": 2.0})
+    table = AlbedoTable(bsdf)
+    for mu in (1.0, 0.6, 0.2, 0.05):
+        count = 1_000_000
+        si = dr.zeros(mi.SurfaceInteraction3f, count)
+        si.wi = mi.Vector3f((1 - mu**2) ** 0.5, 0, mu)
+        rng = mi.PCG32(count)
+        point = mi.Point2f(rng.next_float32(), rng.next_float32())
+        weight = np.array(bsdf.sample(mi.BSDFContext(), si, rng.next_float32(), point)[1][0], float)
+        error = weight.std() / count**0.5
+        assert abs(np.array(table.at(mi.Float(mu)))[0, 0] - weight.mean()) < 5 * error + 2e-4
