@@ -10,6 +10,7 @@ import os
 import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -103,7 +104,11 @@ def put(path: Path, content: str | bytes) -> None:
         if not path.exists() or path.is_file():
             write(Path(os.path.realpath(path)), content)  # a link stays one
             return
-        path.write_bytes(encoded(content))
+        # Opening a pipe without a reader would wait forever.
+        descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+        os.set_blocking(descriptor, True)
+        with open(descriptor, "wb") as file:
+            file.write(encoded(content))
 
 
 def content(path: str | Path, largest: int = LARGEST) -> bytes:
@@ -127,7 +132,10 @@ def require_regular(path: str | Path, largest: int | None = None) -> None:
 
 
 class Entry:
-    """A JSON file that keeps a mapping under ``key``, the text of all that it depends on."""
+    """A JSON file that keeps a mapping under ``key``, the text of all that it depends on.
+
+    A checksum detects a damaged file, which is no result.
+    """
 
     def __init__(self, path: str | Path, key: str) -> None:
         self.path, self.key = Path(path), key
@@ -138,22 +146,27 @@ class Entry:
         The caller must check that it holds what it should.
         """
         try:
-            found = json.loads(content(self.path))
+            text = content(self.path)
+            body = text[len(self._head(b"")) : -1]
+            found = json.loads(body) if text == self._head(body) + body + b"}" else None
         except (OSError, ValueError, RecursionError):
             return None
-        is_entry = isinstance(found, dict) and found.get("key") == self.key
-        kept = found.get("content") if is_entry else None
-        return kept if isinstance(kept, dict) else None
+        return found if isinstance(found, dict) else None
 
     def save(self, content: Mapping[str, Any]) -> None:
         """Save a mapping, in place of the old one."""
         try:
             if self.path.exists():
                 require_regular(self.path)
-            entry = {"key": self.key, "content": content}
-            write(self.path, json.dumps(entry, ensure_ascii=False))
+            body = json.dumps(content, ensure_ascii=False).encode()
+            write(self.path, self._head(body) + body + b"}")
         except OSError as error:
             raise InputError(
                 f"{self.path}: {error.strerror or error}. Results are kept there: make room,"
                 " or choose another output folder with -o."
             ) from error
+
+    def _head(self, body: bytes) -> bytes:
+        """Return the text before the content: the key, and the content's checksum."""
+        key = json.dumps(self.key, ensure_ascii=False)
+        return f'{{"key": {key}, "sha256": "{sha256(body).hexdigest()}", "content": '.encode()

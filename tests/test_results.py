@@ -251,10 +251,13 @@ def test_names_of_folders_are_plain_and_free(tmp_path):
         "cost": "cost-2", "Tables": "Tables-2", "index.html": "index.html-2",
         "u\u0308": "\u00fc", "x" * 300: "x" * 100, "\udcff": "-",
     }  # fmt: skip
-    assert {name: results.folder_name(name) for name in names} == names
     out = results.own(tmp_path / "out")
+    for number, (name, place) in enumerate(names.items()):
+        alone = results.own(tmp_path / f"out-{number}")
+        assert results.assigned(alone, [(name, None)]) == [place]
     results.assigned(out, [(name, None) for name in names])
-    assert {path.name for path in tmp_path.iterdir()} == {"out"}
+    made = {"out", *(f"out-{number}" for number in range(len(names)))}
+    assert {path.name for path in tmp_path.iterdir()} == made
 
 
 # --- Disks -----------------------------------------------------------------------------------
@@ -270,6 +273,9 @@ def test_what_a_user_names_is_written_in_place_of_a_file_or_into_a_device(tmp_pa
     (tmp_path / "full").symlink_to("/dev/full")
     with pytest.raises(OutputError, match="No space left"):
         atomic.put(tmp_path / "full", "too much")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OutputError, match="pipe: No such device"):
+        atomic.put(tmp_path / "pipe", "nobody reads it")
     with pytest.raises(OutputError, match="too long"):
         atomic.put(tmp_path / ("x" * 300), "no file")
 
@@ -297,7 +303,9 @@ def test_an_entry_is_its_content_under_its_key_or_nothing(tmp_path):
     assert entry.load() == {"rows": [1, 2.5, None, "ü"]}
     assert atomic.Entry(entry.path, "another").load() is None
     whole = entry.path.read_bytes()
-    for damaged in (b"[]", b"3", b"\xff\xfe", *(whole[:i] for i in range(len(whole)))):
+    flipped = (whole[:i] + bytes([whole[i] ^ 1]) + whole[i + 1 :] for i in range(len(whole)))
+    cut = (whole[:i] for i in range(len(whole)))
+    for damaged in (b"[]", b"3", b"\xff\xfe", whole + b" ", *flipped, *cut):
         entry.path.write_bytes(damaged)
         assert entry.load() is None
     entry.path.unlink()

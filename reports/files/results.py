@@ -236,12 +236,6 @@ def assigned(folder: Path, subjects: Iterable[tuple[str, Path | None]]) -> list[
     return found
 
 
-def folder_name(name: str, taken: Iterable[str] = ()) -> str:
-    """Return a name for a folder: plain characters, neither reserved nor taken."""
-    taken = set(taken)
-    return next(each for each in _candidates(name) if each not in taken)
-
-
 def _candidates(name: str) -> Iterator[str]:
     composed = unicodedata.normalize("NFC", name)
     plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in composed)

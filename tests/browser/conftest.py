@@ -53,7 +53,7 @@ def report(tmp_path_factory):
         (NOISY, cost_records.explained(noisy()), study),
         (EXACT, exact(), None),
     ):
-        place = results.folder_name(name)
+        (place,) = results.assigned(folder, [(name, None)])
         views.append(scene.write(folder, place, comparison, priced))
         found.records[name] = plain(comparison.record)
         with OpenEXR.File(str(folder / place / "comparison.exr"), separate_channels=True) as file:
