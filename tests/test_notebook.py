@@ -28,6 +28,15 @@ shown
 """
 
 
+def tags_of(html):
+    """Return the tags of a page in order, each with its attributes."""
+    tags = []
+    parser = HTMLParser()
+    parser.handle_starttag = lambda tag, attributes: tags.append((tag, dict(attributes)))
+    parser.feed(html)
+    return tags
+
+
 @pytest.mark.thorough
 def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path):
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
@@ -39,15 +48,14 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
     picture = Image.open(BytesIO(b64decode(shown["data"]["image/png"])))
     assert picture.width > 2 * picture.height
     assert shown["data"]["text/plain"].startswith("Textbook shading is visibly wrong in")
-    tags = []
-    parser = HTMLParser()
-    parser.handle_starttag = lambda tag, attributes: tags.append((tag, dict(attributes)))
-    parser.feed(shown["data"]["text/html"])
-    ((tag, attributes),) = tags
+    ((tag, attributes),) = tags_of(shown["data"]["text/html"])
     assert (tag, attributes["sandbox"]) == ("iframe", "allow-scripts")
     page = attributes["srcdoc"]
     assert page.lstrip().startswith("<!")
-    assert page.count('src="data:image/webp') >= 3  # textbook, physical and error
+    pictures = [one for tag, one in tags_of(page) if tag == "img" and "hidden" not in one]
+    captions = [one["alt"].rpartition(", ")[2] for one in pictures]
+    assert captions == ["Textbook shading", "Physical reference", "ΔE2000"]
+    assert all(one["src"].startswith("data:image/webp") for one in pictures)
     assert "box <b>" not in page
     assert "box &lt;b&gt;" in page
 
