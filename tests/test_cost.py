@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from comparisons.case import open_case
 from comparisons.cost import cost as studies
 from comparisons.cost import measure, methods, times
 from comparisons.cost.cost import cost
@@ -53,15 +54,8 @@ def short():
     ["cornell-box", "fig-6-10", pytest.param("narrow-band-lamp", marks=pytest.mark.thorough)],
 )
 def test_a_study_has_its_effects_files_and_tables(name):
-    scene = SCENES[name]
-    set_variant(scene.variant)
-    options = Options(
-        resolution=(24, 24),
-        heuristic_variant=scene.heuristic_variant,
-        interpolation=scene.interpolation,
-        tessellation=scene.tessellation,
-    )
-    study = cost(scene.source(), options, TINY)
+    case = open_case(name, Options(resolution=(24, 24)))
+    study = cost(case.source, case.options, TINY)
     set_variant("llvm_ad_rgb")
     record, whole = study.record, study.record.attribution
     made = cost_files.documents(study)

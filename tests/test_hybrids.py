@@ -53,16 +53,9 @@ def whole(renderer, count=8, seed=40):
 )
 def found(request):
     """The causes of one small scene, and its kernel and reference, rendered anew."""
-    scene = SCENES[request.param]
-    set_variant(scene.variant)
-    options = Options(
-        resolution=(24, 24),
-        heuristic_variant=scene.heuristic_variant,
-        interpolation=scene.interpolation,
-        tessellation=scene.tessellation,
-    )
-    ready = guarded(scene.source(), options)
-    causes = attribution.find(ready, scene.source(), options)
+    case = open_case(request.param, Options(resolution=(24, 24)))
+    ready = guarded(case.source, case.options)
+    causes = attribution.find(ready, case.source, case.options)
     images = [whole(half).mean for half in (ready.heuristic, ready.reference)]
     yield SimpleNamespace(name=request.param, causes=causes, images=images)
     set_variant("llvm_ad_rgb")
