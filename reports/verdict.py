@@ -20,6 +20,7 @@ from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import VisibleShare
 from comparisons.gallery.builtin import SCENES
 from heuristic import program
+from reference.planning.effects import EFFECTS
 from reports.terminal.words import number, percent, seconds
 
 if TYPE_CHECKING:
@@ -30,19 +31,6 @@ NAMED = 3
 
 EXACT = 0.01
 """ΔE2000: smaller means are rounding, or noise that nobody sees."""
-
-MISSING = {
-    "distance attenuation": "fall-off with distance",
-    "environment": "environment light",
-    "extended lights": "the size of the lamps",
-    "interreflection": "light between surfaces",
-    "microfacets and Fresnel": "microfacets",
-    "occlusion": "shadows",
-    "polygon interpolation": "normals between the vertices",
-    "spectral": "spectral light",
-    "spot cone": "the fall-off in a spot's cone",
-}
-"""What an image without an effect lacks."""
 
 CHOICES = ("--heuristic", "--pairing", "--interpolation")
 """Options that a command repeats only where they differ from the scene's defaults."""
@@ -188,7 +176,7 @@ def about(record: ComparisonRecord, cost: Cost | None = None, threshold: float =
 
 
 def _noun(effect: str) -> str:
-    return MISSING.get(effect, effect)
+    return next((one.noun for one in EFFECTS if one.label == effect), "") or effect
 
 
 def _capital(text: str) -> str:

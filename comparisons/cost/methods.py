@@ -30,9 +30,11 @@ from reference.planning.effects import (
     EFFECTS,
     ENVIRONMENT,
     INTERREFLECTION,
+    MICROFACETS,
     OCCLUSION,
     POLYGONS,
     SPECTRAL,
+    TRANSMISSION,
     Effect,
 )
 from reference.planning.facts import SHAPE
@@ -72,7 +74,7 @@ STAND_INS = tuple(
 PHONG_BSDF = Method(
     name="phong BSDF, full transport",
     family="phong BSDF",
-    without=tuple(effect.label for effect in EFFECTS if effect.part == "BSDF form"),
+    without=(MICROFACETS.label, TRANSMISSION.label),
 )
 DIRECT = Method(name="direct", family="physical", without=(INTERREFLECTION.label,))
 PATHS = tuple(
@@ -225,7 +227,7 @@ class Ladder:
     def _why_not(self, method: Method, refusals: Mapping[str, str]) -> str:
         """Return why the scene cannot have a method, in words; empty if it can.
 
-        ``refusals`` are the reasons against interpolations and heuristics, by name.
+        ``refusals`` are ``{interpolation or heuristic: why it cannot be measured}``.
         """
         # Without an environment in the heuristic half, a stand-in for it has no input.
         has_background = self.ready.heuristic.scene.environment() is not None

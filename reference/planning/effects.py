@@ -18,9 +18,6 @@ from reference.planning.rules import NO_SECOND_REFLECTION, NO_SHADOWS, PruningRu
 from reference.records import Record
 from reference.scene.graph import Graph, graft
 
-PARTS = ("interpolation", "spectral", "visibility", "light form", "BSDF form", "transport")
-"""The parts of a departure that effects cause, in the order in which they are split off."""
-
 
 class Decision(Record):
     """Whether a scene calls for an effect, and why.
@@ -43,11 +40,11 @@ class Effect:
     """An effect of light. Two are equal only if they are the same.
 
     ``heuristic``, ``reference`` and ``cost`` are its form in each half and its cost, in words;
-    ``noun`` is what an image without it lacks, and ``step`` what it changes in an image, if studies
-    have a step for it. ``rule(facts)`` returns whether the scene needs it, and the evidence; with
-    ``undecided`` a yes only means that it is not ruled out. ``part`` is one of :data:`PARTS`, and
-    ``colour`` a CSS colour; None for effects equal in both halves. ``sampled`` is whether its
-    direct light needs random numbers.
+    ``noun`` is what an image without it lacks, in words, unless its label says it; ``colour`` is a
+    CSS colour, None for effects equal in both halves. ``step`` is what it changes in an image, if
+    studies have a step for it. ``rule(facts)`` returns whether the scene needs it, and the
+    evidence; with ``undecided`` a yes only means that it is not ruled out. ``sampled`` is whether
+    its direct light needs random numbers.
 
     The integrator leaves an effect with a ``pruning`` rule out, with the parameters ``without`` of
     `direct_all`; ``is_alike(facts)``: both halves treat it alike. Other effects are left out by
@@ -64,7 +61,6 @@ class Effect:
     cost: str
     rule: Callable[[Facts], tuple[bool, str]] | None = None
     undecided: bool = False
-    part: str | None = None
     colour: str | None = None
     sampled: bool = False
     step: str = ""
@@ -154,6 +150,7 @@ SPECULAR = Effect(
 
 POLYGONS = Effect(
     label="polygon interpolation",
+    noun="normals between the vertices",
     heuristic="flat, Gouraud (6.35-6.38)",
     reference="none",
     cost="less than Phong",
@@ -161,7 +158,6 @@ POLYGONS = Effect(
         facts.interpolation is not Interpolation.PHONG,
         f"interpolation {facts.interpolation.value}",
     ),
-    part="interpolation",
     colour="#f0e442",
 )
 
@@ -172,7 +168,6 @@ SPECTRAL = Effect(
     reference="wavelengths",
     cost="samples, 4 values each",
     rule=lambda facts: (mi.is_spectral, f"variant {mi.variant()}"),
-    part="spectral",
     colour="#882255",
     sampled=True,
 )
@@ -269,11 +264,11 @@ def _ambient_light(phong: mi.Properties, facts: Facts) -> dict:
 
 ATTENUATION = Effect(
     label="distance attenuation",
+    noun="fall-off with distance",
     heuristic="f_att (6.1, 8.6)",
     reference="1 / d^2",
     cost="a division per light",
     rule=_attenuated,
-    part="light form",
     colour="#d55e00",
     sites=_inexact_lights(with_cone=False),
     put=_put_lights,
@@ -281,11 +276,11 @@ ATTENUATION = Effect(
 
 CONE = Effect(
     label="spot cone",
+    noun="the fall-off in a spot's cone",
     heuristic="6.2-6.4",
     reference="spot",
     cost="a comparison and a power per light",
     rule=_coned,
-    part="light form",
     colour="#999933",
     sites=_inexact_lights(with_cone=True),
     put=_put_lights,
@@ -293,11 +288,11 @@ CONE = Effect(
 
 EXTENDED = Effect(
     label="extended lights",
+    noun="the size of the lamps",
     heuristic="a spot or point",
     reference="sampled area lights",
     cost="samples, two rays each",
     rule=lambda facts: (len(facts.lamps) > 0, facts.light_kinds),
-    part="light form",
     colour="#56b4e9",
     sampled=True,
     sites=_shining,
@@ -307,11 +302,11 @@ EXTENDED = Effect(
 
 ENVIRONMENT = Effect(
     label="environment",
+    noun="environment light",
     heuristic="ambient light",
     reference="light from everywhere",
     cost="samples, or a table",
     rule=_surrounded,
-    part="light form",
     colour="#009e73",
     sampled=True,
     sites=_surroundings,
@@ -359,11 +354,11 @@ def _reflected(facts: Facts) -> tuple[bool, str]:
 
 MICROFACETS = Effect(
     label="microfacets and Fresnel",
+    noun="microfacets",
     heuristic="none",
     reference="roughplastic",
     cost="a BSDF evaluation per light",
     rule=_reflected,
-    part="BSDF form",
     colour="#cc79a7",
     sites=_inexact_surfaces(opaque=True),
     put=_put_materials,
@@ -379,7 +374,6 @@ TRANSMISSION = Effect(
         "a BSDF may let light through" if facts.is_clear else "every BSDF is opaque",
     ),
     undecided=True,
-    part="BSDF form",
     colour="#44aa99",
     sites=_inexact_surfaces(opaque=False),
     put=_put_materials,
@@ -390,11 +384,11 @@ TRANSMISSION = Effect(
 
 OCCLUSION = Effect(
     label="occlusion",
+    noun="shadows",
     heuristic="none, or if requested",
     reference="shadow rays",
     cost="a ray per light",
     pruning=NO_SHADOWS,
-    part="visibility",
     colour="#0072b2",
     is_alike=lambda facts: facts.has_shadows,
     # A sample of the BSDF would hit what hides a light.
@@ -404,11 +398,11 @@ OCCLUSION = Effect(
 
 INTERREFLECTION = Effect(
     label="interreflection",
+    noun="light between surfaces",
     heuristic="none",
     reference="paths",
     cost="samples, two rays per reflection",
     pruning=NO_SECOND_REFLECTION,
-    part="transport",
     colour="#e69f00",
     is_alike=lambda facts: facts.pair.max_depth == 2,
     without={"max_depth": 2},
