@@ -35,23 +35,3 @@ def jackknifed(values: ArrayLike) -> Estimated:
     """
     value, *others = np.asarray(values, float)
     return student(float(value), float(jackknife_error(others)), len(others))
-
-
-def of_mean(values: ArrayLike) -> Estimated:
-    """Return the mean of independent values, with its interval."""
-    values = np.asarray(values, float)
-    error = values.std(ddof=1) / np.sqrt(len(values))
-    return student(float(values.mean()), float(error), len(values))
-
-
-def median_ranks(count: int) -> tuple[int, int, float]:
-    """Return the indices of the sorted values that enclose a median, and their coverage.
-
-    Each of ``count`` values is below the median with chance 1/2, whatever the distribution. The
-    enclosing values are the closest that reach the coverage :data:`LEVEL`; with fewer than six
-    values, not even the extremes do.
-    """
-    from scipy.stats import binom
-
-    place = max(0, int(binom.ppf((1 - LEVEL) / 2, count, 0.5)) - 1)
-    return place, count - 1 - place, float(1 - 2 * binom.cdf(place, count, 0.5))

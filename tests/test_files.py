@@ -133,8 +133,8 @@ def test_png_keeps_small_images_and_shrinks_large_ones_on_request():
 
 def test_error_map_spans_magma_and_stays_in_it():
     row = pixels_of(images.error_map([[0.0, 10.0, 20.0, 500.0, -1.0]], 20.0))[0]
-    assert images.css_colour(row[0]) == "#000004"
-    assert images.css_colour(row[2]) == "#fcfdbf"
+    assert bytes(row[0]).hex() == "000004"
+    assert bytes(row[2]).hex() == "fcfdbf"
     np.testing.assert_array_equal(row[3], row[2])
     np.testing.assert_array_equal(row[4], row[0])
     assert row[0].sum() < row[1].sum() < row[2].sum()
@@ -157,7 +157,7 @@ def test_pictures_draw_a_map_over_its_printed_range():
         assert set(made) == {"heuristic", "reference", "significant", *drawn(), RATIO.name}
         end, below = decode(made[name])[0]
         last = images.colour_table("RdBu_r" if name == RATIO.name else "magma")[-6:]
-        assert images.css_colour(end) == f"#{last}"
+        assert bytes(end).hex() == last
         assert (below != end).any()
 
 

@@ -14,16 +14,8 @@ def test_the_jackknife_of_a_mean_is_its_standard_error():
 
 
 def test_the_interval_of_a_mean_is_that_of_students_table():
-    found = intervals.of_mean([1.0, 2.0, 3.0, 4.0])  # t(0.975, 3) = 3.182446
-    half = 3.182446 * np.std([1, 2, 3, 4], ddof=1) / 2
+    error = np.std([1, 2, 3, 4], ddof=1) / 2
+    found, half = intervals.student(2.5, error, 4), 3.182446 * error  # t(0.975, 3) = 3.182446
     assert (found.value, found.low) == (2.5, pytest.approx(2.5 - half, rel=1e-6))
     assert found.high - 2.5 == 2.5 - found.low
     assert intervals.student(0.25, 0.0, 16) == intervals.Estimated(0.25, 0.25, 0.25)
-
-
-@pytest.mark.parametrize(
-    ("count", "expected"),
-    [(2, (0, 1, 0.5)), (5, (0, 4, 1 - 2 / 32)), (9, (1, 7, 1 - 20 / 512))],
-)
-def test_the_ranks_around_a_median_are_those_of_the_sign_test(count, expected):
-    assert intervals.median_ranks(count) == pytest.approx(expected, abs=1e-15)

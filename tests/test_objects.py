@@ -100,7 +100,8 @@ def test_intervals_on_shapes_tell_the_spread_of_replicates():
     still, noisy = found["still"], found["noisy"]
     assert (still.pixels, noisy.pixels) == (3, 2)
     assert still.removes[0].low == still.removes[0].high == 2.0
-    expected = intervals.of_mean(spread)
+    error = spread.std(ddof=1) / np.sqrt(len(spread))
+    expected = intervals.student(spread.mean(), error, len(spread))
     assert noisy.removes[0].value == pytest.approx(expected.value)
     assert noisy.removes[0].high == pytest.approx(expected.high)
 

@@ -34,7 +34,7 @@ QUALITY = 80
 COLUMNS = 4
 
 #: Colour maps by purpose.
-ERROR_COLOURS, SIGNED_COLOURS, VALUE_COLOURS = "magma", "RdBu_r", "viridis"
+ERROR_COLOURS, SIGNED_COLOURS = "magma", "RdBu_r"
 
 #: Pixels of a thumbnail's longer side; cards show it at two thirds of that size.
 THUMBNAIL = 160
@@ -74,21 +74,9 @@ def mask_map(marked: ArrayLike, counted: ArrayLike | None = None) -> Image.Image
     return _with_palette(index, np.array(colours, np.uint8))
 
 
-def colour_bar(colormap: str, stops: int = 17) -> str:
-    """The colour map from low to high as a CSS ``linear-gradient`` to the right."""
-    table = _table(colormap)
-    chosen = table[np.linspace(0, len(table) - 1, stops).round().astype(int)]
-    return f"linear-gradient(to right, {', '.join(css_colour(colour) for colour in chosen)})"
-
-
 def colour_table(colormap: str) -> str:
     """The 256 colours of a map as hexadecimal digits, six per colour."""
     return _table(colormap).tobytes().hex()
-
-
-def css_colour(colour: ArrayLike) -> str:
-    """Three bytes as ``#rrggbb``."""
-    return "#" + bytes(int(c) for c in np.asarray(colour)).hex()
 
 
 def png(picture: Image.Image, longest: int | None = None) -> bytes:
