@@ -130,9 +130,7 @@ class ComparisonRecord(Record, kw_only=True):
     resolution: Resolution
     plan: Plan
     viewing: Viewing
-    metrics: Annotated[
-        dict[str, Summary], Meta(description="Summaries by name of the declared metric.")
-    ]
+    metrics: Annotated[dict[str, Summary], Meta(description="The summary of each declared metric.")]
     log2_luminance: RatioSummary
     significant: Significant
     pixels: Pixels
@@ -174,7 +172,7 @@ class ComparisonRecord(Record, kw_only=True):
 class Images:
     """The images of a comparison; (H, W, 3) linear, or (H, W) for maps.
 
-    ``maps`` holds the perceptual metrics by name, and ``log2_luminance``. ``objects`` and
+    ``maps`` are those of the perceptual metrics and ``log2_luminance``. ``objects`` and
     ``materials`` hold the index in the record of what each pixel sees, -1 for uncounted pixels.
     """
 

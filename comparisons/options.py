@@ -46,7 +46,7 @@ class Options(
     """The options of a comparison, as the command line names them; None leaves one to the scene.
 
     A ``heuristic`` may also be a function of a point or a :class:`heuristic.Heuristic`: it is
-    declared in this process, and stored by name. A value that is not allowed raises
+    declared in this process, and its name is stored. A value that is not allowed raises
     :class:`InputError`.
     """
 

@@ -56,7 +56,7 @@ class Hero:
 
 def made(request: Options | None = None) -> Hero:
     """Compare the scene as the command does."""
-    job = Job(request or Options(), with_cost=True)
+    job = Job(request or Options(), with_causes=True)
     with TemporaryDirectory() as folder:
         view, _ = scene.compare(SCENE, Path(folder), SCENE, job, lambda *_: None)
         files = {name: Path(folder, SCENE, f"{name}.png") for name in PANELS}

@@ -327,7 +327,7 @@ HEURISTICS: Declared[Heuristic] = Declared(
     mean_ambient="heuristic.indirect_light:MEAN",
     hemisphere_ambient="heuristic.indirect_light:HEMISPHERE",
 )
-"""All heuristics, by name."""
+"""All heuristics."""
 
 declare = HEURISTICS.declare
 """Declare a heuristic in this process, and return it."""

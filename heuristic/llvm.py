@@ -143,7 +143,7 @@ def use_threads(count: int | None = None) -> None:
 
 
 def _is_missing(path: Path | None) -> bool:
-    """Return whether a path is no file; a bare name is searched for by the system."""
+    """Return whether a path is not a file; a bare name is searched for by the system."""
     return path is not None and len(path.parts) > 1 and not path.is_file()
 
 

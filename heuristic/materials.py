@@ -57,7 +57,7 @@ def _components(value):
 
 
 def checked_flag(name: str, value: Any) -> bool:
-    """Return a truth value of Python or NumPy; anything else is no flag."""
+    """Return a truth value of Python or NumPy; anything else is not a flag."""
     if not isinstance(value, bool | np.bool_):
         raise InputError(f"{name} = {value!r} is not allowed: give True or False.")
     return bool(value)
@@ -80,7 +80,7 @@ def wavelength_count(value: Any) -> int:
 
 
 def require_common_wavelengths(values: Mapping[str, Any]) -> None:
-    """Reject checked values, by name, of different numbers of components; single ones fit any."""
+    """Reject values ``{name: value}`` of different numbers of components; single ones fit any."""
     counts = {name: wavelength_count(value) for name, value in values.items()}
     several = {name: count for name, count in counts.items() if count > 1}
     if len(set(several.values())) > 1:

@@ -261,4 +261,4 @@ WEIGHTINGS = {
     "area": area_weighted_normals,
     "angle": angle_weighted_normals,
 }
-"""How much each face around a vertex counts (6.32-6.34), by name."""
+"""How much each face around a vertex counts (6.32-6.34)."""

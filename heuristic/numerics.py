@@ -245,7 +245,7 @@ def _is_single(value):
 def _inverse_root_power(square):
     """Return a power of two near ``1 / sqrt(square)``, by halving the bits of the exponent.
 
-    Any power of two will do, so an overflowed or vanished square is no special case.
+    Any power of two will do, so an overflowed or vanished square is not a special case.
     """
     if not dr.is_jit_v(square):
         usable = 0 < square < inf

@@ -396,7 +396,7 @@ class Job:
 
     request: Options
     figures: bool = False
-    with_cost: bool = False
+    with_causes: bool = False
     fresh: bool = False
     within: float = 2.0
     ladders: frozenset[str] = frozenset()

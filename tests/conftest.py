@@ -43,7 +43,7 @@ def spectral():
     yield from in_variant("llvm_ad_spectral")
 
 
-WHY = next(option for option in compare.params if option.name == "with_cost")
+WHY = next(option for option in compare.params if option.name == "with_causes")
 """Whether `compare` finds causes, which takes nine tenths of a small run."""
 
 # In tests, commands render in this process, which has loaded all that they need, without causes.

@@ -78,7 +78,7 @@ class Audit(Record, kw_only=True):
     record_version: int = VERSION
     subject: str
     kind: Kind
-    parameters: Annotated[dict[str, float | str], Meta(description="Those given, by name.")]
+    parameters: Annotated[dict[str, float | str], Meta(description="The parameters that were set.")]
     variant: str
     angles: Annotated[tuple[Amount, ...], Meta(description="From the normal, in degrees.")]
     curves: tuple[MaterialCurves, ...]

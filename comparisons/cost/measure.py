@@ -126,8 +126,8 @@ def judge_by(reference: Estimate, counted: NDArray[np.bool_], viewing: Viewing) 
 class Measurements:
     """A measured ladder: the options and effort used, methods and points.
 
-    ``lines`` are the times of all methods and steps, by name; ``images`` are ``{method: (H, W,
-    3)}``, one rendering with the most samples of each; ``size`` is that of the images.
+    ``lines`` are ``{method or step: its times}``; ``images`` are ``{method: (H, W, 3)}``, one
+    rendering with the most samples of each; ``size`` is that of the images.
     """
 
     options: Options
@@ -242,7 +242,7 @@ def tried(
     pixels: int,
     progress: Progress | None = None,
 ) -> dict[Key, Renderer]:
-    """Return renderers by name and samples per pixel: those of ``counts``, and some for the time.
+    """Return ``{(name, samples per pixel): renderer}`` for ``counts``, and some for the time.
 
     The largest takes at least :data:`times.LEAST_S`, and one a fourth of its samples. ``firsts``
     have the most samples of the method's counts.

@@ -26,7 +26,7 @@ def checked_threshold(threshold: float) -> float:
     """Return a threshold that records hold shares for; any other raises `InputError`."""
     if threshold not in THRESHOLDS:
         raise InputError(
-            f"{threshold:g} is no threshold of visible differences: give {THRESHOLDS[0]:g} to"
+            f"{threshold:g} is not a threshold of visible differences: give {THRESHOLDS[0]:g} to"
             f" {THRESHOLDS[-1]:g} in steps of {THRESHOLDS[1] - THRESHOLDS[0]:g}, such as"
             f" {TOLERANCE:g}."
         )

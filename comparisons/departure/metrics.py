@@ -170,14 +170,14 @@ class Pixelwise(Metric):
 
 
 METRICS: Declared[Metric] = Declared("metric", "fotismos.metrics")
-"""All metrics by name, in the order of reports; the first one judges scenes."""
+"""All metrics, in the order of reports; the first one judges scenes."""
 
 declare = METRICS.declare
 """Declare a metric and return it; everything then lists it."""
 
 
 def drawn() -> dict[str, Metric]:
-    """Return the metrics whose maps are shown, by name."""
+    """Return the metrics whose maps are shown."""
     return {name: metric for name, metric in METRICS.items() if metric.drawn}
 
 

@@ -2,7 +2,7 @@
 
 The halves of a pair differ in a few effects. Any subset of them makes a scene: the physical half
 with the BSDFs, lights and environment of the heuristic one where an effect is left out. Emission
-and ambient light of the heuristic half are no transported light. They are a pass of their own, of
+and ambient light of the heuristic half are not transported light. They are a pass of their own, of
 what a camera ray meets, which is added.
 
 Every image is rendered in a few replicates, each with its own seed, which all images share. So

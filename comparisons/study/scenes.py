@@ -144,7 +144,7 @@ SCENES = {
     # A sphere in a closed room of diffuse walls, under a round lamp at the ceiling.
     "enclosure": StudyScene({"light_size": LIGHT_SIZE, "wall_albedo": WALL_ALBEDO}, _enclosure),
 }
-"""The study scenes by name. Other scenes are studied through paths to their parameters."""
+"""The study scenes. Other scenes are studied through paths to their parameters."""
 
 UNLIMITED = StudyParameter("", -inf, inf, 0, "a parameter of the scene, by its path")
 """Any parameter of a user's scene."""

@@ -44,7 +44,7 @@ LAYERS = 64
 
 
 def define() -> dict[str, Any]:
-    """Return what makes the integrator, by name, for the current variant."""
+    """Return ``{name: what makes it}`` for the integrator in the current variant."""
 
     class HeuristicIntegrator(mi.SamplingIntegrator):
         """See the module's docstring."""

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 @jobs.scene_options
 @click.option(
     "--why/--no-why",
-    "with_cost",
+    "with_causes",
     default=True,
     help="Find causes and remedies, at a small size; of a picture, none. [default: why]",
 )
@@ -53,7 +53,7 @@ def compare(
     output: Path,
     figures: bool,
     fresh: bool,
-    with_cost: bool,
+    with_causes: bool,
     timeout: float,
     workers: int | None,
     scheduler: str | None,
@@ -115,7 +115,7 @@ def compare(
     batch.run(
         scenes,
         output,
-        jobs.Job(request, figures, with_cost=with_cost, fresh=fresh, within=within),
+        jobs.Job(request, figures, with_causes=with_causes, fresh=fresh, within=within),
         jobs.pool(timeout, len(scenes), workers, scheduler),
         on_page=jobs.open_page if is_opened else None,
         finish=finish if has_summary else None,

@@ -81,7 +81,7 @@ def report(
     request = jobs.request(rendering)
     names = [] if request.everything else list(SCENES)
     ladders = frozenset() if quick else LADDERS
-    job = jobs.Job(request, figures, with_cost=True, fresh=fresh, within=within, ladders=ladders)
+    job = jobs.Job(request, figures, with_causes=True, fresh=fresh, within=within, ladders=ladders)
     rendered = jobs.pool(timeout, len(SCENES), workers, scheduler)
     further = _verified(output, names[VERIFIED_QUICKLY if quick else slice(None)], request, quick)
     batch.run(tuple(SCENES), output, job, rendered, further, jobs.open_page if is_opened else None)

@@ -162,7 +162,7 @@ def run(
             total = SCENE * len(places) + (FURTHER * len(further.tasks) if further else 0.0)
             try:
                 with progress.shown(total=total) as bar:
-                    stages = ("rendering", *(["causes"] if job.with_cost else ()))
+                    stages = ("rendering", *(["causes"] if job.with_causes else ()))
                     content = _compare(pool, batch, calls, bar, further, stages)
             except KeyboardInterrupt:
                 pool.end()

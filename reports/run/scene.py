@@ -73,7 +73,7 @@ def _compared(
     from comparisons.compare import compare
 
     begin = perf_counter()
-    comparison = compare(case.source, case.options, progress, case.command(), job.with_cost)
+    comparison = compare(case.source, case.options, progress, case.command(), job.with_causes)
     spent = _stages(comparison.record, perf_counter() - begin)
     study = None
     if case.word in job.ladders and comparison.causes:
@@ -128,7 +128,7 @@ def key_of(case: Case, job: Job) -> str | None:
     parts: dict[str, Any] = {
         "record": VERSION,
         "metrics": list(METRICS),
-        "why, figures, ladder": (job.with_cost, job.figures, case.word in job.ladders),
+        "why, figures, ladder": (job.with_causes, job.figures, case.word in job.ladders),
         "options": plain(case.options),
         "variant": case.variant,
         "versions": versions(),
