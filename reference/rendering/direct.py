@@ -25,7 +25,7 @@ Parameter           Type (default)      Meaning
 """
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import drjit as dr
@@ -37,17 +37,14 @@ from heuristic.convention import Colour, Interaction, Mask, Scene
 UNROLLED = 16
 """Lights of a kind that have their own code."""
 
-_registered: set[str] = set()
-
 
 def register() -> None:
     """Register the plugin with Mitsuba for the current variant. Calling it again does nothing."""
-    if mi.variant() not in _registered:
-        _define()
-        _registered.add(mi.variant())
+    _define(mi.variant())
 
 
-def _define():
+@cache
+def _define(_variant: str) -> None:
     class DirectAllIntegrator(mi.SamplingIntegrator):
         """See the module's docstring."""
 

@@ -18,6 +18,7 @@ T. N. L. Patterson, *Randomization of number theoretic methods for multiple inte
 the rotation.
 """
 
+from functools import cache
 from math import isqrt
 
 import drjit as dr
@@ -33,14 +34,10 @@ STOCK_SAMPLER = "independent"
 _ALONG, _ACROSS = 0x68BC21EB, 0x02E5BE93
 """Odd numbers that distinguish the permutations of one dimension."""
 
-_registered: set[str] = set()
-
 
 def register() -> None:
     """Register the plugin with Mitsuba for the current variant. Calling it again does nothing."""
-    if mi.variant() not in _registered:
-        _define()
-        _registered.add(mi.variant())
+    _define(mi.variant())
 
 
 def with_sampler(graph: Graph, plugin: str) -> Graph:
@@ -60,7 +57,8 @@ def cells(count: int) -> tuple[int, int]:
     return small, count // small
 
 
-def _define() -> None:
+@cache
+def _define(_variant: str) -> None:
     class RotatedMultijitter(mi.Sampler):
         """See the module's docstring."""
 
