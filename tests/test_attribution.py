@@ -100,9 +100,7 @@ def true(value):
 
 
 @pytest.mark.guarantee(
-    "attribution",
-    "Errors behind attributions exclude noise: none of it remains where nothing differs, and at "
-    "most two fifths near the noise.",
+    "attribution", "Attributed errors exclude noise; near its size, two fifths of it may remain."
 )
 @pytest.mark.parametrize("draw", DRAWN.values(), ids=DRAWN)
 def test_noise_is_taken_out_at_any_departure(draw):

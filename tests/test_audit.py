@@ -224,7 +224,7 @@ def test_a_density_that_is_wrong_is_found(rgb):
 
 
 @pytest.mark.guarantee(
-    "kernel", "Every built-in heuristic and example shader passes the hard cases of an audit."
+    "kernel", "Every built-in heuristic and example shader passes an audit's hard cases."
 )
 def test_every_heuristic_goes_through_the_hard_cases(rgb):
     for name in [*sorted(HEURISTICS), *SHADERS]:

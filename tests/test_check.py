@@ -117,10 +117,7 @@ def check_alarms(make, resolution, count, levels):
     assert 0.02 < small / noisy < 0.08
 
 
-@pytest.mark.guarantee(
-    "checks",
-    "Checks of an unchanged scene raise alarms no more often than stated.",
-)
+@pytest.mark.guarantee("checks", "Unchanged scenes raise alarms no more often than stated.")
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["plastic-spheres", "cornell-box"])
 def test_200_checks_of_an_unchanged_scene_alarm_no_more_than_stated(rgb, name):

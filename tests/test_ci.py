@@ -35,10 +35,7 @@ SMALL = ("--spp", 4, "--resolution", "12x8")
 # --- Gates -----------------------------------------------------------------------------------
 
 
-@pytest.mark.guarantee(
-    "checks",
-    "A gate passes only if noise is no reason, and fails only if noise is none.",
-)
+@pytest.mark.guarantee("checks", "A gate neither passes nor fails because of noise.")
 def test_a_gate_is_undecided_where_noise_may_be_the_reason():
     share = VisibleShare(threshold=2.0, value=0.4, low=0.3, high=0.5)
     lead = structs.replace(records.summary(3.0), visible=(share,))
@@ -103,9 +100,7 @@ def test_what_moved_fails_with_a_table_and_the_others_are_checked(failure):
     assert re.search(r"error: .*broken\.json: this is not JSON", failure.messages)
 
 
-@pytest.mark.guarantee(
-    "checks", "A failure writes one page: before, now, where, on which object, and why."
-)
+@pytest.mark.guarantee("checks", "A failure writes one page: before, now, where, and why.")
 def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
     html = (failure.out / "index.html").read_text(encoding="utf-8")
     for part in (
@@ -277,10 +272,7 @@ def test_causes_name_the_half_the_place_the_colour_and_the_object():
 # --- Files of others -------------------------------------------------------------------------
 
 
-@pytest.mark.guarantee(
-    "runs",
-    "--junit, --summary and --images replace nothing that fotismos did not make, and no input.",
-)
+@pytest.mark.guarantee("runs", "`--junit`, `--summary` and `--images` replace no file of yours.")
 @pytest.mark.parametrize(
     ("option", "name"),
     [("--junit", "a.xml"), ("--summary", "a.xml"), ("--junit", "mine.txt"), ("--summary", "b.md")],
@@ -339,9 +331,7 @@ def test_a_report_replaces_an_earlier_one_and_a_summary_is_appended(run, tmp_pat
 
 
 @pytest.mark.guarantee(
-    "runs",
-    "Names and messages from a scene reach a terminal, a CI log, Markdown and spreadsheets as"
-    " text: no escape sequence, command, markup or formula of theirs is executed.",
+    "runs", "Names from a scene reach terminals, CI logs and tables as mere text."
 )
 def test_hostile_names_are_printed_as_text(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

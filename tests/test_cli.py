@@ -214,7 +214,7 @@ def test_odd_surroundings_are_one_message(shell, expected, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.guarantee("runs", "`--help` only helps: nothing is installed, written or rendered.")
+@pytest.mark.guarantee("runs", "`--help` installs, writes and renders nothing.")
 @pytest.mark.parametrize("command", ["", "docs", "test", "bench", "lint", "compare"])
 def test_help_only_helps(command, tmp_path):
     """In a copy without an installation, and without a network to install from."""

@@ -93,8 +93,7 @@ def _estimate(made, integrator, stream):
 
 
 @pytest.mark.guarantee(
-    "reference",
-    "Light found through a mirror or glass counts as in Mitsuba's `path`.",
+    "reference", "Light through a mirror or glass counts as in Mitsuba's `path`."
 )
 @pytest.mark.parametrize(("ball", "light"), CASES)
 def test_a_light_found_by_way_of_a_ball_counts_as_in_mitsubas_path(rgb, ball, light):

@@ -23,7 +23,7 @@ def mistakes_of(path):
         return (str(error),)
 
 
-@pytest.mark.guarantee("runs", "Well-known shader mistakes are each named in words.")
+@pytest.mark.guarantee("runs", "Well-known shader mistakes are named in words.")
 @pytest.mark.parametrize("suffix", LANGUAGES)
 def test_wrong_shaders_are_told_what_is_wrong(rgb, tmp_path, suffix):
     page = (SHADERS.parent / "shaders.md").read_text(encoding="utf-8")

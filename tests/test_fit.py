@@ -155,7 +155,7 @@ def test_the_derivatives_are_those_of_central_differences_in_double_precision(fo
 # --- The search -----------------------------------------------------------------------------------
 
 
-@pytest.mark.guarantee("pairing", "A fit recovers the parameters that an image was made with.")
+@pytest.mark.guarantee("pairing", "A fit recovers the parameters that made an image.")
 @pytest.mark.parametrize("loss", LOSSES)
 @pytest.mark.parametrize("form", ["phong", "blinn"])
 def test_known_parameters_are_recovered_from_an_image_made_with_them(form, loss, rgb):

@@ -21,7 +21,7 @@ def test_no_input_gives_a_nan_an_infinity_or_a_large_error(check):
 
 
 @pytest.mark.guarantee(
-    "kernel", "None of a hundred million random inputs gives a NaN, an infinity or a large error."
+    "kernel", "No random input of a hundred million gives NaN, infinity or a large error."
 )
 @pytest.mark.slow
 @CHECKS

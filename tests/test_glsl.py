@@ -56,10 +56,7 @@ def returning(expression):
 
 
 @opengl
-@pytest.mark.guarantee(
-    "kernel",
-    "Phong's model, written in GLSL and run by OpenGL, gives the kernel's image to 1e-5.",
-)
+@pytest.mark.guarantee("kernel", "Phong's model in GLSL gives the kernel's image to 1e-5.")
 def test_phong_in_glsl_is_phong():
     spectral = {"variant": "llvm_ad_spectral", "heuristic_variant": "llvm_ad_rgb"}
     for scene, more in (

@@ -24,8 +24,7 @@ def record():
 
 
 @pytest.mark.guarantee(
-    "kernel",
-    "Hard cases stay within an error bound that the formula as printed breaks.",
+    "kernel", "Hard cases stay within an error bound that the printed formula breaks."
 )
 def test_ours_keeps_the_bound(record):
     """The naive formula violates it, which shows that the case is hard, and that this can fail."""

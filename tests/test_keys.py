@@ -142,9 +142,7 @@ def frame(size):
 
 
 @pytest.mark.guarantee(
-    "runs",
-    "A finished scene is rendered again once a file changes that Mitsuba read for it, wherever it"
-    " was found; one in Python always is.",
+    "runs", "A finished scene is rendered again once a file that Mitsuba read changes."
 )
 def test_a_finished_scene_is_rendered_again_once_a_file_changes(run, folder):
     name, write, element = KINDS["texture"]

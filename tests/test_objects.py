@@ -54,8 +54,7 @@ def compared():
 
 
 @pytest.mark.guarantee(
-    "attribution",
-    "Every shape and every region is listed with its share of the departure, and its cause.",
+    "attribution", "Every shape and region has its share of the departure, and its cause."
 )
 def test_the_floor_carries_the_shadow_and_the_sphere_nothing(compared):
     record = compared.record
@@ -71,7 +70,7 @@ def test_the_floor_carries_the_shadow_and_the_sphere_nothing(compared):
 
 
 @pytest.mark.guarantee(
-    "attribution", "What an effect removes on each shape averages to what it removes in the image."
+    "attribution", "What an effect removes on all shapes averages to what it removes."
 )
 def test_what_is_removed_on_shapes_averages_to_that_of_the_image(compared):
     why = compared.record.why

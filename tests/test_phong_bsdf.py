@@ -278,11 +278,7 @@ def test_values_that_mean_nothing_are_refused(rgb):
         mi.load_dict(phong(k_d=0.5, shininess=9))
 
 
-@pytest.mark.guarantee(
-    "kernel",
-    "A coefficient or exponent that is edited below 0 through `mi.traverse` is refused, never a"
-    " NaN.",
-)
+@pytest.mark.guarantee("kernel", "A coefficient or exponent edited below 0 is refused.")
 def test_a_value_edited_below_zero_is_refused(rgb):
     rgb_value = {"type": "rgb", "value": [0.5, 0.4, 0.3]}
     for name, value in {"k_d.value": mi.Color3f(0.5, -0.3, 0.2), "n": -2.0}.items():

@@ -53,10 +53,7 @@ def cornell():
 # --- The same departure --------------------------------------------------------------------------
 
 
-@pytest.mark.guarantee(
-    "runs",
-    "A picture from another run has that run's departure, to the file's precision.",
-)
+@pytest.mark.guarantee("runs", "A picture from another run has that run's departure.")
 def test_a_picture_of_another_run_has_its_departure(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     scene = "plastic-spheres"
@@ -180,10 +177,7 @@ ODD = {
 }
 
 
-@pytest.mark.guarantee(
-    "runs",
-    "The comparison names each of twelve mistakes in how a picture was made.",
-)
+@pytest.mark.guarantee("runs", "Each of twelve mistakes in how a picture was made is named.")
 def test_mistakes_in_a_picture_are_named(rgb, tmp_path, cornell):
     """And nothing of the reference of another seed, or the kernel, whose shading alone is wrong."""
     for name, (spoil, message) in ODD.items():

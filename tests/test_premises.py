@@ -43,11 +43,7 @@ def means(description):
     return found
 
 
-@pytest.mark.guarantee(
-    "plans",
-    "A pruning rule is rejected if a premise is not known to hold, as in the scenes that it "
-    "once got wrong.",
-)
+@pytest.mark.guarantee("plans", "A rule is rejected if a premise is not known to hold.")
 @pytest.mark.parametrize("name", SCENES)
 def test_the_plan_of_a_scene_that_was_planned_wrongly_is_right(rgb, name):
     (planned, error), (stock, other) = means(SCENES[name]())

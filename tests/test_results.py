@@ -32,8 +32,7 @@ def rendered(run, scene_file, out, *more):
 
 
 @pytest.mark.guarantee(
-    "runs",
-    "A finished scene is rendered again once fotismos itself changes, or a file of its results.",
+    "runs", "A finished scene is rendered again once fotismos or its results change."
 )
 def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
     run, scene_file, tmp_path, monkeypatch
@@ -139,9 +138,7 @@ def test_files_of_others_stay_and_ours_are_replaced(tmp_path):
     assert (out / "index.html").read_text() == "new"
 
 
-@pytest.mark.guarantee(
-    "runs", "Nothing that fotismos did not make is overwritten or deleted in an output folder."
-)
+@pytest.mark.guarantee("runs", "Nothing of yours in an output folder is overwritten or deleted.")
 @pytest.mark.parametrize(
     ("name", "make"),
     [
@@ -212,7 +209,7 @@ with results.hold(sys.argv[1], "fotismos compare mine.xml"):
 """
 
 
-@pytest.mark.guarantee("runs", "Two commands never write to one folder: the second says who does.")
+@pytest.mark.guarantee("runs", "Two commands never write to one folder.")
 def test_two_commands_in_one_folder_are_refused(tmp_path):
     words = [sys.executable, "-P", "-c", HOLD, str(tmp_path)]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -280,9 +277,7 @@ def test_what_a_user_names_is_written_in_place_of_a_file_or_into_a_device(tmp_pa
         atomic.put(tmp_path / ("x" * 300), "no file")
 
 
-@pytest.mark.guarantee(
-    "runs", "If a write fails, the earlier file stays whole, and no partial one is left."
-)
+@pytest.mark.guarantee("runs", "If a write fails, the earlier file stays whole.")
 @pytest.mark.parametrize("call", ["write_bytes", "replace"])
 def test_a_write_that_fails_leaves_the_earlier_file(call, tmp_path, monkeypatch):
     atomic.write(tmp_path / "a", "old")

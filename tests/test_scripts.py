@@ -44,10 +44,7 @@ DEEDS = {
 
 
 @pytest.mark.thorough
-@pytest.mark.guarantee(
-    "runs",
-    "Changes that a scene's script makes to its process affect no other scene.",
-)
+@pytest.mark.guarantee("runs", "A scene's script affects no other scene.")
 def test_what_scripts_do_reaches_no_other_scene(run, apart, tmp_path):
     folder, out = tmp_path / "scenes", tmp_path / "out"
     folder.mkdir()

@@ -58,7 +58,7 @@ def random_spots(kind, count=12):
             yield {"type": kind, "cutoff": cutoff, "exponent": exponent, "k0": 0.0, "k2": 1.0}
 
 
-@pytest.mark.guarantee("pairing", "Spots keep their flux to 1e-4, in both directions.")
+@pytest.mark.guarantee("pairing", "Spots keep their flux to 1e-4, both ways.")
 @pytest.mark.parametrize("kind", ["spot", "heuristic_spot"])
 def test_spots_keep_their_flux_both_ways(rgb, kind):
     """To 1e-4, by numeric integration of what the plugins of both halves send."""

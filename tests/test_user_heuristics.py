@@ -38,10 +38,7 @@ GREY = "def shade(point):\n    return point.ambient * 0 + 0.25\n"
 # --- The same as what is built in ----------------------------------------------------------------
 
 
-@pytest.mark.guarantee(
-    "kernel",
-    "Phong's model, written as a function in a file, gives the kernel's image to 1e-5.",
-)
+@pytest.mark.guarantee("kernel", "Phong's model in a Python file gives the kernel's image to 1e-5.")
 def test_phong_in_a_file_is_phong():
     scenes = [(name, {"interpolation": kind}) for name, kind in (
         ("fig-8-9", "phong"), ("fig-8-11-n3", "gouraud"), ("fig-6-5-m40", "flat"),
@@ -273,8 +270,7 @@ MISTAKES = {
 
 
 @pytest.mark.guarantee(
-    "runs",
-    "A mistake in your heuristic gives one message, with the file, the line and the remedy.",
+    "runs", "A mistake in your heuristic is one message with file, line and remedy."
 )
 def test_a_mistake_is_named_with_file_and_line(rgb, written):
     for text, message in MISTAKES.values():

@@ -109,9 +109,7 @@ RULES = {
 }  # fmt: skip
 
 
-@pytest.mark.guarantee(
-    "attribution", "What a verdict names as a remedy passes the criterion that the scene failed."
-)
+@pytest.mark.guarantee("attribution", "A remedy passes the criterion that the scene failed.")
 @pytest.mark.parametrize("rule", RULES)
 def test_each_rule_has_its_sentence(rule):
     record, cost, threshold, expected = RULES[rule]

@@ -37,10 +37,7 @@ def without_noise(test, passes):
     return raw.mean(), debiased(LEADING, test, found.grouped, DEFAULT_VIEWING, raw)
 
 
-@pytest.mark.guarantee(
-    "means",
-    "Intervals of mean ΔE2000 contain the truth at departures of 0, 1 and 5.",
-)
+@pytest.mark.guarantee("means", "Intervals of mean ΔE2000 contain the truth at 0, 1 and 5.")
 @pytest.mark.parametrize("count", [4, 16])
 @pytest.mark.parametrize(("factor", "about"), [(1.0, 0), (1.045, 1), (1.245, 5)])
 def test_the_mean_without_noise_has_little_bias_and_an_honest_interval(rgb, factor, about, count):
@@ -63,8 +60,7 @@ def test_the_mean_without_noise_has_little_bias_and_an_honest_interval(rgb, fact
 
 
 @pytest.mark.guarantee(
-    "means",
-    "Intervals of the share of visible pixels contain the truth, also in skewed noise.",
+    "means", "Intervals of the visible share contain the truth, in skewed noise too."
 )
 @pytest.mark.parametrize("kind", ["lognormal", "poisson", "rare"])
 def test_shares_of_visible_pixels_are_within_their_intervals(rgb, kind):
@@ -97,10 +93,7 @@ def test_shares_of_visible_pixels_are_within_their_intervals(rgb, kind):
     assert np.mean(inside) >= 0.93
 
 
-@pytest.mark.guarantee(
-    "means",
-    "A brightness error of a tenth on plain grey does not pass as noise.",
-)
+@pytest.mark.guarantee("means", "A brightness error of a tenth does not pass as noise.")
 @pytest.mark.parametrize("spread", [0.3, 0.45])
 def test_a_tenth_more_brightness_is_no_noise_on_a_plain_grey(rgb, spread):
     """The mean is at its floor, up to 1.1 times, which says nothing: noise hides the departure."""

@@ -47,10 +47,7 @@ def values(report):
     return map_, np.broadcast_to(np.arange(HEIGHT)[:, None] > 0, map_.shape)
 
 
-@pytest.mark.guarantee(
-    "means",
-    "A rectangle drawn in the picture gets its mean, its share and its cause.",
-)
+@pytest.mark.guarantee("means", "A rectangle drawn in the picture gets its mean, share and cause.")
 def test_a_rectangle_has_the_numbers_of_its_pixels_and_its_address(visitor, report):
     page = visitor.open(SCENE)
     box = visitor.canvas().bounding_box()

@@ -29,11 +29,7 @@ def require_agreement(found):
     np.testing.assert_array_less(np.abs(found.value), found.half_width)
 
 
-@pytest.mark.guarantee(
-    "reference",
-    "At default settings the reference matches 25 closed forms (docs/witnesses.md); a bias of"
-    " 0.3 % fails.",
-)
+@pytest.mark.guarantee("reference", "The reference matches 25 closed forms; a bias of 0.3 % fails.")
 @cases
 def test_the_reference_is_the_closed_form(rgb, witness):
     """In the mean over the image, known to the stated precision, and over its blocks."""

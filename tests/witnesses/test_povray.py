@@ -65,7 +65,7 @@ def require_agreement(name, folder):
 
 
 @pytest.mark.guarantee(
-    "kernel", "The figures of chapter 8 match POV-Ray's pixel by pixel, to half-float rounding."
+    "kernel", "Chapter 8's figures match POV-Ray's to half-float rounding, pixel by pixel."
 )
 @pytest.mark.parametrize("name", FIGURES + OTHERS)
 def test_a_figure_is_that_of_povray_to_half_float_rounding(rgb, name, tmp_path):
