@@ -188,8 +188,8 @@ def _stand_ins(records):
     said = "; ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
     left = f" Never: {'; '.join(never)}." if never else ""
     left += (
-        " Measured in version 0.2, lost in all scenes and gone since: spherical harmonics; ambient"
-        " occlusion; ambient occlusion from the depth image."
+        " Measured in version 0.2, lost in all scenes but one and gone since: spherical harmonics;"
+        " ambient occlusion; ambient occlusion from the depth image; filtered shadow map."
     )
     return f"Stand-ins on the front, by the number of scenes: {said}.{left}"
 

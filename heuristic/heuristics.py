@@ -322,8 +322,7 @@ HEURISTICS: Declared[Heuristic] = Declared(
     GROUP,
     phong="heuristic.heuristics:PHONG",
     blinn="heuristic.heuristics:BLINN",
-    shadow_map="heuristic.shadow_maps:HARD",
-    soft_shadow_map="heuristic.shadow_maps:SOFT",
+    shadow_map="heuristic.shadow_maps:MAP",
     mean_ambient="heuristic.indirect_light:MEAN",
     hemisphere_ambient="heuristic.indirect_light:HEMISPHERE",
 )

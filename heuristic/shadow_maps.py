@@ -1,20 +1,15 @@
-"""Shadows from depth images of the lamps: hard ones, and soft ones by percentage-closer filtering.
+"""Shadows from depth images of the lamps.
 
 Williams, "Casting curved shadows on curved surfaces" (1978): a point is lit where the depth image
-of the lamp has nothing nearer. Reeves, Salesin and Cook, "Rendering antialiased shadows with depth
-maps" (1987): the share of nearby texels that say so is the share of the light that arrives. It
-softens every edge by the same width in the image, whereas a lamp's penumbra grows with the distance
-from the occluder.
+of the lamp has nothing nearer.
 
 A lamp with a position has one depth image over all directions, on the six sides of a cube; parallel
 light has one over the scene's projected disc. It is traced through the centres of its texels. A
 point is looked up from slightly above its surface. On a plane the distance changes by ``w tan a``
 over a width ``w`` across the light, which arrives at an angle ``a`` to the normal; a height of ``w
-sin a`` compensates. To keep planes from hiding themselves, ``w`` is half the diagonal of the
-averaged area: the texel plus the filter.
+sin a`` compensates. To keep planes from hiding themselves, ``w`` is half the diagonal of a texel.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,9 +24,6 @@ from heuristic.lights import FAR, DirectionalLight
 
 LAMPS = 16
 """Lamps with a depth image, at most."""
-
-TAPS = 4
-"""Texels along each side of the averaged square."""
 
 LEAST = 1e-4
 """Share of a distance by which a lookup may exceed the image's: single precision."""
@@ -61,27 +53,17 @@ class DepthImage:
             return position - self.centre
         return self.frame.to_local(position - self.centre) + mi.Vector3f(0, 0, 1) * self.radius
 
-    def distance(self, offset: Any) -> Any:
-        """Return the distance of a point from the lamp."""
-        return dr.norm(offset) if self.frame is None else offset.z
-
-    def texel(self, distance: Any) -> Any:
-        """Return the width of a texel at a distance, in units of the scene."""
-        return (distance if self.frame is None else self.radius) * (2 / self.resolution)
-
-    def depth(self, offset: Any, frame: Any, u: float, v: float) -> Any:
-        """Return the image's value ``u`` and ``v`` texels away from a point's ``offset``."""
+    def read(self, offset: Any) -> tuple[Any, Any, Any]:
+        """Return a point's distance from the lamp, the width of a texel there, and its number."""
         size = self.resolution
         if self.frame is None:
-            place = offset + (frame.s * u + frame.t * v) * self.texel(dr.norm(offset))
-            return dr.gather(mi.Float, self.depths, _cube_texel(place, size))
+            distance = dr.norm(offset)
+            return distance, distance * (2 / size), _cube_texel(offset, size)
         x, y = (
-            dr.clip(
-                mi.Int32(dr.floor((place / self.radius + 1) * (size / 2) + beside)), 0, size - 1
-            )
-            for place, beside in ((offset.x, u), (offset.y, v))
+            dr.clip(mi.Int32(dr.floor((place / self.radius + 1) * (size / 2))), 0, size - 1)
+            for place in (offset.x, offset.y)
         )
-        return dr.gather(mi.Float, self.depths, mi.UInt32(y * size + x))
+        return offset.z, self.radius * (2 / size), mi.UInt32(y * size + x)
 
 
 def light_map(scene: Any, light: Any, resolution: int) -> DepthImage:
@@ -178,42 +160,23 @@ def _lamps(scene: Any) -> list[Any]:
     return [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
 
 
-def hard(point: Point) -> Array:
+def shade(point: Point) -> Array:
     """Return the chapters' model, with shadows from the lamps' depth images."""
-    return _shaded(point, [(0.0, 0.0)], 0.0)
-
-
-def soft(point: Point) -> Array:
-    """Return the chapters' model, with the unhidden share of each lamp's light."""
-    radius = point.parameters.radius
-    places = [radius * (2 * (tap + 0.5) / TAPS - 1) for tap in range(TAPS)]
-    return _shaded(point, [(u, v) for u in places for v in places], 1.5 * radius)
-
-
-def _shaded(point: Point, taps: Sequence[tuple], width: Any) -> Array:
-    """Return the sum over lamps, each with its share; ``width`` is half the filter's diagonal."""
     colour = point.textbook(lights=[])
     bare = replace(point.arguments.material, k_i=0, k_a=0)
-    for light, depths in zip(point.arguments.lights, point.prepared, strict=True):
+    for light, image in zip(point.arguments.lights, point.prepared, strict=True):
         own = point.textbook(lights=[light], material=bare, ambient=0, visible=None)
-        colour = colour + own * _share(point, light, depths, taps, width)
+        colour = colour + dr.select(_is_lit(point, light, image), own, 0)
     return colour
 
 
-def _share(point: Point, light: Any, depths: Any, taps: Sequence[tuple], width: Any) -> Array:
-    """Return the share of a lamp's light that its image lets through."""
-    toward = light.illuminate(point.position).toward
-    cosine = dr.dot(point.normal, toward)
+def _is_lit(point: Point, light: Any, image: DepthImage) -> Any:
+    cosine = dr.dot(point.normal, light.illuminate(point.position).toward)
     sine = dr.maximum(dr.sqrt(dr.maximum(1 - dr.square(cosine), 0)), SMALLEST_SINE)
-    texel = depths.texel(depths.distance(depths.offset(point.position)))
-    height = (point.parameters.bias + width) * texel * sine
-    offset = depths.offset(point.position + point.normal * height)
-    distance = depths.distance(offset) * (1 - LEAST)
-    frame = mi.Frame3f(dr.normalize(mi.Vector3f(offset)))
-    share = mi.Float(0)
-    for u, v in taps:
-        share += dr.select(distance <= depths.depth(offset, frame, u, v), 1.0, 0.0)
-    return share / len(taps)
+    _, width, _ = image.read(image.offset(point.position))
+    height = point.parameters.bias * width * sine
+    distance, _, texel = image.read(image.offset(point.position + point.normal * height))
+    return distance * (1 - LEAST) <= dr.gather(mi.Float, image.depths, texel)
 
 
 RESOLUTION = Parameter("resolution", 512, 16, 2048, prepared=True)
@@ -222,19 +185,12 @@ RESOLUTION = Parameter("resolution", 512, 16, 2048, prepared=True)
 BIAS = Parameter("bias", 0.75, 0.0, 8.0)
 """Height above the surface, in texels: half a diagonal is enough for planes."""
 
-RADIUS = Parameter("radius", 2.0, 0.25, 16.0)
-"""Half the side of the averaged square, in texels."""
-
-_NEEDS = frozenset(INPUTS) - {"uv", "visible"}
-HARD = Heuristic(
-    "shadow-map", hard, "shadow map", _NEEDS, (RESOLUTION, BIAS), prepare, refuse=refuse
-)
-SOFT = Heuristic(
-    "soft-shadow-map",
-    soft,
-    "filtered shadow map",
-    _NEEDS,
-    (RESOLUTION, BIAS, RADIUS),
+MAP = Heuristic(
+    "shadow-map",
+    shade,
+    "shadow map",
+    frozenset(INPUTS) - {"uv", "visible"},
+    (RESOLUTION, BIAS),
     prepare,
     refuse=refuse,
 )

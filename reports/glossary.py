@@ -129,9 +129,7 @@ METHODS: Terms = {
     ("Gouraud kernel",): "The textbook’s model at the corners of polygons, interpolated between.",
     ("Phong kernel",): "The textbook’s model at each point, with interpolated normals.",
     ("kernel with shadows",): "The textbook’s model with a shadow ray to each light.",
-    ("shadow map", "filtered shadow map"): (
-        "Shadows from a depth image as each light sees it; filtered: with soft edges."
-    ),
+    ("shadow map",): "Shadows from a depth image as each light sees it.",
     ("constant ambient", "hemisphere ambient"): (
         "Ambient light that stands in for light between surfaces: one colour, or two colours for up"
         " and down."

@@ -1,6 +1,5 @@
 """Approximations of light transport: closed forms, Mitsuba's path, and the kernel's shadow rays."""
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from tests.random_scenes import is_sound, random_scene
 from tests.sky import sky_above, two_colours
 
 AMBIENT = ("mean-ambient", "hemisphere-ambient")
-MODELS = (*AMBIENT, "shadow-map", "soft-shadow-map")
+MODELS = (*AMBIENT, "shadow-map")
 
 
 def looking(origin, target, up=(0, 0, 1), size=32, fov=40.0, **others):
@@ -210,62 +209,28 @@ def test_no_plane_hides_itself_with_the_default_bias(rgb):
         for angle in np.deg2rad((0, 60, 87)):
             scene = floor_under(kind, float(angle))
             plain = image(scene, "phong", 1)
-            for model, resolution in (("shadow-map", 32), ("soft-shadow-map", 256)):
-                found = image(scene, model, 1, resolution=resolution)
-                np.testing.assert_allclose(found, plain, rtol=1e-5)
+            found = image(scene, "shadow-map", 1, resolution=32)
+            np.testing.assert_allclose(found, plain, rtol=1e-5)
     scene = floor_under("point", float(np.deg2rad(60)))
     bare = image(scene, "shadow-map", 1, bias=0.0)
     assert np.mean(bare < 0.5 * image(scene, "phong", 1)) > 0.1
-
-
-def test_an_edge_is_a_ramp_as_wide_as_the_filter(rgb):
-    """A roof over half of a floor, under light from straight above."""
-    bsdf = {"type": "phong", "k_d": 1.0, "twosided": True}
-    roof = mi.ScalarTransform4f().translate((-1, 0, 0.5))
-    scene = mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": {"type": "heuristic"},
-            "sensor": looking((0.5, -3, 0.45), (0.2, 0, 0)),
-            "floor": {"type": "rectangle", "bsdf": bsdf},
-            "roof": {"type": "rectangle", "to_world": roof, "bsdf": bsdf},
-            "lamp": {"type": "heuristic_directional", "direction": (0, 0, -1)},
-        }
-    )
-    taps, radius = 4, 8.0
-    lamp = scene.emitters()[0].light(dr.zeros(mi.SurfaceInteraction3f))
-    depths = shadow_maps.light_map(scene, lamp, 256)
-    width = float(depths.texel(mi.Float(1.0))[0])
-    x = np.linspace(-12, 12, 97) * width
-    offset = depths.offset(mi.Point3f(mi.Float(x), 0.1, 0.0))
-    places = [radius * (2 * (tap + 0.5) / taps - 1) for tap in range(taps)]
-    frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
-    reached = [
-        np.array(depths.distance(offset) * 0.999 <= depths.depth(offset, frame, u, v))
-        for u in places
-        for v in places
-    ]
-    # Which of the map's axes is which does not matter: a row of taps is as wide as a column.
-    expected = np.clip(0.5 + x / width / (2 * radius), 0, 1)
-    assert abs(np.mean(reached, axis=0) - expected).max() <= 1 / taps + 1e-6
 
 
 # --- All of them ----------------------------------------------------------------------------------
 
 
 def test_a_scene_without_lamps_or_with_too_many_is_refused_with_the_reason(rgb):
-    for model, count, reason in (
-        ("shadow-map", 0, "it has no lamp"),
-        ("soft-shadow-map", 17, "it has 17 lamps, and at most 16 get a depth image"),
+    for count, reason in (
+        (0, "it has no lamp"),
+        (17, "it has 17 lamps, and at most 16 get a depth image"),
     ):
         given = integrating_sphere(0.5)
         lamp = given.pop("lamp")
         scene = mi.load_dict(given | {f"lamp{i}": lamp for i in range(count)})
         with pytest.raises(
-            InputError, match=f"heuristic {model} cannot shade this scene: {reason}"
+            InputError, match=f"heuristic shadow-map cannot shade this scene: {reason}"
         ):
-            image(scene, model)
-        assert named(model).refuse(scene)
+            image(scene, "shadow-map")
 
 
 @pytest.mark.parametrize(

@@ -147,7 +147,6 @@ def test_methods_stand_in_order_with_declared_ones_before_the_full_plan(rgb, dec
         ("Phong kernel",),
         ("kernel with shadows",),
         ("shadow map",),
-        ("filtered shadow map",),
         ("constant ambient",),
         ("hemisphere ambient",),
         ("phong BSDF, full transport",),

@@ -64,7 +64,6 @@ STAND_INS = tuple(
     )
     for name, heuristic, effects in (
         ("shadow map", "shadow-map", (OCCLUSION.label,)),
-        ("filtered shadow map", "soft-shadow-map", (OCCLUSION.label,)),
         ("constant ambient", "mean-ambient", _INDIRECT),
         ("hemisphere ambient", "hemisphere-ambient", _INDIRECT),
     )
