@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from msgspec import structs
 
-from comparisons import record
 from comparisons.comparison import (
     Comparison,
     ComparisonRecord,
@@ -21,6 +20,7 @@ from comparisons.comparison import (
     NoiseTarget,
     Significant,
     TimeSpent,
+    versions,
 )
 from comparisons.departure import marks, regions, statistics
 from comparisons.departure.blocks import bands
@@ -144,7 +144,7 @@ def _compare(
         interpolation=options.polygon_shading.value,
         seed=options.seed,
         resolution=(width, height),
-        plan=record.plan_record(ready, reference.spp * estimates.passes, estimates.passes),
+        plan=ready.plan_record(estimates.passes),
         viewing=options.viewing,
         pixels=Pixels(counted=int(images.counted.sum()), total=width * height),
         regions=regions.find(images.maps[LEADING.name], images.counted),
@@ -156,9 +156,9 @@ def _compare(
         ),
         unrepresentable=ready.pair.unrepresentable,
         integrator_given=ready.pair.integrator,
-        overridden=record.overridden(ready.pair, ready.plan, reference.spp * ready.passes),
-        warnings=(*(picture.odd if picture else ()), *record.warnings(ready)),
-        versions=record.versions(),
+        overridden=ready.overridden,
+        warnings=(*(picture.odd if picture else ()), *ready.warnings()),
+        versions=versions(),
         command=command,
         caution=caution,
         noise_target=estimates.stop,

@@ -1,17 +1,23 @@
-"""What a comparison returns: its record, ``comparison.json``, and its images."""
+"""What a comparison returns: its record, ``comparison.json``, its images, and its causes."""
 
 from __future__ import annotations
 
+import platform
 from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+import drjit as dr
 import numpy as np
 from msgspec import Meta
+from numpy.typing import NDArray
 
 from comparisons.departure.colour import Viewing
 from comparisons.departure.regions import ObjectShare, Region
 from comparisons.departure.statistics import RatioSummary, Summary
-from comparisons.why import Attribution, Causes
+from comparisons.processes.pool import cores
+from heuristic import __version__
 from reference.pairing.factors import Unrepresentable
 from reference.pairing.halves import Pairing
 from reference.pairing.prepare import Override
@@ -20,6 +26,8 @@ from reference.records import (
     VERSION,
     Amount,
     Count,
+    Estimated,
+    Machine,
     Pixels,
     Positive,
     Record,
@@ -32,6 +40,32 @@ from reference.rendering.renderer import Times
 
 if TYPE_CHECKING:
     from comparisons.pixel_terms import TermGrid
+
+
+LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a result depends on."""
+    found = {"fotismos": __version__, "python": platform.python_version()}
+    found |= {library: metadata.version(library) for library in LIBRARIES}
+    found["LLVM"] = ".".join(map(str, dr.detail.llvm_version()))
+    return found
+
+
+def machine() -> Machine:
+    """Return what times depend on."""
+    system = f"{platform.system()} {platform.machine()}"
+    return Machine(processor=_processor(), cores=cores(), system=system)
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor() or platform.machine()
 
 
 class Significant(Record):
@@ -81,6 +115,128 @@ class NoiseTarget(Record):
     reached: Amount
     stopped_by: Literal["target", "samples"]
     limit_spp: Annotated[int, Meta(ge=2, description="Samples per pixel that end a run.")]
+
+
+Effects = tuple[str, ...]
+"""Labels of effects, in their order."""
+
+
+class MeanError(Record):
+    """A mean ΔE2000 with its 95 % interval; without noise it may come out below 0."""
+
+    mean: float
+    low: float
+    high: float
+
+
+class Contribution(Record):
+    """What simulating one effect removes.
+
+    Attributes
+    ----------
+    effect
+        Its label.
+    removes
+        Mean ΔE2000 that it removes; negative if it increases the departure.
+    alone, last
+        The same if it is the first effect added, and the last.
+    sampling_error
+        Standard error of ``removes`` from drawing orders; 0 if all subsets were rendered.
+    """
+
+    effect: str
+    removes: Estimated
+    alone: float
+    last: float
+    sampling_error: Amount
+
+
+class ObjectContribution(Record):
+    """What each effect removes from the departure on one shape.
+
+    Weighted by their pixels, the values of all shapes average to those of the whole image.
+
+    Attributes
+    ----------
+    name
+        Id of the shape.
+    pixels
+        Number of counted pixels that see it.
+    share
+        Its part of the departure.
+    departure
+        Mean ΔE2000 of the heuristic half on it, without noise.
+    removes
+        Mean ΔE2000 that each effect removes there, in the order of the attribution's effects.
+    left
+        Mean ΔE2000 that remains there when all effects are simulated.
+    """
+
+    name: str
+    pixels: Size
+    share: float
+    departure: float
+    removes: tuple[Estimated, ...]
+    left: float
+
+
+class Hybrid(Record):
+    """An image in which some effects are simulated, and its mean ΔE2000 without noise."""
+
+    effects: Effects
+    error: float
+
+
+class Attribution(Record):
+    """What the effects remove from the departure of the heuristic half.
+
+    Attributes
+    ----------
+    effects
+        One contribution each. They and the closure add up to the departure.
+    departure
+        Mean ΔE2000 of the heuristic half, without noise.
+    closure
+        What remains with all effects simulated: only a fault can leave any.
+    implementation
+        Mean ΔE2000 between the kernel and its plugin under Mitsuba's direct light: rounding.
+    resolution, spp, replicates
+        Size of the images, samples per pixel of each replicate, and their number.
+    orders
+        Orders of the effects that were drawn; 0 if every subset was rendered.
+    hybrids
+        All images that were rendered, fewest effects first.
+    objects
+        What the effects remove on each shape.
+    """
+
+    effects: tuple[Contribution, ...]
+    departure: float
+    closure: MeanError
+    implementation: Amount
+    resolution: Resolution
+    spp: Size
+    replicates: Size
+    orders: int
+    hybrids: tuple[Hybrid, ...] = ()
+    objects: tuple[ObjectContribution, ...] = ()
+
+
+@dataclass(frozen=True)
+class Causes:
+    """The attribution of a departure, and where in the image the effects remove what.
+
+    ``maps`` are ``{effect: (H, W)}``, the ΔE2000 that each removes; with ``left``, what remains
+    when all are simulated, they add up to ``departure``. ``counted`` (H, W) are the pixels that
+    count. ``previews`` are ``{labels of the simulated effects: (f H, f W, 3)}``, linear.
+    """
+
+    record: Attribution
+    maps: dict[str, NDArray]
+    departure: NDArray
+    left: NDArray
+    counted: NDArray[np.bool_]
+    previews: dict[tuple[str, ...], NDArray]
 
 
 class PictureRecord(Record):

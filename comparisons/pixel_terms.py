@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.options import Options
-from comparisons.why import Colour, TermMaterial
 from heuristic import kernel, materials, terms, vectors
 from heuristic.convention import Scene
 from heuristic.errors import InputError
@@ -36,6 +35,24 @@ MOST_LIGHTS = 64
 
 MATERIALS = 256
 """Different sets of coefficients, at most: textures have more."""
+
+
+Colour = tuple[float, float, float]
+"""Linear RGB."""
+
+
+@dataclass(frozen=True)
+class TermMaterial:
+    """The kernel's material at some points; a lobe's normalisation is part of ``k_s``."""
+
+    name: str
+    k_i: Colour
+    k_a: Colour
+    k_d: Colour
+    k_s: Colour
+    n: float
+    form: str
+    ambient: Colour
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -11,13 +12,17 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from msgspec import structs
 
 from comparisons.options import Options
 from heuristic.convention import Scene
 from heuristic.errors import InputError
+from heuristic.heuristics import named
 from reference.pairing.halves import Pair
+from reference.pairing.prepare import Override
 from reference.planning.guard import examine_plan
 from reference.planning.plan import Guard, Plan, physical_integrator, plan, sampler
+from reference.planning.rules import SAMPLED_AS_HIT, loses_light
 from reference.rendering.gbuffer import GBuffer, gbuffer, image_size, require_surface
 from reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
 from reference.rendering.sampler import with_sampler
@@ -81,6 +86,52 @@ class Prepared:
     def counted(self) -> np.ndarray:
         """The pixels (H, W) that count: those that see a surface."""
         return self.surface.hit
+
+    @property
+    def overridden(self) -> tuple[Override, ...]:
+        """The settings of the scene that are not used, and what is used instead."""
+        pair, plan = self.pair, self.plan
+        used = f"{plan.sampler}, {self.reference.spp * self.passes} samples per pixel"
+        found = [
+            structs.replace(entry, used=used) if entry.what == "sampler" else entry
+            for entry in pair.overridden
+        ]
+        asks_for_volumes = pair.media or pair.integrator in ("volpath", "volpathmis")
+        if plan.stock_integrator == "volpath" and not asks_for_volumes:
+            used = "volpath: others err on curved shapes behind hidden lamps"
+            found.append(Override(what="integrator", given=pair.integrator or "path", used=used))
+        if pair.rr_depth is not None and pair.rr_depth != plan.rr_depth:
+            depths = {"given": str(pair.rr_depth), "used": str(plan.rr_depth)}
+            found.append(Override(what="rr_depth", **depths))
+        return tuple(found)
+
+    def plan_record(self, passes: int) -> Plan:
+        """Return the plan with the samples and passes that were rendered."""
+        spp, reads = self.reference.spp * passes, named(self.pair.shading).inputs
+        return structs.replace(
+            self.plan, spp=spp, passes=passes, heuristic_reads=reads, guard=self.guard
+        )
+
+    def warnings(self) -> Iterator[str]:
+        """Yield what is odd about a scene: its pair, its plan, or how Mitsuba renders it."""
+        yield from self.pair.warnings
+        if self.guard and self.guard.state == "disagreed":
+            yield (
+                f"The plan changes the light: {self.guard.words}. So everything was simulated. A"
+                " rule of pruning is wrong for this scene: please report it."
+            )
+        if loses_light(self.plan.integrator, self.pair):
+            yield (
+                "Mitsuba's path returns black for rays that pass straight through masks into the"
+                " background, and drops the light that the masks reflect: the reference is too dark"
+                " there. The integrator volpath is right."
+            )
+        for rule in self.plan.rules:
+            if rule.premise == SAMPLED_AS_HIT.sentence:
+                yield (
+                    f"{rule.evidence}, so the reference depends on how Mitsuba weights the two."
+                    " Give a mesh with face_normals, or a cylinder that is round and not mirrored."
+                )
 
 
 def prepare(source: Source, options: Options | None = None) -> Prepared:

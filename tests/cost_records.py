@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from msgspec import convert, structs
 
+from comparisons.comparison import Attribution
 from comparisons.cost.cost import Study
 from comparisons.cost.cost_record import Cost
 from comparisons.hybrids.attribution import Causes
-from comparisons.why import Attribution
 from reference.records import VERSION
 from tests import records
 

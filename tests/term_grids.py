@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from comparisons.pixel_terms import GridLight, TermGrid
-from comparisons.why import TermMaterial
+from comparisons.pixel_terms import GridLight, TermGrid, TermMaterial
 
 CELL = 4
 """Pixels along the sides of a cell."""

@@ -11,6 +11,7 @@ import pytest
 from msgspec import structs
 
 from comparisons.case import open_case
+from comparisons.comparison import MeanError
 from comparisons.cost import cost as studies
 from comparisons.cost import measure, methods, times
 from comparisons.cost.cost import cost
@@ -20,7 +21,6 @@ from comparisons.cost.methods import BUILT_IN, Ladder, declare
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.prepared import prepare
-from comparisons.why import MeanError
 from heuristic.errors import InputError
 from heuristic.heuristics import Interpolation
 from reference.rendering.sums import Accumulator

@@ -10,9 +10,9 @@ import pytest
 from msgspec import structs
 from PIL import Image
 
+from comparisons.comparison import MeanError
 from comparisons.cost.cost_record import EffectCost
 from comparisons.departure.metrics import METRICS, RATIO, drawn
-from comparisons.why import MeanError
 from heuristic.errors import InputError
 from reference.records import Estimated, plain
 from reports.files import images

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
+from comparisons.comparison import MeanError
 from comparisons.cost import times
 from comparisons.cost.cost_record import Method, Point
 from comparisons.cost.front import at_size, beats, fronted, sufficient
 from comparisons.cost.measure import QUICK, Effort, timed, tried
-from comparisons.why import MeanError
 from heuristic.errors import InputError
 from reference.records import Estimated
 from reference.rendering.renderer import passes

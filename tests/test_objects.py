@@ -5,12 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from comparisons import intervals
 from comparisons.case import open_case
 from comparisons.compare import compare
 from comparisons.departure import regions
 from comparisons.hybrids.attribution import by_object, named
 from comparisons.options import Options
+from reference.rendering import sums
 from reference.rendering.gbuffer import ObjectIds, gbuffer
 from tests import records
 from tests.test_physics import look_at
@@ -100,7 +100,7 @@ def test_intervals_on_shapes_tell_the_spread_of_replicates():
     assert (still.pixels, noisy.pixels) == (3, 2)
     assert still.removes[0].low == still.removes[0].high == 2.0
     error = spread.std(ddof=1) / np.sqrt(len(spread))
-    expected = intervals.student(spread.mean(), error, len(spread))
+    expected = sums.student(spread.mean(), error, len(spread))
     assert noisy.removes[0].value == pytest.approx(expected.value)
     assert noisy.removes[0].high == pytest.approx(expected.high)
 

@@ -66,7 +66,8 @@ def total_of(view):
     planes = unpacked(view.grid, view.tops)
     material = planes["material"]
     image = np.zeros((*material.shape, 3))
-    for number, found in enumerate(view.materials, 1):
+    for number, shown in enumerate(view.materials, 1):
+        found = pixel_terms.TermMaterial(**shown)
         here = (material == number)[..., None]
         k_d, k_s = map(np.array, (found.k_d, found.k_s))
         value = np.add(found.k_i, np.multiply(found.ambient, found.k_a))

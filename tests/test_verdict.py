@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import pytest
 from msgspec import structs
 
+from comparisons.comparison import MeanError
 from comparisons.cost import cost_record
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import VisibleShare
-from comparisons.why import MeanError
 from heuristic.heuristics import HEURISTICS, Interpolation, Point
 from reference.records import Estimated
 from reports import verdict

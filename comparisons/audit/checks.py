@@ -9,7 +9,6 @@ import mitsuba as mi
 import numpy as np
 from msgspec import Meta
 
-from comparisons import record
 from comparisons.audit import diagnosis, furnace
 from comparisons.audit.subjects import (
     INCIDENT,
@@ -18,6 +17,7 @@ from comparisons.audit.subjects import (
     ShadingSubject,
     Subject,
 )
+from comparisons.comparison import versions
 from heuristic import heuristics
 from reference.records import VERSION, Amount, Record, Versions
 
@@ -132,7 +132,7 @@ def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "
         faults=tuple(subject.faults),
         mistakes=diagnosis.describe(name) if kind == "heuristic" else (),
         command=command,
-        versions=record.versions(),
+        versions=versions(),
     )
 
 

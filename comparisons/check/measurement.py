@@ -20,12 +20,11 @@ import numpy as np
 from msgspec import Meta, structs
 from numpy.typing import NDArray
 
-from comparisons import record
 from comparisons.case import Case
+from comparisons.comparison import versions
 from comparisons.departure.colour import Array, Viewing
 from comparisons.departure.metrics import LEADING, METRICS, RATIO, log2_luminance_ratio
 from comparisons.departure.statistics import noise_floor
-from comparisons.intervals import jackknife_error
 from comparisons.options import Options
 from comparisons.prepared import guarded, require_light
 from heuristic import program
@@ -34,6 +33,7 @@ from reference import records
 from reference.pairing.prepare import film_size
 from reference.records import VERSION, Amount, Record, Versions, laid_out
 from reference.rendering.renderer import Progress, passes
+from reference.rendering.sums import jackknife_error
 from reference.scene.source import Source
 
 PASSES, MOST_PASSES = 16, 1024
@@ -285,7 +285,7 @@ def baseline_of(
             "record_version": VERSION,
             "scene": scene,
             "options": dict(sorted(options.items())),
-            "versions": record.versions(),
+            "versions": versions(),
             "images": images,
             **_rounded(records.plain(measured)),
         },

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 
-from comparisons import record
+from comparisons.comparison import Causes, machine, versions
 from comparisons.cost import times
 from comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
 from comparisons.cost.front import at_size, fronted, sufficient
@@ -29,7 +29,6 @@ from comparisons.cost.methods import FULL_PLAN
 from comparisons.departure.criterion import checked_threshold
 from comparisons.hybrids.attribution import find
 from comparisons.options import Options
-from comparisons.why import Causes
 from heuristic.errors import InputError
 from reference.pairing.prepare import film_size
 from reference.planning.plan import Guard
@@ -102,8 +101,8 @@ def cost(
         closure=known.record.closure,
         viewing=options.viewing,
         pixels=Pixels(counted=int(counted.sum()), total=counted.size),
-        machine=record.machine(),
-        versions=record.versions(),
+        machine=machine(),
+        versions=versions(),
         command=command,
         guard=ready.guard or Guard(),
         at=at,

@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from comparisons.comparison import Contribution, MeanError
 from comparisons.departure.colour import Viewing
-from comparisons.why import Contribution, MeanError
 from heuristic.heuristics import Interpolation
 from reference.planning.plan import Guard
 from reference.records import (

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 from msgspec import structs
 
+from comparisons.comparison import MeanError
 from comparisons.cost.cost_record import Point, TimedMethod
-from comparisons.why import MeanError
 from reference.records import Estimated
 
 Interval = Estimated | MeanError

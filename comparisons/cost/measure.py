@@ -20,6 +20,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
+from comparisons.comparison import MeanError
 from comparisons.cost import times
 from comparisons.cost.cost_record import Converged, Method, Point, TimedMethod
 from comparisons.cost.methods import Ladder, Step
@@ -28,7 +29,6 @@ from comparisons.departure.criterion import LIMIT
 from comparisons.departure.metrics import LEADING
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
-from comparisons.why import MeanError
 from heuristic.errors import InputError
 from reference.pairing.prepare import film_size
 from reference.records import Estimated

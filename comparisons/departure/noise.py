@@ -48,9 +48,8 @@ from numpy.typing import ArrayLike, NDArray
 from comparisons.departure.blocks import ratio
 from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import Distances, Metric, Pixelwise
-from comparisons.intervals import jackknife_error, student
 from reference.records import Positive, Record, Share
-from reference.rendering.sums import Grouped
+from reference.rendering.sums import Grouped, jackknife_error, student
 
 Array = NDArray[np.float64]
 

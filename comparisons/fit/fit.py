@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.comparison import versions
 from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import drawn
 from comparisons.departure.statistics import noise_floor
@@ -34,7 +35,6 @@ from comparisons.fit.model import OwnModel, PhongModel, Surface
 from comparisons.fit.search import COVERAGE, LOSSES, Objective, bounded_minimum, identify, search
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
-from comparisons.record import versions, warnings
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import PHONG, Heuristic, Interpolation, named
 from heuristic.materials import FORMS
@@ -144,7 +144,7 @@ def fit(
         pixels=Pixels(counted=int(rendered.counted.sum()), total=rendered.counted.size),
         fits=tuple(one for one, _, _ in fits),
         best=best,
-        warnings=tuple(warnings(ready)),
+        warnings=tuple(ready.warnings()),
         versions=versions(),
         time={"rendering_s": rendering, "fitting_s": perf_counter() - begin - rendering},
         command=command,

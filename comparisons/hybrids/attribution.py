@@ -24,8 +24,17 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from comparisons import intervals
-from comparisons.comparison import CAUSES, Comparison, ComparisonRecord
+from comparisons.comparison import (
+    CAUSES,
+    Attribution,
+    Causes,
+    Comparison,
+    ComparisonRecord,
+    Contribution,
+    Hybrid,
+    MeanError,
+    ObjectContribution,
+)
 from comparisons.departure.blocks import ratio
 from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import LEADING, delta_e_2000
@@ -41,12 +50,11 @@ from comparisons.hybrids.hybrids import (
 )
 from comparisons.options import Options
 from comparisons.prepared import Prepared
-from comparisons.why import Attribution, Causes, Contribution, Hybrid, MeanError, ObjectContribution
 from heuristic.errors import FotismosError
 from reference.planning.effects import Effect
 from reference.rendering.gbuffer import ObjectIds, gbuffer, image_size, require_surface, resize
 from reference.rendering.renderer import Progress, Renderer, Stream, passes
-from reference.rendering.sums import MEAN, Accumulator, block_numbers
+from reference.rendering.sums import MEAN, Accumulator, block_numbers, jackknifed
 from reference.scene.source import Source
 
 WIDTH = 48
@@ -215,14 +223,14 @@ def attribute(
     contributions = tuple(
         Contribution(
             effect=effect.label,
-            removes=intervals.jackknifed(removed[effect.label].mean(axis=1)),
+            removes=jackknifed(removed[effect.label].mean(axis=1)),
             alone=float((error(nothing) - error(frozenset({effect})))[0].mean()),
             last=float((error(everything - {effect}) - error(everything))[0].mean()),
             sampling_error=sampling_error,
         )
         for effect, sampling_error in zip(effects, sampling_errors, strict=True)
     )
-    closure = intervals.jackknifed(error(everything).mean(axis=1))
+    closure = jackknifed(error(everything).mean(axis=1))
     hybrids = [
         Hybrid(effects=labels(effects, each), error=float(found[0].mean()))
         for each, found in errors.items()
@@ -275,7 +283,7 @@ def by_object(
             pixels=one.pixels,
             share=one.share,
             departure=one.mean_dE2000,
-            removes=tuple(intervals.jackknifed(each[:, row]) for each in gains),
+            removes=tuple(jackknifed(each[:, row]) for each in gains),
             left=float(remaining[row]),
         )
         for row, one in enumerate(found)

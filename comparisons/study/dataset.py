@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from msgspec.structs import replace
 
 from comparisons.atomic import require_regular
+from comparisons.comparison import versions
 from comparisons.departure import statistics
 from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.departure.metrics import (
@@ -23,7 +24,6 @@ from comparisons.departure.metrics import (
     METRICS,
     RATIO,
 )
-from comparisons.record import versions
 from comparisons.study.design import OWN, StudyFile
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
 from heuristic.errors import InputError, unknown

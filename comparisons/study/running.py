@@ -17,9 +17,9 @@ import mitsuba as mi
 import numpy as np
 import pyarrow as pa
 
-from comparisons import record
 from comparisons.atomic import Entry
 from comparisons.case import RGB, open_case
+from comparisons.comparison import versions
 from comparisons.prepared import guarded
 from comparisons.processes.pool import Pool, Task
 from comparisons.study import dataset, surface
@@ -96,7 +96,7 @@ def _points(part: StudyPart) -> Iterator[StudyPoint]:
     except InputError as error:
         raise InputError(f"part {part.name!r}: {error}") from error
     own = "" if part.scene in SCENES else digest(source_of(part, points[0]))
-    content = [own, named(part.options.heuristic).digest(), record.versions()]
+    content = [own, named(part.options.heuristic).digest(), versions()]
     identity = sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
     for number, values in enumerate(points):
         yield StudyPoint(part, number, values, identity)

@@ -1,4 +1,4 @@
-"""Running sums of passes: their mean, its standard error, and how its noise is distributed.
+"""Running sums of passes: their mean, its standard error or interval, and how its noise is spread.
 
 Every standard error here comes from the spread of passes, which are independent. Path-traced noise
 is skewed: rare paths carry much of the light, and until one arrives a pixel looks darker, with a
@@ -13,8 +13,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from heuristic.convention import Array
+from reference.records import Estimated
 
 GROUPS = 8
 """Groups of passes, at most: seven degrees of freedom for an interval."""
@@ -206,3 +208,33 @@ def add_difference(sums: Sequence[Accumulator], images: Any) -> None:
 def _doubles(image: Any) -> Array:
     """Return the values of a tensor or array (H, W, 3) as doubles."""
     return mi.Float64((image if dr.is_tensor_v(image) else mi.TensorXd(image)).array)
+
+
+LEVEL = 0.95
+
+
+def jackknife_error(left_out: ArrayLike) -> NDArray[np.float64]:
+    """Return the standard error of a statistic from its values (n, ...), each without one repeat.
+
+    It holds for nonlinear statistics too, whose values for single, noisier repeats would not
+    average to their value for the mean.
+    """
+    left_out = np.asarray(left_out, float)
+    return np.sqrt((len(left_out) - 1) * left_out.var(axis=0))
+
+
+def student(value: float, error: float, count: int) -> Estimated:
+    """Return the interval around a value whose standard error comes from ``count`` repeats."""
+    from scipy.special import stdtrit  # scipy.stats takes a second to import
+
+    half = float(stdtrit(count - 1, 0.5 + LEVEL / 2)) * error
+    return Estimated(value, value - half, value + half)
+
+
+def jackknifed(values: ArrayLike) -> Estimated:
+    """Return the first of values (1 + n), with an interval from the others.
+
+    The first is of all repeats, each other one leaves out one of them.
+    """
+    value, *others = np.asarray(values, float)
+    return student(float(value), float(jackknife_error(others)), len(others))

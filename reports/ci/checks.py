@@ -11,11 +11,11 @@ from comparisons.case import Case, open_case
 from comparisons.check.measurement import HALVES, baseline_of, made_small, measure_scene
 from comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
 from comparisons.compare import compare
+from comparisons.comparison import versions
 from comparisons.departure.metrics import LEADING
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.processes.pool import Pool, Task
-from comparisons.record import versions
 from heuristic import program
 from heuristic.errors import FotismosError, InputError
 from reference.records import VERSION, Amount, Count, Record, Share, to_json

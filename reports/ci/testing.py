@@ -12,11 +12,11 @@ from comparisons import atomic
 from comparisons.case import Case, Scene, open_case
 from comparisons.check.measurement import PASSES, made_small, measure_scene
 from comparisons.check.moved import LEVEL
-from comparisons.intervals import student
 from comparisons.options import Options
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import in_file, known_as
 from reference import records
+from reference.rendering.sums import student
 from reports.ci import baselines, checks, summary
 
 

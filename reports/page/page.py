@@ -30,10 +30,10 @@ from reports.page.scene_view import Making, SceneView, WhyView
 from reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
+    from comparisons.comparison import Attribution
     from comparisons.cost.cost_record import Cost
     from comparisons.hard_cases import HardCases
     from comparisons.verification import Verification
-    from comparisons.why import Attribution
 
 TITLE = "Textbook shading against physically based rendering"
 

@@ -15,7 +15,6 @@ from msgspec import field
 from numpy.typing import NDArray
 
 from comparisons.departure.regions import Region
-from comparisons.why import TermMaterial
 from reference.records import Record, plain
 from reports.page.embedding import Embedded, packed
 
@@ -46,7 +45,7 @@ class TermsView(Record):
 
     grid: Embedded | None = None
     tops: dict[str, float] = field(default_factory=dict)
-    materials: tuple[TermMaterial, ...] = ()
+    materials: tuple[dict[str, Any], ...] = ()
     lights: tuple[dict[str, Any], ...] = ()
     missing: str = ""
     picked: PickedTerms | None = None
@@ -92,7 +91,7 @@ def view(
     return TermsView(
         grid=packed(planes),
         tops=tops,
-        materials=grid.materials,
+        materials=tuple(vars(material) for material in grid.materials),
         lights=tuple({"name": each.name, "intensity": each.intensity} for each in grid.lights),
         picked=picked,
     )

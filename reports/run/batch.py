@@ -81,7 +81,7 @@ class Batch:
 
     def record(self) -> RunRecord:
         """The record of the run, with its stages until now."""
-        from comparisons import record
+        from comparisons.comparison import machine, versions
         from reports.files.results import START, RunRecord
 
         other = perf_counter() - START - sum(self.stages.values())
@@ -89,8 +89,8 @@ class Batch:
             command=self.command,
             stages=dict(self.stages) | {"other": max(0.0, other)},
             failures=tuple(self.failures()),
-            machine=record.machine(),
-            versions=record.versions(),
+            machine=machine(),
+            versions=versions(),
         )
 
     def write_page(self, is_interrupted: bool = False, **content: Any) -> None:

@@ -115,7 +115,7 @@ def key_of(case: Case, job: Job) -> str | None:
     place, options, versions, and the sources of fotismos where it runs from a checkout. What a
     script reads is not known.
     """
-    from comparisons.record import versions
+    from comparisons.comparison import versions
     from reference.scene.source import digest
 
     if Path(case.word).suffix == ".py":

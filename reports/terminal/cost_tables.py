@@ -11,9 +11,9 @@ from reports.terminal.tables import printed
 from reports.terminal.words import number, parameter, seconds
 
 if TYPE_CHECKING:
+    from comparisons.comparison import MeanError
     from comparisons.cost.cost import Choice
     from comparisons.cost.cost_record import Cost, Point
-    from comparisons.why import MeanError
     from reference.records import Estimated
 
 Rows: TypeAlias = Iterator[Sequence[str]]

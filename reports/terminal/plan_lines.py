@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from msgspec.structs import asdict
 
 from comparisons.prepared import Prepared
-from comparisons.record import plan_record
 from reference.planning.effects import Decision, labelled
 from reference.planning.plan import Plan
 from reference.records import VERSION, Amount, Record
@@ -43,7 +42,7 @@ class PlanReport(Plan, kw_only=True):
 
 def plan_report(scene: str, ready: Prepared, variant: str) -> PlanReport:
     """Return the plan of a prepared comparison."""
-    made = plan_record(ready, ready.reference.spp * ready.passes, ready.passes)
+    made = ready.plan_record(ready.passes)
     return PlanReport(
         scene=scene,
         variant=variant,
