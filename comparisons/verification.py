@@ -5,19 +5,18 @@ both, and the times at equal noise: the variance of an independent mean falls wi
 so a method costs ``variance x time``.
 """
 
-import mitsuba as mi
 import numpy as np
 
 from comparisons.departure import marks
 from comparisons.departure.metrics import leading_distance
 from comparisons.options import Options
-from comparisons.prepared import prepare
+from comparisons.prepared import Prepared, prepare
 from reference.planning.plan import Plan
-from reference.records import VERSION, Estimated, Record
+from reference.records import VERSION, Record
 from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.renderer import Progress, Renderer, Stream, pass_seed, passes
 from reference.rendering.sampler import with_sampler
-from reference.rendering.sums import Accumulator, DifferenceSums
+from reference.rendering.sums import DEVIATION, Accumulator, DifferenceSums, add_difference
 from reference.scene.source import Source
 
 LEVEL = 0.01
@@ -26,9 +25,6 @@ LEVEL = 0.01
 PASSES_WITH_PATHS = 4
 """Factor on the passes if paths are sampled: few paths carry most of the variance, which is hard to
 measure itself."""
-
-RESAMPLES = 2000
-"""Resamples of the bootstrap."""
 
 
 class Verification(Record, kw_only=True):
@@ -40,8 +36,6 @@ class Verification(Record, kw_only=True):
     terms that are 0. Times are medians per pass, noise the root mean square over the pixels of the
     standard error of one pass. ``gain`` is ``everything_s everything_noise^2 / (planned_s
     planned_noise^2)``: how many times faster the planned reference reaches the same noise.
-    ``planning_s`` is the time of planning, ``saved_s`` what the plan saves at the noise of all its
-    passes.
     """
 
     scene: str
@@ -56,9 +50,7 @@ class Verification(Record, kw_only=True):
     everything_s: float
     planned_noise: float
     everything_noise: float
-    gain: Estimated
-    planning_s: float
-    saved_s: float
+    gain: float
     record_version: int = VERSION
 
 
@@ -74,8 +66,8 @@ def verify(
     any pixel is marked though nothing differs.
     """
     options = options or Options()
-    planned, everything = sides = [
-        prepare(source, options.changed(everything=choice)) for choice in (False, True)
+    everything, planned = sides = [
+        prepare(source, options.changed(everything=choice)) for choice in (True, False)
     ]
     count = max(side.passes for side in sides)
     count = max(count, 2) * (1 if planned.plan.max_depth == 2 else PASSES_WITH_PATHS)
@@ -83,26 +75,20 @@ def verify(
     counted = gbuffer(planned.scene, width, height).hit
     # The sides have different seeds: equal ones would hide shared noise.
     streams = (
-        passes([planned.reference], options.seed, count, progress=progress, stage="verifying"),
         passes([everything.reference], options.seed, count, stream=Stream.OTHER_SIDE),
+        passes([planned.reference], options.seed, count, progress=progress, stage="verifying"),
     )
-    total, apart = Accumulator(), DifferenceSums(counted)
-    images: tuple[list[np.ndarray], list[np.ndarray]] = ([], [])
-    variances: tuple[list[float], list[float]] = ([], [])
+    own, apart = (Accumulator(DEVIATION), Accumulator(DEVIATION)), DifferenceSums(counted)
     for both in zip(*streams, strict=True):
-        tensors = [mi.TensorXd(one.images[0]) for one in both]
-        total.add(tensors[0])
-        apart.add(tensors[1] - tensors[0])
-        for tensor, before, own in zip(tensors, images, variances, strict=True):
-            before.append(np.array(tensor)[counted])
-            if len(before) == 2:  # each pair of passes gives an independent estimate
-                own.append(_variance(*before))
-                before.clear()
-    difference = apart.estimate()
+        add_difference((*own, apart), [one.images[0] for one in both])
+    difference, mean = apart.estimate(), sum(total.mean() for total in own) / 2
     distance = leading_distance(options.viewing)
-    marked = marks.find(difference, total.mean(), counted, distance, level=level)
+    marked = marks.find(difference, mean, counted, distance, level=level)
     seconds = [side.reference.pass_times().median_s for side in sides]
-    gain = _gain(sides[0].reference, sides[1].reference, variances)
+    # A plan without noise would divide by zero.
+    noise = [
+        max(np.sqrt(count * np.mean(total.standard_error()[counted] ** 2)), 1e-7) for total in own
+    ]
     return Verification(
         scene=source.name,
         planned=_words(planned.plan),
@@ -111,44 +97,21 @@ def verify(
         significant=int((marked == marks.MARKED).sum()),
         pixels=int(counted.sum()),
         largest=float(np.abs(difference.mean).max()),
-        heuristic_largest=_kernel_difference(sides, options.seed),
-        planned_s=seconds[0],
-        everything_s=seconds[1],
-        planned_noise=float(np.sqrt(np.mean(variances[0]))),
-        everything_noise=float(np.sqrt(np.mean(variances[1]))),
-        gain=gain,
-        planning_s=planned.planning_seconds,
-        saved_s=seconds[0] * planned.passes * (gain.value - 1),
+        heuristic_largest=_kernel_difference(planned, everything, options.seed),
+        planned_s=seconds[1],
+        everything_s=seconds[0],
+        planned_noise=float(noise[1]),
+        everything_noise=float(noise[0]),
+        gain=float(seconds[0] * noise[0] ** 2 / (seconds[1] * noise[1] ** 2)),
     )
 
 
-def _variance(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the variance of a pass, from two; a plan without noise would divide by zero."""
-    return max(float(np.mean((one - other) ** 2) / 2 if one.size else 0.0), 1e-14)
-
-
-def _gain(
-    planned: Renderer, everything: Renderer, variances: tuple[list[float], list[float]]
-) -> Estimated:
-    """Return the ratio of costs, with a bootstrap over pairs of passes and over times."""
-    rng = np.random.default_rng(0)
-    costs, resampled = [], []
-    for renderer, own in zip((planned, everything), variances, strict=True):
-        times = np.array(renderer.times[1:] or renderer.times)
-        costs.append(renderer.pass_times().median_s * np.mean(own))
-        chosen = rng.choice(own, (RESAMPLES, len(own))).mean(axis=1)
-        resampled.append(chosen * np.median(rng.choice(times, (RESAMPLES, len(times))), axis=1))
-    low, high = np.quantile(resampled[1] / resampled[0], (0.025, 0.975))
-    return Estimated(value=float(costs[1] / costs[0]), low=float(low), high=float(high))
-
-
-def _kernel_difference(sides: list, seed: int) -> float:
+def _kernel_difference(planned: Prepared, everything: Prepared, seed: int) -> float:
     """Return the largest effect of the terms left out of the kernel, with equal rays."""
-    sampler, spp = sides[0].plan.sampler, sides[0].heuristic.spp
     images = []
-    for side in sides:
-        scene = with_sampler(side.pair.heuristic, sampler).instantiate()
-        renderer = Renderer(scene, None, spp, "heuristic image")
+    for side in (planned, everything):
+        scene = with_sampler(side.pair.heuristic, planned.plan.sampler).instantiate()
+        renderer = Renderer(scene, None, planned.heuristic.spp, "heuristic image")
         images.append(np.array(renderer.render(pass_seed(seed, 0))))
     return float(np.abs(images[0] - images[1]).max())
 

@@ -12,7 +12,7 @@ import pytest
 
 from comparisons.departure.metrics import METRICS, THRESHOLDS, drawn
 from comparisons.verification import Verification
-from reference.records import Estimated, Machine
+from reference.records import Machine
 from reports import verdict
 from reports.files.results import Failure, RunRecord
 from reports.page import embedding, page, templating
@@ -260,10 +260,10 @@ def test_the_page_has_each_of_its_parts_once_and_no_name_twice():
 def test_details_have_what_was_checked_and_every_metric():
     numbers = {
         "significant": 3, "pixels": 1436, "planned_s": 0.0032, "planned_noise": 0.5,
-        "everything_s": 0.25, "everything_noise": 0.125, "planning_s": 0.002,
-        "heuristic_largest": 0.0, "resolution": (96, 80), "largest": 0.5, "saved_s": 1.0,
+        "everything_s": 0.25, "everything_noise": 0.125,
+        "heuristic_largest": 0.0, "resolution": (96, 80), "largest": 0.5,
+        "gain": 91.5,
     }  # fmt: skip
-    numbers["gain"] = Estimated(value=91.5, low=80.0, high=100.0)
     verification = Verification(scene=HOSTILE, planned="direct_all", everything="path", **numbers)
     machine = Machine(processor=HOSTILE, cores=2, system="Linux")
     run = RunRecord(command="", stages={"page": 1.5}, failures=(), machine=machine, versions={})

@@ -243,9 +243,6 @@ def block_edges(side: int) -> NDArray[np.int_]:
 LARGEST = float(np.finfo(np.float32).max)
 """Largest number: images are in single precision, and squares of errors must not overflow."""
 
-FORMAT_0_1 = '"format": "fotismos baseline 1"'
-"""The first line of a baseline of fotismos 0.1; its other lines are still valid."""
-
 
 class Baseline(Record, kw_only=True, omit_defaults=True):
     """Measurements of one scene, from independent passes of both halves."""
@@ -294,11 +291,7 @@ def baseline_of(
 
 
 def read_baseline(text: str, name: str) -> Baseline:
-    """Read a baseline from its file's content, also one of fotismos 0.1.
-
-    ``InputError`` has the name of the file and the fault in it.
-    """
-    text = text.replace(FORMAT_0_1, f'"record_version": {VERSION}', 1)
+    """Read a baseline; ``InputError`` has the name of the file and the fault in it."""
     try:
         baseline = records.read(Baseline, text, name)
         _require_sane(baseline)

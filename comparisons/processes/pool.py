@@ -2,22 +2,25 @@
 
 A process does task after task, so its start-up is paid once. A new one replaces one that died, or
 that ran a user's code (:func:`end_after_task`). Each leads its own process group, which ends as a
-whole: with the process, when its time is up, or when the parent ends in any way.
+whole: with the process, when its time is up, or when the parent ends in any way. The processes of a
+command take turns: while one measures times, the others wait.
 """
 
+import fcntl
 import logging
 import os
 import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
 from math import inf
 from multiprocessing import connection, get_context, parent_process, resource_tracker
+from pathlib import Path
 from time import monotonic, sleep
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Self
 
 from comparisons.processes.interruption import SIGNALS, held_back
 from heuristic.errors import FotismosError, LostProcessError
@@ -277,3 +280,46 @@ def _send(pipe: Any, kind: str, content: Any) -> None:
     except Exception as error:  # pickling can raise anything
         reason = f"its result cannot be sent: {type(error).__name__}: {error}"
         pipe.send(("set_exception", LostProcessError(reason), _is_spent))
+
+
+# --- Turns --------------------------------------------------------------------------------------
+
+
+class Turn:
+    """A turn of a process among those that share a folder; within this context it works.
+
+    Working processes share a lock on the folder. One that measures has it alone, and first takes
+    that of a subfolder: a process that begins to work waits there, so that it never comes first.
+    """
+
+    def __init__(self, folder: Path, gate: Path) -> None:
+        self._folder, self._gate = folder, gate
+
+    def __enter__(self) -> Self:
+        self._file = os.open(self._folder, os.O_RDONLY)
+        with self._at_gate():
+            fcntl.flock(self._file, fcntl.LOCK_SH)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self._file)
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Wait until no other process works, and let none begin within this context."""
+        fcntl.flock(self._file, fcntl.LOCK_UN)
+        with self._at_gate():
+            fcntl.flock(self._file, fcntl.LOCK_EX)
+        try:
+            yield
+        finally:
+            fcntl.flock(self._file, fcntl.LOCK_SH)
+
+    @contextmanager
+    def _at_gate(self) -> Iterator[None]:
+        file = os.open(self._gate, os.O_RDONLY)
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            yield
+        finally:
+            os.close(file)

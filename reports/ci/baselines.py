@@ -14,7 +14,7 @@ from PIL import Image
 from comparisons import atomic
 from comparisons.atomic import content, require_regular
 from comparisons.case import SUFFIXES, Case, file_of, open_case
-from comparisons.check.measurement import FORMAT_0_1, HALVES, Baseline, read_baseline
+from comparisons.check.measurement import HALVES, Baseline, read_baseline
 from comparisons.options import Options
 from heuristic import program
 from heuristic.errors import InputError
@@ -63,7 +63,7 @@ LARGEST = 2**24
 LONGEST_KEPT = 128
 """Pixels of the longer side of the pictures that a baseline keeps."""
 
-HEADS = ('{\n  "record_version"', "{\n  " + FORMAT_0_1)
+HEAD = '{\n  "record_version"'
 """How baselines begin."""
 
 _HOW = f"Make one with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`."
@@ -84,7 +84,7 @@ def was_ours(path: Path) -> bool:
         text = content(path, LARGEST).decode(errors="replace")
     except OSError:
         return False
-    return any(text.startswith(head) or head.startswith(text) for head in HEADS)
+    return text.startswith(HEAD) or HEAD.startswith(text)
 
 
 def require_own_pictures(path: Path) -> None:

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from comparisons.processes.pool import Task
-from comparisons.processes.turns import Turn
+from comparisons.processes.pool import Task, Turn
 from reports import jobs
 from reports.commands.plan import verified
 from reports.run import batch

@@ -15,7 +15,7 @@ from msgspec import structs
 from comparisons import atomic
 from comparisons.comparison import CAUSES, ComparisonRecord
 from comparisons.departure.metrics import METRICS, drawn
-from comparisons.processes.turns import Turn
+from comparisons.processes.pool import Turn
 from heuristic import program
 from heuristic.heuristics import named
 from reference.records import VERSION, Record, plain, to_json
