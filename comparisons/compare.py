@@ -119,16 +119,16 @@ def _compare(
     stages |= {"planning": ready.planning_seconds, "guard": guard.seconds}
     width, height = image_size(ready.scene)
     if options.image:  # before any long rendering: a picture may be flipped
-        from comparisons.pictures import picture_warnings
+        from comparisons import pictures  # loaded late: few comparisons have any
 
-        place = picture_warnings.located(heuristic, ready.scene)
+        place = pictures.located(heuristic, ready.scene)
     estimates = render(ready, options, ready.counted, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
     exact = ready.plan.exact and not options.image
     numbers, images = _measure(estimates, ready.surface, options, exact)
     shown = images.heuristic, images.reference, images.counted
     caution = require_light(*shown, source.name, options)
-    picture = picture_warnings.picture_record(place, options, images) if options.image else None
+    picture = pictures.picture_record(place, options, images) if options.image else None
     done("metrics")
     traced: Terms = None, "Terms are traced with --why."
     if why:

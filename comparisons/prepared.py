@@ -138,9 +138,9 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
     """Pair and plan a scene in the current variant, and make both halves ready to render."""
     options = options or Options()
     if options.image:
-        from comparisons.pictures import picture_files  # loaded late: few comparisons have any
+        from comparisons import pictures  # loaded late: few comparisons have any
 
-        options = picture_files.at_size_of_pictures(source, options)
+        options = pictures.at_size_of_pictures(source, options)
     pair = options.pair(source)
     physical = with_sampler(pair.physical, sampler(options.everything)).instantiate()
     width, height = image_size(physical)
@@ -233,6 +233,6 @@ def _heuristic_renderer(
         made = Renderer(scene, None, spp, "heuristic image")
         if not options.image:
             return made
-        from comparisons.pictures import picture_files
+        from comparisons import pictures
 
-        return picture_files.PictureHalf(picture_files.read_all(options), made)
+        return pictures.PictureHalf(pictures.read_all(options), made)

@@ -9,14 +9,14 @@ import OpenEXR
 import pytest
 from PIL import Image
 
+from comparisons import pictures
 from comparisons.case import open_case
 from comparisons.compare import compare
 from comparisons.comparison import PictureRecord
 from comparisons.departure.colour import from_srgb, to_srgb
 from comparisons.departure.metrics import METRICS
 from comparisons.options import Options
-from comparisons.pictures import picture_files, picture_warnings
-from comparisons.pictures.picture_warnings import TURNED
+from comparisons.pictures import TURNED
 from comparisons.prepared import prepare
 from heuristic.errors import InputError, NonFiniteError
 
@@ -46,8 +46,8 @@ def cornell():
     case = open_case("cornell-box", Options(resolution=(SIDE, SIDE), spp=512))
     ready = prepare(case.source, case.options)
     images = [np.array(half.render(5), float) for half in (ready.reference, ready.heuristic)]
-    edges = picture_warnings.geometry_edges(ready.scene, SIDE, SIDE)
-    return images[0], images[1], [edges, picture_warnings.picture_edges(images[1])], ready.counted
+    edges = pictures.geometry_edges(ready.scene, SIDE, SIDE)
+    return images[0], images[1], [edges, pictures.picture_edges(images[1])], ready.counted
 
 
 # --- The same departure --------------------------------------------------------------------------
@@ -87,7 +87,7 @@ def test_a_png_is_read_to_its_bits_by_its_transfer_function(rgb, tmp_path):
     for bits, kind in ((8, np.uint8), (16, np.uint16)):
         codes = np.arange(48).reshape(4, 4, 3) * (2**bits // 50)
         mi.Bitmap(codes.astype(kind)).write(str(path))
-        linear, decoded = (picture_files.read(str(path), word) for word in ("linear", "srgb"))
+        linear, decoded = (pictures.read(str(path), word) for word in ("linear", "srgb"))
         np.testing.assert_allclose(linear, codes / (2**bits - 1), atol=1e-7)
         np.testing.assert_allclose(decoded, from_srgb(codes / (2**bits - 1)), atol=1e-6)
 
@@ -126,11 +126,11 @@ def test_repeats_tell_the_pictures_noise(rgb, tmp_path):
 def test_shifts_are_measured_to_a_fraction_of_a_pixel(cornell):
     reference, kernel, expected, _ = cornell
     for x, y in ((-3, 0), (-1, 1), (0, -2), (1, 1), (2, -2)):
-        shift, _ = picture_warnings.measure(np.roll(reference, (y, x), (0, 1)), expected)
+        shift, _ = pictures.measure(np.roll(reference, (y, x), (0, 1)), expected)
         assert shift == pytest.approx((x, y), abs=0.35)
     for part in (0.25, 0.5, 0.75):
         moved = (1 - part) * kernel + part * np.roll(kernel, 1, 1)
-        shift, _ = picture_warnings.measure(moved, expected)
+        shift, _ = pictures.measure(moved, expected)
         assert shift == pytest.approx((part, 0), abs=0.2)
 
 
@@ -138,13 +138,13 @@ def test_a_picture_that_is_turned_over_is_refused_by_its_edges(rgb):
     case = open_case("fig-6-14", Options(resolution=(SIDE, SIDE), spp=64))
     ready = prepare(case.source, case.options)
     image = np.array(ready.heuristic.render(1), float)
-    expected = [picture_warnings.geometry_edges(ready.scene, SIDE, SIDE)]
+    expected = [pictures.geometry_edges(ready.scene, SIDE, SIDE)]
     for picture in (image, TURNED["mirrored left to right"](image)):  # the triangle is symmetric
-        picture_warnings.measure(picture, expected)
+        pictures.measure(picture, expected)
     # Turned by 180 degrees it is the same as upside down, for the same reason.
     for how in ("upside down", "turned by 180 degrees"):
         with pytest.raises(InputError, match="the picture is upside down: corrected, its edges"):
-            picture_warnings.measure(TURNED[how](image), expected)
+            pictures.measure(TURNED[how](image), expected)
 
 
 # --- What is odd, in words -----------------------------------------------------------------------
@@ -153,12 +153,12 @@ def test_a_picture_that_is_turned_over_is_refused_by_its_edges(rgb):
 def odd(picture, cornell):
     """Return what is said of a picture of two repeats."""
     reference, _, expected, counted = cornell
-    shift, edges = picture_warnings.measure(picture, expected)
+    shift, edges = pictures.measure(picture, expected)
     record = PictureRecord(
         files=("x", "y"), transfer=None, repeats=2, shift=shift, edges=edges,
-        ratio=picture_warnings.ratios(picture[counted], reference[counted]),
+        ratio=pictures.ratios(picture[counted], reference[counted]),
     )  # fmt: skip
-    return list(picture_warnings.describe(record, picture, reference, counted))
+    return list(pictures.describe(record, picture, reference, counted))
 
 
 ODD = {
@@ -191,8 +191,8 @@ def test_mistakes_in_a_picture_are_named(rgb, tmp_path, cornell):
 
 def test_a_lamp_that_a_picture_clips_does_not_count_as_exposure():
     reference = np.array([[0.2, 0.3, 0.4], [40.0, 30.0, 20.0]])
-    assert picture_warnings.ratios(reference.clip(0, 1), reference) == (1, 1, 1)
-    assert picture_warnings.ratios(2 * reference, reference) == pytest.approx((2, 2, 2))
+    assert pictures.ratios(reference.clip(0, 1), reference) == (1, 1, 1)
+    assert pictures.ratios(2 * reference, reference) == pytest.approx((2, 2, 2))
 
 
 # --- Bad input -----------------------------------------------------------------------------------
@@ -234,16 +234,16 @@ BAD = (
 def test_what_is_no_picture_is_refused(rgb, tmp_path):
     for make, message in BAD:
         with pytest.raises((InputError, NonFiniteError), match=f"(?s){message}"):
-            picture_files.read(make(tmp_path / "x.exr"))
+            pictures.read(make(tmp_path / "x.exr"))
     path = tmp_path / "x.png"
     path.write_bytes(b"no picture")
     with pytest.raises(InputError, match=r"x.png: not a readable PNG file"):
-        picture_files.read(str(path), "srgb")
+        pictures.read(str(path), "srgb")
     Image.fromarray(np.full((8, 8, 4), 128, np.uint8)).save(path)
     with pytest.raises(InputError, match=r"not state its transfer function.*--transfer srgb"):
-        picture_files.read(str(path))
+        pictures.read(str(path))
     with pytest.raises(InputError, match="64 of 64 pixels have an alpha below 1"):
-        picture_files.read(str(path), "srgb")
+        pictures.read(str(path), "srgb")
 
 
 def test_sizes_and_repeats_must_fit(rgb, tmp_path):

@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 
 from comparisons.audit.subjects import shaded
 from comparisons.departure.colour import from_srgb, to_srgb
-from comparisons.pictures.picture_warnings import MISREADINGS, Misreading, factor_of_pi
+from comparisons.pictures import MISREADINGS, factor_of_pi
 from comparisons.textbook import clamped, dot, halfway, lobe, mirrored, unit
 from heuristic import heuristics
 from heuristic.heuristics import Heuristic
@@ -112,7 +112,7 @@ def _explain(model: Model, seen: Array, counts: Array) -> tuple[str, TermFit] | 
     """Return the mistake that explains the values seen, and its fit; no words if there is none."""
     right = model.terms()
     changed = [(words, model.terms(**change(model))) for words, change in MISTAKES]
-    encoded = [(f"its {each.symptom}", each.undo(seen)) for each in ENCODINGS]
+    encoded = [(f"its {symptom}", undo(seen)) for symptom, undo in ENCODINGS.items()]
 
     candidates = [("", right, seen), *((words, right, values) for words, values in encoded)]
     candidates += [(words, terms, seen) for words, terms in changed]
@@ -307,14 +307,11 @@ SCALED: tuple[Mistake, ...] = (
 )  # fmt: skip
 """Mistakes by some number, which their words show."""
 
-ENCODINGS = (
-    *MISREADINGS,
-    Misreading("values look encoded by a power of 1/2.2", lambda image: image**2.2),
-    Misreading("values look decoded by a power of 2.2", lambda image: image ** (1 / 2.2)),
-    Misreading("values look sRGB-encoded twice", lambda image: from_srgb(from_srgb(image))),
-    Misreading(
-        "values look tone-mapped by x / (1 + x)",
-        lambda image: image / np.maximum(1 - image, 1e-6),
-    ),
-)
+ENCODINGS: dict[str, Callable[[Array], Array]] = {
+    **MISREADINGS,
+    "values look encoded by a power of 1/2.2": lambda image: image**2.2,
+    "values look decoded by a power of 2.2": lambda image: image ** (1 / 2.2),
+    "values look sRGB-encoded twice": lambda image: from_srgb(from_srgb(image)),
+    "values look tone-mapped by x / (1 + x)": lambda image: image / np.maximum(1 - image, 1e-6),
+}
 """Mistakes in how a shader encodes its values."""

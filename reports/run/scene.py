@@ -122,7 +122,7 @@ def key_of(case: Case, job: Job) -> str | None:
         return None
     files = []
     if case.options.image:
-        from comparisons.pictures.picture_files import path_of  # loaded late: few have pictures
+        from comparisons.pictures import path_of  # loaded late: few have pictures
 
         files = [path_of(word) for word in case.options.image]
     parts: dict[str, Any] = {

@@ -1,0 +1,493 @@
+"""Pictures of other renderers (EXR and PNG) as the heuristic half, and what is odd in them.
+
+Values are linear, in units of display white, with the primaries of BT.709, like all images here. A
+PNG does not state its transfer function, so the user must. What cannot be compared is rejected.
+
+The position is found by edges: a shift looks like wrong shading. Geometric edges, where the normal
+or the hit changes, are in any picture of the same scene, however it is shaded. The heuristic half
+mostly shares its edges too: it shows where light ends. The picture's edges are correlated with both
+at all shifts up to :data:`REACH`, and the better agreement counts; a parabola through the highest
+values gives the fraction of a pixel. A flipped picture correlates better once it is flipped back.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from itertools import permutations
+from math import pi
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from msgspec import structs
+
+from comparisons.comparison import Images, PictureRecord
+from comparisons.departure.colour import from_srgb, to_srgb
+from comparisons.options import Options
+from heuristic.errors import InputError, NonFiniteError, suggestion
+from reference.pairing.prepare import film_size
+from reference.rendering.gbuffer import gbuffer
+from reference.rendering.renderer import Renderer, Times
+from reference.scene.source import Source
+
+SUFFIXES = (".exr", ".png")
+
+BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+"""CIE x, y of red, green, blue and white."""
+
+SAME_PRIMARIES = 2e-3
+"""Largest difference of chromaticities that are the same: some files round them."""
+
+MOST_NEGATIVE = -1e-3
+"""Below this, a negative value is more than rounding."""
+
+
+class PictureHalf:
+    """Pictures (H, W, 3) as the passes of a heuristic half, one after another.
+
+    Several are repeats, whose spread gives the noise; a single one serves for every pass. ``half``
+    is the renderer that they replace.
+    """
+
+    def __init__(self, images: list[np.ndarray], half: Renderer) -> None:
+        self.images, self.half = images, half
+        self.variant = half.variant
+        self.times: list[float] = []
+        self.compilation = 0.0
+
+    def render(self, seed: int) -> mi.TensorXf:
+        """Return the next picture; the seed is ignored."""
+        begin = perf_counter()
+        image = mi.TensorXf(self.images[len(self.times) % len(self.images)])
+        self.times.append(perf_counter() - begin)
+        return image
+
+    def pass_times(self) -> Times:
+        """Return the times of reading the pictures."""
+        return Times.of(self.times, 0.0)
+
+
+def read_all(options: Options) -> list[np.ndarray]:
+    """Return the pictures that options name: all of one size, and one or an even number."""
+    images = [read(word, options.transfer) for word in options.image]
+    sizes = {image.shape[:2] for image in images}
+    if len(sizes) > 1:
+        shown = ", ".join(f"{width}x{height}" for height, width in sorted(sizes))
+        raise InputError(f"pictures of {shown}: give repeats of one size.")
+    if len(images) > 1 and options.noise is not None:
+        raise InputError(
+            f"noise = {options.noise:g} and {len(images)} repeats: a noise target may need more"
+            " passes than there are pictures. Give --spp instead of --noise."
+        )
+    if len(images) > 1 and len(images) % 2:
+        raise InputError(
+            f"{len(images)} repeats: give one, or an even number, whose halves give the noise."
+        )
+    return images
+
+
+def at_size_of_pictures(source: Source, options: Options) -> Options:
+    """Return options with the resolution of their pictures, which must be the film's in shape."""
+    height, width = read_all(options)[0].shape[:2]
+    own = film_size(source.parse(), options.sensor)
+    film = options.resolution or own
+    if options.resolution and film != (width, height):
+        raise InputError(
+            f"{options.image[0]}: it has {width}x{height} pixels, and --resolution"
+            f" {film[0]}x{film[1]} is requested. Omit the option."
+        )
+    if abs(width * film[1] - height * film[0]) > max(film):  # more than a pixel
+        raise InputError(
+            f"{options.image[0]}: it has {width}x{height} pixels, an aspect ratio of"
+            f" {width / height:.4g}, and the scene's film {film[0]}x{film[1]},"
+            f" {film[0] / film[1]:.4g}. Render the picture with the scene's camera, or ignore the"
+            f" film's size with --resolution {width}x{height}."
+        )
+    return options.changed(resolution=(width, height))
+
+
+def read(word: str, transfer: str | None = None) -> np.ndarray:
+    """Return a picture as linear RGB, (H, W, 3), float32.
+
+    ``word`` is the path of a file, or ``FILE.exr:LAYER``. Without a ``transfer`` function,
+    an EXR is linear.
+    """
+    path, layer = _parts(word)
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file. Give a {' or '.join(SUFFIXES)} picture.")
+    image = _exr(path, layer) if path.suffix.lower() == ".exr" else _png(path, transfer)
+    wrong = ~np.isfinite(image).all(axis=-1)
+    if wrong.any():
+        raise NonFiniteError(f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture.")
+    if transfer == "srgb":
+        image = from_srgb(image)
+    wrong = np.any(image < MOST_NEGATIVE, axis=-1)
+    if wrong.any():
+        raise InputError(
+            f"{word}: {_counted(wrong)} negative. Colours outside BT.709 are negative, and so are"
+            " overshoots of a sharpening filter: write linear BT.709 without either."
+        )
+    return np.ascontiguousarray(image, np.float32)
+
+
+def path_of(word: str) -> Path:
+    """Return the file that a word names."""
+    return _parts(word)[0]
+
+
+def _parts(word: str) -> tuple[Path, str]:
+    file, _, layer = word.rpartition(":")
+    if file.lower().endswith(SUFFIXES):
+        return Path(file), layer
+    if not word.lower().endswith(SUFFIXES):
+        raise InputError(f"{word}: pictures are {' or '.join(SUFFIXES)} files. Convert it to EXR.")
+    return Path(word), ""
+
+
+def _exr(path: Path, layer: str) -> np.ndarray:
+    import OpenEXR  # loaded late: PNGs do not need it
+
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            header = dict(file.header())
+            channels = {name: np.array(c.pixels) for name, c in file.channels().items()}
+    except Exception as error:  # the library raises many types for a file that is not EXR
+        raise InputError(f"{path}: not a readable EXR file: {error}.") from error
+    _require_plain(path, header)
+    prefix = f"{layer}." if layer else ""
+    if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
+        raise _without_colours(path, layer, channels)
+    _require_opaque(path, channels.get(f"{prefix}A"))
+    return np.stack([channels[f"{prefix}{c}"].astype(float) for c in "RGB"], axis=-1)
+
+
+def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> InputError:
+    layers = sorted({name[:-2] for name in channels if name.endswith(".R")})
+    if layer and {*"RGB"} <= set(channels):
+        return InputError(f"{path}: it has R, G and B but no layer {layer!r}: give {path}.")
+    if not layers:
+        return InputError(
+            f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B."
+        )
+    where = f"no layer {layer!r}{suggestion(layer, layers)}" if layer else "no channel R"
+    return InputError(
+        f"{path}: it has {where}. Its layers are {', '.join(layers)}: give {path}:{layers[0]}."
+    )
+
+
+def _require_plain(path: Path, header: Mapping[str, Any]) -> None:
+    """Require a whole picture in BT.709."""
+    data, display = (np.array(header[name]).tolist() for name in ("dataWindow", "displayWindow"))
+    if data != display:
+        sizes = (
+            f"{right - left + 1}x{bottom - top + 1} from ({left}, {top})"
+            for (left, top), (right, bottom) in (data, display)
+        )
+        raise InputError(
+            f"{path}: it is cropped: its data window is {next(sizes)}, its display window"
+            f" {next(sizes)}. Save the whole picture."
+        )
+    primaries = header.get("chromaticities")
+    if primaries is not None and max(abs(np.subtract(primaries, BT709))) > SAME_PRIMARIES:
+        raise InputError(
+            f"{path}: its primaries and white are ({', '.join(f'{v:.4g}' for v in primaries)})."
+            f" Convert it to BT.709 (sRGB): {', '.join(map(str, BT709))}."
+        )
+
+
+def _png(path: Path, transfer: str | None) -> np.ndarray:
+    if transfer is None:
+        raise InputError(
+            f"{path}: a PNG does not state its transfer function. Add --transfer srgb for values"
+            " encoded for displays, or --transfer linear."
+        )
+    try:
+        pixels = np.array(mi.Bitmap(str(path)))
+    except RuntimeError as error:
+        raise InputError(f"{path}: not a readable PNG file: {error}.") from error
+    image = pixels / float(np.iinfo(pixels.dtype).max)
+    image = image[..., None] if image.ndim == 2 else image
+    colours, rest = (3, image[..., 3:]) if image.shape[2] > 2 else (1, image[..., 1:])
+    _require_opaque(path, rest[..., 0] if rest.size else None)
+    return np.broadcast_to(image[..., :colours], (*image.shape[:2], 3))
+
+
+def _require_opaque(path: Path, alpha: np.ndarray | None) -> None:
+    if alpha is None or (alpha >= 1 - 1 / 512).all():
+        return
+    count = int(np.count_nonzero(alpha < 1 - 1 / 512))
+    raise InputError(
+        f"{path}: {count} of {alpha.size} pixels have an alpha below 1, and their colours may or"
+        " may not be premultiplied. Composite the picture over its background, without alpha."
+    )
+
+
+def _counted(wrong: np.ndarray) -> str:
+    y, x = np.unravel_index(np.argmax(wrong), wrong.shape)
+    count = int(np.count_nonzero(wrong))
+    return f"{count} of {wrong.size} pixels, the first at (x, y) = ({x}, {y}), are"
+
+
+# --- Position ----------------------------------------------------------------------------------
+
+TURNED = {
+    "upside down": lambda image: image[::-1],
+    "mirrored left to right": lambda image: image[:, ::-1],
+    "turned by 180 degrees": lambda image: image[::-1, ::-1],
+}
+
+TEMPLATE_SPP = 16
+"""Samples per pixel of the image whose edges are compared with a picture's."""
+
+REACH, FINER = 8, 4
+"""Largest shift considered in pixels, at most a quarter of the picture's smaller side; and rays
+along each side of a pixel."""
+
+LEAST, CLEARLY = 0.08, 1.5
+"""Correlation below which edges are uninformative, and the factor by which flipping a picture
+raises it if the picture is flipped."""
+
+Place = tuple[tuple[float, float] | None, float]
+"""By how many pixels (x, y) a picture's content is too far right and too low, if its edges show it,
+and the correlation of the edges there."""
+
+
+def located(half: PictureHalf, scene: mi.Scene) -> Place:
+    """Return the position of pictures relative to a scene's camera; refuse flipped ones."""
+    mean = np.mean(half.images, axis=0)
+    half.half.spp = TEMPLATE_SPP
+    template = np.array(half.half.render(0), float)
+    edges = geometry_edges(scene, mean.shape[1], mean.shape[0])
+    return measure(mean, [edges, picture_edges(template)])
+
+
+def geometry_edges(scene: mi.Scene, width: int, height: int) -> np.ndarray:
+    """Return how much the geometry changes at each pixel, (H, W)."""
+    surface = gbuffer(scene, FINER * width, FINER * height)
+    layers = np.concatenate([surface.normal, surface.hit[..., None]], axis=-1)
+    return _edges(layers.reshape(height, FINER, width, FINER, 4).mean(axis=(1, 3)))
+
+
+def picture_edges(image: np.ndarray) -> np.ndarray:
+    """Return how much an image changes at each pixel, in stops, up to 1."""
+    luminance = np.maximum(np.asarray(image, float) @ (0.2126, 0.7152, 0.0722), 0)
+    least = 0.02 * np.percentile(luminance, 95) + 1e-6
+    return _edges(np.log2(luminance + least)[..., None])
+
+
+def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Place:
+    """Return the position of an image (H, W, 3), encoded in any way; refuse a flipped one.
+
+    ``expected`` are maps (H, W) of edges that it may contain; the best agreement counts.
+    """
+
+    def place(seen: np.ndarray) -> Place:
+        return max((_shift(edges, seen) for edges in expected), key=lambda each: each[1])
+
+    seen = picture_edges(image)
+    best = place(seen)
+    for how, turn in TURNED.items():
+        other = place(turn(seen))
+        if other[1] > max(CLEARLY * best[1], 2 * LEAST):
+            raise InputError(
+                f"the picture is {how}: corrected, its edges would correlate with the scene's by"
+                f" {other[1]:.2f} instead of {best[1]:.2f}. Correct it, and compare again."
+            )
+    return best
+
+
+def _edges(layers: np.ndarray) -> np.ndarray:
+    """Return the size of the gradient, on a scale that is 1/2 at 1/4 and ends at 1."""
+    size = np.sqrt((np.array(np.gradient(layers, axis=(0, 1))) ** 2).sum(axis=(0, -1)))
+    return size / (size + 0.25)
+
+
+def _shift(edges: np.ndarray, seen: np.ndarray) -> Place:
+    reach = max(1, min(REACH, min(edges.shape) // 4))
+    shifts = range(-reach, reach + 1)
+    table = np.array([[_correlation(seen, edges, y, x) for x in shifts] for y in shifts])
+    y, x = map(int, np.unravel_index(np.argmax(table), table.shape))
+    highest = float(table[y, x])
+    if highest < LEAST:
+        return None, highest
+    down, right = y - reach + _vertex(table[:, x], y), x - reach + _vertex(table[y], x)
+    return (float(right), float(down)), highest
+
+
+def _correlation(seen: np.ndarray, edges: np.ndarray, down: int, right: int) -> float:
+    """Return the correlation of two maps where they overlap after a shift of the first."""
+    height, width = edges.shape
+    a = seen[max(down, 0) : height + down, max(right, 0) : width + right]
+    b = edges[max(-down, 0) : height - down, max(-right, 0) : width - right]
+    a, b = a - a.mean(), b - b.mean()
+    size = np.sqrt((a * a).sum() * (b * b).sum())
+    return float((a * b).sum() / size) if size > 0 else 0.0
+
+
+def _vertex(values: np.ndarray, place: int) -> float:
+    """Return the offset of the vertex of a parabola through a maximum and its neighbours."""
+    if not 0 < place < len(values) - 1:
+        return 0.0
+    before, top, after = values[place - 1 : place + 2]
+    bend = before - 2 * top + after
+    return 0.0 if bend >= 0 else float(0.5 * (before - after) / bend)
+
+
+# --- Encoding ----------------------------------------------------------------------------------
+
+
+CHANNELS = ("red", "green", "blue")
+
+
+def _ordered(order: tuple[int, ...], image: np.ndarray) -> np.ndarray:
+    return image[..., list(order)]
+
+
+MISREADINGS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "values look sRGB-encoded": from_srgb,
+    "values look decoded twice": to_srgb,
+    **{
+        f"channels look like {', '.join(CHANNELS[place] for place in order)}": partial(
+            _ordered, order
+        )
+        for order in permutations(range(3))
+        if order != (0, 1, 2)
+    },
+}
+"""Mistakes in encoding colours: their symptoms, and their inverses."""
+
+CURES = {
+    "values look sRGB-encoded": ": give --transfer srgb, or write linear values",
+    "values look decoded twice": ": give --transfer linear",
+}
+
+NEAR_PI = 0.05
+"""Relative distance within which a level counts as a factor of pi."""
+
+
+def factor_of_pi(level: float) -> str:
+    """Name the factor of pi that a level is close to; empty if none."""
+    if abs(level / pi - 1) < NEAR_PI:
+        return "a missing division by pi"
+    return "a division by pi too many" if abs(level * pi - 1) < NEAR_PI else ""
+
+
+# --- Sentences ---------------------------------------------------------------------------------
+
+SHIFT, LEVEL, TINT = 0.5, 2.0, 0.05
+"""Smallest shift in pixels, factor of brightness, and relative difference of the channels' factors
+that are reported."""
+
+BLOCK, EVEN = 8, 0.2
+"""A tint is the white's if it spreads by this share at most over blocks of this side in pixels."""
+
+BETTER = 0.5
+"""Largest share of the difference that a credible other reading of the values leaves."""
+
+
+def picture_record(place: Place, options: Options, images: Images) -> PictureRecord:
+    """Return the record of the pictures that replace a heuristic half, with its warnings."""
+    shown, reference = (each[images.counted] for each in (images.heuristic, images.reference))
+    shift, edges = place
+    record = PictureRecord(
+        files=options.image,
+        transfer=options.transfer,
+        repeats=len(options.image),
+        shift=shift,
+        edges=edges,
+        ratio=ratios(shown, reference),
+    )
+    odd = describe(record, images.heuristic, images.reference, images.counted)
+    return structs.replace(record, odd=tuple(odd))
+
+
+def ratios(picture: np.ndarray, reference: np.ndarray) -> tuple[float, float, float]:
+    """Return the means of a picture's channels over those of the reference, both (N, 3)."""
+    if picture.max() <= 1:  # clipped at display white, as a PNG is: a lamp would decide
+        reference = np.minimum(reference, 1)
+    least = 1e-6
+    red, green, blue = (picture.mean(axis=0) + least) / (reference.mean(axis=0) + least)
+    return float(red), float(green), float(blue)
+
+
+def describe(
+    record: PictureRecord, picture: np.ndarray, reference: np.ndarray, counted: np.ndarray
+) -> Iterator[str]:
+    """Yield what is odd about a picture, its position first.
+
+    Images are linear, (H, W, 3); ``counted`` (H, W) is where the scene has a surface.
+    """
+    if record.shift is None:
+        yield "The picture's edges do not show whether it is aligned with the scene's camera."
+    elif max(map(abs, record.shift)) >= SHIFT:
+        x, y = record.shift
+        yield (
+            f"The picture's edges are shifted by {abs(x):.1f} pixels to the"
+            f" {'right' if x > 0 else 'left'} and {abs(y):.1f} pixels {'down' if y > 0 else 'up'},"
+            " which looks like wrong shading. Check the camera, the crop and the pixel centres"
+            " first."
+        )
+    if record.repeats == 1:
+        yield (
+            "The picture is one file, so its noise is unknown and counts as departure. Give"
+            " repeats of other seeds to separate the two."
+        )
+    if reading := _other_reading(picture, reference, counted):
+        yield f"The picture is misread. {reading}"
+        return
+    level = float(np.mean(record.ratio))
+    if (mistake := factor_of_pi(level)) or not 1 / LEVEL < level < LEVEL:
+        yield (
+            f"The picture is {level:.3g} times as bright as the reference:"
+            f" {mistake or 'another exposure'}?"
+        )
+    yield from _white(picture, reference, counted)
+
+
+def _white(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> Iterator[str]:
+    """Yield a tint that is the same everywhere; wrong shading varies over the picture."""
+    shown, expected = (_blocks(each, counted) for each in (picture, reference))
+    logs = np.log(shown / expected)
+    logs -= logs.mean(axis=1, keepdims=True)
+    tint = np.median(logs, axis=0)
+    spread = np.median(np.abs(logs - tint), axis=0).max()
+    if np.ptp(tint) > TINT and spread < EVEN * np.abs(tint).max():
+        relative = ", ".join(f"{value:.3g}" for value in np.exp(tint))
+        yield f"Its red, green and blue are relatively {relative} times as strong: another white?"
+
+
+def _blocks(image: np.ndarray, counted: np.ndarray) -> np.ndarray:
+    """Return the mean colours (B, 3) of blocks, over the pixels that count; never quite black."""
+    height, width = (side // BLOCK * BLOCK for side in counted.shape)
+    weighted = np.where(counted[..., None], image, 0)[:height, :width].astype(float)
+    sums = weighted.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3).sum(axis=(1, 3))
+    sums = sums.reshape(-1, 3)
+    return np.maximum(sums, 1e-3 * max(sums.mean(), 1e-9))
+
+
+def _other_reading(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> str:
+    """Describe the other reading of its values that brings the picture near the reference."""
+    plain = _distance(picture[counted], reference[counted])
+    if plain < 1e-3:
+        return ""
+    readings = {f"Its {one}{CURES.get(one, '')}.": undo for one, undo in MISREADINGS.items()}
+    readings |= {f"It looks {how}, or lit from the other side.": turn
+                 for how, turn in TURNED.items()}  # fmt: skip
+    distances = {
+        words: _distance(undo(picture)[counted], reference[counted])
+        for words, undo in readings.items()
+    }
+    words = min(distances, key=distances.__getitem__)
+    return words if distances[words] <= BETTER * plain else ""
+
+
+def _distance(image: np.ndarray, reference: np.ndarray) -> float:
+    """Return the relative RMS difference after the best factor on an image."""
+    image, reference = np.asarray(image, float), np.asarray(reference, float)
+    # Clipped near display white, or highlights alone would decide.
+    image, reference = (np.minimum(each, 4 * each.mean() + 1e-9) for each in (image, reference))
+    factor = np.sum(image * reference) / max(np.sum(image * image), 1e-30)
+    return float(
+        np.sqrt(np.mean((factor * image - reference) ** 2) / np.mean(reference**2 + 1e-12))
+    )

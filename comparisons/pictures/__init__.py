@@ -1,1 +1,0 @@
-"""Pictures of other renderers in place of the heuristic half."""
