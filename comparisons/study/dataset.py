@@ -53,7 +53,7 @@ IDENTITY: dict[str, Column] = {
 PARAMETERS: dict[str, Column] = {
     name: (parameter.unit, parameter.meaning, float)
     for scene in SCENES.values()
-    for name, parameter in (ROUGHPLASTIC | PHONG | scene.parameters).items()
+    for name, parameter in (ROUGHPLASTIC | PHONG | scene).items()
 }
 HALVES = {
     "specular": ("1", "the {}'s specular part (scene lobe: in the mirror direction)"),

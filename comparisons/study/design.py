@@ -50,6 +50,7 @@ from comparisons.case import SUFFIXES
 from comparisons.options import Options
 from comparisons.study.scenes import (
     PHONG,
+    RENDERED,
     ROUGHPLASTIC,
     SCENES,
     UNLIMITED,
@@ -220,11 +221,10 @@ def _part(raw: dict[str, Any], where: str, folder: Path) -> StudyPart:
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
     name = options.heuristic
-    if name != DEFAULTS.heuristic and scene in SCENES and SCENES[scene].make is None:
-        rendered = [each for each, one in SCENES.items() if one.make is not None]
+    if name != DEFAULTS.heuristic and scene in SCENES.keys() - RENDERED.keys():
         raise InputError(
             f"{where}: the scene {scene} is not rendered, and supports Phong's model alone. Study"
-            f" {name} on {' or '.join(rendered)}, or on your own scene."
+            f" {name} on {' or '.join(RENDERED)}, or on your own scene."
         )
     if in_file := heuristics.in_file(name):
         file, function = in_file
@@ -258,7 +258,7 @@ def _all_levels(table: PartTable, where: str) -> dict[str, Levels]:
                 f"{where}: {', '.join(sorted(phong | plastic))} belong to two materials. Give those"
                 " of one; pairing derives the other."
             )
-        known = (PHONG if phong else ROUGHPLASTIC) | SCENES[table.scene].parameters | known
+        known = (PHONG if phong else ROUGHPLASTIC) | SCENES[table.scene] | known
         for name in raw:
             if name not in known:
                 raise unknown(f"{where}:", name, sorted(known))

@@ -25,7 +25,7 @@ from comparisons.processes.pool import Pool, Task
 from comparisons.study import dataset, surface
 from comparisons.study.dataset import STEPPED, STEPS, Row, largest_miss, measure
 from comparisons.study.design import OWN, StudyFile, StudyPart
-from comparisons.study.scenes import SCENES, Point, bsdf
+from comparisons.study.scenes import RENDERED, SCENES, Point, bsdf
 from heuristic import plugins
 from heuristic.errors import FotismosError, InputError, unknown
 from heuristic.heuristics import named
@@ -219,7 +219,7 @@ def split(point: Point) -> tuple[Point, Point]:
 
 def source_of(part: StudyPart, point: Point, identity: str = "") -> Source:
     """Return the scene of a point: a study scene is made, another is read."""
-    if part.scene in SCENES and (make := SCENES[part.scene].make):
+    if make := RENDERED.get(part.scene):
         return Source(part.scene, lambda: make(point, bsdf(point)))
     return _read(part.scene, identity)
 

@@ -58,18 +58,6 @@ LIGHT_SIZE = StudyParameter("deg", 0.1, 120, 2, "angular diameter of the lamp, f
 WALL_ALBEDO = StudyParameter("1", 0, 0.95, 0.5, "reflectance of the walls")
 
 
-@dataclass(frozen=True)
-class StudyScene:
-    """A parametrised scene.
-
-    Besides ``parameters``, its own, it has those of one of the two materials. ``make`` makes the
-    dictionary for ``mitsuba.load_dict`` from a point and a BSDF; None for what is not rendered.
-    """
-
-    parameters: dict[str, StudyParameter]
-    make: Callable[[Point, Dict], Dict] | None = None
-
-
 def bsdf(point: Point) -> Dict:
     """Return the dictionary of a point's material, ``roughplastic`` or ``phong``."""
     if "n" in point:
@@ -138,13 +126,17 @@ def _camera(place: Vector, target: Vector, up: Vector, field_of_view: float) -> 
 
 SCENES = {
     # A flat surface under parallel light, seen from all directions.
-    "lobe": StudyScene({"light_angle": LIGHT_ANGLE}),
+    "lobe": {"light_angle": LIGHT_ANGLE},
     # A sphere under a round lamp far away.
-    "sphere": StudyScene({"light_angle": PHASE_ANGLE, "light_size": LIGHT_SIZE}, _sphere),
+    "sphere": {"light_angle": PHASE_ANGLE, "light_size": LIGHT_SIZE},
     # A sphere in a closed room of diffuse walls, under a round lamp at the ceiling.
-    "enclosure": StudyScene({"light_size": LIGHT_SIZE, "wall_albedo": WALL_ALBEDO}, _enclosure),
+    "enclosure": {"light_size": LIGHT_SIZE, "wall_albedo": WALL_ALBEDO},
 }
-"""The study scenes. Other scenes are studied through paths to their parameters."""
+"""The parameters of the study scenes, besides those of one of the two materials. Other scenes are
+studied through paths to their parameters."""
+
+RENDERED: dict[str, Callable[[Point, Dict], Dict]] = {"sphere": _sphere, "enclosure": _enclosure}
+"""What makes the dictionaries of study scenes from a point and a BSDF."""
 
 UNLIMITED = StudyParameter("", -inf, inf, 0, "a parameter of the scene, by its path")
 """Any parameter of a user's scene."""

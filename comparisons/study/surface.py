@@ -5,20 +5,18 @@ surface lies in the plane z = 0, and the light in the plane y = 0 at negative x,
 is at azimuth 0. Directions point away from the surface.
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
-import heuristic
+from comparisons.audit import furnace
+from comparisons.audit.subjects import shaded
 from comparisons.study.dataset import Row, largest_miss, measure
 from comparisons.study.scenes import Point
-from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.numerics import is_moderate
+from heuristic.heuristics import PHONG
+from heuristic.lights import DirectionalLight
 from reference.pairing.albedo import RoughPlastic, to_phong, to_roughplastic
 from reference.pairing.factors import Convention, Miss, Phong
 
@@ -31,55 +29,26 @@ PEAK_STEP = 0.05
 """Degrees between the directions searched for a lobe's peak."""
 
 
-@dataclass(frozen=True)
-class StudyMaterial:
-    """A material in both models, with the misses of the pairing."""
-
-    phong: Phong
-    plastic: RoughPlastic
-    misses: tuple[Miss, ...]
-
-    def columns(self) -> Row:
-        """Return its parameters in both models, and its miss."""
-        return {
-            "miss": largest_miss(self.misses),
-            "alpha": self.plastic.alpha,
-            "int_ior": self.plastic.int_ior,
-            "reflectance": self.plastic.diffuse_reflectance[0],
-            "n": self.phong.n,
-            "k_d": self.phong.k_d[0],
-            "k_s": self.phong.k_s[0],
-        }
-
-
-def material(point: Point, convention: Convention) -> StudyMaterial:
-    """Return the material of a point, which has the parameters of one of the models."""
-    if "n" in point:
-        k_d, k_s = ((point[name],) * 3 for name in ("k_d", "k_s"))
-        return _of_phong(Phong(k_d, k_s, point["n"]), convention)
-    grey = (point["reflectance"],) * 3
-    return _of_plastic(RoughPlastic(grey, point["alpha"], point["int_ior"]), convention)
-
-
 @lru_cache(maxsize=256)
-def _of_phong(phong: Phong, convention: Convention) -> StudyMaterial:
-    if not any(phong.k_s):
-        # Pairing makes it plain diffuse, not roughplastic.
-        return StudyMaterial(phong, RoughPlastic(phong.k_d, 1.0, 1.0), ())
-    plastic, misses = to_roughplastic(phong, convention)
-    return StudyMaterial(phong, plastic, misses)
-
-
-@lru_cache(maxsize=256)
-def _of_plastic(plastic: RoughPlastic, convention: Convention) -> StudyMaterial:
-    return StudyMaterial(to_phong(plastic, convention), plastic, ())
+def material(
+    point: tuple[tuple[str, float], ...], convention: Convention
+) -> tuple[Phong, RoughPlastic, tuple[Miss, ...]]:
+    """Return a point's material in both models, of which it has one, and the pairing's misses."""
+    values = dict(point)
+    if "n" not in values:
+        grey = (values["reflectance"],) * 3
+        plastic = RoughPlastic(grey, values["alpha"], values["int_ior"])
+        return to_phong(plastic, convention), plastic, ()
+    k_d, k_s = ((values[name],) * 3 for name in ("k_d", "k_s"))
+    phong = Phong(k_d, k_s, values["n"])
+    if not any(k_s):  # pairing makes it plain diffuse, not roughplastic
+        return phong, RoughPlastic(k_d, 1.0, 1.0), ()
+    return phong, *to_roughplastic(phong, convention)
 
 
 def direction(theta: ArrayLike, phi: ArrayLike) -> np.ndarray:
     """Return unit vectors (3, N) from polar angles and azimuths in degrees."""
-    angles = np.broadcast_arrays(np.atleast_1d(theta), phi)
-    t, p = map(np.deg2rad, angles)
-    return np.stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+    return furnace.direction(np.deg2rad(theta), np.deg2rad(phi))
 
 
 def heuristic_radiance(
@@ -88,25 +57,14 @@ def heuristic_radiance(
     """Return the kernel's radiance (N,), in all and of the specular part alone.
 
     Directions (3, N) are of light and viewer. Display-linear: a white diffuse surface that faces
-    the light has the value 1. All numbers are opaque, so one kernel serves all materials.
+    the light has the value 1.
     """
-    number = dr.leaf_t(mi.Float)
-    k_d, k_s, n = (dr.opaque(number, v) for v in (phong.k_d[0], phong.k_s[0], phong.n))
-    count = light.shape[1]
-    sun = heuristic.DirectionalLight(-mi.Vector3f(light), dr.opaque(number, 1.0))
-    parts = [
-        heuristic.shade(
-            dr.zeros(mi.Point3f, count),
-            mi.Normal3f(0, 0, 1),
-            mi.Vector3f(view),
-            heuristic.Material(
-                k_d=coefficients[0], k_s=coefficients[1], n=n, n_is_moderate=is_moderate(phong.n)
-            ),
-            [sun],
-        )
-        for coefficients in ((k_d, k_s), (0, k_s))
-    ]
-    total, specular = (np.array(part, float) for part in parts)
+    sun, place = DirectionalLight(-mi.Vector3f(light), 1.0), (0 * furnace.UP, furnace.UP, view)
+    lobe = {"k_s": phong.k_s[0], "n": phong.n}
+    total, specular = (
+        np.array(shaded(PHONG, place, lobe | {"k_d": k_d}, [sun]), float)[0]
+        for k_d in (phong.k_d[0], 0.0)
+    )
     return total, specular
 
 
@@ -114,29 +72,14 @@ def reference_radiance(
     plastic: RoughPlastic, light: np.ndarray, view: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the radiance of Mitsuba's BSDF, as :func:`heuristic_radiance` does."""
-    bsdf = _bsdf(plastic)
-    si = dr.zeros(mi.SurfaceInteraction3f, light.shape[1])
-    si.wi = mi.Vector3f(view)
-    context = mi.BSDFContext()
-    total = bsdf.eval(context, si, mi.Vector3f(light))
-    context.type_mask = +mi.BSDFFlags.DiffuseReflection
-    diffuse = bsdf.eval(context, si, mi.Vector3f(light))
-    dr.eval(total, diffuse)
-    total, diffuse = (
-        IRRADIANCE_PER_INTENSITY * np.atleast_2d(np.array(value, float))[0]
-        for value in (total, diffuse)
-    )
+    diffuse = {"reflectance": plastic.diffuse_reflectance[0]}
+    bsdfs = [{"type": "diffuse", **diffuse}] * 2
+    if plastic.int_ior != plastic.ext_ior:
+        values = {name: getattr(plastic, name) for name in ("alpha", "int_ior", "ext_ior")}
+        values |= {"type": "roughplastic", "diffuse_reflectance": diffuse["reflectance"]}
+        bsdfs = [values | {"specular_reflectance": k} for k in (plastic.specular_reflectance[0], 0)]
+    total, diffuse = (furnace.of_bsdf(mi.load_dict(bsdf))(light, view)[0] for bsdf in bsdfs)
     return total, total - diffuse
-
-
-@lru_cache(maxsize=8)
-def _bsdf(plastic: RoughPlastic) -> Any:
-    if plastic.int_ior == plastic.ext_ior:
-        return mi.load_dict({"type": "diffuse", "reflectance": plastic.diffuse_reflectance[0]})
-    colours = ("diffuse_reflectance", "specular_reflectance")
-    values = {name: getattr(plastic, name) for name in ("alpha", "int_ior", "ext_ior")}
-    values |= {name: getattr(plastic, name)[0] for name in colours}
-    return mi.load_dict({"type": "roughplastic"} | values)
 
 
 @lru_cache(maxsize=1)
@@ -181,17 +124,26 @@ def lobe(point: Point, convention: Convention) -> Row:
 
     Statistics are over views of equal projected solid angle.
     """
-    made, angle = material(point, convention), point["light_angle"]
+    phong, plastic, misses = material(tuple(point.items()), convention)
+    angle = point["light_angle"]
     plane, mirror = direction(np.arange(0, 90, PEAK_STEP), 0.0), direction(angle, 0.0)
     parts = (views(), hemisphere()[0], plane, mirror)
     view = np.concatenate(parts, axis=1)
     light = np.broadcast_to(direction(angle, 180.0), view.shape)
     splits = np.cumsum([part.shape[1] for part in parts])[:-1]
-    result: Row = made.columns()
+    result: Row = {
+        "miss": largest_miss(misses),
+        "alpha": plastic.alpha,
+        "int_ior": plastic.int_ior,
+        "reflectance": plastic.diffuse_reflectance[0],
+        "n": phong.n,
+        "k_d": phong.k_d[0],
+        "k_s": phong.k_s[0],
+    }
     images = []
     for half, (total, lobe_alone) in (
-        ("heuristic", heuristic_radiance(made.phong, light, view)),
-        ("reference", reference_radiance(made.plastic, light, view)),
+        ("heuristic", heuristic_radiance(phong, light, view)),
+        ("reference", reference_radiance(plastic, light, view)),
     ):
         seen, everywhere, _, _ = np.split(total, splits)
         _, specular, in_plane, mirrored = np.split(lobe_alone, splits)
