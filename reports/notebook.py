@@ -26,7 +26,6 @@ from comparisons.cost.cost_record import Cost, Method
 from comparisons.cost.methods import declare as declare_method
 from comparisons.departure.metrics import Metric
 from comparisons.departure.metrics import declare as declare_metric
-from comparisons.fit.fit import FitOptions
 from comparisons.fit.fit import fit as fit_parameters
 from comparisons.fit.fit_record import FitRecord
 from comparisons.options import Options
@@ -173,7 +172,7 @@ def fit(
     """Return the best heuristic parameters, and the error that remains; see :func:`compare`."""
     case = open_case(scene, Options.of(options), name)
     command = case.command("fit")
-    return fit_parameters(case.source, case.options, FitOptions(loss), None, command).record
+    return fit_parameters(case.source, case.options, loss, command=command).record
 
 
 def check(baseline: str | Path, significance: float = LEVEL) -> CheckRecord:

@@ -23,11 +23,12 @@ from comparisons.cost import methods
 from comparisons.cost.cost_record import Method
 from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.departure.metrics import METRICS, Metric, declare
-from comparisons.fit.fit import departures
+from comparisons.fit.fit import RenderedHalves, departures
 from comparisons.study import dataset
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.heuristics import HEURISTICS, Heuristic
+from reference.rendering.sums import Estimate
 from tests.schemas import schema
 from tests.small_scene import PLAIN
 
@@ -143,7 +144,9 @@ def test_a_metric_from_outside_is_in_fits_and_studies(metric):
     rng = np.random.default_rng(0)
     before, after, reference = rng.random((3, 8, 8, 3))
     counted = np.ones((8, 8), bool)
-    data, maps = departures(before, after, reference, counted, 0 * after, DEFAULT_VIEWING)
+    exact = Estimate(reference, 0 * after, 0 * after, 2)
+    halves = RenderedHalves(None, (), before, exact, exact, counted, DEFAULT_VIEWING)
+    data, maps = departures(halves, after)
     expected = blurred(after, reference, DEFAULT_VIEWING)
     np.testing.assert_array_equal(maps["blurred"], expected)
     assert data["blurred"].after == expected.mean()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from comparisons.fit.fit import FitOptions
+from comparisons.fit.fit import fit
 from comparisons.gallery.builtin import builtin
 from comparisons.study import design
 from heuristic.errors import InputError, unknown
@@ -29,7 +29,7 @@ def test_a_word_that_is_not_known_is_told_with_what_is_allowed():
     [
         (lambda: builtin("cornel-box"), "cornell-box"),
         (lambda: check_form("Phong"), "phong"),
-        (lambda: FitOptions(loss="perceptive"), "perceptual"),
+        (lambda: fit(builtin("fig-8-9").source(), loss="perceptive"), "perceptual"),
         (lambda: design.parse(STUDY), "alpha"),
     ],
 )

@@ -18,7 +18,7 @@ from PIL import Image
 
 from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.fit import fit as fitting
-from comparisons.fit.fit import FitOptions, fit
+from comparisons.fit.fit import fit
 from comparisons.fit.fit_record import FitRecord
 from comparisons.fit.model import OwnModel, PhongModel, bounds, phong_parameters, see, start
 from comparisons.fit.search import LOSSES, Objective, descend, identify, search
@@ -250,7 +250,7 @@ def fitted(request):
     """A fit of figure 8.9 by each loss."""
     mi.set_variant("llvm_ad_rgb")
     options = Options(resolution=(48, 48), spp=16)
-    return fit(builtin("fig-8-9").source(), options, FitOptions(loss=request.param))
+    return fit(builtin("fig-8-9").source(), options, request.param)
 
 
 def test_the_errors_are_those_of_the_loss_that_was_minimised(fitted, rgb):
@@ -304,7 +304,7 @@ def test_a_gain_is_that_of_least_squares(rgb, written):
     """In linear RGB the best gain has a closed form: the image is proportional to it."""
     name = written(GAIN.replace(" + 0.1 * dr.square(1 + tint) * point.ambient", ""))
     options = Options(resolution=(24, 24), spp=32, heuristic=name)
-    found = fit(builtin("fig-8-9").source(), options, FitOptions(loss="linear"))
+    found = fit(builtin("fig-8-9").source(), options, "linear")
     h, r = found.before, found.reference
     (nearest,) = found.record.fits
     gain, tint = nearest.own
@@ -355,7 +355,7 @@ def test_what_cannot_be_fitted_is_refused(run, rgb, written, tmp_path):
     with pytest.raises(InputError, match="no pixel sees a surface"):
         fit(Source("away", away), Options(resolution=(8, 8), spp=4))
     with pytest.raises(InputError, match="phong, blinn"):
-        FitOptions(forms=())
+        fit(builtin("fig-8-9").source(), forms=())
     for words, expected in (
         (("fig-6-10",), "--interpolation phong"),
         (("fig-8-6a", "--loss", "L1"), "perceptual"),

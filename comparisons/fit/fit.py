@@ -8,6 +8,7 @@ For Phong's model, the forms of its lobe are fitted; for a user's heuristic, the
 declares.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import log
 from time import perf_counter
@@ -32,7 +33,16 @@ from comparisons.fit.fit_record import (
     physical_materials,
 )
 from comparisons.fit.model import OwnModel, PhongModel, Surface
-from comparisons.fit.search import COVERAGE, LOSSES, Objective, bounded_minimum, identify, search
+from comparisons.fit.search import (
+    COVERAGE,
+    LOSSES,
+    Certainty,
+    Loss,
+    Objective,
+    bounded_minimum,
+    identify,
+    search,
+)
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
 from heuristic.errors import InputError, unknown
@@ -72,23 +82,6 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class FitOptions:
-    """Choices of a fit besides the rendering.
-
-    ``loss`` is a name in :data:`comparisons.fit.search.LOSSES`; ``forms`` are forms of the lobe.
-    """
-
-    loss: str = "perceptual"
-    forms: tuple[str, ...] = FORMS
-
-    def __post_init__(self):
-        if self.loss not in LOSSES:
-            raise unknown("loss", self.loss, LOSSES)
-        if not self.forms or not set(self.forms) <= set(FORMS):
-            raise InputError(f"forms {self.forms}: give one or more of {', '.join(FORMS)}.")
-
-
-@dataclass(frozen=True)
 class RenderedHalves:
     """Both halves of a scene: the image of the paired parameters, the reference, the pixels."""
 
@@ -97,28 +90,30 @@ class RenderedHalves:
     before: NDArray
     reference: Estimate
     difference: Estimate
-
-    @property
-    def counted(self) -> NDArray[np.bool_]:
-        """The pixels that a fit counts."""
-        return self.ready.counted
+    counted: NDArray[np.bool_]
+    viewing: Viewing
 
 
 def fit(
     source: Source,
     options: Options | None = None,
-    chosen: FitOptions | None = None,
+    loss: str = "perceptual",
+    forms: Sequence[str] = FORMS,
     progress: Progress | None = None,
     command: str = "",
 ) -> Fit:
     """Fit the heuristic half of a scene to its reference, in the current variant.
 
+    ``loss`` is a name in :data:`comparisons.fit.search.LOSSES`; ``forms`` are forms of the lobe.
     The resolution and samples are :data:`RESOLUTION` and :data:`SPP` if omitted. Films get a box
     filter, which keeps pixels independent. ``progress(stage, done, total)`` is called after each
     pass; ``command`` repeats the fit, for the record.
     """
     begin = perf_counter()
-    chosen = chosen or FitOptions()
+    if loss not in LOSSES:
+        raise unknown("loss", loss, LOSSES)
+    if not forms or not set(forms) <= set(FORMS):
+        raise InputError(f"forms {forms}: give one or more of {', '.join(FORMS)}.")
     options = _completed(options or Options())
     heuristic = named(options.heuristic)
     rendered = render(guarded(source.edited(filter_by_box), options), options, progress)
@@ -126,9 +121,9 @@ def fit(
     if heuristic is PHONG:
         with variant(VARIANT):
             seen = model.see(rendered.ready.heuristic, rendered.seeds)
-            fits = [_form_fit(rendered, seen, form, chosen, options) for form in chosen.forms]
+            fits = [_form_fit(rendered, seen, form, LOSSES[loss]) for form in forms]
     else:
-        fits = [_own_fit(rendered, heuristic, chosen, options)]
+        fits = [_own_fit(rendered, heuristic, LOSSES[loss])]
     best = min(range(len(fits)), key=lambda place: fits[place][0].loss)
     ready = rendered.ready
     record = FitRecord(
@@ -140,7 +135,7 @@ def fit(
         passes=ready.passes,
         viewing=options.viewing,
         pairing=options.pairing,
-        loss={"name": chosen.loss, "unit": LOSSES[chosen.loss].unit},
+        loss={"name": loss, "unit": LOSSES[loss].unit},
         pixels=Pixels(counted=int(rendered.counted.sum()), total=rendered.counted.size),
         fits=tuple(one for one, _, _ in fits),
         best=best,
@@ -196,30 +191,25 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
         add_difference(sums, one.images)
     before, reference, difference = (total.estimate() for total in sums)
     seeds = tuple(pass_seed(options.seed, number) for number in range(ready.passes))
-    return RenderedHalves(ready, seeds, before.mean, reference, difference)
+    counted, viewing = ready.counted, options.viewing
+    return RenderedHalves(ready, seeds, before.mean, reference, difference, counted, viewing)
 
+
+Starts = list[tuple[float | None, NDArray]]
+"""Places to search from: the exponent of each, None for the paired one, and the parameters."""
 
 FormResult = tuple[FormFit, NDArray, dict[str, NDArray]]
 """The record of a form's fit, its image, and the maps of what it leaves."""
 
 
-def _form_fit(
-    rendered: RenderedHalves, whole: Surface, form: str, chosen: FitOptions, options: Options
-) -> FormResult:
+def _form_fit(rendered: RenderedHalves, whole: Surface, form: str, loss: Loss) -> FormResult:
     """Fit one form of the lobe."""
-    loss, counted = LOSSES[chosen.loss], rendered.counted
-    seen = whole.within(counted.ravel())
+    seen = whole.within(rendered.counted.ravel())
     fitted = model.phong_parameters(seen, form)
     phong = PhongModel(seen, form, fitted)
-    objective = Objective(phong, rendered.reference.mean[counted], loss, options.viewing)
-    x, least, searches = search(objective, form_starts(objective))
     reached = [len(np.unique(samples["pixel"])) for samples in seen.samples]
-    error = rendered.difference.standard_error[counted]
     pixels = np.array([reached[parameter.owner] for parameter in fitted])
-    certainties, covariance = identify(objective, x, pixels, error)
-    records = [
-        phong_record(phong, place, x, certainties, covariance) for place in range(len(fitted))
-    ]
+    x, certainties, covariance, losses = _search(rendered, phong, loss, form_starts, pixels)
     physical = physical_materials(rendered.ready.pair.physical)
     materials = tuple(
         FittedMaterial(
@@ -227,17 +217,19 @@ def _form_fit(
             reference=physical.get(name),
             pixels=reached[owner],
             parameters=tuple(
-                one for one, p in zip(records, fitted, strict=True) if p.owner == owner
+                phong_record(phong, place, x, certainties, covariance)
+                for place, parameter in enumerate(fitted)
+                if parameter.owner == owner
             ),
         )
         for owner, name in enumerate(seen.names)
     )
     after = PhongModel(whole, form, fitted).image(x).reshape(rendered.before.shape)
-    parts: dict[str, Any] = {"form": form, "materials": materials, "convergence": searches}
-    return _judged(rendered, objective, least, after, **parts)
+    by_metric, maps = departures(rendered, after)
+    return FormFit(form=form, materials=materials, departure=by_metric, **losses), after, maps
 
 
-def form_starts(objective: Objective) -> list[tuple[float | None, NDArray]]:
+def form_starts(objective: Objective) -> Starts:
     """Return the paired parameters, and lobes of several widths with coefficients that suit each.
 
     The latter are the best in linear RGB.
@@ -246,7 +238,7 @@ def form_starts(objective: Objective) -> list[tuple[float | None, NDArray]]:
     paired, (low, high) = model.start(phong.parameters), model.bounds(phong.parameters)
     at_n = np.array([parameter.name == "n" for parameter in phong.parameters])
     linear = phong.linear
-    starts: list[tuple[float | None, NDArray]] = [(None, paired)]
+    starts: Starts = [(None, paired)]
     for n in STARTS:
         x = np.where(at_n, log(n * 4 if phong.form == "blinn" else n), paired)
         columns = phong.columns(x)[linear].reshape(linear.sum(), -1)
@@ -258,9 +250,7 @@ def form_starts(objective: Objective) -> list[tuple[float | None, NDArray]]:
     return starts
 
 
-def _own_fit(
-    rendered: RenderedHalves, heuristic: Heuristic, chosen: FitOptions, options: Options
-) -> FormResult:
+def _own_fit(rendered: RenderedHalves, heuristic: Heuristic, loss: Loss) -> FormResult:
     """Fit the parameters that a heuristic declares, from places within their bounds."""
     advice = "`def shade(point, gloss: Range(0, 1) = 0.5)`"
     if not heuristic.traced:
@@ -273,18 +263,14 @@ def _own_fit(
             f"heuristic {heuristic.name} has no parameters to fit. Declare one with its bounds:"
             f" {advice}."
         )
-    counted = rendered.counted
-    own = OwnModel(rendered.ready.heuristic, heuristic, rendered.seeds, counted)
-    reference = rendered.reference.mean[counted]
-    objective = Objective(own, reference, LOSSES[chosen.loss], options.viewing)
+    own = OwnModel(rendered.ready.heuristic, heuristic, rendered.seeds, rendered.counted)
     default = np.array([each.paired for each in own.parameters])
     reach, (low, high) = REACH * np.maximum(np.abs(default), 1.0), model.bounds(own.parameters)
     low, high = np.maximum(low, default - reach), np.minimum(high, default + reach)
     random = np.random.default_rng(0).uniform(low, high, (OWN_STARTS, len(default)))
-    best, least, searches = search(objective, [(None, x) for x in (default, *random)])
-    pixels = np.full(len(default), counted.sum())
-    error = rendered.difference.standard_error[counted]
-    certainties, covariance = identify(objective, best, pixels, error)
+    starts: Starts = [(None, x) for x in (default, *random)]
+    pixels = np.full(len(default), rendered.counted.sum())
+    best, certainties, covariance, losses = _search(rendered, own, loss, lambda _: starts, pixels)
     spread = COVERAGE * np.sqrt(np.diag(covariance))
     records = tuple(
         parameter_record(
@@ -296,40 +282,44 @@ def _own_fit(
         )
         for i, (parameter, x) in enumerate(zip(own.parameters, best.tolist(), strict=True))
     )
-    parts = {"form": rendered.ready.pair.shading, "own": records, "convergence": searches}
-    return _judged(rendered, objective, least, own.whole(best), **parts)
+    after, form = own.whole(best), rendered.ready.pair.shading
+    by_metric, maps = departures(rendered, after)
+    return FormFit(form=form, own=records, departure=by_metric, **losses), after, maps
 
 
-def _judged(
-    rendered: RenderedHalves, objective: Objective, loss: float, after: NDArray, **parts: Any
-) -> FormResult:
-    """Return the record of a fit, with its departures by metric."""
-    before, reference, counted = rendered.before, rendered.reference.mean, rendered.counted
-    by_metric, maps = departures(
-        before, after, reference, counted, rendered.difference.noise, objective.viewing
-    )
-    error = objective.value_of(before[counted]) - loss
-    record = FormFit(loss=loss, parameter_error=error, departure=by_metric, **parts)
-    return record, after, maps
+def _search(
+    rendered: RenderedHalves,
+    fitted: PhongModel | OwnModel,
+    loss: Loss,
+    starts: Callable[[Objective], Starts],
+    pixels: NDArray,
+) -> tuple[NDArray, list[Certainty], NDArray, dict[str, Any]]:
+    """Return the best parameters, how certain they are, and the fields of the losses."""
+    counted = rendered.counted
+    objective = Objective(fitted, rendered.reference.mean[counted], loss, rendered.viewing)
+    x, least, searches = search(objective, starts(objective))
+    error = rendered.difference.standard_error[counted]
+    certainties, covariance = identify(objective, x, pixels, error)
+    removed = objective.value_of(rendered.before[counted]) - least
+    losses = {"loss": least, "parameter_error": removed, "convergence": searches}
+    return x, certainties, covariance, losses
 
 
 def departures(
-    before: NDArray,
-    after: NDArray,
-    reference: NDArray,
-    counted: NDArray[np.bool_],
-    noise: NDArray,
-    viewing: Viewing,
+    rendered: RenderedHalves, after: NDArray
 ) -> tuple[dict[str, FitDeparture], dict[str, NDArray]]:
     """Return the departures by metric, and the metrics' maps (H, W) after the fit."""
+    reference, counted, viewing = rendered.reference.mean, rendered.counted, rendered.viewing
     by_metric, maps = {}, {}
     for name, metric in drawn().items():
-        first, maps[name] = (metric(image, reference, viewing) for image in (before, after))
+        first, maps[name] = (
+            metric(image, reference, viewing) for image in (rendered.before, after)
+        )
         means = [metric.mean(values[counted]) for values in (first, maps[name])]
         by_metric[name] = FitDeparture(
             before=means[0],
             after=means[1],
             p95_after=float(np.percentile(maps[name][counted], 95)),
-            noise_floor=noise_floor(metric, reference, noise, counted, viewing),
+            noise_floor=noise_floor(metric, reference, rendered.difference.noise, counted, viewing),
         )
     return by_metric, maps

@@ -13,7 +13,6 @@ from reports import jobs
 from reports.terminal.words import quiet_option, tell, tell_where, verbose_option
 
 if TYPE_CHECKING:
-    from comparisons.fit.fit import FitOptions
     from comparisons.fit.fit_record import FitRecord
     from comparisons.options import Options
 
@@ -65,15 +64,14 @@ def fit(
     jobs.require_known(scenes)
     with jobs.pool(timeout) as pool:
         pool.start()
-        from comparisons.fit.fit import FitOptions
         from heuristic.materials import FORMS
         from reference.records import plain
         from reports.files.results import hold, own, places
         from reports.run import fit_files
         from reports.terminal import progress
 
-        chosen = FitOptions(loss, FORMS if form == "all" else (form,))
-        common = (jobs.request(words), chosen, {"loss": loss, "form": form})
+        forms = FORMS if form == "all" else (form,)
+        common = (jobs.request(words), forms, {"loss": loss, "form": form})
         with hold(output, jobs.command_line()) as top:
             folder = own(top / "fit")
             folders = places(folder, scenes)
@@ -94,8 +92,8 @@ def fit(
 def fitted(
     name: str,
     request: Options,
-    chosen: FitOptions,
-    words: dict[str, Any],
+    forms: tuple[str, ...],
+    words: dict[str, str],
     place: Path,
     progress: Any,
 ) -> FitRecord:
@@ -105,6 +103,7 @@ def fitted(
     from reports.run import fit_files
 
     case = open_case(name, request)
-    result = fit(case.source, case.options, chosen, progress, case.command("fit", **words))
+    command = case.command("fit", **words)
+    result = fit(case.source, case.options, words["loss"], forms, progress, command)
     fit_files.write(place, result)
     return result.record
