@@ -49,19 +49,13 @@ def engines() -> dict[str, Audit]:
 
 
 def argued(found: dict[str, Audit]) -> Iterator[str]:
-    """Yield the table of engines: the worst value of each check, and where it was found."""
+    """Yield the table of engines: *holds*, or the worst value found."""
     rows = [
         (f"[{name}](shaders/{ENGINES[name].partition(':')[0]})",
-         *(_where(record.named(check)) for check in ARGUED))
+         *(_cell(record.named(check)) for check in ARGUED))
         for name, record in found.items()
     ]  # fmt: skip
-    yield from markdown([("Form", *ARGUED), *rows], right=4)
-
-
-def _where(check: Checked) -> str:
-    if check.verdict == "holds":
-        return f"holds ({number(check.value)})"
-    return f"**{number(check.value)}**: {check.worst}"
+    yield from markdown([("Form", *ARGUED), *rows], right=1)
 
 
 def table(found: dict[str, Audit]) -> Iterator[str]:

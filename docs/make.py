@@ -92,14 +92,20 @@ def marks(part):
 
 
 def rules():
-    """Yield the rules of pruning: what each omits, its proof, and its premises."""
+    """Yield the rules of pruning: what each omits, its proof, and its premises, numbered once."""
+    numbers: dict[str, int] = {}
     for rule in RULES:
-        yield f"### {rule.name[0].upper()}{rule.name[1:]}"
-        yield from ("", f"*What is absent:* {rule.absent}.", "", f"*Proof.* {rule.proof}")
-        yield from ("", "*Premises*, each checked:", "")
-        yield from (f"- {premise.sentence}" for premise in rule.premises)
-        if rule is not RULES[-1]:
+        known = ", ".join(str(numbers[p.sentence]) for p in rule.premises if p.sentence in numbers)
+        if rule is not RULES[0]:
             yield ""
+        yield f"### {rule.name[0].upper()}{rule.name[1:]}"
+        yield from ("", f"*Absent:* {rule.absent}.", "", f"*Proof.* {rule.proof}", "")
+        yield f"*Premises*{' ' * bool(known)}{known}:"
+        yield ""
+        for premise in rule.premises:
+            if premise.sentence not in numbers:
+                numbers[premise.sentence] = len(numbers) + 1
+                yield f"{len(numbers)}. {premise.sentence}"
 
 
 def _images(name, interpolation=None):

@@ -24,6 +24,7 @@ from comparisons.verification import verify
 from reports.charts import vega
 from reports.charts.cost_charts import titled
 from reports.terminal.tables import markdown
+from reports.terminal.words import seconds
 from tests.benchmarks import kernel
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -72,31 +73,21 @@ def findings() -> None:
 
 
 def attribution() -> Iterator[str]:
-    """Study the cost of accuracy, draw its chart, and yield the README's sentence."""
+    """Study the cost of accuracy, draw its chart, and yield the README's sentences."""
     case = open_case(COST_SCENE, Options())
     record = cost(case.source, case.options).record
     atomic.write(DOCS / "cost-cornell-box.svg", vega.paper(titled(record)))
-    times = {one.name: one.ratio.value for one in record.methods}
-    points = {one.method: one for one in record.points}  # the last one has the most samples
-    worth = {one.effect: one.removes for one in record.attribution.effects}
-    by_worth = sorted(worth, key=lambda effect: -worth[effect].value)
-    removed = ", ".join(
-        f"{effect} {worth[effect].value:.3g} ({worth[effect].low:.3g} to {worth[effect].high:.3g})"
-        for effect in by_worth
-    )
-    closure = record.closure
-    kernel, shadows, full = (
-        points[name].error.mean for name in ("Phong kernel", "kernel with shadows", "full plan")
-    )
+    points = sorted(record.points, key=lambda one: one.spp)
+    kernel, *_ = (one for one in points if one.method == "Phong kernel")
+    shadows, *_ = (one for one in points if one.method == "kernel with shadows")
+    few, *_, many = (one for one in points if one.method == "full plan")
     yield (
-        f"A sample of the full plan takes {times['full plan']:.2g} times as long as one of the"
-        f" textbook kernel, direct light alone {times['direct']:.2g} times. The kernel is"
-        f" {kernel:.1f} away from the reference (mean ΔE2000), and more samples do not bring it"
-        f" nearer; the full plan is {full:.1f} away with {points['full plan'].spp} samples."
-        f" Adding shadows alone gives {shadows:.1f}, because the light between surfaces"
-        " that would fill them is missing. Averaged over all orders of adding them, the effects"
-        f" remove from {record.attribution.departure:.1f} (95 % intervals): {removed}."
-        f" With all of them, {closure.mean:.2g} ({closure.low:.2g} to {closure.high:.2g}) remains."
+        f"The textbook kernel is {kernel.error.mean:.1f} away from the reference (mean ΔE2000)"
+        f" after {seconds(kernel.seconds.value)}, and more samples do not bring it nearer; the full"
+        f" plan is {few.error.mean:.1f} away after {seconds(few.seconds.value)} and"
+        f" {many.error.mean:.1f} after {seconds(many.seconds.value)}. Adding shadows alone gives"
+        f" {shadows.error.mean:.1f}, because the light between surfaces that would fill them is"
+        " missing."
     )
 
 

@@ -32,8 +32,7 @@ def test_wrong_shaders_are_told_what_is_wrong(rgb, tmp_path, suffix):
         folder.mkdir()
         (said,) = mistakes_of(wrong.write(folder))
         assert re.search(wrong.message, said), wrong.name
-        (row,) = [line for line in page.splitlines() if line.startswith(f"| {wrong.name} |")]
-        assert re.search(wrong.message, row.rpartition(" | ")[2])
+        assert f"{wrong.name}{'.' if wrong is WRONG[-1] else ';'}" in page
 
 
 @pytest.mark.parametrize("suffix", LANGUAGES)

@@ -16,11 +16,6 @@ class Wrong:
     wrong: str
     message: str
 
-    @property
-    def language(self) -> str:
-        """What it is written in."""
-        return {GLSL: "GLSL", PYTHON: "Python"}[self.suffix]
-
     def write(self, folder: Path) -> Path:
         """Write the shader to a folder, and return its path."""
         text = (SHADERS / f"phong{self.suffix}").read_text(encoding="utf-8")
