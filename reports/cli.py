@@ -8,9 +8,9 @@ import os
 import shlex
 import signal
 import sys
-from collections.abc import Iterator, Mapping
 from importlib import import_module
-from typing import Any
+from itertools import chain
+from typing import Any, cast
 
 import click
 from click.shell_completion import get_completion_class
@@ -70,51 +70,40 @@ def completion(context: click.Context, shell: str) -> None:
     click.echo(script.source_template % script.source_vars())
 
 
-class Commands(Mapping[str, click.Command]):
-    """The commands by their names; a module is imported when its command is looked up."""
-
-    def __getitem__(self, name: str) -> click.Command:
-        if name not in set(self):
-            raise KeyError(name)
-        own = {"scenes": scenes, "completion": completion}
-        return own.get(name) or getattr(import_module(f"reports.commands.{name}"), name)
-
-    def __iter__(self) -> Iterator[str]:
-        return (name for names in COMMANDS.values() for name in names)
-
-    def __len__(self) -> int:
-        return sum(map(len, COMMANDS.values()))
-
-
 class Group(jobs.Helped, click.Group):
-    """A group with commands in groups, which suggests one for a mistyped one."""
+    """The commands in groups; a module is imported when its command is looked up."""
 
     def list_commands(self, context: click.Context) -> list[str]:
         """Return the names in the order of the groups."""
-        return list(self.commands)
+        return list(chain.from_iterable(COMMANDS.values()))
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        """Return a command by its name."""
+        if name not in self.list_commands(context) or name in self.commands:
+            return self.commands.get(name)
+        return cast(click.Command, getattr(import_module(f"reports.commands.{name}"), name))
 
     def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options, and the commands with their whole summaries."""
         super().format_options(context, formatter)
         for group, names in COMMANDS.items():
             with formatter.section(group):
-                found = ((name, self.commands[name].get_short_help_str(1000)) for name in names)
-                formatter.write_dl(list(found))
+                found = ((name, self.get_command(context, name)) for name in names)
+                formatter.write_dl([(n, one.get_short_help_str(1000)) for n, one in found if one])
 
     def resolve_command(self, context: click.Context, words: list[str]) -> Any:
         """Find the command that the first word names."""
         word = words[0]
         if self.get_command(context, word) is None and not word.startswith("-"):
-            near = suggestion(word, self.commands)
-            context.fail(
-                f"{word!r} is not a command{near}: choose one of {', '.join(self.commands)}."
-            )
+            names = self.list_commands(context)
+            near = suggestion(word, names)
+            context.fail(f"{word!r} is not a command{near}: choose one of {', '.join(names)}.")
         return super().resolve_command(context, words)
 
 
 @click.group(
     cls=Group,
-    commands=Commands(),
+    commands=[scenes, completion],
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(__version__, prog_name="fotismos")

@@ -260,23 +260,18 @@ IN_PROCESSES = True
 """Whether scenes are read and rendered in separate processes; tests use their own process."""
 
 
-class Percentage(click.ParamType):
-    """A percentage with its sign, from 0 % to 100 %, as a share from 0 to 1."""
-
-    name = "percentage"
-
-    def convert(
-        self, value: str, parameter: click.Parameter | None, context: click.Context | None
-    ) -> float:
-        digits, sign, rest = value.strip().partition("%")
-        try:
-            share = float(digits) / 100.0
-        except ValueError:
-            share = math.nan
-        if not (sign and not rest and 0.0 <= share <= 1.0):
-            message = f"{value!r} is not a percentage: give one from 0% to 100%, such as 5%."
-            self.fail(message, parameter, context)
-        return share
+def percentage(text: str) -> float:
+    """Parse a percentage with its sign, from 0 % to 100 %, as a share from 0 to 1."""
+    digits, sign, rest = text.strip().partition("%")
+    try:
+        share = float(digits) / 100.0
+    except ValueError:
+        share = math.nan
+    if not (sign and not rest and 0.0 <= share <= 1.0):
+        raise click.BadParameter(
+            f"{text!r} is not a percentage: give one from 0% to 100%, such as 5%."
+        )
+    return share
 
 
 within_option = click.option(

@@ -230,12 +230,12 @@ def test_help_only_helps(command, tmp_path):
 # --- Manners ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", sorted(cli.cli.commands))
+@pytest.mark.parametrize("name", sorted(cli.cli.list_commands(None)))
 def test_help_shows_examples_that_are_commands(name, run):
     code, printed, _ = run(name, "--help")
     assert code == 0
     _, _, examples = printed.partition("Examples")
-    command = cli.cli.commands[name]
+    command = cli.cli.get_command(None, name)
     found = 0
     for line in examples.partition("\nOptions")[0].splitlines():
         if line.strip().startswith("fotismos"):

@@ -14,7 +14,7 @@ from comparisons.options import Options
 from comparisons.prepared import prepare
 from reference.rendering.gbuffer import pixel_rays
 from reference.rendering.renderer import variant
-from reports.page import terms_view
+from reports.page.why_view import terms_view
 
 KERNEL = 1e-5
 """Of the largest value: single precision, and ``n`` times its rounding of a cosine."""
@@ -58,7 +58,7 @@ def require_sum(grid, ready):
     expected = kernel(ready, grid)
     assert expected.max() > 0.1
     assert abs(grid.total() - expected).max() <= KERNEL * expected.max()
-    assert abs(total_of(terms_view.view(grid)) - expected).max() <= CODES * expected.max()
+    assert abs(total_of(terms_view(grid)) - expected).max() <= CODES * expected.max()
 
 
 def total_of(view):

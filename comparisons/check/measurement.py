@@ -301,8 +301,8 @@ def read_baseline(text: str, name: str) -> Baseline:
     except (InputError, ValueError, OverflowError, RecursionError) as error:
         where = "" if str(error).startswith(name) else f"{name}: "
         raise InputError(
-            f"{where}{error} `{program.command('check', 'BASELINE', '--update', '--scene')} SCENE`"
-            " writes it."
+            f"{where}{error} Delete it, and write it again:"
+            f" `{program.command('check', 'BASELINE', '--update', '--scene')} SCENE`."
         ) from error
     return baseline
 

@@ -63,9 +63,6 @@ LARGEST = 2**24
 LONGEST_KEPT = 128
 """Pixels of the longer side of the pictures that a baseline keeps."""
 
-HEAD = '{\n  "record_version"'
-"""How baselines begin."""
-
 _HOW = f"Make one with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`."
 
 
@@ -76,15 +73,6 @@ def read(path: Path) -> BaselineFile:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}. {_HOW}") from error
     return BaselineFile(path, read_baseline(text, str(path)))
-
-
-def was_ours(path: Path) -> bool:
-    """Return whether a broken file begins as baselines do, or is cut off in their beginning."""
-    try:
-        text = content(path, LARGEST).decode(errors="replace")
-    except OSError:
-        return False
-    return text.startswith(HEAD) or HEAD.startswith(text)
 
 
 def require_own_pictures(path: Path) -> None:

@@ -13,7 +13,6 @@ from comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
 from comparisons.compare import compare
 from comparisons.comparison import versions
 from comparisons.departure.metrics import LEADING
-from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.processes.pool import Pool, Task
 from heuristic import program
@@ -330,8 +329,9 @@ def update_one(
     """Write one baseline; ``scene`` is None if the file names it."""
     if with_pictures:
         baselines.require_own_pictures(path)
-    file, options = _readable(path, scene), baselines.options_for(options, path)
-    if file is not None:
+    options = baselines.options_for(options, path)
+    if path.exists():
+        file = baselines.read(path)
         old = file.baseline
         if scene is not None and baselines.scene_for(scene, path) != old.scene:
             raise InputError(
@@ -342,25 +342,9 @@ def update_one(
         if Options.of(options) == Options.of(old.options):
             return update(file, file.open(), significance, with_pictures, progress), None
         with_pictures = with_pictures or bool(old.images)
-    assert scene is not None, "a baseline that cannot be read comes with its scene"
+    assert scene is not None, "a missing baseline comes with its scene"
     case = open_case(scene, Options.of(baselines.options_from(options, path)))
     return create(path, baselines.scene_for(scene, path), case, with_pictures, progress), None
-
-
-def _readable(path: Path, scene: str | None) -> BaselineFile | None:
-    """Read a baseline; None if it is missing, or broken while its scene is given."""
-    if not path.exists():
-        return None
-    try:
-        return baselines.read(path)
-    except InputError as error:
-        if scene is None or not path.is_file():
-            raise
-        if not baselines.was_ours(path):
-            raise InputError(
-                f"{path}: this file is not a baseline, and is not overwritten. Give another one."
-            ) from error
-        return None
 
 
 def _targets(path: Path, scenes: Sequence[str]) -> list[tuple[Path, str | None]]:
@@ -369,9 +353,7 @@ def _targets(path: Path, scenes: Sequence[str]) -> list[tuple[Path, str | None]]
         if len(scenes) > 1:
             raise InputError(f"{path}: a baseline is of one --scene; give a folder for several.")
         if not scenes and not path.exists():
-            if path.stem not in SCENES:
-                raise InputError(f"{path}: there is no such baseline. Give its --scene.")
-            scenes = (path.stem,)
+            raise InputError(f"{path}: there is no such baseline. Give its --scene.")
         return [(path, scenes[0] if scenes else None)]
     if scenes:
         named = {path / f"{baselines.name_of(scene)}.json": scene for scene in scenes}

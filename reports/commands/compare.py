@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 @jobs.within_option
 @click.option(
     "--max-visible",
-    type=jobs.Percentage(),
+    type=jobs.percentage,
     metavar="P%",
     help="Exit code 1 unless at most this share of each scene's pixels differs visibly.",
 )

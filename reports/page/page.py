@@ -26,7 +26,7 @@ from reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT
 from reports.files import images
 from reports.files.results import Failure, RunRecord
 from reports.page import templating
-from reports.page.scene_view import Making, SceneView, WhyView
+from reports.page.scene_view import SceneView, WhyView
 from reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
@@ -66,37 +66,28 @@ class PageScene(SceneView, kw_only=True):
     advice: Runs
 
 
-class FailedScene(Failure, kw_only=True):
-    """A scene that could not be compared, and its name in the page's address."""
-
-    id: str
-
-
 def render(
     views: Sequence[SceneView],
     title: str = TITLE,
     failures: Sequence[Failure] = (),
-    making: Making | None = None,
+    state: str = "",
     threshold: float = TOLERANCE,
 ) -> str:
     """One HTML page of all scenes, worst first, that begins at a threshold.
 
-    `failures` are the scenes that could not be compared, and `making` says how far an unfinished
-    run is.
+    `failures` are the scenes that could not be compared; `state` is a sentence on an unfinished
+    run.
     """
     taken: set[str] = set()
     usual = THRESHOLDS.index(threshold)
     records = [view.record for view in views]
     scenes = [_scene(view, taken) for view in views]
     scenes.sort(key=lambda scene: -scene.shares[usual])
-    failed = [
-        FailedScene(failure.scene, failure.error, id=_identifier(failure.scene, taken))
-        for failure in failures
-    ]
+    failed = {_identifier(failure.scene, taken): failure for failure in failures}
     data = {
         "scenes": [
             *map(_scene_data, scenes),
-            *({"id": failure.id, "name": failure.scene, "failed": True} for failure in failed),
+            *({"id": id, "name": one.scene, "failed": True} for id, one in failed.items()),
         ],
         "thresholds": THRESHOLDS,
         "usual": threshold,
@@ -119,7 +110,7 @@ def render(
         metrics=METRICS,
         leading=LEADING,
         details=DETAILS,
-        making=making,
+        state=state,
     )
 
 

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from msgspec import field
 
 from comparisons.comparison import ComparisonRecord
-from reference.records import Record
+from reference.records import Record, plain
 from reports.charts.vega import Figure
 from reports.files.images import Sheet
 from reports.page.embedding import Embedded
-from reports.page.terms_view import TermsView
 
 
 class EffectMap(Record):
@@ -35,6 +33,24 @@ class WhyView(Record):
     effects: EffectMap
     pictures: Sheet | None = None
     maps: Sheet | None = None
+
+
+class TermsView(Record):
+    """The page's data of the terms of a scene.
+
+    ``grid`` has planes over the grid of pixels, and ``tops`` those of its values ≥ 0; lights have a
+    name and their ``I_p0``. ``missing`` says why there are no terms.
+    """
+
+    grid: Embedded | None = None
+    tops: dict[str, float] = field(default_factory=dict)
+    materials: tuple[dict[str, Any], ...] = ()
+    lights: tuple[dict[str, Any], ...] = ()
+    missing: str = ""
+
+    def manifest(self) -> dict[str, Any]:
+        """The data of the page's script, except the grid's planes, as plain data."""
+        return plain(self) | {"grid": self.grid.manifest() if self.grid else None}
 
 
 class CostView(Record):
@@ -87,15 +103,6 @@ class SceneView(Record):
     terms: TermsView | None = None
     before: Before | None = None
     why: WhyView | None = None
-
-
-@dataclass(frozen=True)
-class Making:
-    """The number of finished scenes of an unfinished run."""
-
-    done: int
-    total: int
-    is_interrupted: bool = False
 
 
 def picture_name(kind: str, name: str) -> str:

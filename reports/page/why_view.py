@@ -1,8 +1,9 @@
-"""Causes for the page: which effect dominates where, and small pictures of combinations."""
+"""What the page shows with causes: the effects of pixels, small pictures, and terms of 8.10."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +14,21 @@ from comparisons.departure.metrics import delta_e_2000
 from comparisons.hybrids.attribution import dominating
 from reports.charts.theme import EFFECT_COLOURS
 from reports.files import images
-from reports.page.scene_view import EffectMap, WhyView
+from reports.page.embedding import packed
+from reports.page.scene_view import EffectMap, TermsView, WhyView
+
+if TYPE_CHECKING:
+    from comparisons.pixel_terms import TermGrid
 
 LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789"))
 """Codes of the map: no effect, a pixel that does not count, and the effects' places."""
 
 STEP, UNCOUNTED = 0.1, 255
 """ΔE2000 of a level of the maps, and the level of pixels that do not count; as in switches.js."""
+
+
+LARGEST_CODE = 65535
+"""The largest code of the terms' planes."""
 
 
 def why_view(
@@ -52,4 +61,43 @@ def why_view(
         found,
         images.sheet([images.tonemap(each, viewing.exposure) for each in previews]),
         images.sheet([Image.fromarray(each.astype(np.uint8)) for each in left], lossless=True),
+    )
+
+
+def terms_view(grid: TermGrid) -> TermsView:
+    """Return the page's data of a grid of terms: 16-bit codes of their factors.
+
+    A cosine ``c`` has the code ``65535 (1 + c) / 2``; a value ``v`` ≥ 0 has
+    ``65535 sqrt(v / top)``, with the plane's ``top``, and is off by at most ``top`` / 65000. The
+    planes are packed like those of images (:mod:`reports.page.embedding`).
+    ``templates/viewer/terms.js`` reads them.
+    """
+    seen = grid.material >= 0
+    shiny = np.array([any(material.k_s) for material in grid.materials] + [False])[grid.material]
+    cosines, amounts = {"cos_view": grid.cos_view}, dict[str, NDArray]()
+    for number, light in enumerate(grid.lights):
+        cosines |= {
+            f"{number}.cos_incidence": light.cos_incidence,
+            f"{number}.cos_view": light.cos_view,
+        }
+        amounts |= {
+            f"{number}.attenuation": light.attenuation * seen,
+            f"{number}.lobe": light.lobe * shiny,
+        }
+    if grid.others is not None:
+        amounts |= {f"others.{c}": grid.others[..., i] * seen for i, c in enumerate("RGB")}
+    tops = {name: float(values.max(initial=0)) or 1.0 for name, values in amounts.items()}
+
+    planes = {"material": (grid.material + 1).astype(np.uint16)}
+    for name, values in cosines.items():
+        code = np.rint(LARGEST_CODE * (1 + np.clip(values, -1, 1)) / 2)
+        planes[name] = np.where(seen, code, 0).astype(np.uint16)
+    for name, values in amounts.items():
+        code = np.rint(LARGEST_CODE * np.sqrt(np.maximum(values, 0) / tops[name]))
+        planes[name] = code.astype(np.uint16)
+    return TermsView(
+        grid=packed(planes),
+        tops=tops,
+        materials=tuple(vars(material) for material in grid.materials),
+        lights=tuple({"name": each.name, "intensity": each.intensity} for each in grid.lights),
     )

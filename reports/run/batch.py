@@ -97,15 +97,16 @@ class Batch:
         """Write the page and its details, with further arguments of both."""
         from reports.files import results
         from reports.page import page
-        from reports.page.scene_view import Making
 
         begin, path = perf_counter(), self.folder / results.PAGE
-        making = None
-        if is_interrupted or self.done < len(self.places):
-            making = Making(self.done, len(self.places), is_interrupted)
+        state, done = "", f"{self.done} of {len(self.places)} scenes are done"
+        if is_interrupted:
+            state = f"Interrupted: {done}; the same command resumes the run."
+        elif self.done < len(self.places):
+            state = f"In progress: {done}; reload to see more."
         results.write(self.folder / page.DETAILS, page.details(len(self.ordered), **content))
         html = page.render(
-            self.ordered, failures=self.failures(), making=making, threshold=self.within
+            self.ordered, failures=self.failures(), state=state, threshold=self.within
         )
         results.write(path, html)
         end = perf_counter()

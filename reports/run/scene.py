@@ -20,8 +20,8 @@ from heuristic import program
 from heuristic.heuristics import named
 from reference.records import VERSION, Record, plain, to_json
 from reports.files import images, results
-from reports.page import embedding, terms_view
-from reports.page.scene_view import SceneView
+from reports.page import embedding
+from reports.page.scene_view import SceneView, TermsView
 
 if TYPE_CHECKING:
     from comparisons.case import Case
@@ -228,14 +228,22 @@ def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> 
     record, shown = comparison.record, comparison.images
     exposure = record.viewing.exposure
     small = images.thumbnails(shown, exposure)
-    picked = terms_view.picked(comparison.terms, record.regions, shown.reference)
     return SceneView(
         record=record,
         thumbnails={name: images.webp_of(png) for name, png in small.items()},
         embedded=embedding.embed(images.channels(layers or _layers(shown)), shown.counted),
-        terms=terms_view.view(comparison.terms, comparison.no_terms, picked),
+        terms=_terms(comparison),
         why=_why(comparison),
     )
+
+
+def _terms(comparison: Comparison) -> TermsView | None:
+    """Return the terms at pixels for the page, or why there are none."""
+    if comparison.terms is None:
+        return TermsView(missing=comparison.no_terms) if comparison.no_terms else None
+    from reports.page.why_view import terms_view  # loaded late: --no-why traces none
+
+    return terms_view(comparison.terms)
 
 
 def _why(comparison: Comparison) -> WhyView | None:

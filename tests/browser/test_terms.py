@@ -2,7 +2,6 @@
 
 import re
 
-import numpy as np
 import pytest
 
 from tests import term_grids
@@ -104,18 +103,3 @@ def test_the_background_and_other_shading_say_that_there_are_no_terms(visitor):
     visitor.open(f"#scene={EXACT}")
     assert "Flat shading" in page.locator("#terms .note").text_content()
     assert not page.locator("#terms table").is_visible()
-
-
-@pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)
-def test_without_scripts_the_terms_of_one_pixel_add_up(visitor):
-    visitor.page.goto(visitor.report.url)
-    (table,) = visitor.page.locator(".unscripted table:visible").all()
-    rows = {
-        row.locator("th").text_content(): [
-            float(cell.get_attribute("value")) for cell in row.locator("td data").all()
-        ]
-        for row in table.locator("tbody tr").all()
-    }
-    whole, _ = rows.pop("textbook"), rows.pop("physical")
-    assert len(rows) > 2
-    np.testing.assert_allclose(np.sum([*rows.values()], axis=0), whole, rtol=1e-6)

@@ -1,4 +1,4 @@
-// Equation 8.10 at the marked pixel, with its numbers, from the page's grid (see terms_view.py).
+// Equation 8.10 at the marked pixel, with its numbers, from the page's grid (see why_view.py).
 
 /** The largest code of the grid. */
 const LARGEST_CODE = 65535;
