@@ -27,7 +27,7 @@ SIZE = 512, 384
 TOLERANCES = (5.0, 2.0, 1.0)
 
 NONE = "none"
-AT_FULL_SIZE = "cornell-box", "plastic-spheres", "outdoors"
+AT_FULL_SIZE = "cornell-box", "plastic-spheres"
 
 
 def measured(names: Sequence[str] = (*SCENES, *map(str, LARGER))) -> list[Cost]:
@@ -189,8 +189,7 @@ def _stand_ins(records):
     said = "; ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
     left = f" Never: {'; '.join(never)}." if never else ""
     left += (
-        " Measured in version 0.2, lost in all scenes but one and gone since: spherical harmonics;"
-        " ambient occlusion; ambient occlusion from the depth image; filtered shadow map."
+        " Gone since version 0.2: filtered shadow map (1), spherical harmonics, ambient occlusion."
     )
     return f"Stand-ins on the front, by the number of scenes: {said}.{left}"
 
