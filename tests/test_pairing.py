@@ -301,7 +301,7 @@ def test_what_has_no_pair_is_named_with_what_is_lost(rgb):
     (light,) = (record for record in pair.pairing.emitters if record.name == "beam")
     assert light.given == "projector"
     lost = {(loss.name, loss.lost) for loss in pair.unrepresentable}
-    assert {("mirror", "mirror image"), ("beam", "its picture")} <= lost
+    assert {("mirror", "mirror image"), ("beam", "this kind of light")} <= lost
 
 
 def test_a_coefficient_that_is_no_reflectance_and_a_missing_camera_are_named(rgb):

@@ -62,7 +62,7 @@ class NearestPhong:
     """The phong material that replaces a BSDF; with values as in :mod:`reference.scene.values`.
 
     ``lost`` are pairs of something that the heuristic model has no form for, and the rule for the
-    rest.
+    rest; ``physical`` are parameters of the BSDF, as engines have them, for users' heuristics.
     """
 
     k_i: Any = 0.0
@@ -76,6 +76,7 @@ class NearestPhong:
     transmittance: Any = 0.0
     tilt: Any = None
     lost: tuple[tuple[str, str], ...] = ()
+    physical: dict[str, Any] = field(default_factory=dict)
 
     def properties(self) -> mi.Properties:
         """Return the properties of the node ``phong``, without defaults."""
@@ -89,6 +90,8 @@ class NearestPhong:
                 props[name] = getattr(self, name)
         if self.tilt is not None:
             props["tilt"] = self.tilt
+        for name, value in self.physical.items():
+            props[name] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
         return props
 
     def parameters(self) -> dict[str, Any]:
@@ -106,12 +109,14 @@ class NearestPhong:
 class Context:
     """A graph that rules read and add nodes to, and the materials ``done`` so far, by node.
 
-    ``rule_of(plugin)`` returns the rule of a BSDF that is not in :data:`RULES`.
+    ``rule_of(plugin)`` returns the rule of a BSDF that is not in :data:`RULES`. With ``for_users``
+    materials also have their physical parameters.
     """
 
     graph: Graph
     convention: Convention
     rule_of: Callable[[str], "Rule"] | None = None
+    for_users: bool = False
     done: dict[int, NearestPhong] = field(default_factory=dict)
 
     def nearest(self, index: int) -> NearestPhong:
@@ -126,6 +131,16 @@ class Context:
     def value(self, index: int, key: str, default: Any) -> Any:
         """Return a parameter as the parser keeps it."""
         return self.graph.props(index).get(key, default)
+
+    def physical(
+        self, base_color: Any = 0.0, alpha: Any = 1.0, ior: Any = 1.0, metallic: Any = 0.0
+    ) -> dict[str, Any]:
+        """Return physical parameters by their names, if users' heuristics read them.
+
+        They stand for a surface that reflects nothing, without an interface, unless they are given.
+        """
+        found = {"base_color": base_color, "alpha": alpha, "ior": ior, "metallic": metallic}
+        return found if self.for_users else {}
 
     def plugin(self, index: int) -> str:
         """Return a node's plugin."""
@@ -210,17 +225,24 @@ def phong(graph: Graph, index: int) -> Phong:
 
 
 def itself(context: Context, index: int) -> NearestPhong:
-    """``phong``: itself."""
-    props = context.graph.props(index)
+    """``phong``: itself; physically the ``diffuse`` or ``roughplastic`` that it is paired with."""
+    props, physical = context.graph.props(index), {}
+    if context.for_users:
+        plugin, own, _ = physical_partner(context.graph, index, context.convention)
+        if plugin == "diffuse":
+            physical = context.physical(own["reflectance"])
+        else:
+            ior = own["int_ior"] / own["ext_ior"]
+            physical = context.physical(own["diffuse_reflectance"], own["alpha"], ior)
     names = ("k_i", "k_a", "k_d", "k_s", "n", "form", "normalised", "twosided", "transmittance")
     given = {name: props[name] for name in (*names, "tilt") if name in props}
-    return NearestPhong(**given)
+    return NearestPhong(**given, physical=physical)
 
 
 def diffuse(context: Context, index: int) -> NearestPhong:
     """``diffuse``: ``k_d = k_a = rho`` (exact)."""
     reflectance = context.value(index, "reflectance", 0.5)
-    return NearestPhong(k_a=reflectance, k_d=reflectance)
+    return NearestPhong(k_a=reflectance, k_d=reflectance, physical=context.physical(reflectance))
 
 
 RULES: dict[str, Rule] = {"phong": itself, "diffuse": diffuse}

@@ -2,8 +2,7 @@
 
 Lights without a row in the table get the nearest light: an environment or a sky becomes ``I_a``,
 its mean radiance over the sphere, and the sun a directional light of its irradiance and mean
-direction; a ``projector`` or textured ``spot`` becomes the even cone of the same solid angle and
-flux; a textured ``area`` light has its mean radiance. Any other light is left out.
+direction; a textured ``area`` light has its mean radiance. Any other light is left out.
 
 **Level.** A light without an exact pair differs from its form in the other half by shape. Its level
 follows one rule, so only the shape differs: *equal flux if the light's parameters determine it;

@@ -90,8 +90,8 @@ def pair(
     FLAT and GOURAUD make meshes of the heuristic half's shapes, by ``tessellation``
     (:mod:`heuristic.tessellation`); if that is given, PHONG gets meshes too. ``prune`` lets the
     kernel leave out the terms that no material has. ``heuristic`` names the declaration that shades
-    the heuristic half; ``with_partners`` lets its materials know their physical partners
-    (:mod:`reference.pairing.partners`), as they do for every user's heuristic.
+    the heuristic half; ``with_partners`` lets its materials know their physical parameters
+    (:mod:`reference.pairing.nearest`), as they do for every user's heuristic.
     """
     register()
     graph = source.parse()
@@ -112,19 +112,12 @@ def _paired(
     geometry = cache(_bare(graph).instantiate)
 
     model, half, replaced = named(heuristic), graph.copy(), Replacements()
-    context = bsdfs.Context(half, convention)
+    context = bsdfs.Context(half, convention, for_users=with_partners or not model.is_own)
     if any(half.plugin(index) not in bsdfs.RULES for index in half.nodes(BSDF)):
         from reference.pairing import nearest  # loaded late: only for lobes and transmission
 
         context.rule_of = nearest.rule_of
-    if model.is_own and not with_partners:
-        bsdfs.to_heuristic(context, replaced)
-    else:
-        from reference.pairing import partners  # loaded late: only users' heuristics read them
-
-        known = partners.read(half, convention)
-        bsdfs.to_heuristic(context, replaced)
-        partners.give(half, known)
+    bsdfs.to_heuristic(context, replaced)
     for index in half.nodes(BSDF) if model.form else ():
         if half.plugin(index) == "phong":
             half.props(index)["form"] = model.form

@@ -2,8 +2,8 @@
 
 ``area``: in the far field a point or an even spot, nearby a glow ``k_i``. ``constant``, ``envmap``
 and any other plugin whose light surrounds the scene: ``I_a``, the mean radiance; the sun of
-``sunsky`` and ``timed_sunsky`` is a directional light. ``projector`` and textured ``spot``: an even
-cone. Any other light is left out: it has no nearest form.
+``sunsky`` and ``timed_sunsky`` is a directional light. Any other light, such as ``projector`` or a
+textured ``spot``, is left out: it has no nearest form.
 
 Spots differ. Mitsuba's is even up to its beam width and falls linearly in the angle to 0 at its
 cutoff; the chapters' (6.4) falls as ``cos^m`` and is cut off. Neither can reproduce the other. The
@@ -33,8 +33,6 @@ def to_heuristic(light: LightNode) -> Any:
             _area(light)
         case "spot" if light.shape is None and light.value("texture", None) is None:
             _spot_to_heuristic(light)
-        case "projector" | "spot" if light.shape is None:
-            _even_cone(light)
         case "constant" if light.shape is None:
             light.becomes_ambient()
             return light.value("radiance", 1.0)
@@ -106,25 +104,6 @@ def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float], float]:
     radius = ROOM * np.linalg.norm(places - centroid[:, None], axis=0).max()
     area = float(np.ravel(shape.surface_area())[0])
     return centroid.tolist(), area, normal.tolist(), float(radius)
-
-
-def _even_cone(light: LightNode) -> None:
-    origin, axis = light.column(3), light.column(2)
-    beam = probe.beam(light.graph, light.emitter, origin, axis)
-    if beam is None:
-        light.leave_out()
-        return
-    cutoff, intensity = beam
-    props = heuristic(
-        "heuristic_spot",
-        position=mi.ScalarPoint3f(*origin),
-        direction=mi.ScalarVector3f(*axis),
-        cutoff=cutoff,
-        exponent=0.0,
-        intensity=intensity,
-    )
-    note = f"an even cone of {cutoff:.4g} deg, of the same solid angle and flux"
-    light.replace(props, INTENSITY_FACTOR, exact=False, note=note, lost="its picture")
 
 
 def _daylight(light: LightNode) -> Any:

@@ -87,10 +87,9 @@ class LightNode:
         factor: float = INTENSITY_FACTOR,
         exact: bool = True,
         note: str = "",
-        lost: str = "",
     ) -> None:
         """Replace it by a light of another plugin."""
-        self._record(props.plugin_name(), factor, exact, note, lost)
+        self._record(props.plugin_name(), factor, exact, note)
         self.graph.replace(self.index, props)
 
     def becomes_ambient(self, note: str = "", lost: str = "") -> None:
@@ -103,7 +102,7 @@ class LightNode:
         self._record("none", 0.0, False, note, "this kind of light")
         self.graph.remove(self.index)
 
-    def _record(self, derived, factor, exact, note, lost):
+    def _record(self, derived, factor, exact, note, lost=""):
         self.replaced.emitter(self.label, self.plugin, derived, factor, exact, note)
         if lost:
             self.replaced.lose(self.label, self.plugin, lost, note)

@@ -4,9 +4,15 @@ One function per plugin; any other BSDF, including a user's, is measured (:func:
 Transparent BSDFs are seen through without refraction: light that passes at normal incidence,
 straight or refracted, becomes the transmittance, reflected light a lobe. A closed body has two such
 surfaces on each path.
+
+Users' heuristics also read physical parameters: a plugin's own, with ``alpha`` at least 1e-4 and
+``ior`` the index inside over the one outside. Of conductors ``base_color`` is the albedo at normal
+incidence, ``metallic`` 1 and ``ior`` 1; of dielectrics ``base_color`` is 0. What is measured has
+the albedo of its diffuse part, and the index of its lobe's albedo. Index 1 means no interface.
 """
 
 from dataclasses import asdict, replace
+from math import sqrt
 from typing import Any
 
 import drjit as dr
@@ -26,6 +32,9 @@ from reference.scene.graph import Graph, Reference
 SMOOTH_ALPHA = 0.05
 """Replaces a smaller roughness: a mirror's lobe has no width, and the model's light no extent. The
 albedo is kept, so the highlight holds as much as the mirror image of a small light."""
+
+LARGEST_IOR = 4.0
+"""Limit of measured indices: germanium has 4."""
 
 
 def lobe(context: Context, reflected: Any, alpha: Any) -> dict[str, Any]:
@@ -49,26 +58,58 @@ def unknown(context: Context, index: int) -> NearestPhong:
     """The diffuse part as ``k_d``, the rest as a lobe of the same albedo and width."""
     found = probe.with_values(context.graph, index)
     if found is None:
-        return NearestPhong(
-            k_a=0.5, k_d=0.5, lost=(("reflection", "diffuse of 0.5: it cannot be sampled"),)
-        )
+        lost = (("reflection", "diffuse of 0.5: it cannot be sampled"),)
+        return NearestPhong(k_a=0.5, k_d=0.5, lost=lost, physical=context.physical(0.5))
     graph = context.graph
+    known = values.plain(found.specular)
+    root = sqrt(min(float(np.mean(known)) if known is not None else 0.04, 0.99))
+    ior = min((1 + root) / (1 - root), LARGEST_IOR)
+    width = min(max(found.alpha, SMALLEST_ALPHA), 1.0)
+    physical = context.physical(found.diffuse, width, ior)
     rule = "k_d, k_s and n measured at normal incidence, textures averaged"
-    lost = "all but a diffuse part and a lobe"
+    all_but = "all but a diffuse part and a lobe"
     if context.plugin(index) == "hair":
         # Light transmitted by a fibre leaves on the other side of the same strand.
         half = values.total(graph, found.reflected, found.passed)
         everything = values.total(graph, half, found.scattered)
-        whole = ((lost, "k_d is the whole albedo"),)
-        return NearestPhong(k_a=everything, k_d=everything, twosided=True, lost=whole)
+        return NearestPhong(
+            k_a=everything,
+            k_d=everything,
+            twosided=True,
+            lost=((all_but, "k_d is the whole albedo"),),
+            physical=physical,
+        )
     if not values.is_zero(found.scattered):
-        lost += ", and light scattered through"
+        all_but += ", and light scattered through"
     return NearestPhong(
         k_a=found.reflected,
         k_d=found.diffuse,
         **lobe(context, found.specular, found.alpha),
         transmittance=found.passed,
-        lost=((lost, rule),),
+        lost=((all_but, rule),),
+        physical=physical,
+    )
+
+
+def _alpha(context: Context, index: int) -> Any:
+    rough = context.plugin(index).startswith("rough")
+    along = context.value(index, "alpha_u", 0.1)
+    return _at_least(context.value(index, "alpha", along if rough else 0.0))
+
+
+def _at_least(alpha: Any) -> Any:
+    known = values.plain(alpha)
+    return alpha if known is None else max(known, SMALLEST_ALPHA)
+
+
+def _ior(graph: Graph, index: int, inside: str) -> float:
+    inner = values.index_of_refraction(graph, index, "int_ior", inside)
+    return inner / values.index_of_refraction(graph, index, "ext_ior", "air")
+
+
+def _of_plastic(context: Context, index: int, base: Any) -> dict[str, Any]:
+    return context.physical(
+        base, _alpha(context, index), _ior(context.graph, index, "polypropylene")
     )
 
 
@@ -84,18 +125,19 @@ def roughplastic(context: Context, index: int) -> NearestPhong:
     """
     graph, base = context.graph, context.value(index, "diffuse_reflectance", 0.5)
     coat = context.value(index, "specular_reflectance", 1.0)
+    physical = _of_plastic(context, index, base)
     if values.plain(base) is not None and values.plain(coat) is not None:
         found = albedo.to_phong(_roughplastic(graph, index), context.convention)
-        return NearestPhong(k_a=found.k_d, **asdict(found))
+        return NearestPhong(k_a=found.k_d, **asdict(found), physical=physical)
     white = _roughplastic(graph, index, (1.0,) * 3, (1.0,) * 3)
     unit = albedo.to_phong(white, context.convention)
     k_s = values.product(graph, coat, unit.k_s[0])
     if context.convention is Convention.LITERAL:
-        return NearestPhong(k_a=base, k_d=base, k_s=k_s, n=unit.n)
+        return NearestPhong(k_a=base, k_d=base, k_s=k_s, n=unit.n, physical=physical)
     half = _roughplastic(graph, index, (0.5,) * 3, (1.0,) * 3)
     level = albedo.to_phong(half, context.convention).k_d[0]
     k_d = _of_base(graph, base, unit.k_d[0], level)
-    return NearestPhong(k_a=k_d, k_d=k_d, k_s=k_s, n=unit.n)
+    return NearestPhong(k_a=k_d, k_d=k_d, k_s=k_s, n=unit.n, physical=physical)
 
 
 def plastic(context: Context, index: int) -> NearestPhong:
@@ -107,11 +149,10 @@ def plastic(context: Context, index: int) -> NearestPhong:
     graph = context.graph
     base = context.value(index, "diffuse_reflectance", 0.5)
     if context.convention is Convention.LITERAL:
-        coat, n = (
-            context.value(index, "specular_reflectance", 1.0),
-            exponent_of(SMOOTH_ALPHA, "blinn"),
-        )
-        return NearestPhong(k_a=base, k_d=base, k_s=coat, n=n, lost=(MIRROR,))
+        coat = context.value(index, "specular_reflectance", 1.0)
+        n = exponent_of(SMOOTH_ALPHA, "blinn")
+        found = NearestPhong(k_a=base, k_d=base, k_s=coat, n=n)
+        return replace(found, lost=(MIRROR,), physical=_of_plastic(context, index, base))
     inside = values.index_of_refraction(graph, index, "int_ior", "polypropylene")
     outside = values.index_of_refraction(graph, index, "ext_ior", "air")
     nonlinear = context.value(index, "nonlinear", False)
@@ -120,7 +161,13 @@ def plastic(context: Context, index: int) -> NearestPhong:
     )
     k_d = _of_base(graph, base, whole, half)
     reflected = _tinted(context, index, mirror, "specular_reflectance")
-    return NearestPhong(k_a=k_d, k_d=k_d, **lobe(context, reflected, 0.0), lost=(MIRROR,))
+    return NearestPhong(
+        k_a=k_d,
+        k_d=k_d,
+        **lobe(context, reflected, 0.0),
+        lost=(MIRROR,),
+        physical=_of_plastic(context, index, base),
+    )
 
 
 def conductor(context: Context, index: int) -> NearestPhong:
@@ -137,7 +184,12 @@ def conductor(context: Context, index: int) -> NearestPhong:
     else:
         alpha, lost = context.value(index, "alpha", white.alpha), []
     lost += [("Fresnel reflection", "the reflectance at normal incidence, at all angles")]
-    return NearestPhong(k_a=reflected, **lobe(context, reflected, alpha), lost=tuple(lost))
+    return NearestPhong(
+        k_a=reflected,
+        **lobe(context, reflected, alpha),
+        lost=tuple(lost),
+        physical=context.physical(reflected, _alpha(context, index), metallic=1.0),
+    )
 
 
 def principled(context: Context, index: int) -> NearestPhong:
@@ -147,17 +199,23 @@ def principled(context: Context, index: int) -> NearestPhong:
     of ``alpha = roughness^2``. The share ``spec_trans`` is seen through without refraction.
     """
     graph = context.graph
-    k_d = context.value(index, "base_color", 0.5)
+    k_d = base = context.value(index, "base_color", 0.5)
     for key in ("metallic", "spec_trans"):
         k_d = values.rest(graph, k_d, context.value(index, key, 0.0))
     found = probe.measured(context.graph, index)
     roughness = context.value(index, "roughness", 0.5)
+    alpha = values.product(graph, roughness, roughness)
+    specular = values.plain(context.value(index, "specular", 0.5))
+    # Mitsuba's reading of `specular`, F0 = 0.08 specular, as an index.
+    ior = 2 / (1 - sqrt(0.08 * specular)) - 1 if isinstance(specular, float) else 1.5
+    ior, metallic = context.value(index, "eta", ior), context.value(index, "metallic", 0.0)
     return NearestPhong(
         k_a=found.reflected if values.plain(k_d) is not None else k_d,
         k_d=k_d,
-        **lobe(context, found.specular, values.product(graph, roughness, roughness)),
+        **lobe(context, found.specular, alpha),
         transmittance=found.passed,
         lost=(("sheen, clearcoat, Fresnel reflection", "a diffuse part and one lobe"),),
+        physical=context.physical(base, _at_least(alpha), ior, metallic),
     )
 
 
@@ -225,6 +283,7 @@ def _clear(context: Context, index: int, lost: str, twosided: bool) -> NearestPh
         transmittance=_tinted(context, index, white.passed, "specular_transmittance"),
         twosided=twosided,
         lost=((lost, NEAREST),),
+        physical=context.physical(0.0, _alpha(context, index), _ior(context.graph, index, "bk7")),
     )
 
 
@@ -235,7 +294,7 @@ def _tinted(context: Context, index: int, reflected: Any, key: str) -> Any:
 
 def null(context: Context, index: int) -> NearestPhong:
     """``null``: transmittance 1 (exact)."""
-    return NearestPhong(transmittance=1.0, twosided=True)
+    return NearestPhong(transmittance=1.0, twosided=True, physical=context.physical())
 
 
 def alike(
@@ -270,7 +329,12 @@ def twosided(context: Context, index: int) -> NearestPhong:
         name: values.sides(graph, getattr(front, name), getattr(back, name))
         for name in (*COEFFICIENTS, "n", "transmittance")
     }
-    return replace(front, **sided, twosided=True, lost=front.lost + back.lost)
+    physical = {
+        name: values.sides(graph, value, back.physical[name])
+        for name, value in front.physical.items()
+    }
+    lost = front.lost + back.lost
+    return replace(front, **sided, twosided=True, lost=lost, physical=physical)
 
 
 def mask(context: Context, index: int) -> NearestPhong:
@@ -313,6 +377,10 @@ def blend(context: Context, index: int) -> NearestPhong:
         twosided=first.twosided or second.twosided,
         tilt=first.tilt or second.tilt,
         lost=first.lost + second.lost + lost,
+        physical={
+            name: values.blend(graph, value, second.physical[name], weight)
+            for name, value in first.physical.items()
+        },
     )
 
 

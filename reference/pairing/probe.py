@@ -207,25 +207,6 @@ def irradiance(graph: Graph, emitter: mi.Emitter) -> tuple[Any, list[float]] | N
     return as_value(graph, means / IRRADIANCE_PER_INTENSITY, emitted=True), (-toward).tolist()
 
 
-def beam(
-    graph: Graph, emitter: mi.Emitter, position: Sequence[float], axis: Sequence[float]
-) -> tuple[float, Any] | None:
-    """Return cutoff (degrees) and intensity of the even cone with a light's solid angle and flux.
-
-    The search narrows from the hemisphere to the cone that holds all light. None if there is none.
-    """
-    widest = 0.0  # cosine of the cone's half angle
-    for _ in range(4):
-        shines = _intensities(emitter, position, axis, widest).max(axis=0) > 0
-        if not shines.any():
-            return None
-        widest = max(1 - (1 - _cosines(widest)[shines].min()) * 1.05, 0.0)
-    found = _intensities(emitter, position, axis, widest)
-    share = (found.max(axis=0) > 0).mean()
-    cutoff = np.degrees(np.arccos(1 - share * (1 - widest)))
-    return float(cutoff), as_value(graph, found.mean(axis=1) / share, emitted=True)
-
-
 def surface_mean(graph: Graph, shape: mi.Shape) -> Any:
     """Return the mean radiance of a shape that shines, over its surface, seen head on."""
     emitter = shape.emitter()
@@ -249,29 +230,6 @@ def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:
         means.append(_channel_means(weight))
         toward += np.array(ds.d, float) @ np.mean(np.array(weight, float), axis=0)
     return np.concatenate(means), toward / max(float(np.linalg.norm(toward)), 1e-30)
-
-
-def _intensities(
-    emitter: mi.Emitter, position: Sequence[float], axis: Sequence[float], widest: float
-) -> np.ndarray:
-    """Return the intensity in directions spread over a cone, (channels, samples)."""
-    cosine = _cosines(widest)
-    sine = np.sqrt(np.maximum(1 - cosine**2, 0))
-    turn = 2 * np.pi * np.array(_lattice()[1], float)
-    local = mi.Vector3f(*(mi.Float(c) for c in (sine * np.cos(turn), sine * np.sin(turn), cosine)))
-    direction = mi.Frame3f(dr.normalize(mi.Vector3f(*axis))).to_world(local)
-    it = dr.zeros(mi.SurfaceInteraction3f, SAMPLES_OF_LIGHTS)
-    it.p = mi.Point3f(*position) + direction
-    found = []
-    for wavelengths in _wavelengths():
-        ds, weight = emitter.sample_direction(_at(it, wavelengths), mi.Point2f(0.5))
-        weight = dr.select(ds.pdf > 0, weight, 0)
-        found.append(np.array(weight, float).reshape(len(weight), SAMPLES_OF_LIGHTS))
-    return np.concatenate(found)
-
-
-def _cosines(widest: float) -> np.ndarray:
-    return 1 - np.array(_lattice()[0], float) * (1 - widest)
 
 
 def _lattice() -> tuple[mi.Float, ...]:
