@@ -59,10 +59,20 @@ def argued(found: dict[str, Audit]) -> Iterator[str]:
 
 
 def table(found: dict[str, Audit]) -> Iterator[str]:
-    """Yield the table of checks: *holds*, or the worst value found."""
+    """Yield the table of checks that do not hold for all: *holds*, or the worst value found."""
     first = next(iter(found.values()))
-    rows = [(name, *map(_cell, record.checks)) for name, record in found.items()]
-    yield from markdown([("", *(check.name for check in first.checks)), *rows], right=1)
+    names = [check.name for check in first.checks]
+    shown = [
+        name
+        for name in names
+        if any(record.named(name).verdict == "does not hold" for record in found.values())
+    ]
+    rows = [
+        (title, *(_cell(record.named(name)) for name in shown)) for title, record in found.items()
+    ]
+    yield from markdown([("", *shown), *rows], right=1)
+    yield ""
+    yield f"Hold for all: {', '.join(name for name in names if name not in shown)}."
 
 
 def _cell(check: Checked) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 from comparisons import atomic
 from comparisons.case import open_case
 from comparisons.cost.cost import cost
+from comparisons.departure.metrics import LEADING
 from comparisons.fit.fit_record import FitRecord
 from comparisons.options import Options
 from comparisons.study import dataset, design
@@ -47,14 +48,19 @@ def baselines() -> None:
     _run("pytest", "-q", "tests/test_baselines.py", "--fotismos-update")
 
 
-def fits() -> None:
-    """Fit the figures of chapter 8."""
-    import fits  # next to this script
-
+def fits() -> Iterator[str]:
+    """Fit the figures of chapter 8, and yield the table of departures before and after."""
     words = ("-P", "-m", "reports", "fit", *CHAPTER_8, "--json")
     done = subprocess.run([sys.executable, *words], cwd=ROOT, check=True, capture_output=True)
-    records = msgspec.json.decode(done.stdout, type=list[FitRecord])
-    atomic.write(DOCS / "fit-figures.md", "\n".join(fits.page(records)) + "\n")
+    rows = []
+    for record in msgspec.json.decode(done.stdout, type=list[FitRecord]):
+        best = record.nearest
+        departure = best.departure[LEADING.name]
+        errors = departure.before, departure.after, best.parameter_error, best.loss
+        before, after, *parts = (f"{each:.2f}" for each in errors)
+        rows.append((record.scene, best.form, f"{before}→{after}", *parts))
+    head = "scene", "form", LEADING.label, "parameter error", "model error"
+    yield from markdown([head, *rows], right=2)
 
 
 def findings() -> None:

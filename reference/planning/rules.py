@@ -169,18 +169,16 @@ def _seen_inside_a_lamp(facts: Facts) -> str | None:
 
 SAMPLED_AS_HIT = Premise(
     "Every lamp's shape is a mesh, a rectangle or a disk whose shading normals are those of its"
-    " surface, a sphere, or a cylinder that is round and not mirrored. Mitsuba's samples of other"
-    " lamps face another way than what rays hit, or lie beside it, so its mean depends on how both"
-    " are weighted.",
+    " surface, a sphere, or a cylinder that is round and not mirrored: Mitsuba's samples of others"
+    " are not what rays hit.",
     _sampled_elsewhere,
 )
 
 LIGHT_BY_LIGHT = PruningRule(
     name="light by light",
     absent="noise of picking one light: the sum over all equals the mean of one over its chance",
-    proof="Mitsuba picks a light at random and divides by its chance. The mean is the sum over"
-    " all lights, which `direct_all` takes at each sample. The two are equal if each estimate of"
-    " a light has the right mean, however a sample of the BSDF is weighted against it.",
+    proof="The mean is the sum over all lights, which `direct_all` takes at each sample, if each"
+    " estimate of a light has the right mean, however samples of the BSDF are weighted against it.",
     premises=(
         SAMPLED_AS_HIT,
         NO_MEDIUM,
@@ -192,9 +190,8 @@ LIGHT_BY_LIGHT = PruningRule(
             _many,
         ),
         Premise(
-            "No closed shape that shines and reflects inside is seen from inside: at points of its"
-            " own surface Mitsuba's sampling of a sphere finds light that a sample of the BSDF"
-            " does not, so its mean depends on how both are weighted.",
+            "No closed shape that shines and reflects inside is seen from inside: Mitsuba's"
+            " sampling of a sphere finds light there that a sample of the BSDF does not.",
             _seen_inside_a_lamp,
         ),
     ),
@@ -284,12 +281,11 @@ def occluder(facts: Facts) -> str | None:
 NO_SHADOWS = PruningRule(
     name="no shadow rays",
     absent="no shape can stand between a light and a reflecting surface",
-    proof="Light from a point y reaches a surface point x along a segment, which lies in the box"
-    " around y and the shape of x. A shape whose box does not touch that one does not touch the"
-    " segment. The shape of x itself is not an obstacle: x lies on its outer side and is seen from"
-    " outside, and a segment that passes through the shape arrives from behind, where an opaque"
-    " BSDF returns nothing. A light that is flat, or convex and shines outwards, does not hide the"
-    " side that shines.",
+    proof="Light from a point y reaches a surface point x along a segment in the box around y and"
+    " the shape of x. A shape whose box does not touch that one does not touch the segment. The"
+    " shape of x itself hides nothing: x is seen from outside, and a segment that passes through"
+    " the shape arrives from behind, where an opaque BSDF returns nothing. A light that is flat, or"
+    " convex and shines outwards, does not hide the side that shines.",
     premises=(
         *KNOWN_SURFACES,
         Premise(
@@ -315,11 +311,10 @@ def facing_pair(facts: Facts) -> str | None:
 NO_SECOND_REFLECTION = PruningRule(
     name="direct light alone",
     absent="no point of a reflecting surface sees another one",
-    proof="A second reflection needs two surface points that see each other, both on sides that"
-    " reflect. Two points on the outer side of one convex shape never do, nor do two of a flat one."
-    " No path that begins outside reaches the inside of a closed shape. Two points of"
-    " different shapes do not where one of the shapes is flat, reflects on one side, and the other"
-    " lies behind it. A shape that reflects nothing takes no part.",
+    proof="A second reflection needs two points that see each other, both on sides that reflect."
+    " Two points on the outer side of one convex shape never do, nor do two of a flat one. No path"
+    " that begins outside reaches the inside of a closed shape. Two points of different shapes do"
+    " not where one shape is flat, reflects on one side, and the other lies behind it.",
     premises=(
         *KNOWN_SURFACES,
         Premise(

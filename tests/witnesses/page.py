@@ -1,6 +1,5 @@
 """The tables of docs/witnesses.md, made from the cases' own declarations and by running them."""
 
-import ast
 from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -11,22 +10,6 @@ from comparisons.gallery.builtin import SCENES
 from reports.terminal import tables
 from tests.witnesses import test_closed_forms, test_povray
 from tests.witnesses.witness import Witness, deviation
-
-TESTS = Path(__file__).parents[1]
-
-ELSEWHERE = (
-    "test_sampler::test_the_reference_is_right_inside_a_bright_sphere",
-    "test_physics::test_a_diffuse_plane_under_a_point_light",
-    "test_physics::test_a_diffuse_sphere_under_a_directional_light",
-    "test_physics::test_a_diffuse_sphere_in_a_constant_environment",
-    "test_physics::test_the_spot_of_an_area_light_is_right_in_the_far_field",
-    "test_physics::test_white_diffuse_light_of_unit_intensity_has_the_value_1",
-    "test_pairing::test_a_matched_roughplastic_has_the_albedos_that_it_was_matched_to",
-    "test_pairing::test_the_albedo_of_the_lobe",
-    "test_audit::test_the_textbooks_lobes_return_what_a_quadrature_finds",
-    "test_audit::test_roughplastic_loses_light_is_reciprocal_and_has_a_wrong_derivative",
-)
-"""Other tests that hold something against a closed form or an independent quadrature."""
 
 
 def closed_forms() -> Iterator[str]:
@@ -43,16 +26,6 @@ def figures() -> Iterator[str]:
         f"In {len(found)} figures both see {min(pixels):,} to {max(pixels):,} pixels, and one alone"
         f" sees {max(alone)} at most. The largest difference is {max(largest):.2f} of a rounding."
     )
-
-
-def elsewhere() -> Iterator[str]:
-    """Yield the list of the other tests; a KeyError if one no longer exists."""
-    for entry in ELSEWHERE:
-        module, name = entry.split("::")
-        tree = ast.parse((TESTS / f"{module}.py").read_text(encoding="utf-8"))
-        found = {node.name: node for node in tree.body if isinstance(node, ast.FunctionDef)}
-        words = found[name].name.removeprefix("test_").replace("_", " ")
-        yield f"- [{words}](../tests/{module}.py)"
 
 
 def _measured(witness: Witness) -> str:
