@@ -43,10 +43,6 @@ class Facts:
         """Return the share of points whose value is below a limit."""
         return float(np.mean(np.array(self._values(part, column, where)) < limit))
 
-    def share_of(self, part: str, column: str, name: str, **where: Any) -> float:
-        """Return the share of points whose value is ``name``."""
-        return float(np.mean([value == name for value in self._values(part, column, where)]))
-
     def at_largest(self, part: str, column: str, parameter: str, **where: Any) -> Any:
         """Return a parameter's value where a column is largest."""
         rows = dataset.rows(self._table, part, where)

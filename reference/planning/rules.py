@@ -371,9 +371,8 @@ def _lit_twice(facts: Facts) -> str | None:
 TABULATED_ENVIRONMENT = PruningRule(
     name="environment from a table",
     absent="noise: the reflected environment is its radiance times an albedo",
-    proof="If nothing is hidden, a surface point receives the radiance L from all directions of"
-    " the half space that it is seen from. It reflects L times the albedo of its BSDF for"
-    " the view direction. For an isotropic BSDF that is the same everywhere this depends"
+    proof="If nothing is hidden, a surface point reflects the radiance L times the albedo of its"
+    " BSDF for the view direction. For an isotropic BSDF that is the same everywhere this depends"
     " only on the cosine; for a two-sided one, on its absolute value.",
     premises=(
         Premise("There is one shape, and one BSDF, the same on both sides that reflect.", _not_one),
