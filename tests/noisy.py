@@ -18,7 +18,7 @@ from comparisons.options import Options
 from comparisons.prepared import prepare
 from reference.rendering.gbuffer import gbuffer
 from reference.rendering.renderer import pass_seed
-from reference.rendering.sums import DifferenceSums
+from reference.rendering.sums import Accumulator, DifferenceSums
 from reference.scene.source import Source
 from tests.test_physics import look_at
 
@@ -32,6 +32,26 @@ def estimate(differences, counted=None):
     for one in differences:
         sums.add(mi.TensorXd(np.ascontiguousarray(one, np.float64)))
     return sums.estimate()
+
+
+def whole(renderer, count=8, seed=40):
+    """Return the estimate of passes of a renderer."""
+    total = Accumulator()
+    for number in range(count):
+        total.add(renderer.render(seed + number))
+    return total.estimate()
+
+
+def require_equal(one, other, what=None):
+    """Require that two estimates of eight passes are of one image.
+
+    Pixels may be seven standard errors apart, but for a few at edges, where the pixel filter
+    spreads samples; means of images four.
+    """
+    noise = np.hypot(one.standard_error, other.standard_error)
+    difference = one.mean - other.mean
+    assert (np.abs(difference) > 7 * noise + 1e-5).mean() < 5e-3, what
+    assert abs(difference.mean()) < 4 * np.sqrt(np.mean(noise**2) / noise.size) + 1e-6, what
 
 
 def found(differences, test, counted=None, **options):

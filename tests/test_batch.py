@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import signal
 import subprocess
 import sys
 import time
@@ -24,14 +23,6 @@ def scene():
     os.kill(os.getpid(), signal.SIGABRT)
 """
 
-NEVER_ENDS = """
-import time
-from pathlib import Path
-
-def scene():
-    Path(__file__).with_suffix(".started").touch()
-    time.sleep(1000)
-"""
 
 GOOD = """
 import mitsuba as mi
@@ -202,23 +193,6 @@ def test_several_workers_write_what_one_writes(run, apart, box_filtered, tmp_pat
     tables = [(tmp_path / workers / "tables/metrics.csv").read_text() for workers in "12"]
     names = [[line.split(",")[0] for line in table.splitlines()] for table in tables]
     assert names[0] == names[1]
-
-
-@pytest.mark.thorough
-def test_an_interrupted_batch_shows_what_is_finished_and_says_how_to_go_on(folder, tmp_path):
-    (folder / "c.py").write_text(NEVER_ENDS)
-    out = tmp_path / "out"
-    batch = _start(folder, out)
-    while not (folder / "c.started").exists():
-        assert batch.poll() is None
-        time.sleep(0.05)
-    batch.send_signal(signal.SIGINT)
-    _, messages = batch.communicate(timeout=60)
-    assert batch.returncode == 130
-    assert "same command" in messages
-    assert "Traceback" not in messages
-    page = (out / "index.html").read_text(encoding="utf-8")
-    assert "b/comparison.json" in page
 
 
 def test_values_for_placeholders_go_to_the_scenes_that_have_them(run, folder, tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from comparisons.case import open_case
 from comparisons.departure.colour import MOST_PIXELS
 from comparisons.options import LARGEST_SPP, Options
-from heuristic.errors import InputError
+from heuristic.errors import InputError, unknown
 from heuristic.tessellation import FINEST
 from reference.scene import source
 from tests.small_scene import PLAIN
@@ -140,3 +140,11 @@ def test_stated_options_are_read_back():
         "heuristic": "blinn", "resolution": [3, 4], "noise": 0.5, "seed": 0, "pairing": "matched"
     }  # fmt: skip
     assert Options.of(json.loads(json.dumps(options.stated()))) == options
+
+
+def test_a_word_that_is_not_known_is_told_with_what_is_allowed():
+    message = str(unknown("form =", "cook", ["phong", "blinn"]))
+    assert message == "form = 'cook' is not known: choose one of phong, blinn."
+    message = str(unknown("form =", "blin", ["phong", "blinn"]))
+    assert message.startswith("form = 'blin' is not known (did you mean blinn?): choose one of")
+    assert "did you mean" not in str(unknown("n =", None, ["phong"]))

@@ -102,10 +102,7 @@ def test_what_moved_fails_with_a_table_and_the_others_are_checked(failure):
 @pytest.mark.guarantee("checks", "A failure writes one page: before, now, where, and why.")
 def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
     html = (failure.out / "index.html").read_text(encoding="utf-8")
-    for part in (
-        "1 of 3 moved", "Only the reference moved", "row 2, column 3", "sphere",
-        "reference R, block 2,3", "reference, before", "If this change is intended", "--update",
-    ):  # fmt: skip
+    for part in ("1 of 3 moved", "row 2, column 3", "reference, before", "--update"):
         assert part in html, part
     names = {path.name for path in (failure.out / "fig-8-6b").iterdir()}
     assert {"check.json", "comparison.json", "comparison.exr", "reference.png"} <= names
@@ -187,14 +184,16 @@ def test_bad_words_are_refused(run, tmp_path, monkeypatch):
 
 
 def test_an_update_rewrites_what_moved_and_nothing_else(run, baselines_folder):
-    whole = {path.name: path.read_bytes() for path in baselines_folder.iterdir()}
+    def content():
+        return {path.name: path.read_bytes() for path in baselines_folder.iterdir()}
+
+    whole = content()
     change(baselines_folder / "fig-8-6b.json")
     code, printed, _ = run("check", baselines_folder, "--update")
     assert code == 0
-    assert "fig-8-6b: updated" in printed
-    assert "reference R, block 2,3" in printed
-    assert "1 of 2 baselines written" in printed
-    assert {path.name: path.read_bytes() for path in baselines_folder.iterdir()} == whole
+    for words in ("fig-8-6b: updated", "reference R, block 2,3", "1 of 2 baselines written"):
+        assert words in printed
+    assert content() == whole
 
 
 def test_other_options_write_a_baseline_anew(run, baselines_folder):
@@ -210,16 +209,20 @@ def test_an_update_replaces_no_other_baseline_and_no_other_file(run, tmp_path, m
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "x.xml").write_text(SCENE, encoding="utf-8")
-    assert run("check", "base", "--update", "--scene", "a/x.xml", *FAST)[0] == 0
+
+    def update(baseline, scene):
+        return run("check", baseline, "--update", "--scene", scene, *FAST)
+
+    assert update("base", "a/x.xml")[0] == 0
     before = (tmp_path / "base/x.json").read_bytes()
     assert json.loads(before)["scene"] == "../a/x.xml", "found from anywhere"
-    code, _, messages = run("check", "base", "--update", "--scene", "b/x.xml", *FAST)
+    code, _, messages = update("base", "b/x.xml")
     assert (code, (tmp_path / "base/x.json").read_bytes()) == (2, before)
     assert "the baseline of ../a/x.xml, not of b/x.xml" in messages
     other = tmp_path / "package.json"
     for text in ('{"name": "mine"}', "[]", "mine", before[:99].decode()):
         other.write_text(text)
-        code, _, messages = run("check", other, "--update", "--scene", "a/x.xml", *FAST)
+        code, _, messages = update(other, "a/x.xml")
         assert (code, "Delete it, and write it again" in messages) == (2, True)
         assert other.read_text() == text
 
@@ -269,23 +272,20 @@ def test_causes_name_the_half_the_place_the_colour_and_the_object():
 
 
 @pytest.mark.guarantee("runs", "`--junit`, `--summary` and `--images` replace no file of yours.")
-@pytest.mark.parametrize(
-    ("option", "name"),
-    [("--junit", "a.xml"), ("--summary", "a.xml"), ("--junit", "mine.txt"), ("--summary", "b.md")],
-)
-def test_a_file_of_others_is_not_replaced_by_compare(option, name, run, tmp_path, monkeypatch):
+def test_a_file_of_others_is_not_replaced_by_compare(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     files = {"a.xml": SCENE, "mine.txt": "mine", "b.md": SCENE}
     for each, text in files.items():
         (tmp_path / each).write_text(text)
-    scene = "b.xml" if name == "b.md" else "a.xml"
-    if name == "b.md":  # a link to an input
-        (tmp_path / "b.xml").symlink_to("b.md")
-    code, _, messages = run("compare", scene, *SMALL, option, name)
-    assert code == 2
-    assert f"{option} {name}: " in messages
-    assert {each: (tmp_path / each).read_text() for each in files} == files
-    assert not (tmp_path / "out").exists(), "refused before anything is rendered"
+    (tmp_path / "b.xml").symlink_to("b.md")
+    for option, name, scene in (
+        ("--junit", "a.xml", "a.xml"), ("--summary", "a.xml", "a.xml"),
+        ("--junit", "mine.txt", "a.xml"), ("--summary", "b.md", "b.xml"),
+    ):  # fmt: skip
+        code, _, messages = run("compare", scene, *SMALL, option, name)
+        assert (code, f"{option} {name}: " in messages) == (2, True)
+        assert {each: (tmp_path / each).read_text() for each in files} == files
+        assert not (tmp_path / "out").exists(), "refused before anything is rendered"
 
 
 def test_a_picture_of_others_is_not_replaced_by_a_baselines(run, tmp_path, monkeypatch):
@@ -307,19 +307,9 @@ def test_a_report_replaces_an_earlier_one_and_a_summary_is_appended(run, tmp_pat
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a.xml").write_text(SCENE)
     (tmp_path / "s.md").write_text("before\n")
-    words = (
-        "compare",
-        "a.xml",
-        *SMALL,
-        "--max-visible",
-        "100%",
-        "--junit",
-        "j.xml",
-        "--summary",
-        "s.md",
-    )
+    files = ("--max-visible", "100%", "--junit", "j.xml", "--summary", "s.md")
     for count in (1, 2):
-        assert run(*words)[0] == 0
+        assert run("compare", "a.xml", *SMALL, *files)[0] == 0
         assert (tmp_path / "j.xml").read_text().count("<testcase") == 1
         text = (tmp_path / "s.md").read_text()
         assert text.startswith("before\n")

@@ -9,7 +9,6 @@ import shutil
 import subprocess
 import sys
 from io import StringIO
-from pathlib import Path
 
 import jsonschema
 import pytest
@@ -22,21 +21,25 @@ from tests.schemas import schema
 from tests.small_scene import SCENE
 
 
+def read(path):
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
 def test_compare_writes_what_the_contract_names(two_scenes):
     out, published = two_scenes.out, schema("comparison")
     assert str(out / "index.html") in two_scenes.printed
     for name in ("lambert-sphere", "fig-8-9"):
-        record = json.loads((out / name / "comparison.json").read_text(encoding="utf-8"))
+        record = read(out / name / "comparison.json")
         jsonschema.validate(record, published)
         assert (record["scene"], record["resolution"]) == (name, [24, 16])
-        assert (out / name / "comparison.exr").stat().st_size > 0
-        assert {path.stem for path in (out / name).glob("*.png")} >= {"heuristic", "reference"}
-    record = json.loads((out / "run.json").read_text(encoding="utf-8"))
+        pictures = {path.name for path in (out / name).iterdir()}
+        assert {"comparison.exr", "heuristic.png", "reference.png"} <= pictures
+    record = read(out / "run.json")
     jsonschema.validate(record, schema("run"))
     assert {"rendering", "metrics", "files", "page", "start-up"} <= record["stages"].keys()
-    tables = {path.name for path in (out / "tables").iterdir()}
-    assert tables == {".fotismos", "carriers.csv", "metrics.csv"}
-    names = {path.name for path in out.iterdir()} - {".fotismos", ".fotismos-lock"}
+    tables = {path.name for path in (out / "tables").glob("[!.]*")}
+    assert tables == {"carriers.csv", "metrics.csv"}
+    names = {path.name for path in out.glob("[!.]*")}
     pages = {"index.html", "details.html"}
     assert names == pages | {"run.json", "tables", "lambert-sphere", "fig-8-9"}
 
@@ -44,11 +47,11 @@ def test_compare_writes_what_the_contract_names(two_scenes):
 def test_the_recorded_command_repeats_the_result(run, scene_file, tmp_path):
     options = ("--spp", 8, "--seed", 3, "--resolution", "20x12", "--pairing", "literal")
     run("compare", scene_file, "-o", tmp_path / "a", *options)
-    first = json.loads((tmp_path / "a/my-scene/comparison.json").read_text(encoding="utf-8"))
+    first = read(tmp_path / "a/my-scene/comparison.json")
     words = shlex.split(first["command"])
     assert words[0] == "fotismos"
     run(*words[1:], "-o", tmp_path / "b")
-    second = json.loads((tmp_path / "b/my-scene/comparison.json").read_text(encoding="utf-8"))
+    second = read(tmp_path / "b/my-scene/comparison.json")
     # Mitsuba adds up a wide reconstruction filter in no fixed order.
     for metric in ("dE2000", "dE_ITP", "dE_CAM16UCS"):
         wanted, found = (record["metrics"][metric]["mean"] for record in (first, second))
@@ -90,7 +93,7 @@ def test_causes_that_cannot_be_found_leave_the_comparison_and_a_warning(
     monkeypatch.setattr("comparisons.hybrids.attribution.find", fails)
     words = ("--spp", 4, "--resolution", "12x8", "-o", tmp_path)
     assert run("compare", scene_file, "--why", *words)[0] == 0
-    record = json.loads((tmp_path / "my-scene/comparison.json").read_text(encoding="utf-8"))
+    record = read(tmp_path / "my-scene/comparison.json")
     assert record["metrics"]["dE2000"]["mean"] > 0
     assert record["warnings"][-1] == "The causes are unknown: the effects are unknown"
     page = (tmp_path / "index.html").read_text(encoding="utf-8")
@@ -129,23 +132,11 @@ def test_plan_prints_a_table_and_json(run):
     assert all(effect["called_for"] for effect in data["effects"])
 
 
-@pytest.mark.thorough
-def test_what_mitsuba_says_is_for_those_who_ask(apart, monkeypatch, capfd):
-    """As the process prints it: Mitsuba writes past Python."""
-    words = ["fotismos", "plan", "narrow-band-lamp", "--json", "--resolution", "16x16"]
-    for more, is_told in (([], False), (["-v"], True)):
-        monkeypatch.setattr(sys, "argv", [*words, *more])
-        cli.main()
-        printed, messages = capfd.readouterr()
-        assert json.loads(printed)["effects"]
-        assert ("out-of-gamut" in messages) == is_told
-
-
 def test_what_mitsuba_says_stands_in_the_record_once(run, tmp_path):
     out = tmp_path / "out"
     words = ("compare", "narrow-band-lamp", "--resolution", "16x16", "--spp", 8, "-o", out)
     assert run(*words)[2] == ""
-    record = json.loads((out / "narrow-band-lamp/comparison.json").read_text(encoding="utf-8"))
+    record = read(out / "narrow-band-lamp/comparison.json")
     told = [warning for warning in record["warnings"] if warning.startswith("Mitsuba: ")]
     assert len(told) == len(set(told)) > 0
     assert all("\x1b" not in warning for warning in told)
@@ -168,8 +159,7 @@ def test_a_file_with_tabulated_spectra_is_compared_spectrally(run, tmp_path):
     asked = ("--variant", "llvm_ad_rgb")
     for options, variant in (((), "llvm_ad_spectral"), (asked, "llvm_ad_rgb")):
         run("compare", path, "-o", tmp_path / "out", "--spp", 4, *options)
-        record = json.loads((tmp_path / "out/scene/comparison.json").read_text(encoding="utf-8"))
-        assert record["variant"] == variant
+        assert read(tmp_path / "out/scene/comparison.json")["variant"] == variant
 
 
 def test_a_whole_process_renders_and_is_silent_in_a_pipe(scene_file, tmp_path):
@@ -179,39 +169,51 @@ def test_a_whole_process_renders_and_is_silent_in_a_pipe(scene_file, tmp_path):
     assert (tmp_path / "out/index.html").is_file()
 
 
-@pytest.mark.parametrize(
-    ("shell", "code", "said"),
-    [('exec "$@" >/dev/full', 2, "output: No space left on device"), ('exec "$@" >&-', 0, "")],
-)
-def test_an_output_that_is_full_or_closed_is_no_traceback(shell, code, said):
-    words = ["sh", "-c", shell, "sh", sys.executable, "-P", "-m", "reports", "scenes"]
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
-    done = subprocess.run(words, env=environment, capture_output=True, text=True)
-    assert done.returncode == code
-    assert said in done.stderr
-    assert "Traceback" not in done.stderr
-
-
-# --- Surroundings ----------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("shell", "expected"),
-    [
-        ("cd $(mktemp -d) && rmdir $PWD && exec $0 compare fig-8-9", "current folder: No such"),
-        ("SOURCE_DATE_EPOCH=x exec $0 compare fig-8-9 --figures", "SOURCE_DATE_EPOCH='x'"),
-    ],
-)
-def test_odd_surroundings_are_one_message(shell, expected, tmp_path):
-    program = f"{shlex.quote(sys.executable)} -P -m reports"
-    done = subprocess.run(
-        ["bash", "-c", shell.replace("$0", program)],
-        cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
+def in_shell(script, folder):
+    """Run a bash script in which ``fotismos`` is the program; return what came of it."""
+    program = f'fotismos() {{ exec {shlex.quote(sys.executable)} -P -m reports "$@"; }}\n'
+    return subprocess.run(
+        ["bash", "-c", program + script],
+        cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
     )  # fmt: skip
-    assert done.returncode == 2
-    assert expected in done.stderr
-    assert len(done.stderr.splitlines()) == 1
-    assert not list(tmp_path.iterdir())
+
+
+SURROUNDINGS = (
+    ("fotismos scenes >/dev/full", 2, "output: No space left on device"),
+    ("fotismos scenes >&-", 0, ""),
+    ("cd $(mktemp -d) && rmdir $PWD && fotismos compare fig-8-9", 2, "current folder: No such"),
+    ("SOURCE_DATE_EPOCH=x fotismos compare fig-8-9 --figures", 2, "SOURCE_DATE_EPOCH='x'"),
+)
+
+
+def test_odd_surroundings_are_at_most_one_message(tmp_path):
+    for script, code, expected in SURROUNDINGS:
+        done = in_shell(script, tmp_path)
+        assert done.returncode == code
+        assert expected in done.stderr
+        assert len(done.stderr.splitlines()) == (1 if code else 0)
+        assert not list(tmp_path.iterdir())
+
+
+COMPARE = """
+import sys
+from reports import cli, jobs
+jobs.IN_PROCESSES = False
+words = "compare fig-8-9 --no-why --resolution 16x16 -q -o".split()
+sys.argv = ["fotismos", *words, sys.argv[1]]
+cli.main()
+print(*sorted(sys.modules))
+"""
+
+
+def test_a_comparison_of_a_built_in_scene_imports_what_it_needs(tmp_path):
+    done = python("-c", COMPARE, tmp_path / "out")
+    assert (done.returncode, done.stderr) == (0, "")
+    modules = done.stdout.split()
+    assert "comparisons.compare" in modules
+    elsewhere = ("hard", "fit", "study", "check")
+    unneeded = tuple(f"comparisons.{name}" for name in elsewhere)
+    assert [name for name in modules if name.startswith(unneeded)] == []
 
 
 @pytest.mark.guarantee("runs", "`--help` installs, writes and renders nothing.")
@@ -268,16 +270,12 @@ def test_a_quiet_run_prints_the_page_alone_and_a_verbose_one_says_more(run, tmp_
     code, usual, messages = run("compare", "fig-8-9", "-o", tmp_path, *SMALL)
     assert (code, messages) == (0, "")
     assert "mean ΔE2000" in usual
-    code, printed, messages = run("compare", "fig-8-8a", "-v", "-o", tmp_path, *SMALL)
-    assert "mean ΔE2000" in printed
+    words = ("-v", "--figures", "-o", tmp_path, *SMALL)
+    code, printed, messages = run("compare", "fig-8-8a", *words)
+    assert (code, "mean ΔE2000" in printed) == (0, True)
+    assert (tmp_path / "figures/fig-8-8a.pdf").stat().st_size > 1000
     for word in ("4 samples per pixel", "heuristic_point as point", "missed: specular", "metrics"):
         assert word in messages
-
-
-def test_figures_come_when_asked_for(run, two_scenes, tmp_path):
-    assert not (two_scenes.out / "figures").exists()
-    run("compare", "fig-8-9", "-o", tmp_path, "--figures", *SMALL)
-    assert (tmp_path / "figures/fig-8-9.pdf").stat().st_size > 1000
 
 
 class Terminal(StringIO):
@@ -285,27 +283,24 @@ class Terminal(StringIO):
         return True
 
 
-@pytest.mark.parametrize(("no_color", "coloured"), [(None, True), ("1", False)])
-def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(
-    no_color, coloured, monkeypatch
-):
+def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(monkeypatch):
     for name in ("NO_COLOR", "FORCE_COLOR", "COLORTERM"):
         monkeypatch.delenv(name, raising=False)
-    if no_color:
-        monkeypatch.setenv("NO_COLOR", no_color)
-    monkeypatch.setenv("TERM", "xterm-256color")
-    monkeypatch.setenv("COLUMNS", "100")
-    monkeypatch.setattr(sys, "stderr", Terminal())
-    clock = itertools.count()
-    monkeypatch.setattr("rich.console.monotonic", lambda: next(clock))
-    with progress.shown() as bar:
-        update = bar.of("cornell-box", ("rendering", "causes"))
-        for done in (0, 2, 5):
-            update("rendering", done, 10)
-    shown = sys.stderr.getvalue()
-    assert "cornell-box: rendering 5 of 10 passes, causes next" in shown
-    assert re.search(r"about \d+ s", shown)
-    assert ("\x1b[38;5;" in shown or "\x1b[3" in shown) is coloured
+    for name, value in {"TERM": "xterm-256color", "COLUMNS": "100"}.items():
+        monkeypatch.setenv(name, value)
+    for is_coloured in (True, False):
+        clock = itertools.count()
+        monkeypatch.setattr(sys, "stderr", Terminal())
+        monkeypatch.setattr("rich.console.monotonic", clock.__next__)
+        with progress.shown() as bar:
+            update = bar.of("cornell-box", ("rendering", "causes"))
+            for done in (0, 2, 5):
+                update("rendering", done, 10)
+        shown = sys.stderr.getvalue()
+        assert "cornell-box: rendering 5 of 10 passes, causes next" in shown
+        assert re.search(r"about \d+ s", shown)
+        assert ("\x1b[38;5;" in shown or "\x1b[3" in shown) is is_coloured
+        monkeypatch.setenv("NO_COLOR", "1")
 
 
 def test_completion_prints_what_the_shell_sources(run):
@@ -317,11 +312,7 @@ def test_completion_prints_what_the_shell_sources(run):
     assert (code, "bash" in messages) == (2, True)
 
 
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [("pl", {"plan"}), ("compare fig-8-8", {"fig-8-8a", "fig-8-8b", "fig-8-8c"})],
-)
-def test_bash_completes_commands_and_scenes(words, expected, tmp_path):
+def test_bash_completes_scenes(tmp_path):
     # Under the name of the run script, which the shell calls to complete itself.
     program = tmp_path / "run"
     program.write_text(f'#!/bin/sh\nexec {sys.executable} -m reports "$@"\n')
@@ -329,13 +320,9 @@ def test_bash_completes_commands_and_scenes(words, expected, tmp_path):
     script = (
         "compopt() { :; }\n"  # a bash that is not interactive refuses it
         f"source <({program} completion bash)\n"
-        f"COMP_WORDS=(run {words}) COMP_CWORD={len(words.split())}\n"
+        "COMP_WORDS=(run compare fig-8-8) COMP_CWORD=2\n"
         f"_fotismos_completion {program}\n"
-        "printf '%s\\n' \"${COMPREPLY[@]}\"\n"
+        'echo "${COMPREPLY[@]}"\n'
     )
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    done = subprocess.run(
-        ["bash", "-c", script], env=environment, capture_output=True, text=True, cwd=tmp_path
-    )
-    assert done.stderr == ""
-    assert set(done.stdout.split()) == expected
+    done = in_shell(script, tmp_path)
+    assert (done.stdout.split(), done.stderr) == (["fig-8-8a", "fig-8-8b", "fig-8-8c"], "")

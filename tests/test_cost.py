@@ -1,11 +1,12 @@
 """The cost of accuracy on real scenes: methods, times, files, commands."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
-import mitsuba as mi
+import msgspec
 import numpy as np
 import pytest
 from msgspec import structs
@@ -15,7 +16,7 @@ from comparisons.comparison import MeanError
 from comparisons.cost import cost as studies
 from comparisons.cost import measure, methods, times
 from comparisons.cost.cost import cost
-from comparisons.cost.cost_record import Method
+from comparisons.cost.cost_record import Cost, Method
 from comparisons.cost.measure import WIDTH, Effort, measure_ladder, reduced
 from comparisons.cost.methods import BUILT_IN, Ladder, declare
 from comparisons.gallery.builtin import SCENES
@@ -23,12 +24,12 @@ from comparisons.options import Options
 from comparisons.prepared import prepare
 from heuristic.errors import InputError
 from heuristic.heuristics import Interpolation
-from reference.rendering.sums import Accumulator
 from reference.scene.graph import set_variant
 from reference.scene.source import Source
 from reports.run import cost_files
 from reports.terminal import cost_tables
 from tests.misplanned import scene as described
+from tests.noisy import require_equal, whole
 from tests.schemas import schema
 from tests.small_scene import SCENE
 
@@ -91,13 +92,6 @@ def ladder(source, **options):
     return Ladder(source, chosen, prepare(source, chosen))
 
 
-def whole(renderer, count=8, seed=40):
-    total = Accumulator()
-    for number in range(count):
-        total.add(renderer.render(seed + number))
-    return total.estimate()
-
-
 @pytest.mark.parametrize("name", ["fig-8-9", "cornell-box", "open floor"])
 def test_merged_methods_are_equal_images(rgb, name):
     """Every name that a method swallowed, rendered as if the scene could tell it apart."""
@@ -122,12 +116,7 @@ def test_merged_methods_are_equal_images(rgb, name):
         expected = whole(found.renderer(method, 16))
         for other in set(method.names) & set(apart):
             image = whole(telling.renderer(apart[other], 16), seed=80)
-            noise = np.hypot(expected.standard_error, image.standard_error)
-            # Five standard errors of eight passes, and the pixel filter's own spread at edges.
-            difference = np.abs(expected.mean - image.mean)
-            assert (difference > 7 * noise + 1e-5).mean() < 5e-3, (method.name, other)
-            mean = np.abs((expected.mean - image.mean).mean())
-            assert mean < 4 * np.sqrt(np.mean(noise**2) / noise.size) + 1e-6, (method.name, other)
+            require_equal(expected, image, (method.name, other))
 
 
 TOY = Method(name="no shadows", family="physical", without=("occlusion",), max_depth=2)
@@ -143,31 +132,15 @@ def test_methods_stand_in_order_with_declared_ones_before_the_full_plan(rgb, dec
     declare(TOY)
     declare(HALF)
     everything = ladder(SCENES["plastic-spheres"].source())
-    assert [method.names for method in everything.methods] == [
-        ("Phong kernel",),
-        ("kernel with shadows",),
-        ("shadow map",),
-        ("constant ambient",),
-        ("hemisphere ambient",),
-        ("phong BSDF, full transport",),
-        ("direct",),
-        ("path 3",),
-        ("path 4",),
-        ("path 5",),
-        (TOY.name,),
-        (HALF.name,),
-        ("full plan",),
-    ]
+    paths = ("direct", "path 3", "path 4", "path 5", TOY.name)
+    assert [method.names for method in everything.methods] == [(name,) for name in (
+        "Phong kernel", "kernel with shadows", "shadow map",
+        "constant ambient", "hemisphere ambient", "phong BSDF, full transport", *paths, HALF.name,
+        "full plan",
+    )]  # fmt: skip
     # Nothing shadows the one ball of the figure.
     figure = ladder(SCENES["fig-8-9"].source())
-    assert figure.methods[-1].names == (
-        "direct",
-        "path 3",
-        "path 4",
-        "path 5",
-        TOY.name,
-        "full plan",
-    )
+    assert figure.methods[-1].names == (*paths, "full plan")
     reason = "it stands in for interreflection, which the scene does not have"
     assert figure.left_out[HALF.name] == reason
 
@@ -227,17 +200,14 @@ def test_a_scene_says_why_it_cannot_have_a_method(rgb, tmp_path):
 
 def test_size_and_methods_are_of_the_chosen_sensor(rgb):
     several = described(ball={"type": "sphere"}, size=32)
-    view = mi.ScalarTransform4f().look_at((4, 0, 1), (0, 0, 0), (0, 0, 1))
-    film = {"type": "hdrfilm", "width": 16, "height": 24, "rfilter": {"type": "box"}}
-    several["second"] = {"type": "perspective", "to_world": view, "film": film}
-    source = Source("several", several)
-    assert reduced(source, Options(sensor=1), WIDTH) == (16, 24)
-    assert reduced(source, Options(sensor=1), 8) == (8, 12)
+    other = described((4, 0, 1), size=16)["sensor"]
+    source = Source("several", several | {"second": other})
+    assert reduced(source, Options(sensor=1), WIDTH) == (16, 16)
+    assert reduced(source, Options(sensor=1), 8) == (8, 8)
     assert reduced(source, Options(resolution=(48, 24)), 12) == (12, 6)
 
     def place(sensor, interpolation):
-        pairs = ladder(source, sensor=sensor).pairs
-        graph = pairs.of(interpolation).heuristic
+        graph = ladder(source, sensor=sensor).pairs.of(interpolation).heuristic
         return graph.instantiate().sensors()[0].world_transform().matrix.numpy()
 
     flat = place(1, Interpolation.FLAT)
@@ -255,22 +225,19 @@ def test_the_command_predicts_and_measures_at_another_shape_than_the_films(rgb, 
     assert code == 0
     assert "Predicted and measured there" in said
     place = tmp_path / "cost/lambert-sphere"
-    record = json.loads((place / "cost.json").read_text(encoding="utf-8"))
-    jsonschema.Draft202012Validator(SCHEMA).validate(record)
-    assert record["command"].startswith("fotismos cost lambert-sphere")
-    assert "--rounds 2" in record["command"]
-    assert {"cost.svg", "cost-reference.png", "cost-method-phong-kernel.png"} <= {
-        path.name for path in place.iterdir()
-    }
-    assert (record["resolution"], record["at"]) == ([128, 80], [160, 100])
-    measured = {row["method"]: row for row in record["measured"]}
-    assert measured.keys() == {method["name"] for method in record["methods"]}
-    for row in record["predicted"]:
-        assert row["seconds"]["low"] <= row["seconds"]["value"] <= row["seconds"]["high"]
-        assert row["error"]["low"] <= row["error"]["mean"] <= row["error"]["high"]
-        if row["method"] == "Phong kernel" and row["spp"] == measured["Phong kernel"]["spp"]:
-            found = measured["Phong kernel"]["error"]["mean"]
-            assert row["error"]["mean"] == pytest.approx(found, abs=0.05)
+    text = (place / "cost.json").read_text(encoding="utf-8")
+    jsonschema.Draft202012Validator(SCHEMA).validate(json.loads(text))
+    record = msgspec.json.decode(text, type=Cost)
+    assert re.match("fotismos cost lambert-sphere .*--rounds 2", record.command)
+    files = {path.name for path in place.iterdir()}
+    assert {"cost.svg", "cost-reference.png", "cost-method-phong-kernel.png"} <= files
+    assert (record.resolution, record.at) == ((128, 80), (160, 100))
+    measured = {row.method: row for row in record.measured}
+    assert measured.keys() == {method.name for method in record.methods}
+    kernel = measured["Phong kernel"]
+    (predicted,) = (p for p in record.predicted if (p.method, p.spp) == (kernel.method, kernel.spp))
+    assert predicted.seconds.low <= predicted.seconds.value <= predicted.seconds.high
+    assert predicted.error.mean == pytest.approx(kernel.error.mean, abs=0.05)
 
 
 def test_sizes_that_cannot_be_predicted_or_measured_are_refused(run):
@@ -295,10 +262,9 @@ def test_plan_within_names_the_fastest_that_suffices_and_exits_with_1_if_none_do
     code, said, _ = run(*words, "--within", 10, "--json")
     assert code == 0
     made = json.loads(said)
-    chosen, full, best = made["chosen"], made["full"], made["best"]
-    tolerances = [one["tolerance"]["mean"] for one in (best, full, chosen)]
-    assert 0 < tolerances[0] <= tolerances[1] < 10 > tolerances[2]
-    assert chosen["seconds"]["low"] <= full["seconds"]["high"]
+    best, full, chosen = (made[name]["tolerance"]["mean"] for name in ("best", "full", "chosen"))
+    assert 0 < best <= full < 10 > chosen
+    assert made["chosen"]["seconds"]["low"] <= made["full"]["seconds"]["high"]
     assert {"shadow map", "constant ambient"} <= made["left_out"].keys()
     none = MeanError(mean=20.0, low=19.0, high=21.0)
     points = tuple(structs.replace(point, tolerance=none) for point in found.points)

@@ -1,7 +1,6 @@
 """What page, files and charts show of a study of cost: the record's figures, and its front."""
 
 import json
-import re
 from dataclasses import replace
 
 import jsonschema
@@ -140,31 +139,3 @@ def test_a_chart_names_axes_units_and_every_method():
         for word in ("time for one image (ms", "mean ΔE2000", *(p.method for p in points)):
             assert word in svg
         assert "NaN" not in svg
-
-
-def symbol_layers(svg):
-    """Return the places of the points of each layer that has some, in pixels."""
-    return [
-        [tuple(map(float, place)) for place in re.findall(r"translate\(([^,]+),([^)]+)\)", marks)]
-        for marks in re.findall(r'<g class="mark-symbol role-mark [^>]*>(.*?)</g>', svg)
-    ]
-
-
-def test_points_guides_and_names_lie_where_the_axes_say():
-    points = [*SAMPLED, point("Phong kernel", 16, 0.01, 0.4)]
-    svg = vl_convert.vegalite_to_svg(cost_charts.error_over_time(record(points)))
-    (places,) = map(np.array, symbol_layers(svg))
-    assert np.all((places > 0) & (places < (cost_charts.WIDTH, cost_charts.HEIGHT)))
-    steps = np.diff(places[:3], axis=0)
-    np.testing.assert_allclose(steps[0], steps[1], atol=1e-3)
-    ends = r'd="M([-\d.]+),([-\d.]+)L([-\d.]+),([-\d.]+)"[^>]*stroke-dasharray="([\d,]+)"'
-    drawn = {dash: tuple(map(float, place)) for *place, dash in re.findall(ends, svg)}
-    left, top, right, bottom = drawn["6,4"]
-    for x, y in places[:3]:  # errors fall as the root of the samples: all on the line
-        assert y == pytest.approx(top + (x - left) / (right - left) * (bottom - top), abs=0.1)
-    assert drawn["1,3"] == pytest.approx((0, places[3][1], cost_charts.WIDTH, places[3][1]))
-    text = r'translate\(([^,]+),([^)]+)\)"[^>]*>(Phong kernel|full plan)</text>'
-    names = {name: (float(x), float(y)) for x, y, name in re.findall(text, svg)}
-    assert {x for x, _ in names.values()} == {cost_charts.WIDTH + 14}
-    for name, place in (("full plan", places[2]), ("Phong kernel", places[3])):
-        assert names[name][1] == pytest.approx(place[1] + 3, abs=cost_charts.LABEL_GAP)

@@ -34,7 +34,7 @@ from reference.scene.source import Source
 from tests.programs import ROOT
 from tests.schemas import schema
 
-SIZE = 40
+SIZE = 20
 RED = {"k_a": (0.3, 0.1, 0.1), "k_d": (0.6, 0.2, 0.1), "k_s": 0.4, "n": 12.0}
 GREY = {"k_a": 0.1, "k_d": 0.3, "k_s": 0.6, "n": 40.0}
 FLOOR = {"k_a": 0.2, "k_d": 0.5, "k_s": 0.1, "n": 3.0}

@@ -101,23 +101,20 @@ def quiet():
 def colours():
     """Pairs of linear colours (N, 3) by what they are."""
     rng = np.random.default_rng(5)
-    size = (5_000, 3)
-    some, other = rng.random((2, *size))
+    size = (2_000, 3)
+    some, other, noise = *rng.random((2, *size)), rng.normal(size=size)
     grey = rng.random((len(some), 1)) * np.ones(3)
     cube = np.stack(np.meshgrid(*3 * [HOSTILE]), axis=-1).reshape(-1, 3)
-    corners = np.stack(np.meshgrid(*3 * [[0.0, 1.0]]), axis=-1).reshape(-1, 3)
     return {
         "in gamut": (some, other),
-        "near": (some, some + 1e-4 * rng.normal(size=size)),
-        "nearer": (some, some + 1e-9 * rng.normal(size=size)),
-        "equal": (some, some),
+        "near": (some, some + 1e-4 * noise),
+        "nearer": (some, some + 1e-9 * noise),
         "greys": (grey, rng.permutation(grey)),
         "grey and colour": (grey, other),
         "high dynamic range": tuple(np.exp(rng.normal(0.0, 6.0, (2, *size)))),
-        "out of gamut": tuple(rng.normal(size=(2, *size))),
+        "out of gamut": (noise, rng.permutation(noise)),
         "dark": tuple(np.exp(rng.normal(-12.0, 4.0, (2, *size)))),
         "hostile": (cube, rng.permutation(cube)),
-        "corners": (np.repeat(corners, 8, axis=0), np.tile(corners, (8, 1))),
     }
 
 
@@ -175,13 +172,10 @@ def test_known_extremes():
 
 
 def test_log2_ratio_is_signed_and_defined_at_black():
-    test = np.array([[[0.5] * 3, [0.125] * 3, [0.0] * 3, [-1.0] * 3, [0.0] * 3]])
-    reference = np.array([[[0.25] * 3, [0.25] * 3, [0.0] * 3, [0.0] * 3, [1.0] * 3]])
-    lifted = [
-        np.array(each) + LOG2_EPSILON for each in ((0.5, 0.125, 0, 0, 0), (0.25, 0.25, 0, 0, 1))
-    ]
-    expected = np.log2(lifted[0] / lifted[1])
-    np.testing.assert_allclose(log2_luminance_ratio(test, reference)[0], expected, atol=1e-12)
+    greys = np.array([[0.5, 0.125, 0, -1, 0], [0.25, 0.25, 0, 0, 1]])
+    found = log2_luminance_ratio(*greys[..., None] * np.ones(3))
+    lifted = np.maximum(greys, 0) + LOG2_EPSILON
+    np.testing.assert_allclose(found, np.log2(lifted[0] / lifted[1]), atol=1e-12)
     green = np.full((3, 4, 3), (0.0, 0.4, 0.0))
     ratios, stops = summarise_log2_luminance(2 * green, green, np.ones((3, 4), bool))
     np.testing.assert_allclose([*plain(ratios).values(), *stops.ravel()], 1.0, atol=1e-3)
@@ -292,14 +286,13 @@ def test_summary_is_of_the_mask(metric, images):
     summary, distance = summarise(metric, test, reference, mask, noise=test - reference)
     values = metric(test, reference)
     np.testing.assert_array_equal(distance, values.astype(np.float32))
-    mean = np.sqrt((values[mask] ** 2).mean()) if metric.linear else values[mask].mean()
-    assert summary.mean == pytest.approx(mean)
+    values = values[mask]
+    mean = np.sqrt((values**2).mean()) if metric.linear else values.mean()
+    found = (summary.mean, summary.p50, summary.p95, summary.max)
+    assert found == pytest.approx((mean, *np.percentile(values, (50, 95, 100))))
     for share in summary.visible:
-        assert share.low <= (values[mask] > share.threshold).mean() <= share.high
+        assert share.low <= (values > share.threshold).mean() <= share.high
     assert tuple(share.threshold for share in summary.visible) == metric.visible
-    assert summary.p50 == pytest.approx(np.median(values[mask]))
-    assert summary.p95 == pytest.approx(np.percentile(values[mask], 95))
-    assert summary.max == pytest.approx(values[mask].max())
     floor = noise_floor(metric, reference, test - reference, mask)
     assert summary.noise_floor == pytest.approx(floor)
     assert summary.after_exposure.mean <= summary.mean

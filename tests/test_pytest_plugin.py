@@ -11,27 +11,7 @@ from heuristic.errors import InputError
 from reports.ci.testing import Departure, Fotismos
 from tests import small_baselines
 from tests.programs import ROOT, python
-
-SCENE = """<scene version="3.0.0">
-  <sensor type="perspective">
-    <film type="hdrfilm">
-      <integer name="width" value="16"/><integer name="height" value="12"/>
-    </film>
-  </sensor>
-  <shape type="sphere">
-    <point name="center" x="0" y="0" z="4"/>
-    <bsdf type="diffuse"><rgb name="reflectance" value="0.2, 0.3, 0.5"/></bsdf>
-  </shape>
-  <emitter type="point">
-    <point name="position" x="3" y="2" z="-3"/><float name="intensity" value="90"/>
-  </emitter>
-  <shape type="rectangle">
-    <transform name="to_world">
-      <scale value="9"/><rotate y="1" angle="180"/><translate z="6"/>
-    </transform>
-  </shape>
-</scene>
-"""
+from tests.small_scene import SCENE
 
 SUITE = """
 import pytest
@@ -104,13 +84,9 @@ def test_a_suite_fails_updates_and_passes(suite, tmp_path):
     assert code == 1
     assert "6 failed, 2 passed" in printed
     for words in (
-        "assert dE2000 ",
-        "<= 0.5",
-        "scene: mean dE2000 ",
-        "95 % interval: ",
-        "noise alone: ",
+        "assert dE2000 ", "<= 0.5", "scene: mean dE2000 ", "95 % interval: ", "noise alone: ",
         "scene.json: there is no such baseline. `pytest --fotismos-update` writes it.",
-    ):
+    ):  # fmt: skip
         assert words in printed
 
     code, printed = suite("--fotismos-update", "-k", "unchanged or variants")
@@ -122,9 +98,8 @@ def test_a_suite_fails_updates_and_passes(suite, tmp_path):
     path = baselines / "plain.json"
     text = path.read_text(encoding="utf-8").replace('"mean": [0.', '"mean": [1.', 1)
     path.write_text(text, encoding="utf-8")
-    (tmp_path / "tests/scenes/scene.xml").write_text(
-        SCENE.replace('value="0.2, 0.3, 0.5"', 'value="0.3, 0.3, 0.5"'), encoding="utf-8"
-    )
+    redder = SCENE.replace('value="0.2, 0.3, 0.5"', 'value="0.3, 0.3, 0.5"')
+    (tmp_path / "tests/scenes/scene.xml").write_text(redder, encoding="utf-8")
     code, printed = suite("-k", "unchanged or variants and rgb")
     assert "2 failed, 2 passed" in printed
     for words in ("scene.json: ", "moved", "standard errors", "reference R, block", "pictures: "):

@@ -1,10 +1,13 @@
-"""Records: what schemas say of them, and which files are read."""
+"""Records: their published schemas, and which files are read."""
 
+import jsonschema
 import pytest
 
 from heuristic.errors import InputError
 from reference import records
 from reference.records import VERSION, Record
+from reports.schemas import __main__ as schemas
+from tests.schemas import FOLDER, schema
 
 
 class Toy(Record):
@@ -58,3 +61,15 @@ def test_what_is_not_such_a_record_is_refused(text, expected):
 def test_a_record_of_version_2_in_which_nothing_changed_is_read():
     text = records.to_json(Toy("red", 0.5)).replace('"record_version": 3', '"record_version": 2')
     assert records.read(Toy, text, "toy.json") == Toy("red", 0.5)
+
+
+@pytest.mark.parametrize("name", schemas.PUBLISHED)
+def test_a_published_schema_is_that_of_its_type(name):
+    jsonschema.Draft202012Validator.check_schema(schema(name))
+    published = (FOLDER / f"{name}.schema.json").read_text(encoding="utf-8")
+    assert published == schemas.text(name), "run python -m reports.schemas"
+
+
+def test_every_published_schema_has_a_type():
+    published = {path.name.removesuffix(".schema.json") for path in FOLDER.glob("*.json")}
+    assert published == set(schemas.PUBLISHED)

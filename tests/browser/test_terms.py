@@ -1,7 +1,5 @@
 """Term by term: the numbers at the pixel that is picked."""
 
-import re
-
 import pytest
 
 from tests import term_grids
@@ -81,18 +79,6 @@ def test_the_reference_is_that_of_the_pixel_of_the_terms(visitor, report):
     physical = shown_rows(page)["physical"]
     assert physical[1:] == [texts[f"reference.{channel}"] for channel in range(3)]
     assert texts["standard_error"] in physical[0]
-
-
-def test_numbers_multiply_to_their_term(visitor):
-    page = visitor.open(SCENE)
-    pick(visitor, 37, 22, "click")
-    rows = shown_rows(page)
-    arriving = [float(n) for n in re.findall(r"[\d.]+", rows["key"][0].split("=")[1])]
-    *colours, f_att = arriving
-    factors = rows["key diffuse"][0].split("=")[1]
-    *k_d, cosine = map(float, re.findall(r"[\d.]+", factors))
-    product = [i * f_att * k * cosine for i, k in zip(colours, k_d, strict=True)]
-    assert product == pytest.approx(values(rows["key diffuse"]), rel=0.02)
 
 
 def test_the_background_and_other_shading_say_that_there_are_no_terms(visitor):

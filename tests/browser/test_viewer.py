@@ -202,16 +202,6 @@ def test_the_wheel_scrolls_the_page_until_a_click_into_the_picture(visitor):
     assert "zoom" in visitor.state()
 
 
-def test_dragging_pans_where_it_is_zoomed(visitor):
-    visitor.open(f"{SCENE}&mode=error&zoom=40&x=24&y=16")
-    box = visitor.canvas().bounding_box()
-    drag(visitor, (0.4, 0.4), (0.3, 0.5))
-    state = visitor.state()
-    assert float(state["x"]) == pytest.approx(24 + 0.1 * box["width"] / 40, abs=0.3)
-    assert float(state["y"]) == pytest.approx(16 - 0.1 * box["height"] / 40, abs=0.3)
-    assert "pixel" not in state  # a drag marks nothing
-
-
 def test_every_key_does_what_the_help_says(visitor):
     page = visitor.open(SCENE)
     keyboard = page.keyboard
