@@ -1,9 +1,10 @@
 """Times, fronts, and choices on numbers: a clock and renderers that are made up."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from msgspec.structs import astuple
 
 from comparisons.comparison import MeanError
 from comparisons.cost import times
@@ -45,9 +46,7 @@ class Clock:
         return np.zeros((1, 1, 3))
 
     def sampled(self, spp):
-        return Clock(
-            self.overhead, self.per_sample, self.rng, self.taken, spp, self.bend, self.variant
-        )
+        return replace(self, spp=spp, times=[], processor_times=[])
 
 
 def lines_of(per_sample, rng, rounds=7, taken=0.0, overhead=6e-3, **more):
@@ -62,15 +61,12 @@ def lines_of(per_sample, rng, rounds=7, taken=0.0, overhead=6e-3, **more):
 # -- Times -----------------------------------------------------------------------------------------
 
 
-def test_the_largest_rendering_takes_long_enough_and_one_has_a_fourth_of_its_samples(rgb):
+def test_the_largest_rendering_takes_long_enough(rgb):
     slow = {"kernel": KERNEL, "plan": 100 * KERNEL}
     _, renderers = lines_of(slow, np.random.default_rng(0))
-    counts = {name: [spp for own, spp in renderers if own == name] for name in slow}
-    assert counts["plan"] == [4, 16, 64]
-    assert counts["kernel"] == [4, 16, 64, 256, 1024]
-    for name, own in counts.items():
-        assert min(renderers[name, own[-1]].times) >= times.LEAST_S
-        assert own[-1] // 4 in own
+    for name, counts in (("plan", [4, 16, 64]), ("kernel", [4, 16, 64, 256, 1024])):
+        assert [spp for own, spp in renderers if own == name] == counts
+        assert min(renderers[name, counts[-1]].times) >= times.LEAST_S
 
 
 def test_overhead_and_time_per_sample_are_found_beside_bursts(rgb):
@@ -120,10 +116,9 @@ def test_a_tenth_of_the_kernel_is_detected_and_nothing_is_not(rgb):
 
 def test_intervals_hold_the_time_and_what_steps_add_is_the_whole(rgb):
     rng, held = np.random.default_rng(5), 0
+    slow = {name: ratio * KERNEL for name, ratio in zip("abcd", (1, 4, 9, 22), strict=True)}
     for _ in range(40):
-        slow = {"kernel": KERNEL, "direct": 4 * KERNEL, "other": 9 * KERNEL, "plan": 22 * KERNEL}
-        lines, _ = lines_of(slow, rng)
-        a, b, c, d = lines.values()
+        a, b, c, d = lines_of(slow, rng)[0].values()
         steps = [(0.5, a, b), (0.5, b, d), (0.5, a, c), (0.5, c, d)]
         parts = [times.difference([step], 1000).value for step in steps]
         whole = times.difference(steps, 1000)
@@ -164,16 +159,10 @@ def test_the_front_of_exact_points_is_what_nothing_is_as_good_as():
 
 
 def test_what_is_too_close_to_call_is_not_ranked():
-    slow, fast, exact, bad = fronted(
-        [
-            made("slow", 4, 1.04, 2.0, 0.05),
-            made("fast", 4, 1.0, 2.02, 0.05),
-            made("exact", 4, 5.0, 0.1, 0.05),
-            made("bad", 4, 1.5, 2.0, 0.05),
-        ]
-    )
-    assert (slow.front, fast.front, exact.front, bad.front) == (True, True, True, False)
-    assert (slow.ties, fast.ties, exact.ties) == (("fast",), ("slow",), ())
+    amounts = {"slow": (1.04, 2.0), "fast": (1.0, 2.02), "exact": (5.0, 0.1), "bad": (1.5, 2.0)}
+    found = fronted([made(name, 4, *each, 0.05) for name, each in amounts.items()])
+    assert [one.front for one in found] == [True, True, True, False]
+    assert [one.ties for one in found[:3]] == [("fast",), ("slow",), ()]
     for seed in range(50):
         rng = np.random.default_rng(seed)
         points = [made(str(n), 1, *rng.uniform(1, 2, 2), rng.uniform(0, 0.3)) for n in range(8)]
@@ -199,11 +188,10 @@ def test_the_time_at_another_size_follows_from_overhead_and_time_per_sample():
     record = cost_records.record()
     larger = at_size(record.points, record.methods, (1280, 720))
     for point, one in zip(record.points, larger, strict=True):
-        method = record.method(point.method)
-        samples = 1280 * 720 * point.spp
-        for end in ("value", "low", "high"):
-            expected = getattr(method.overhead_s, end) + samples * getattr(method.per_sample_s, end)
-            assert getattr(one.seconds, end) == pytest.approx(expected)
+        method, samples = record.method(point.method), 1280 * 720 * point.spp
+        overhead, per_sample = map(astuple, (method.overhead_s, method.per_sample_s))
+        expected = np.add(overhead, np.multiply(samples, per_sample))
+        assert astuple(one.seconds) == pytest.approx(expected)
         assert one.error == point.error
 
 

@@ -39,23 +39,23 @@ def why(**effects):
 
 def study(*points):
     """Return a study of the kernel and of methods ``(name, spp, ms, tolerance)``."""
-    names = ["Phong kernel", *(name for name, *_ in points)]
+    kernel = ("Phong kernel", 4, 3.9, 8.0)
     methods = [
         SimpleNamespace(
-            name=name, names=(name,), is_kernel=name == "Phong kernel", shadows=False, heuristic="",
+            name=name, names=(name,), is_kernel=name == kernel[0], shadows=False, heuristic="",
             interpolation=Interpolation.PHONG,
         )
-        for name in names
+        for name, *_ in (kernel, *points)
     ]  # fmt: skip
     made = [
         cost_record.Point(
             method=name,
             spp=spp,
-            seconds=Estimated(value=ms / 1e3, low=0.95 * ms / 1e3, high=1.05 * ms / 1e3),
-            error=MeanError(mean=1.0, low=1.0, high=1.0),
-            tolerance=MeanError(mean=tolerance, low=tolerance, high=1.01 * tolerance),
+            seconds=Estimated(ms / 1e3, 0.95 * ms / 1e3, 1.05 * ms / 1e3),
+            error=MeanError(1.0, 1.0, 1.0),
+            tolerance=MeanError(tolerance, tolerance, 1.01 * tolerance),
         )
-        for name, spp, ms, tolerance in (("Phong kernel", 4, 3.9, 8.0), *points)
+        for name, spp, ms, tolerance in (kernel, *points)
     ]
     return SimpleNamespace(
         predicted=made, points=(), at=(64, 48), resolution=(8, 6), methods=methods,

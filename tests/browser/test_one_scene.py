@@ -40,13 +40,17 @@ def test_the_page_begins_with_the_scene_and_leads_to_the_overview(tab, alone, tm
     tab.wait_for_function(f"() => {SEEN} === 'scene'")
 
 
-def test_in_a_frame_all_works_and_the_address_of_the_notebook_stays(tab, alone, tmp_path):
+def test_in_a_frame_all_fits_and_works_and_the_address_of_the_notebook_stays(tab, alone, tmp_path):
     notebook = tmp_path / "notebook.html"
     notebook.write_text(Shown(None, alone)._repr_html_(), encoding="utf-8")
+    tab.set_viewport_size({"width": 960, "height": HEIGHT})
     tab.goto(notebook.as_uri())
     frame = tab.frames[1]
     frame.wait_for_function("() => document.querySelector('#viewer').dataset.ready")
     assert frame.evaluate(SEEN) == "scene"
+    place = "(name) => document.querySelector(name).getBoundingClientRect()"
+    assert frame.evaluate(f"() => ({place})('#viewer > canvas').width") > 800
+    assert frame.evaluate(f"() => ({place})('#viewer .numbers').bottom") <= HEIGHT
     button = frame.get_by_role("button", name="Split")
     button.click()
     assert button.get_attribute("aria-pressed") == "true"
@@ -57,15 +61,3 @@ def test_in_a_frame_all_works_and_the_address_of_the_notebook_stays(tab, alone, 
     frame.get_by_role("link", name=EXACT).first.click()
     assert frame.evaluate(SEEN) == "scene"
     assert tab.url == notebook.as_uri()
-
-
-def test_the_viewer_with_its_controls_fits_a_frame(tab, alone, tmp_path):
-    notebook = tmp_path / "notebook.html"
-    notebook.write_text(Shown(None, alone)._repr_html_(), encoding="utf-8")
-    tab.set_viewport_size({"width": 960, "height": HEIGHT})
-    tab.goto(notebook.as_uri())
-    frame = tab.frames[1]
-    frame.wait_for_function("() => document.querySelector('#viewer').dataset.ready")
-    place = "(name) => document.querySelector(name).getBoundingClientRect()"
-    assert frame.evaluate(f"() => ({place})('#viewer > canvas').width") > 800
-    assert frame.evaluate(f"() => ({place})('#viewer .numbers').bottom") <= HEIGHT

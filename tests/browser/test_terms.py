@@ -14,14 +14,10 @@ def shown_rows(page):
     """Return the table's rows by name, as texts of their cells, in order; a light's go by it."""
     rows, light = {}, ""
     for line in page.locator("#terms tbody tr").all():
-        cells = [text.strip() for text in line.locator("th, td").all_text_contents()]
-        light = cells[0] if "light" in (line.get_attribute("class") or "") else light
-        name = (
-            cells[0]
-            if cells[0] in ("ambient", "textbook", "physical", light)
-            else f"{light} {cells[0]}"
-        )
-        rows[name] = cells[1:]
+        name, *cells = (text.strip() for text in line.locator("th, td").all_text_contents())
+        light = name if "light" in (line.get_attribute("class") or "") else light
+        is_whole = name in ("ambient", "textbook", "physical", light)
+        rows[name if is_whole else f"{light} {name}"] = cells
     return rows
 
 
@@ -30,19 +26,14 @@ def values(cells):
 
 
 def pick(visitor, x, y, how):
-    left, top = visitor.place_of(x, y)
-    place = {"x": left, "y": top}
-    if how == "touch":
-        visitor.canvas().tap(position=place)
-    elif how == "keys":
-        visitor.canvas().click(
-            position=dict(zip("xy", visitor.place_of(x - 3, y - 10), strict=True))
-        )
+    by_keys = how == "keys"
+    first = visitor.place_of(x - 3, y - 10) if by_keys else visitor.place_of(x, y)
+    act = visitor.canvas().tap if how == "touch" else visitor.canvas().click
+    act(position=dict(zip("xy", first, strict=True)))
+    if by_keys:
         visitor.canvas().focus()
         for key in (*["ArrowRight"] * 3, "Shift+ArrowDown"):
             visitor.page.keyboard.press(key)
-    else:
-        visitor.canvas().click(position=place)
     visitor.settle()
 
 
@@ -56,11 +47,8 @@ def test_the_terms_are_those_of_the_pixel(visitor, how):
     for x, y in ((9, 14), (37, 22)):
         pick(visitor, x, y, how)
         expected = GRID.at(x, y)
-        assert (
-            page.locator("#terms h3")
-            .text_content()
-            .endswith(f"at {expected.pixel[0]}, {expected.pixel[1]}: {expected.material.name}")
-        )
+        place = "at {}, {}: ".format(*expected.pixel) + expected.material.name
+        assert page.locator("#terms h3").text_content().endswith(place)
         rows = shown_rows(page)
         assert values(rows["textbook"]) == pytest.approx(expected.total, rel=6e-3)
         assert values(rows["ambient"]) == pytest.approx(expected.ambient, rel=6e-3)
