@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from comparisons.audit import checks, furnace
+from comparisons.audit import checks
 from comparisons.audit.subjects import (
     DISTANCES,
     EXTREMES,
@@ -238,15 +238,9 @@ def test_every_heuristic_goes_through_the_hard_cases(rgb):
 @pytest.mark.thorough
 @opengl
 def test_a_shader_in_glsl_is_audited_without_derivatives(rgb):
-    subject = named(str(DOCS / "phong.glsl"), (24, 18))
-    found, _ = checked(subject)
+    found, _ = checked(named(str(DOCS / "phong.glsl"), (24, 18)))
     assert found["gradient"].verdict == "not asked"
     assert found["values"].verdict == "holds"
-    pairs = furnace.random_and_mirrored()
-    for material in subject.materials:
-        built_in = named("phong").response(material, *pairs)
-        own = subject.response(material, *pairs)
-        np.testing.assert_allclose(own, built_in, rtol=1e-4, atol=1e-5)
 
 
 # --- The command and its files -------------------------------------------------------------------

@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from comparisons.check.measurement import baseline_of, measure_scene, read_baseline
-from comparisons.check.moved import check, differences, moved
+from comparisons.check.moved import differences, moved
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import InputError
@@ -17,16 +17,13 @@ from reference.scene.source import Source
 SMALL = Options(resolution=(64, 64))
 
 
-def spheres(**changes):
-    """The plastic spheres, with what their plastic has changed, or the distance of their lamp."""
+def spheres(alpha=1, distance=1):
+    """The plastic spheres; their roughness and the distance of their lamp change by factors."""
     scene = SCENES["plastic-spheres"].make()
     for name in ("sphere-1", "sphere-2", "sphere-3"):
-        bsdf = scene[name]["bsdf"] = dict(scene[name]["bsdf"])
-        bsdf["alpha"] *= changes.get("alpha", 1)
-        colour = bsdf["diffuse_reflectance"]["value"]
-        value = tuple(changes.get("k_d", 1) * c for c in colour)
-        bsdf["diffuse_reflectance"] = {"type": "rgb", "value": value}
-    place = [changes.get("distance", 1) * x for x in (-3, -4, 7)]
+        bsdf = scene[name]["bsdf"]
+        scene[name]["bsdf"] = bsdf | {"alpha": alpha * bsdf["alpha"]}
+    place = [distance * x for x in (-3, -4, 7)]
     look = mi.ScalarTransform4f().look_at(place, (0, 0, 0), (0, 0, 1))
     scene["lamp"]["to_world"] = look.scale(0.5)
     return scene
@@ -48,7 +45,6 @@ def measured(make, seed=0, resolution=(64, 64), spp=None):
 # --- Power -----------------------------------------------------------------------------------
 
 CHANGES = {
-    "1 % in k_d": (spheres, lambda: spheres(k_d=1.01)),
     "2 % in alpha": (spheres, lambda: spheres(alpha=1.02)),
     "the lamp at 1 % more distance": (spheres, lambda: spheres(distance=1.01)),
     "one bounce less": (box, lambda: box(bounces=-1)),
@@ -65,27 +61,6 @@ def test_a_small_change_is_caught_with_another_seed(rgb, name):
     before, after = CHANGES[name]
     moves = moved(differences(measured(before), measured(after, 1000)))
     assert any(move.half == "reference" for move in moves)
-
-
-def test_what_moved_is_where_the_change_is(rgb):
-    """Of one sphere alone: blocks without it, or its light on the floor, stay."""
-
-    def third(factor):
-        scene = spheres()
-        value = tuple(factor * c for c in (0.1, 0.27, 0.36))
-        scene["sphere-3"]["bsdf"]["diffuse_reflectance"] = {"type": "rgb", "value": value}
-        return scene
-
-    before = measured(lambda: third(1), spp=64)
-    result = check(Source("spheres", lambda: third(1.05)), SMALL.changed(spp=64), before)
-    assert not result.passed
-    blocks = {move.block for move in result.moved if move.block}
-    assert {(2, 4), (3, 4)} <= blocks
-    assert not blocks & {(1, 1), (2, 1), (1, 4), (4, 1)}
-    old, new = result.blocks("reference")
-    assert (new - old)[1, 3].min() > 0
-    assert "of 16 blocks, most in row" in " ".join(result.causes())
-    assert result.objects("reference", result.now.pictures["reference"] * 0)
 
 
 # --- False alarms ----------------------------------------------------------------------------
@@ -169,15 +144,3 @@ def test_a_file_that_is_no_baseline_is_refused(text):
         assert "--update" in str(refused.value)
     with pytest.raises(InputError, match="array"):
         read_baseline("[]", "x.json")
-
-
-def test_a_metric_that_was_declared_later_is_not_tested(rgb):
-    options = SMALL.changed(spp=32, resolution=(16, 16))
-    before = measured(box, 0, (16, 16), 32)
-    names = [name for name in before.metrics if name != "dE_ITP"]
-    result, whole = (
-        check(Source("box", box), options, known) for known in (before.of(names), before)
-    )
-    assert result.passed
-    assert len(result.moves) == len(whole.moves) - 1
-    assert "dE_ITP" in result.now.measurement.metrics

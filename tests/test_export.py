@@ -87,10 +87,9 @@ def test_the_geometry_is_the_scenes_own(rgb):
     shapes = {"sensor": {"type": "perspective", "fov": fov, "to_world": to_world, "film": film}}
     for mesh in file["meshes"]:
         (primitive,) = mesh["primitives"]
-        positions = array_of(file, primitive["attributes"]["POSITION"])
-        faces = array_of(file, primitive["indices"]).reshape(-1, 3)
-        made = meshes.new_mesh(mesh["name"], mi.Point3f(positions.T), mi.Vector3u(faces.T))
-        shapes[mesh["name"]] = made
+        positions = mi.Point3f(array_of(file, primitive["attributes"]["POSITION"]).T)
+        faces = mi.Vector3u(array_of(file, primitive["indices"]).reshape(-1, 3).T)
+        shapes[mesh["name"]] = meshes.new_mesh(mesh["name"], positions, faces)
     seen = gbuffer(mi.load_dict({"type": "scene", **shapes}), *SIZE)
     same = found.layers["shape"] > 0
     assert (seen.hit == same).mean() > 0.99  # rays along the open edge of the box
@@ -98,12 +97,11 @@ def test_the_geometry_is_the_scenes_own(rgb):
         off = np.linalg.norm(own - found.layers[layer], axis=-1)[same & seen.hit]
         assert np.percentile(off, 99) < 1e-3
     both = np.array(found.camera["projection"]) @ np.array(found.camera["view"])
-    p = found.layers["P"][same].astype(float)
-    clip = np.concatenate([p, np.ones((len(p), 1))], axis=1) @ both.T
+    clip = np.insert(found.layers["P"][same].astype(float), 3, 1, axis=1) @ both.T
     ndc = clip[:, :3] / clip[:, 3:]
     y, x = np.nonzero(same)
-    np.testing.assert_allclose((ndc[:, 0] + 1) / 2 * SIZE[0] - 0.5, x, atol=2e-3)
-    np.testing.assert_allclose((1 - ndc[:, 1]) / 2 * SIZE[1] - 0.5, y, atol=2e-3)
+    pixels = (1 + ndc[:, :2] * (1, -1)) / 2 * SIZE - 0.5
+    np.testing.assert_allclose(pixels, np.stack([x, y], axis=1), atol=2e-3)
     assert (np.abs(ndc[:, 2]) <= 1).all()
 
 

@@ -1,19 +1,12 @@
 """Every hard case breaks the naive formula and not ours; the exact values agree with mpmath."""
 
-import drjit as dr
 import mpmath
 import numpy as np
 import pytest
-from drjit.llvm import Array3f, Float
 from markupsafe import escape
 
-import heuristic
 from comparisons import hard_cases
-from comparisons.departure.metrics import delta_e_2000
 from comparisons.hard_cases import CASES, error
-from heuristic import vectors
-from reference.pairing.albedo import SMALLEST_IOR, to_roughplastic
-from reference.pairing.factors import Convention, Phong
 from reports.page import page
 
 
@@ -41,22 +34,6 @@ def test_light_where_there_is_none_is_an_infinite_error():
         assert error([0, 0, value], nothing) == np.inf
     assert error([0, 0, 0], nothing) == 0
     assert error([2.0, 0, 0], np.array([1, 0, 0], np.longdouble)) == 1
-
-
-def test_limits_that_mathematics_does_not_settle_are_as_stated(rgb):
-    """No formula breaks at these; each could be defined otherwise."""
-    # A spot of m = 0 is an even cone, lit up to its cutoff even beyond 90 degrees.
-    at = Array3f(0.75**0.5, 0.0, -0.5)
-    for m in (0, dr.opaque(Float, 0)):
-        spot = heuristic.SpotLight((0, 0, 0), (0, 0, 1), 1.0, cutoff=135.0, exponent=m)
-        assert np.array(spot.illuminate(at).intensity + dr.zeros(Float, 1)) == 1
-    # Below the smallest normal float a surface may be too dark, but never NaN or too bright.
-    assert dr.norm(vectors.normalise(dr.opaque(Array3f, (6e-41, 0, 8e-41))))[0] <= 1
-    # Mitsuba rejects an IOR of 1. A lobe too faint for any above the smallest gets that.
-    faint = Phong((0.5,) * 3, (1e-12,) * 3, 9.0)
-    assert to_roughplastic(faint, Convention.MATCHED)[0].int_ior == pytest.approx(SMALLEST_IOR)
-    # A display shows twice and three times white alike.
-    assert delta_e_2000(np.full((1, 1, 3), 2.0), np.full((1, 1, 3), 3.0)) == 0
 
 
 # --- On the page ---------------------------------------------------------------------------------

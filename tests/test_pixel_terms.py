@@ -1,8 +1,5 @@
 """Equation 8.10 term by term: what the records and the page hold is what the kernel has."""
 
-import base64
-import zlib
-
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -15,6 +12,8 @@ from comparisons.prepared import prepare
 from reference.rendering.gbuffer import pixel_rays
 from reference.rendering.renderer import variant
 from reports.page.why_view import terms_view
+from tests.misplanned import scene as described
+from tests.test_embedding import codes
 
 KERNEL = 1e-5
 """Of the largest value: single precision, and ``n`` times its rounding of a cosine."""
@@ -83,32 +82,24 @@ def total_of(view):
 
 
 def unpacked(embedded, tops):
-    differences = np.frombuffer(zlib.decompress(base64.b64decode(embedded.data)), np.uint16)
-    codes = np.cumsum(differences, dtype=np.uint16).astype(float)
-    found = {}
-    for name, code in zip(
-        embedded.names, codes.reshape(-1, embedded.height, embedded.width), strict=True
-    ):
-        if name == "material":
-            found[name] = code
-        elif name in tops:
-            found[name] = tops[name] * (code / 65535) ** 2
-        else:
-            found[name] = 2 * code / 65535 - 1
-    return found
+    found = {name: plane.astype(float) for name, plane in codes(embedded).items()}
+    material = found.pop("material")
+    for name, code in found.items():
+        is_signed = name not in tops
+        found[name] = 2 * code / 65535 - 1 if is_signed else tops[name] * (code / 65535) ** 2
+    return found | {"material": material}
+
+
+def unit(vector):
+    return vector / np.linalg.norm(vector)
 
 
 def seen_on_the_unit_sphere(x, y, side, viewer):
     """Return where the ray through a pixel's centre meets the figures' sphere, in float64."""
-    viewer = np.array(viewer, float)
-    forward = -viewer / np.linalg.norm(viewer)
-    right = np.cross(forward, (0, 0, 1))
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    reach = np.tan(np.radians(20))
-    across, down = (2 * (place + 0.5) / side - 1 for place in (x, y))
-    ray = forward + reach * (across * right - down * up)
-    ray /= np.linalg.norm(ray)
+    forward = unit(-viewer)
+    right = unit(np.cross(forward, (0, 0, 1)))
+    across, down = (np.tan(np.radians(20)) * (2 * (place + 0.5) / side - 1) for place in (x, y))
+    ray = unit(forward + across * right - down * np.cross(right, forward))
     half = ray @ viewer
     return viewer - ray * (half + np.sqrt(half**2 - viewer @ viewer + 1))
 
@@ -123,40 +114,28 @@ def test_each_factor_is_that_of_the_formula():
         found = grid.at(x, y)
         assert found.pixel == (x, y)
         normal = seen_on_the_unit_sphere(x, y, 32, viewer)
-        view = (viewer - normal) / np.linalg.norm(viewer - normal)
+        view = unit(viewer - normal)
         assert found.cos_view == pytest.approx(normal @ view, abs=1e-5)
         assert found.ambient == pytest.approx((0.3, 0.3, 0.3))
-        for number, (name, lamp) in enumerate(lamps.items()):
-            light = found.lights[number]
-            toward = (np.array(lamp) - normal) / np.linalg.norm(np.array(lamp) - normal)
+        for number, (light, lamp) in enumerate(zip(found.lights, lamps.values(), strict=True)):
+            toward = unit(lamp - normal)
             cosine = normal @ toward
-            mirrored = 2 * cosine * normal - toward
-            lobe = max(mirrored @ view, 0) ** 9 if cosine > 0 else 0
-            assert (light.name, light.attenuation) == (name, pytest.approx(1))
-            assert light.cos_incidence == pytest.approx(cosine, abs=1e-5)
-            assert light.cos_reflection == pytest.approx(mirrored @ view, abs=1e-5)
-            assert light.lobe == pytest.approx(lobe, abs=1e-4)
-            assert light.diffuse[number] == pytest.approx(0.5 * max(cosine, 0), abs=1e-5)
-            assert light.specular[number] == pytest.approx(0.7 * lobe, abs=1e-4)
+            reflection = (2 * cosine * normal - toward) @ view
+            lobe = max(reflection, 0) ** 9 if cosine > 0 else 0
+            cosines = light.cos_incidence, light.cos_reflection, light.attenuation
+            assert cosines == pytest.approx((cosine, reflection, 1), abs=1e-5)
+            terms = light.diffuse[number], light.specular[number], light.lobe
+            assert terms == pytest.approx((0.5 * max(cosine, 0), 0.7 * lobe, lobe), abs=1e-4)
             assert sum(light.diffuse) == light.diffuse[number]
             lit += cosine > 0 and lobe > 0.01
+        assert [light.name for light in found.lights] == list(lamps)
     assert lit >= 4
 
 
-def sphere(material, *lights, **more):
-    sensor = {
-        "type": "perspective",
-        "fov": 30,
-        "film": {"type": "hdrfilm", "width": 16, "height": 16},
-        "to_world": mi.ScalarTransform4f().look_at((0, -4, 1), (0, 0, 0), (0, 0, 1)),
-    }
-    scene = {
-        "type": "scene",
-        "sensor": sensor,
-        "ball": {"type": "sphere", "bsdf": material},
-        **more,
-    }
-    return scene | {f"lamp {number}": light for number, light in enumerate(lights)}
+def sphere(material, *lights):
+    parts = {"ball": {"type": "sphere", "bsdf": material}}
+    parts |= {f"lamp {number}": light for number, light in enumerate(lights)}
+    return described((0, -4, 1), size=16, **parts)
 
 
 def lamp(x, strength=30.0):

@@ -43,7 +43,6 @@ def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
     content = record.read_text(encoding="utf-8")
     mean = str(json.loads(content)["metrics"]["dE2000"]["mean"])
     record.write_text(content.replace(mean, mean[::-1]), encoding="utf-8")
-    assert record.stat().st_size == len(content.encode())
     assert rendered(run, scene_file, out)
     assert mean[::-1] not in record.read_text(encoding="utf-8")
     record.unlink()
@@ -51,10 +50,10 @@ def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
     with monkeypatch.context() as patched:
         patched.setattr(heuristic.program, "source_digest", lambda: "terms.diffuse, halved")
         assert [rendered(run, scene_file, out) for _ in range(2)] == [True, False]
-    for more in (("--fresh",), ("--seed", 1), ("--noise", 9)):
+    for more in (("--fresh",), ("--seed", 1)):
         assert rendered(run, scene_file, out, *more)
     scene_file.write_text(SCENE.replace("0.2, 0.3, 0.5", "0.2, 0.3, 0.6"), encoding="utf-8")
-    assert rendered(run, scene_file, out, "--noise", 9)
+    assert rendered(run, scene_file, out, "--seed", 1)
 
 
 def test_a_scene_in_python_is_never_reused(run, tmp_path):
@@ -72,16 +71,15 @@ def comparison():
 
 def test_a_view_is_found_again_unless_anything_is_damaged(comparison, tmp_path):
     view = scene.write(results.own(tmp_path), "a", comparison, key="key")
-    place = tmp_path / "a"
+    place, file = tmp_path / "a", tmp_path / "a/view.json"
     assert scene.load(place, "key") == view
-    assert scene.load(place, "another") is None
-    assert scene.load(place, None) is None
-    text = (place / "view.json").read_text(encoding="utf-8")
+    assert scene.load(place, "another") is scene.load(place, None) is None
+    text = file.read_text(encoding="utf-8")
     cuts = (text[:size] for size in range(0, len(text), len(text) // 20))
     for broken in ("", "[]", "{}", text.replace("digests", "digest"), *cuts):
-        (place / "view.json").write_text(broken, encoding="utf-8")
+        file.write_text(broken, encoding="utf-8")
         assert scene.load(place, "key") is None
-    (place / "view.json").write_text(text, encoding="utf-8")
+    file.write_text(text, encoding="utf-8")
     (place / "comparison.exr").unlink()
     assert scene.load(place, "key") is None
 
@@ -125,16 +123,13 @@ def test_files_of_others_stay_and_ours_are_replaced(tmp_path):
     with results.hold(tmp_path / "out", "test") as out:
         results.write(out / "index.html", "old")
         results.write(results.own(out / "cost") / "cost.json", "old")
-    (out / "mine.txt").write_text("mine")
-    (out / "cost/mine.txt").write_text("mine")
+    for folder in (out, out / "cost"):
+        (folder / "mine.txt").write_text("mine")
     with results.hold(out, "test"):
         results.write(out / "index.html", "new")
         results.clear(out / "cost", ["cost.json", "none.json"])
-    names = {str(path.relative_to(out)) for path in out.rglob("*")}
-    assert names == {
-        ".fotismos", ".fotismos-lock", "index.html", "mine.txt", "cost", "cost/.fotismos",
-        "cost/mine.txt",
-    }  # fmt: skip
+    names = {str(path.relative_to(out)) for path in out.rglob("[!.]*")}
+    assert names == {"index.html", "mine.txt", "cost", "cost/mine.txt"}
     assert (out / "index.html").read_text() == "new"
 
 
@@ -169,12 +164,9 @@ def test_what_others_made_is_one_message_and_stays(run, scene_file, tmp_path, na
 @pytest.mark.parametrize("name", [results.MARK, results.LOCK])
 def test_a_mark_or_lock_that_is_no_file_is_refused(name, tmp_path):
     (tmp_path / "mine").write_text("mine")
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / name).symlink_to(tmp_path / "mine")
-    with (
-        pytest.raises(OutputError, match=r"File exists\. Move away"),
-        results.hold(tmp_path / "out", "test"),
-    ):
+    (tmp_path / name).symlink_to("mine")
+    refused = pytest.raises(OutputError, match=r"File exists\. Move away")
+    with refused, results.hold(tmp_path, "test"):
         pass
     assert (tmp_path / "mine").read_text() == "mine"
 

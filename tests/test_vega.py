@@ -32,16 +32,6 @@ def test_a_chart_takes_the_texts_colour_and_has_a_transparent_ground():
     assert "shadow" in svg
 
 
-def test_a_specifications_own_config_has_the_last_word():
-    own = {"axis": {"labelFontSize": 7}, "bar": {"size": 3}}
-    spec = theme.themed(bars(config=own), theme.PAGE)
-    assert spec["config"]["axis"]["labelFontSize"] == 7
-    assert spec["config"]["axis"]["labelColor"] == "currentColor"
-    assert spec["config"]["bar"] == {"size": 3}
-    assert "labelFontSize" in theme.PAGE["axis"]
-    assert theme.PAGE["axis"]["labelFontSize"] != 7
-
-
 def test_paper_is_white_with_black_text_and_otherwise_as_the_page():
     svg = vega.paper(bars()).decode()
     assert 'fill="white"' in svg

@@ -9,26 +9,6 @@ from tests.browser.conftest import EXACT, HEIGHT, NOISY, NOISY_ID, WIDTH
 from tests.browser.test_viewer import top_of
 
 SCENE = f"#scene={NOISY_ID}&mode=error"
-PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
-
-
-def swipe(page, selector, start, end):
-    """A finger that goes from one place of an element to another, in CSS pixels."""
-    page.evaluate(
-        """([selector, from, to]) => {
-          const element = document.querySelector(selector);
-          element.setPointerCapture = () => {};
-          const box = element.getBoundingClientRect();
-          const send = (type, [x, y]) => element.dispatchEvent(new PointerEvent(type, {
-            pointerId: 1, pointerType: "touch", bubbles: true, buttons: 1,
-            clientX: box.left + x, clientY: box.top + y }));
-          send("pointerdown", from);
-          send("pointermove", from.map((value, axis) => (value + to[axis]) / 2));
-          send("pointermove", to);
-          send("pointerup", to);
-        }""",
-        [selector, start, end],
-    )
 
 
 def numbers(page):
@@ -120,20 +100,3 @@ def test_bars_are_parts_of_the_pixels_and_a_drag_over_them_moves_the_threshold(v
     page.mouse.up()
     assert visitor.state()["t"] in ("4", "4.25")
     assert page.locator("#viewer [data-threshold]").input_value() == visitor.state()["t"]
-
-
-@pytest.mark.parametrize("visitor", [PHONE], indirect=True)
-def test_fingers_select_and_brush_on_a_phone(visitor, report):
-    page = visitor.open(SCENE)
-    page.get_by_role("button", name="Select").tap()
-    swipe(page, "#viewer > canvas", *([*visitor.place_of(*at)] for at in ((10, 5), (29, 24))))
-    visitor.settle()
-    assert visitor.state()["box"] == "10,5,20,20"
-    inside = values(report)[0][5:25, 10:30]
-    assert figure(numbers(page)["mean"]) == pytest.approx(inside.mean(), rel=0.01)
-    box = page.locator("#distribution svg").bounding_box()
-    swipe(page, "#distribution svg", [2, 20], [box["width"], 20])
-    visitor.settle()
-    assert visitor.state()["t"] == "10"
-    page.get_by_role("button", name="Clear").tap()
-    assert "box" not in visitor.state()
