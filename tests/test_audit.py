@@ -274,7 +274,6 @@ def test_only_values_that_no_light_has_fail_the_command(run, tmp_path):
         "def even(point):\n"
         "    facing = dr.dot(point.normal, point.view)\n"
         "    return dr.select(facing < 1e-5, dr.log(facing - 1), 1) * point.material.k_s\n",
-        encoding="utf-8",
     )
     out = tmp_path / "out"
     code, said, _ = run("audit", "--bsdf", "diffuse", "-p", "reflectance=0.5", "-o", out, "--json")
@@ -283,9 +282,9 @@ def test_only_values_that_no_light_has_fail_the_command(run, tmp_path):
     code, said, _ = run("audit", "--heuristic", f"{file}:even", "-o", out)
     assert (code, "nan" in said) == (1, True)
     folder = out / "audit/mine-even"
-    assert (folder / "audit.svg").read_text(encoding="utf-8").startswith("<svg")
-    record = json.loads((folder / "audit.json").read_text(encoding="utf-8"))
-    html = (folder / "index.html").read_text(encoding="utf-8")
+    assert (folder / "audit.svg").read_text().startswith("<svg")
+    record = json.loads((folder / "audit.json").read_text())
+    html = (folder / "index.html").read_text()
     assert all(check["worst"] in html for check in record["checks"])
 
 

@@ -55,7 +55,7 @@ def parses(monkeypatch):
 
 
 def test_a_file_is_parsed_once(run, scene_file, tmp_path, parses):
-    scene_file.write_text(PLAIN, encoding="utf-8")
+    scene_file.write_text(PLAIN)
     assert run("compare", scene_file, "-o", tmp_path / "out", *SMALL)[0] == 0
     assert parses == [str(scene_file)]
 
@@ -63,7 +63,7 @@ def test_a_file_is_parsed_once(run, scene_file, tmp_path, parses):
 def test_a_script_runs_once_in_each_attempt(run, tmp_path):
     """Also where the result is found finished."""
     script, runs = tmp_path / "s.py", tmp_path / "s.runs"
-    script.write_text(SCRIPT, encoding="utf-8")
+    script.write_text(SCRIPT)
     for attempt in (1, 2):
         assert run("compare", script, "-o", tmp_path / "out", *SMALL)[0] == 0
         assert runs.read_text() == "x" * attempt
@@ -101,7 +101,7 @@ def test_a_command_repeats_what_was_given(rgb, tmp_path):
 
 def test_values_for_placeholders_are_refused_where_there_are_none(rgb, tmp_path):
     script = tmp_path / "s.py"
-    script.write_text(SCRIPT, encoding="utf-8")
+    script.write_text(SCRIPT)
     for scene in ("fig-8-9", script, spectral_scene):
         with pytest.raises(InputError, match=r"-D foo: only Mitsuba files"):
             open_case(scene, Options(define={"foo": 1}))

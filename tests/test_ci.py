@@ -1,10 +1,8 @@
 """Checks, gates and what CI reads of them: exit codes, JUnit, Markdown, and what they replace."""
 
 import json
-import os
 import re
 import shutil
-import subprocess
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
@@ -13,7 +11,6 @@ import jsonschema
 import numpy as np
 import OpenEXR
 import pytest
-import yaml
 from msgspec import structs
 
 from comparisons.check.measurement import HALVES, MeasuredScene, measurement
@@ -25,10 +22,10 @@ from reference.rendering.gbuffer import ObjectIds
 from reports import jobs
 from reports.ci import checks, summary
 from tests import records
-from tests.programs import ROOT, command_line
+from tests.programs import command_line
 from tests.schemas import schema
 from tests.small_baselines import FAST, change
-from tests.small_scene import PLAIN, SCENE
+from tests.small_scene import SCENE
 
 SMALL = ("--spp", 4, "--resolution", "12x8")
 
@@ -61,7 +58,7 @@ def test_a_run_beyond_its_bounds_ends_with_1_and_says_so_everywhere(two_scenes):
     suite = ElementTree.parse(two_scenes.folder / "j.xml").getroot().find("testsuite")
     assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
     assert "at most 10.0 % may: fail" in suite.find("testcase/failure").get("message")
-    text = (two_scenes.folder / "s.md").read_text(encoding="utf-8")
+    text = (two_scenes.folder / "s.md").read_text()
     assert "| fail |" in text
     assert f"`{two_scenes.out / 'index.html'}`" in text
 
@@ -75,7 +72,7 @@ def failure(made_baselines, tmp_path_factory):
     folder = tmp_path_factory.mktemp("failed")
     baselines = shutil.copytree(made_baselines, folder / "baselines")
     change(baselines / "fig-8-6b.json")
-    (baselines / "broken.json").write_text("{", encoding="utf-8")
+    (baselines / "broken.json").write_text("{")
     words = ("check", baselines, "-o", folder / "out")
     files = ("--junit", folder / "j.xml", "--summary", folder / "s.md")
     code, printed, messages = command_line(*words, *files)
@@ -101,12 +98,12 @@ def test_what_moved_fails_with_a_table_and_the_others_are_checked(failure):
 
 @pytest.mark.guarantee("checks", "A failure writes one page: before, now, where, and why.")
 def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
-    html = (failure.out / "index.html").read_text(encoding="utf-8")
+    html = (failure.out / "index.html").read_text()
     for part in ("1 of 3 moved", "row 2, column 3", "reference, before", "--update"):
         assert part in html, part
     names = {path.name for path in (failure.out / "fig-8-6b").iterdir()}
     assert {"check.json", "comparison.json", "comparison.exr", "reference.png"} <= names
-    record = json.loads((failure.out / "fig-8-6b/check.json").read_text(encoding="utf-8"))
+    record = json.loads((failure.out / "fig-8-6b/check.json").read_text())
     assert record["objects"]["reference"]["sphere"] > 0.9
     assert record["causes"][0].startswith("Only the reference moved")
     (move,) = record["moved"]
@@ -128,18 +125,18 @@ def test_ci_reads_what_moved_and_what_was_not_checked(failure):
     (message,) = suite.findall("testcase/failure")
     assert message.get("message").startswith("reference R, block 2,3 moved from ")
     assert "standard errors" in message.text
-    text = (failure.folder / "s.md").read_text(encoding="utf-8")
+    text = (failure.folder / "s.md").read_text()
     assert "| fig-8-6b | failed | reference R, block 2,3 (1 in all) |" in text
     assert f"`{failure.folder / 'out/check/index.html'}`" in text
 
 
 def test_json_follows_its_schema_and_a_lost_metric_is_not_tested(run, baselines_folder, tmp_path):
     path = baselines_folder / "fig-8-6a.json"
-    data = json.loads(path.read_text(encoding="utf-8"))
+    data = json.loads(path.read_text())
     jsonschema.validate(data, schema("baseline"))
     for name in ("ldr_flip", "hdr_flip"):
         del data["metrics"][name]
-    path.write_text(json.dumps(data), encoding="utf-8")
+    path.write_text(json.dumps(data))
     code, printed, _ = run("check", path, "--json", "-o", tmp_path / "out")
     found = json.loads(printed)
     jsonschema.validate(found, schema("check"))
@@ -161,7 +158,7 @@ def test_bad_words_are_refused(run, tmp_path, monkeypatch):
     for name in ("empty", "a", "b"):
         (tmp_path / name).mkdir()
     for name in ("a/x.xml", "b/x.xml"):
-        (tmp_path / name).write_text(SCENE, encoding="utf-8")
+        (tmp_path / name).write_text(SCENE)
     for words, expected in {
         ("check", "nix.json"): "no such baseline",
         ("check", "empty"): "no baseline",
@@ -199,7 +196,7 @@ def test_an_update_rewrites_what_moved_and_nothing_else(run, baselines_folder):
 def test_other_options_write_a_baseline_anew(run, baselines_folder):
     path = baselines_folder / "fig-8-6b.json"
     assert run("check", path, "--update", "--pairing", "literal", "--seed", 4)[0] == 0
-    options = json.loads(path.read_text(encoding="utf-8"))["options"]
+    options = json.loads(path.read_text())["options"]
     assert (options["pairing"], options["seed"]) == ("literal", 4)
     assert (options["spp"], options["resolution"]) == (32, [16, 12])
 
@@ -208,7 +205,7 @@ def test_an_update_replaces_no_other_baseline_and_no_other_file(run, tmp_path, m
     monkeypatch.chdir(tmp_path)
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "x.xml").write_text(SCENE, encoding="utf-8")
+        (tmp_path / name / "x.xml").write_text(SCENE)
 
     def update(baseline, scene):
         return run("check", baseline, "--update", "--scene", scene, *FAST)
@@ -338,43 +335,3 @@ def test_hostile_names_are_printed_as_text(run, tmp_path, monkeypatch):
     csv = (tmp_path / "out/tables/carriers.csv").read_text()
     assert "=1+1" in csv
     assert ",=1+1" not in csv
-
-
-# --- Workflows to copy -----------------------------------------------------------------------
-
-
-def steps(service):
-    """The steps of a workflow of the documentation that run commands of fotismos."""
-    text = (ROOT / "docs/checks.md").read_text(encoding="utf-8")
-    workflow = next(
-        yaml.safe_load(block)
-        for block in re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
-        if service in block
-    )
-    if service == "script:":
-        return workflow["shading"]["script"]
-    return [step["run"] for step in workflow["jobs"]["check"]["steps"] if "run" in step]
-
-
-@pytest.mark.thorough
-def test_the_workflows_of_the_documentation_pass_until_a_scene_fails(made_baselines, tmp_path):
-    (tmp_path / "fotismos").symlink_to(ROOT)
-    shutil.copytree(made_baselines, tmp_path / "baselines")
-    (tmp_path / "scenes").mkdir()
-    scene = tmp_path / "scenes/ball.xml"
-    scene.write_text(re.sub('(?s)<shape type="rect.*?</shape>', "", PLAIN), encoding="utf-8")
-
-    def codes(words):
-        environment = os.environ | {"DRJIT_CACHE_DIR": str(tmp_path / ".drjit")}
-        return [
-            subprocess.run(["bash", "-ec", each], cwd=tmp_path, env=environment).returncode
-            for each in words
-        ]
-
-    on_github = steps("runs-on:")
-    assert set(steps("script:")) < set(on_github)
-    assert codes(on_github) == [0, 0, 0]
-    assert ElementTree.parse(tmp_path / "gates.xml").getroot().get("failures") == "0"
-    scene.write_text(SCENE, encoding="utf-8")
-    change(tmp_path / "baselines/fig-8-6b.json")
-    assert codes(on_github[1:]) == [1, 1]

@@ -22,7 +22,7 @@ from tests.small_scene import SCENE
 
 
 def read(path):
-    return json.loads(path.read_text(encoding="utf-8"))
+    return json.loads(path.read_text())
 
 
 def test_compare_writes_what_the_contract_names(two_scenes):
@@ -96,19 +96,19 @@ def test_causes_that_cannot_be_found_leave_the_comparison_and_a_warning(
     record = read(tmp_path / "my-scene/comparison.json")
     assert record["metrics"]["dE2000"]["mean"] > 0
     assert record["warnings"][-1] == "The causes are unknown: the effects are unknown"
-    page = (tmp_path / "index.html").read_text(encoding="utf-8")
+    page = (tmp_path / "index.html").read_text()
     assert "The causes are unknown: the effects are unknown" in page
 
 
 def test_a_scene_that_fails_is_named_and_the_others_are_compared(run, scene_file, tmp_path):
     broken = tmp_path / "broken.xml"
-    broken.write_text(_changed('type="diffuse"', 'type="nonesuch"'), encoding="utf-8")
+    broken.write_text(_changed('type="diffuse"', 'type="nonesuch"'))
     out = tmp_path / "out"
     code, printed, messages = run("compare", broken, scene_file, "-o", out, "--spp", 4)
     assert code == 2
     assert "1 of 2 scenes failed" in messages
     assert "my scene" in printed
-    page = (out / "index.html").read_text(encoding="utf-8")
+    page = (out / "index.html").read_text()
     assert "<b>Failed:</b>" in page
     assert (out / "my-scene/comparison.json").is_file()
     assert not (out / "broken").exists()
@@ -155,7 +155,7 @@ def test_plan_verifies(run):
 def test_a_file_with_tabulated_spectra_is_compared_spectrally(run, tmp_path):
     spectrum = '<spectrum name="radiance" value="400:0.1, 700:0.3"/>'
     path = tmp_path / "scene.xml"
-    path.write_text(_changed('<rgb name="radiance" value="0.2"/>', spectrum), encoding="utf-8")
+    path.write_text(_changed('<rgb name="radiance" value="0.2"/>', spectrum))
     asked = ("--variant", "llvm_ad_rgb")
     for options, variant in (((), "llvm_ad_spectral"), (asked, "llvm_ad_rgb")):
         run("compare", path, "-o", tmp_path / "out", "--spp", 4, *options)

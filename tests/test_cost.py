@@ -189,7 +189,7 @@ def test_steps_lead_from_the_kernel_to_the_full_plan_an_effect_at_a_time(rgb):
 
 def test_a_scene_says_why_it_cannot_have_a_method(rgb, tmp_path):
     path = tmp_path / "parallel.xml"
-    path.write_text(SCENE.replace("perspective", "orthographic"), encoding="utf-8")
+    path.write_text(SCENE.replace("perspective", "orthographic"))
     found = ladder(Source("parallel", path))
     assert "has no single viewpoint" in found.left_out["Gouraud kernel"]
     assert found.left_out["path 4"] == "the scene's own paths end at depth 3"
@@ -225,7 +225,7 @@ def test_the_command_predicts_and_measures_at_another_shape_than_the_films(rgb, 
     assert code == 0
     assert "Predicted and measured there" in said
     place = tmp_path / "cost/lambert-sphere"
-    text = (place / "cost.json").read_text(encoding="utf-8")
+    text = (place / "cost.json").read_text()
     jsonschema.Draft202012Validator(SCHEMA).validate(json.loads(text))
     record = msgspec.json.decode(text, type=Cost)
     assert re.match("fotismos cost lambert-sphere .*--rounds 2", record.command)

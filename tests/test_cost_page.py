@@ -99,7 +99,7 @@ def test_a_comparison_with_its_study_replaces_an_earlier_one_as_a_whole(tmp_path
     methods = {name: study.methods[name] for name in ("Phong kernel",)}
     other = replace(study, record=structs.replace(study.record, seed=8), methods=methods)
     scene.write(tmp_path, "scene", comparison, other)
-    assert json.loads((tmp_path / "scene" / "cost.json").read_text("utf-8"))["seed"] == 8
+    assert json.loads((tmp_path / "scene" / "cost.json").read_text())["seed"] == 8
     assert not (tmp_path / "scene" / "cost-method-full-plan.png").exists()
     scene.write(tmp_path, "scene", comparison)
     assert not list((tmp_path / "scene").glob("cost*"))

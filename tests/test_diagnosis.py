@@ -26,7 +26,7 @@ def mistakes_of(path):
 @pytest.mark.guarantee("runs", "Well-known shader mistakes are named in words.")
 @pytest.mark.parametrize("suffix", LANGUAGES)
 def test_wrong_shaders_are_told_what_is_wrong(rgb, tmp_path, suffix):
-    page = (SHADERS.parent / "shaders.md").read_text(encoding="utf-8")
+    page = (SHADERS.parent / "shaders.md").read_text()
     for number, wrong in enumerate(each for each in WRONG if each.suffix == suffix):
         folder = tmp_path / str(number)
         folder.mkdir()
@@ -38,7 +38,7 @@ def test_wrong_shaders_are_told_what_is_wrong(rgb, tmp_path, suffix):
 @pytest.mark.parametrize("suffix", LANGUAGES)
 def test_nothing_is_told_of_right_shaders_and_other_models(rgb, suffix):
     for path in sorted(SHADERS.glob(f"*{suffix}")):
-        functions = re.findall(r"^def ([a-z]\w*)\(point", path.read_text("utf-8"), re.MULTILINE)
+        functions = re.findall(r"^def ([a-z]\w*)\(point", path.read_text(), re.MULTILINE)
         for name in functions or [""]:
             assert mistakes_of(f"{path}:{name}" if name else path) == ()
 
@@ -64,7 +64,6 @@ def test_nothing_is_told_of_models_of_another_kind(rgb, tmp_path):
             "        half = dr.normalize(each.toward + point.view)\n"
             f"        value += each.intensity * ({light})\n"
             "    return value\n",
-            encoding="utf-8",
         )
         assert mistakes_of(path) == (), name
 
@@ -82,11 +81,11 @@ def test_commands_tell_it(run, tmp_path):
     words = ("--no-why", "--spp", 4, "--resolution", "16x16", "-o", out)
     code, said, _ = run("compare", "fig-8-9", "--heuristic", path, *words)
     assert (code, "the exponent is 4 times the material's" in said) == (0, True)
-    assert "the exponent is 4 times" in (out / "index.html").read_text(encoding="utf-8")
+    assert "the exponent is 4 times" in (out / "index.html").read_text()
 
 
 def test_values_that_end_at_1_are_told(rgb, tmp_path):
     path = tmp_path / "cut.py"
-    text = (SHADERS / "phong.py").read_text(encoding="utf-8")
-    path.write_text(text.replace("return value", "return dr.minimum(value, 1)"), encoding="utf-8")
+    text = (SHADERS / "phong.py").read_text()
+    path.write_text(text.replace("return value", "return dr.minimum(value, 1)"))
     assert mistakes_of(path) == ("Its values end at 1: brighter light is cut off.",)

@@ -14,7 +14,7 @@ def with_examples():
     """The names of all modules that hold an example."""
     for room in ROOMS:
         for path in sorted((ROOT / room).rglob("*.py")):
-            if ">>>" in path.read_text(encoding="utf-8"):
+            if ">>>" in path.read_text():
                 yield ".".join(path.relative_to(ROOT).with_suffix("").parts)
 
 

@@ -143,7 +143,7 @@ def test_the_command_writes_files_and_says_what_they_mean(run, tmp_path):
     names = {path.name for path in folder.iterdir()} - {".fotismos"}
     assert names == {"camera.json", "lights.json", "materials.json", "scene.gltf",
                      "gbuffer.exr", "README.md"}  # fmt: skip
-    text = (folder / "README.md").read_text(encoding="utf-8")
+    text = (folder / "README.md").read_text()
     assert "16 by 12 pixels" in text
     assert "--image YOURS.exr" in text
     with OpenEXR.File(str(folder / "gbuffer.exr"), separate_channels=True) as file:

@@ -179,7 +179,7 @@ def test_a_study_of_cost_is_written_with_its_methods_and_attribution(tmp_path):
         ("cost", record.points, "seconds"),
         ("methods", record.methods, "ratio"),
     ):
-        text = (tmp_path / f"tables/box-{part}.csv").read_text("utf-8")
+        text = (tmp_path / f"tables/box-{part}.csv").read_text()
         for row, one in zip(csv.DictReader(StringIO(text)), made, strict=True):
             known = getattr(one, interval)
             found = [float(row[interval + end]) for end in ("", "_low", "_high")]

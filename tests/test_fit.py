@@ -327,7 +327,7 @@ def test_the_command_writes_a_record_and_a_picture_and_repeats_itself(run, tmp_p
     code, printed, messages = run("fit", *words, "-o", tmp_path / "a")
     assert (code, messages) == (0, "")
     file = Path("fit/fig-8-6a/fit.json")
-    data = json.loads((tmp_path / "a" / file).read_text(encoding="utf-8"))
+    data = json.loads((tmp_path / "a" / file).read_text())
     jsonschema.validate(data, schema("fit"))
     assert [one["form"] for one in data["fits"]] == ["phong", "blinn"]
     losses = [one["loss"] for one in data["fits"]]

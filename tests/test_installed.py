@@ -44,11 +44,11 @@ def do(*words, folder=None, code=0):
 def test_the_installed_commands_work(installed, tmp_path):
     fotismos = installed / "fotismos"
     assert "llvm_ad_spectral renders" in " ".join(do(fotismos, "doctor").split())
-    (tmp_path / "ball.xml").write_text(SCENE, encoding="utf-8")
+    (tmp_path / "ball.xml").write_text(SCENE)
     words = ("--resolution", "16x16", "--spp", 8)
     do(fotismos, "compare", "ball.xml", "fig-8-9", *words, folder=tmp_path)
     assert (tmp_path / "out/ball/comparison.exr").is_file()
-    assert "viewer" in (tmp_path / "out/index.html").read_text(encoding="utf-8")
+    assert "viewer" in (tmp_path / "out/index.html").read_text()
     do(fotismos, "check", "base", "--update", "--scene", "ball.xml", *words, folder=tmp_path)
     assert "1 of 1 unmoved" in do(fotismos, "check", "base", folder=tmp_path)
     assert "did you mean fig-8-9?" in do(fotismos, "compare", "fig-8-99", code=2)

@@ -206,7 +206,7 @@ def test_the_page_has_each_of_its_parts_once_and_no_name_twice():
     assert {path.stem for path in (folder / "viewer").iterdir()} == set(page.SCRIPTS)
     assert {path.stem for path in (folder / "styles").iterdir()} == set(page.STYLES)
     declared = re.compile(r"^(?:async )?(?:function|class|const|let) (\w+)", re.MULTILINE)
-    sources = ((folder / "viewer" / f"{name}.js").read_text("utf-8") for name in page.SCRIPTS)
+    sources = ((folder / "viewer" / f"{name}.js").read_text() for name in page.SCRIPTS)
     found = Counter(name for source in sources for name in declared.findall(source))
     assert len(found) > 50
     assert [name for name, count in found.items() if count > 1] == []

@@ -64,7 +64,7 @@ def test_a_picture_of_another_run_has_its_departure(run, tmp_path, monkeypatch):
     assert code == 0
     assert said.splitlines()[1].startswith("shift ")
     first, second = (
-        json.loads((tmp_path / out / scene / "comparison.json").read_text(encoding="utf-8"))
+        json.loads((tmp_path / out / scene / "comparison.json").read_text())
         for out in ("own", "theirs")
     )
     assert second["resolution"] == [SIDE, 48]
@@ -75,7 +75,7 @@ def test_a_picture_of_another_run_has_its_departure(run, tmp_path, monkeypatch):
     assert second["heuristic"] == f"picture {file}"
     assert max(map(abs, second["picture"]["shift"])) < 0.3
     assert file in second["command"]
-    page = (tmp_path / "theirs/index.html").read_text(encoding="utf-8")
+    page = (tmp_path / "theirs/index.html").read_text()
     assert "Its content is moved by" in page
 
 
@@ -270,5 +270,5 @@ def test_a_changed_picture_is_compared_again(run, tmp_path, monkeypatch):
         write(tmp_path / "x.exr", np.full((16, 16, 3), value))
         assert run(*words)[::2] == (0, "")
         path = tmp_path / "out/fig-8-9/comparison.json"
-        records.append((path.stat().st_mtime_ns, path.read_text(encoding="utf-8")))
+        records.append((path.stat().st_mtime_ns, path.read_text()))
     assert records[0] == records[1] != records[2]

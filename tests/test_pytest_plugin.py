@@ -11,7 +11,7 @@ from heuristic.errors import InputError
 from reports.ci.testing import Departure, Fotismos
 from tests import small_baselines
 from tests.programs import ROOT, python
-from tests.small_scene import SCENE
+from tests.small_scene import PLAIN, SCENE
 
 SUITE = """
 import pytest
@@ -59,9 +59,9 @@ def test_variants(fotismos):
 def suite(tmp_path):
     """A folder with a suite; returns a function that runs it, with arguments and variables."""
     (tmp_path / "tests/scenes").mkdir(parents=True)
-    (tmp_path / "tests/test_mine.py").write_text(SUITE, encoding="utf-8")
-    (tmp_path / "tests/scenes/scene.xml").write_text(SCENE, encoding="utf-8")
-    (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --strict-markers\n", encoding="utf-8")
+    (tmp_path / "tests/test_mine.py").write_text(SUITE)
+    (tmp_path / "tests/scenes/scene.xml").write_text(SCENE)
+    (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --strict-markers\n")
 
     def run(*arguments, **variables):
         words = [sys.executable, "-m", "pytest", "-p", "reports.ci.plugin", "-W", "error"]
@@ -96,10 +96,10 @@ def test_a_suite_fails_updates_and_passes(suite, tmp_path):
     assert sorted(path.stem for path in baselines.iterdir()) == names
 
     path = baselines / "plain.json"
-    text = path.read_text(encoding="utf-8").replace('"mean": [0.', '"mean": [1.', 1)
-    path.write_text(text, encoding="utf-8")
+    text = path.read_text().replace('"mean": [0.', '"mean": [1.', 1)
+    path.write_text(text)
     redder = SCENE.replace('value="0.2, 0.3, 0.5"', 'value="0.3, 0.3, 0.5"')
-    (tmp_path / "tests/scenes/scene.xml").write_text(redder, encoding="utf-8")
+    (tmp_path / "tests/scenes/scene.xml").write_text(redder)
     code, printed = suite("-k", "unchanged or variants and rgb")
     assert "2 failed, 2 passed" in printed
     for words in ("scene.json: ", "moved", "standard errors", "reference R, block", "pictures: "):
@@ -129,7 +129,7 @@ SMALL = {"spp": 32, "resolution": (8, 6)}
 def fixtures(rgb, tmp_path):
     """What a test gets without and with ``--fotismos-update``, in a folder with a scene."""
     (tmp_path / "scenes").mkdir()
-    (tmp_path / "scenes/scene.xml").write_text(SCENE, encoding="utf-8")
+    (tmp_path / "scenes/scene.xml").write_text(PLAIN)
     places = tmp_path / "baselines", lambda: tmp_path
     return Fotismos(*places), Fotismos(*places, update=True)
 

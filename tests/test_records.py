@@ -66,7 +66,7 @@ def test_a_record_of_version_2_in_which_nothing_changed_is_read():
 @pytest.mark.parametrize("name", schemas.PUBLISHED)
 def test_a_published_schema_is_that_of_its_type(name):
     jsonschema.Draft202012Validator.check_schema(schema(name))
-    published = (FOLDER / f"{name}.schema.json").read_text(encoding="utf-8")
+    published = (FOLDER / f"{name}.schema.json").read_text()
     assert published == schemas.text(name), "run python -m reports.schemas"
 
 

@@ -40,11 +40,11 @@ def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
     out = tmp_path / "out"
     assert [rendered(run, scene_file, out) for _ in range(2)] == [True, False]
     record = out / "my-scene/comparison.json"
-    content = record.read_text(encoding="utf-8")
+    content = record.read_text()
     mean = str(json.loads(content)["metrics"]["dE2000"]["mean"])
-    record.write_text(content.replace(mean, mean[::-1]), encoding="utf-8")
+    record.write_text(content.replace(mean, mean[::-1]))
     assert rendered(run, scene_file, out)
-    assert mean[::-1] not in record.read_text(encoding="utf-8")
+    assert mean[::-1] not in record.read_text()
     record.unlink()
     assert rendered(run, scene_file, out)
     with monkeypatch.context() as patched:
@@ -52,7 +52,7 @@ def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
         assert [rendered(run, scene_file, out) for _ in range(2)] == [True, False]
     for more in (("--fresh",), ("--seed", 1)):
         assert rendered(run, scene_file, out, *more)
-    scene_file.write_text(SCENE.replace("0.2, 0.3, 0.5", "0.2, 0.3, 0.6"), encoding="utf-8")
+    scene_file.write_text(SCENE.replace("0.2, 0.3, 0.5", "0.2, 0.3, 0.6"))
     assert rendered(run, scene_file, out, "--seed", 1)
 
 
@@ -74,12 +74,12 @@ def test_a_view_is_found_again_unless_anything_is_damaged(comparison, tmp_path):
     place, file = tmp_path / "a", tmp_path / "a/view.json"
     assert scene.load(place, "key") == view
     assert scene.load(place, "another") is scene.load(place, None) is None
-    text = file.read_text(encoding="utf-8")
+    text = file.read_text()
     cuts = (text[:size] for size in range(0, len(text), len(text) // 20))
     for broken in ("", "[]", "{}", text.replace("digests", "digest"), *cuts):
-        file.write_text(broken, encoding="utf-8")
+        file.write_text(broken)
         assert scene.load(place, "key") is None
-    file.write_text(text, encoding="utf-8")
+    file.write_text(text)
     (place / "comparison.exr").unlink()
     assert scene.load(place, "key") is None
 

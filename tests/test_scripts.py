@@ -49,14 +49,14 @@ def test_what_scripts_do_reaches_no_other_scene(run, apart, tmp_path):
     folder, out = tmp_path / "scenes", tmp_path / "out"
     folder.mkdir()
     for number, deed in enumerate(DEEDS.values()):
-        (folder / f"{number:02}.py").write_text(SCENE_OF.format(deed), encoding="utf-8")
-        (folder / f"{number:02}-next.xml").write_text(SCENE, encoding="utf-8")
+        (folder / f"{number:02}.py").write_text(SCENE_OF.format(deed))
+        (folder / f"{number:02}-next.xml").write_text(SCENE)
     size = ("--spp", 4, "--resolution", "8x8", "-q")
     words = ("compare", *sorted(folder.iterdir()), "-o", out, *size)
     here, mask, environment = Path.cwd(), os.umask(0o022), dict(os.environ)
     code, _, messages = run(*words)
     assert (Path.cwd(), os.umask(mask), dict(os.environ)) == (here, 0o022, environment)
-    run_record = json.loads((out / "run.json").read_text(encoding="utf-8"))
+    run_record = json.loads((out / "run.json").read_text())
     failed = {failure["scene"] for failure in run_record["failures"]}
     # Only a scene that breaks what compares it may fail, and it alone.
     broken = f"{list(DEEDS).index('breaks modules'):02}"
@@ -64,7 +64,7 @@ def test_what_scripts_do_reaches_no_other_scene(run, apart, tmp_path):
     assert code == (1 if failed else 0)
     for number in range(len(DEEDS)):
         place = out / f"{number:02}-next"
-        record = json.loads((place / "comparison.json").read_text(encoding="utf-8"))
+        record = json.loads((place / "comparison.json").read_text())
         assert record["scene"] == place.name
         assert (place / "comparison.json").stat().st_mode & 0o777 == 0o644
 

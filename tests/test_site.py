@@ -26,8 +26,8 @@ def sources(docs, tmp_path_factory):
 
 
 def test_the_contents_have_the_order_of_the_list(sources):
-    listed = re.findall(r"\]\(([\w-]+)\.\w+\)", (ROOT / "docs/README.md").read_text("utf-8"))
-    contents = (sources / "index.md").read_text("utf-8").partition("```{toctree}")[2]
+    listed = re.findall(r"\]\(([\w-]+)\.\w+\)", (ROOT / "docs/README.md").read_text())
+    contents = (sources / "index.md").read_text().partition("```{toctree}")[2]
     assert len(listed) > 15
     assert re.findall(r"^docs/([\w-]+)$", contents, re.MULTILINE) == ["index", *listed]
 
@@ -35,17 +35,17 @@ def test_the_contents_have_the_order_of_the_list(sources):
 def test_each_guarantee_leads_to_the_source_of_its_test(sources):
     import guarantees
 
-    page = (sources / "docs/guarantees.md").read_text("utf-8")
+    page = (sources / "docs/guarantees.md").read_text()
     for each in guarantees.guarantees():
         label = re.search(rf"\[{each.test}\]\(#([^)]+)\)", page)[1]
-        text = (sources / f"files/{each.path}.rst").read_text("utf-8")
+        text = (sources / f"files/{each.path}.rst").read_text()
         section = text.partition(f".. _{label}:\n")[2].partition("\n.. _")[0]
         assert re.search(rf"(def|class) {each.test}\b", section), each
         assert each.text.replace("`", "``") in section
 
 
 def test_links_to_modules_name_what_exists(sources):
-    pages = [path.read_text("utf-8") for path in sources.rglob("*.md")]
+    pages = [path.read_text() for path in sources.rglob("*.md")]
     names = re.findall(r"\]\(#((?:heuristic|reference|comparisons|reports)\b[\w.]*)\)", str(pages))
     assert len(names) > 50
     assert [name for name in names if locate(name) is None] == []
@@ -56,7 +56,7 @@ def test_links_to_modules_name_what_exists(sources):
 def test_every_equation_of_the_models_can_be_drawn(docs):
     from website import typeset
 
-    page = (ROOT / "docs/models.md").read_text("utf-8")
+    page = (ROOT / "docs/models.md").read_text()
     found = [a or b for a, b in re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", page)]
     assert len(found) > 20
     assert all(typeset.svg(each).count("M") >= 1 for each in found)

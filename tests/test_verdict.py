@@ -148,7 +148,7 @@ def test_a_run_counts_scenes_and_names_what_those_that_fail_lack_by_pixels():
 def test_a_run_ends_with_its_verdict_and_finds_causes_unless_told_not_to(
     run, causes, scene_file, tmp_path
 ):
-    scene_file.write_text(PLAIN, encoding="utf-8")
+    scene_file.write_text(PLAIN)
     for words, has_causes in (((), True), (("--no-why",), False)):
         small = ("--spp", 4, "--resolution", "12x8", "-o", tmp_path / f"{has_causes}")
         code, printed, _ = run("compare", scene_file, *small, *words)
@@ -172,5 +172,5 @@ def test_a_chosen_threshold_decides_on_the_terminal_and_where_the_page_begins(ru
     assert code == 0
     assert "differ: above ΔE2000 10" in printed
     assert "Textbook shading looks right in fig-8-9." in printed
-    assert 'value="10.0"' in (tmp_path / "index.html").read_text(encoding="utf-8")
+    assert 'value="10.0"' in (tmp_path / "index.html").read_text()
     assert run(*words, "--within", 2.1)[0] == 2

@@ -62,8 +62,8 @@ def report(tmp_path_factory):
     failures = [Failure(scene=FAILED, error="lost.xml: there is no such file")]
     machine = Machine(processor="any", cores=2, system="Linux")
     run = RunRecord(command="", stages={"page": 1.0}, failures=(), machine=machine, versions={})
-    (folder / "index.html").write_text(page.render(views, failures=failures), encoding="utf-8")
-    (folder / page.DETAILS).write_text(page.details(2, run=run), encoding="utf-8")
+    (folder / "index.html").write_text(page.render(views, failures=failures))
+    (folder / page.DETAILS).write_text(page.details(2, run=run))
     return found
 
 

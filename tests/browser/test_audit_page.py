@@ -23,7 +23,7 @@ def page_file(tmp_path_factory):
     mi.set_variant("llvm_ad_rgb")
     plugins.register()
     path = Path(tmp_path_factory.mktemp("audit")) / "index.html"
-    path.write_text(audit_files.render(audit("bsdf", "roughconductor", {})), encoding="utf-8")
+    path.write_text(audit_files.render(audit("bsdf", "roughconductor", {})))
     return path
 
 

@@ -21,7 +21,7 @@ JSON = re.compile(r'<script type="application/json"[^>]*>(.*?)</script>', re.DOT
 @pytest.fixture(scope="session")
 def written(report):
     """The data of the page's scripts, by the name of its type."""
-    html = Path(url2pathname(report.url.removeprefix("file://"))).read_text(encoding="utf-8")
+    html = Path(url2pathname(report.url.removeprefix("file://"))).read_text()
     (data,) = map(json.loads, JSON.findall(html))
     return {"Page": data}
 
@@ -32,12 +32,12 @@ def checked(written, folder):
         f"/** @type {{{kind}}} */ const own{kind} = {json.dumps(written[kind])};"
         for kind in written
     ]
-    (folder / "written.js").write_text("\n".join(lines), encoding="utf-8")
+    (folder / "written.js").write_text("\n".join(lines))
     project = {
         "extends": str(ROOT / "tests/javascript/tsconfig.json"),
         "include": [str(SCRIPTS / "*.js"), "written.js"],
     }
-    (folder / "tsconfig.json").write_text(json.dumps(project), encoding="utf-8")
+    (folder / "tsconfig.json").write_text(json.dumps(project))
     words = [str(COMPILER), "--project", str(folder)]
     return subprocess.run(words, capture_output=True, text=True, timeout=120).stdout
 
@@ -67,8 +67,8 @@ def test_data_of_other_types_are_found(written, tmp_path):
 
 @pytest.mark.parametrize("folder", LOCKS)
 def test_npm_packages_have_one_version_and_a_hash_and_no_address(folder):
-    wanted = json.loads((ROOT / folder / "package.json").read_text("utf-8"))["dependencies"]
-    text = (ROOT / folder / "package-lock.json").read_text("utf-8")
+    wanted = json.loads((ROOT / folder / "package.json").read_text())["dependencies"]
+    text = (ROOT / folder / "package-lock.json").read_text()
     packages = {name: each for name, each in json.loads(text)["packages"].items() if name}
     for name, version in wanted.items():
         assert packages[f"node_modules/{name}"]["version"] == version

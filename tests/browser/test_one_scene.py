@@ -30,7 +30,7 @@ def tab(chromium):
 
 def test_the_page_begins_with_the_scene_and_leads_to_the_overview(tab, alone, tmp_path):
     place = tmp_path / "index.html"
-    place.write_text(alone, encoding="utf-8")
+    place.write_text(alone)
     tab.goto(place.as_uri())
     assert tab.evaluate(SEEN) == "scene"
     tab.get_by_role("link", name="all scenes").click()
@@ -42,7 +42,7 @@ def test_the_page_begins_with_the_scene_and_leads_to_the_overview(tab, alone, tm
 
 def test_in_a_frame_all_fits_and_works_and_the_address_of_the_notebook_stays(tab, alone, tmp_path):
     notebook = tmp_path / "notebook.html"
-    notebook.write_text(Shown(None, alone)._repr_html_(), encoding="utf-8")
+    notebook.write_text(Shown(None, alone)._repr_html_())
     tab.set_viewport_size({"width": 960, "height": HEIGHT})
     tab.goto(notebook.as_uri())
     frame = tab.frames[1]

@@ -1,12 +1,8 @@
 """The first screen: the verdict at a threshold, its pictures, and its bars."""
 
-import copy
-
 import pytest
 
-from reports.page import page as pages
-from tests import records
-from tests.browser.conftest import EXACT, FAILED, NOISY, NOISY_ID, Report, Visitor
+from tests.browser.conftest import EXACT, FAILED, NOISY, NOISY_ID
 from tests.browser.test_page_at_large import PHONE
 
 DESK = {"viewport": {"width": 1440, "height": 900}}
@@ -69,26 +65,6 @@ def test_bars_are_divided_by_what_is_missing_and_stand_worst_first(visitor):
     assert [piece.text_content() for piece in pieces] == ["interreflection", "occlusion"]
     widths = [piece.bounding_box()["width"] for piece in pieces]
     assert widths[0] / widths[1] == pytest.approx(5.895 / 3.141, rel=0.05)
-
-
-def test_a_threshold_may_turn_the_order(chromium, tmp_path):
-    """One scene has few large errors, the other many small ones."""
-    views = []
-    for name, shares in (("few", {1: 0.3, 5: 0.2}), ("many", {1: 0.9, 5: 0.01})):
-        record = records.data() | {"scene": name}
-        metric = record["metrics"]["dE2000"] = copy.deepcopy(record["metrics"]["dE2000"])
-        for each in metric["visible"]:
-            value = shares[1] if each["threshold"] < 5 else shares[5]
-            each |= dict.fromkeys(("value", "low", "high"), value)
-        views.append(records.view(record))
-    path = tmp_path / "index.html"
-    path.write_text(pages.render(views), encoding="utf-8")
-    visitor = Visitor(chromium.new_page(), Report(path.as_uri()))
-    assert names(visitor.open()) == ["many", "few"]
-    assert names(visitor.open("#t=5")) == ["few", "many"]
-    assert names(visitor.open("#t=4.75")) == ["many", "few"]
-    visitor.page.close()
-    assert not visitor.complaints
 
 
 @pytest.mark.parametrize("visitor", [{"viewport": {"width": 1200, "height": 300}}], indirect=True)
