@@ -26,27 +26,19 @@ where its lobe is 0.2 degrees wide."""
 
 
 def of_bsdf(bsdf: Any) -> Response:
-    """Return the response of a BSDF; Mitsuba's ``wi`` is the viewer's side."""
-
-    def response(light: NDArray, view: NDArray) -> NDArray:
-        return np.array(evaluate(bsdf, light, view), float).reshape(-1, _count(light, view))
-
-    return response
+    """Return the response of a BSDF."""
+    return lambda light, view: np.atleast_2d(np.array(evaluate(bsdf, light, view), float))
 
 
 def evaluate(bsdf: Any, light: NDArray, view: NDArray) -> Any:
-    """Return a BSDF's response as a Dr.Jit array."""
-    count = _count(light, view)
+    """Return a BSDF's response as a Dr.Jit array; Mitsuba's ``wi`` is the viewer's side."""
+    count = max(light.shape[1], view.shape[1])
+    toward, wi = (mi.Vector3f(np.broadcast_to(each, (3, count))) for each in (light, view))
     si = dr.zeros(mi.SurfaceInteraction3f, count)
-    si.wi = mi.Vector3f(np.broadcast_to(view, (3, count)))
+    si.wi = wi
     if mi.is_spectral:
         si.wavelengths = 550.0
-    toward = mi.Vector3f(np.broadcast_to(light, (3, count)))
     return dr.pi * mi.Spectrum(bsdf.eval(mi.BSDFContext(), si, toward))
-
-
-def _count(light: NDArray, view: NDArray) -> int:
-    return max(light.shape[1], view.shape[1])
 
 
 def direction(theta: ArrayLike, phi: ArrayLike) -> NDArray:
