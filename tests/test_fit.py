@@ -20,7 +20,7 @@ from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.fit import fit as fitting
 from comparisons.fit.fit import fit
 from comparisons.fit.fit_record import FitRecord
-from comparisons.fit.model import OwnModel, PhongModel, bounds, phong_parameters, see, start
+from comparisons.fit.model import OwnModel, PhongModel, bounds, see, start
 from comparisons.fit.search import LOSSES, Objective, descend, identify, search
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
@@ -82,7 +82,7 @@ def surface_of(scene, passes=2, spp=4):
 
 
 def objective_of(surface, image, form="phong", loss="perceptual", vector=None):
-    model = PhongModel(surface, form, phong_parameters(surface, form), vector)
+    model = PhongModel(surface, form, vector=vector)
     return Objective(model, image, LOSSES[loss], DEFAULT_VIEWING)
 
 

@@ -202,13 +202,12 @@ FormResult = tuple[FormFit, NDArray, dict[str, NDArray]]
 """The record of a form's fit, its image, and the maps of what it leaves."""
 
 
-def _form_fit(rendered: RenderedHalves, whole: Surface, form: str, loss: Loss) -> FormResult:
+def _form_fit(rendered: RenderedHalves, seen: Surface, form: str, loss: Loss) -> FormResult:
     """Fit one form of the lobe."""
-    seen = whole.within(rendered.counted.ravel())
-    fitted = model.phong_parameters(seen, form)
-    phong = PhongModel(seen, form, fitted)
-    reached = [len(np.unique(samples["pixel"])) for samples in seen.samples]
-    pixels = np.array([reached[parameter.owner] for parameter in fitted])
+    counted = rendered.counted.ravel()
+    phong = PhongModel(seen, form, counted)
+    reached = [int(counted[np.unique(samples["pixel"])].sum()) for samples in seen.samples]
+    pixels = np.array([reached[parameter.owner] for parameter in phong.parameters])
     x, certainties, covariance, losses = _search(rendered, phong, loss, form_starts, pixels)
     physical = physical_materials(rendered.ready.pair.physical)
     materials = tuple(
@@ -218,13 +217,13 @@ def _form_fit(rendered: RenderedHalves, whole: Surface, form: str, loss: Loss) -
             pixels=reached[owner],
             parameters=tuple(
                 phong_record(phong, place, x, certainties, covariance)
-                for place, parameter in enumerate(fitted)
+                for place, parameter in enumerate(phong.parameters)
                 if parameter.owner == owner
             ),
         )
         for owner, name in enumerate(seen.names)
     )
-    after = PhongModel(whole, form, fitted).image(x).reshape(rendered.before.shape)
+    after = phong.whole(x).reshape(rendered.before.shape)
     by_metric, maps = departures(rendered, after)
     return FormFit(form=form, materials=materials, departure=by_metric, **losses), after, maps
 
@@ -242,7 +241,7 @@ def form_starts(objective: Objective) -> Starts:
     for n in STARTS:
         x = np.where(at_n, log(n * 4 if phong.form == "blinn" else n), paired)
         columns = phong.columns(x)[linear].reshape(linear.sum(), -1)
-        target = (objective.reference - phong.surface.fixed).ravel()
+        target = (objective.reference - phong.surface.fixed[phong.counted]).ravel()
         x[linear] = bounded_minimum(
             columns @ columns.T, -columns @ target, low[linear], high[linear]
         )

@@ -26,8 +26,8 @@ rendered once, sample by sample, with the reference's rays (the same sampler, se
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cache
+from dataclasses import dataclass
+from functools import cache, lru_cache, partial
 from math import log
 from typing import Any
 
@@ -105,15 +105,6 @@ class Surface:
     fixed: NDArray[np.float64]
     samples_per_pixel: int
 
-    def within(self, counted: NDArray[np.bool_]) -> "Surface":
-        """Return the part of the surface in a mask (N) of pixels, renumbered from 0."""
-        places = np.cumsum(counted) - 1
-        samples = []
-        for part in self.samples:
-            some = {key: values[..., counted[part["pixel"]]] for key, values in part.items()}
-            samples.append(some | {"pixel": places[some["pixel"]]})
-        return replace(self, samples=tuple(samples), fixed=self.fixed[counted])
-
     def pixels(self, owner: int, values: Colour) -> NDArray[np.float64]:
         """Return the image (N, 3) of one value for each sample of a material."""
         pixel, count = self.samples[owner]["pixel"], len(self.fixed)
@@ -185,6 +176,12 @@ def _eye(shading):
         def shaded(self, scene, si, view, normal, active):
             materials = self.known(scene).materials
             number = materials.index(si, active) if len(materials.bsdfs) > 1 else mi.UInt32(0)
+
+            def read(name):
+                """Return one coefficient of the material at each sample, as the scene gives it."""
+                readers = [partial(_coefficient, bsdf, name) for bsdf in materials.bsdfs]
+                return materials.switch(readers, si, active)
+
             seen = {
                 "position": mi.Vector3f(si.p),
                 "normal": mi.Vector3f(normal),
@@ -193,7 +190,7 @@ def _eye(shading):
                 "material": number + dr.zeros(mi.UInt32, dr.width(si.p)),
             }
             for name in {name for bsdf in materials.bsdfs for name in _textured(bsdf)}:
-                seen[name] = _read(materials, number, name, si, active)
+                seen[name] = read(name)
             if shading.occlusion:
                 test = shading.visibility(scene, si, active)
 
@@ -206,23 +203,15 @@ def _eye(shading):
                 shade(place, place, place, Material(k_d=1), lights, 0, keep)
             dr.schedule(seen)
             self.seen = seen
-            return _read(materials, number, "k_i", si, active)
+            return read("k_i")
 
     props = mi.Properties("heuristic")
     props["hide_emitters"] = shading.hide_emitters
     return Eye(props)
 
 
-def _read(materials, number, name, si, active):
-    """Return one coefficient of the material at each sample, as the scene gives it."""
-
-    def reader(bsdf):
-        return lambda si, active: mi.Color3f(getattr(bsdf, name).eval(si, active))
-
-    readers = [reader(bsdf) for bsdf in materials.bsdfs]
-    if len(readers) == 1:
-        return readers[0](si, active)
-    return dr.switch(number, readers, si, active)
+def _coefficient(bsdf, name, si, active):
+    return mi.Color3f(getattr(bsdf, name).eval(si, active))
 
 
 def _textured(bsdf):
@@ -287,34 +276,34 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
 class PhongModel:
     """The heuristic half of a scene as a function of its parameters, for one form of the lobe.
 
-    ``vector`` is the type of the kernel's arrays, such as one of double precision.
+    An image is that of the pixels of a mask (N). ``vector`` is the type of the kernel's arrays,
+    such as one of double precision.
     """
 
     def __init__(
-        self,
-        surface: Surface,
-        form: str,
-        parameters: Sequence[FitParameter],
-        vector: Any = None,
+        self, surface: Surface, form: str, counted: NDArray | None = None, vector: Any = None
     ) -> None:
-        self.surface, self.form, self.parameters = surface, form, parameters
-        self.linear = np.array([parameter.name in COEFFICIENTS for parameter in parameters], bool)
+        self.surface, self.form = surface, form
+        self.counted = np.ones(len(surface.fixed), bool) if counted is None else counted
+        self.parameters = phong_parameters(surface, form)
+        self.linear = np.array([one.name in COEFFICIENTS for one in self.parameters], bool)
         self._vector = vector or mi.Vector3f
         self._basis, self._points = cache(self._rendered_basis), cache(self._point)
-        self._lobes: dict[int, tuple[float, NDArray, NDArray]] = {}
-        self._last: tuple[bytes, NDArray] | None = None
+        self._lobe = lru_cache(maxsize=len(surface.names))(self._rendered_lobe)
+        self._columns = lru_cache(maxsize=1)(self._derivatives)
+
+    def whole(self, x: NDArray) -> NDArray[np.float64]:
+        """Return the image of all pixels for a vector of parameters."""
+        columns = self._columns(tuple(x))[self.linear]
+        return self.surface.fixed + np.tensordot(x[self.linear], columns, 1)
 
     def image(self, x: NDArray) -> NDArray[np.float64]:
-        """Return the image (N, 3) of the surface's pixels for a vector of parameters."""
-        columns = self.columns(x)[self.linear]
-        return self.surface.fixed + np.tensordot(x[self.linear], columns, 1)
+        """Return the image (N, 3) of the counted pixels."""
+        return self.whole(x)[self.counted]
 
     def columns(self, x: NDArray) -> NDArray[np.float64]:
         """Return the derivatives (number of parameters, N, 3) of the image."""
-        key = x.tobytes()
-        if self._last is None or self._last[0] != key:
-            self._last = key, self._columns(x)
-        return self._last[1]
+        return self._columns(tuple(x))[:, self.counted]
 
     def coefficients(self, x: NDArray, name: str) -> dict[int, NDArray]:
         """Return RGB of a coefficient for each material (for ``k_s``, the lobe's albedo)."""
@@ -328,7 +317,7 @@ class PhongModel:
         """Return the index of a material's ``n``."""
         return [(p.name, p.owner) for p in self.parameters].index(("n", owner))
 
-    def _columns(self, x):
+    def _derivatives(self, x):
         result = np.empty((len(x), *self.surface.fixed.shape))
         albedo = self.coefficients(x, "k_s")
         for place, parameter in enumerate(self.parameters):
@@ -346,27 +335,21 @@ class PhongModel:
             value = self._shaded(owner, name, (), self.surface.ambient)
         else:
             value = self._shaded(owner, name, self.surface.lights)
-        return (
-            np.zeros_like(self.surface.fixed)
-            if value is None
-            else self.surface.pixels(owner, value)
-        )
+        return self.surface.pixels(owner, 0.0 if value is None else value)
 
-    def _lobe(self, owner, n):
+    def _rendered_lobe(self, owner, n):
         """Return the specular basis of a material, and its derivative by ``ln n``."""
-        if owner not in self._lobes or self._lobes[owner][0] != n:
-            basis = slope = np.zeros_like(self.surface.fixed)
-            exponent = dr.opaque(dr.value_t(self._vector), n)
-            dr.enable_grad(exponent)
-            lobe = {"n": exponent, "form": self.form, "normalised": True}
-            value = self._shaded(owner, "k_s", self.surface.lights, **lobe)
-            if value is not None:
-                dr.forward_from(exponent)
-                parts = value, dr.grad(value)
-                dr.eval(*parts)
-                basis, slope = (self.surface.pixels(owner, dr.detach(part)) for part in parts)
-            self._lobes[owner] = n, basis, n * slope
-        return self._lobes[owner][1:]
+        exponent = dr.opaque(dr.value_t(self._vector), n)
+        dr.enable_grad(exponent)
+        lobe = {"n": exponent, "form": self.form, "normalised": True}
+        value = self._shaded(owner, "k_s", self.surface.lights, **lobe)
+        if value is None:
+            return (self.surface.pixels(owner, 0.0),) * 2
+        dr.forward_from(exponent)
+        parts = dr.detach(value), dr.grad(value)
+        dr.eval(*parts)
+        basis, slope = (self.surface.pixels(owner, part) for part in parts)
+        return basis, n * slope
 
     def _shaded(self, owner, name, lights, ambient=0, **lobe):
         """Call the kernel with one coefficient of 1; None if no sample or light shows it."""
@@ -406,15 +389,11 @@ class OwnModel:
             for each in heuristic.parameters
         )
         self._renderer, self._seeds, self._counted = renderer, seeds, counted
-        self._images: dict[bytes, NDArray] = {}
-        self._columns: dict[bytes, NDArray] = {}
+        self._kept = lru_cache(maxsize=2 + len(self.parameters))(self._rendered)
 
     def whole(self, x: NDArray) -> NDArray:
         """Return the whole image, (H, W, 3)."""
-        key = x.tobytes()
-        if key not in self._images:
-            self._images = {key: self._rendered(x, None)}
-        return self._images[key]
+        return self._kept(tuple(x))
 
     def image(self, x: NDArray) -> NDArray:
         """Return the image (N, 3) of the counted pixels."""
@@ -422,13 +401,10 @@ class OwnModel:
 
     def columns(self, x: NDArray) -> NDArray:
         """Return the derivatives (number of parameters, N, 3) of the image."""
-        key = x.tobytes()
-        if key not in self._columns:
-            images = [self._rendered(x, place)[self._counted] for place in range(len(x))]
-            self._columns = {key: np.stack(images)}
-        return self._columns[key]
+        images = (self._kept(tuple(x), place) for place in range(len(x)))
+        return np.stack([image[self._counted] for image in images])
 
-    def _rendered(self, x: NDArray, by: int | None) -> NDArray:
+    def _rendered(self, x: tuple[float, ...], by: int | None = None) -> NDArray:
         """Return the mean of the passes, or of their derivatives by one parameter."""
         integrator, scene = self._renderer.integrator, self._renderer.scene
         total = np.zeros(())

@@ -1,5 +1,6 @@
 """Coefficients and emitted spectra as Mitsuba's textures, and the materials of a scene."""
 
+from collections.abc import Callable, Sequence
 from functools import partial
 from numbers import Real
 from typing import Any, ClassVar
@@ -108,7 +109,7 @@ class SceneMaterials:
         present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
         present = present if self.prune else list(COEFFICIENTS)
         readers = [partial(self._read, bsdf, present) for bsdf in self.bsdfs]
-        *values, n, is_blinn = self._switch(readers, si, active)
+        *values, n, is_blinn = self.switch(readers, si, active)
         kind = PairedMaterial if self.physical else Material
         names = (*present, *(PHYSICAL if self.physical else ()))
         forms = sorted({self.form or bsdf.form for bsdf in self.bsdfs})
@@ -145,15 +146,18 @@ class SceneMaterials:
         if not any(bsdf.is_clear for bsdf in self.bsdfs):
             return 0
         readers = [bsdf.eval_null_transmission for bsdf in self.bsdfs]
-        return dr.select(active, self._switch(readers, si, active), 0)
+        return dr.select(active, self.switch(readers, si, active), 0)
 
     def normal(self, si: Interaction, active: Mask) -> Direction:
         """Return the shading normal in world space, with bump and normal maps applied."""
         if not any(bsdf.tilt for bsdf in self.bsdfs):
             return mi.Vector3f(si.sh_frame.n)
-        return self._switch([bsdf.shading_normal for bsdf in self.bsdfs], si, active)
+        return self.switch([bsdf.shading_normal for bsdf in self.bsdfs], si, active)
 
-    def _switch(self, readers, si, active):
+    def switch(
+        self, readers: Sequence[Callable[[Interaction, Mask], Any]], si: Interaction, active: Mask
+    ) -> Any:
+        """Return what the reader of the material at a surface interaction returns."""
         if len(readers) == 1:
             return readers[0](si, active)
         return dr.switch(self.index(si, active), readers, si, active)
