@@ -99,14 +99,14 @@ def by_kernel(setting: Setting) -> NDArray[np.float32]:
     columns = [np.ascontiguousarray(v.T) for v in np.broadcast_arrays(*vectors, *numbers)]
     position, normal, view, light = map(Array3f, columns[:4])
     n, intensity = (Float(each[0]) for each in columns[4:])
-    attenuation = tuple(map(float, s.attenuation))
+    k0, k1, k2 = map(float, s.attenuation)
     lamp: heuristic.PointLight | heuristic.SpotLight
     if s.direction is None:
-        lamp = heuristic.PointLight(light, intensity, attenuation)
+        lamp = heuristic.PointLight(light, intensity, (k0, k1, k2))
     else:
         axis = tuple(map(float, s.direction))
         cone = float(s.cutoff), float(s.m)
-        lamp = heuristic.SpotLight(light, axis, intensity, *cone, attenuation)
+        lamp = heuristic.SpotLight(light, axis, intensity, *cone, (k0, k1, k2))
     material = heuristic.Material(k_d=float(s.k_d), k_s=float(s.k_s), n=n)
     dr.eval(position, normal, view, n, light, intensity)
     value = heuristic.shade(position, normal, view, material, [lamp])
