@@ -14,7 +14,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-import mitsuba as mi
 import msgspec
 import numpy as np
 from msgspec import Meta, structs
@@ -117,12 +116,11 @@ class Measurement(Record):
 
 @dataclass(frozen=True)
 class MeasuredScene:
-    """A scene just measured: pictures of the halves, samples per pixel, scene and doubts."""
+    """A scene just measured: pictures of the halves, samples per pixel and doubts."""
 
     measurement: Measurement
     pictures: dict[str, Array]
     spp: int
-    scene: mi.Scene
     caution: str = ""
 
 
@@ -153,7 +151,7 @@ def measure_scene(
     heuristic, reference = images.mean(axis=0)
     caution = require_light(heuristic, reference, ready.counted, source.name, options)
     pictures = {"heuristic": heuristic, "reference": reference}
-    return MeasuredScene(numbers, pictures, spp, ready.scene, caution)
+    return MeasuredScene(numbers, pictures, spp, caution)
 
 
 def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:

@@ -19,16 +19,13 @@ from comparisons.check.measurement import (
     LINEAR_ROUNDING,
     MeasuredScene,
     Measurement,
-    block_edges,
     measure_scene,
 )
 from comparisons.departure.colour import Array, luminance
 from comparisons.departure.metrics import METRICS, RATIO
-from comparisons.departure.regions import shares
 from comparisons.options import Options
 from heuristic.errors import InputError
 from reference.records import Amount, Record, Share
-from reference.rendering.gbuffer import ObjectIds, gbuffer, image_size
 from reference.rendering.renderer import Progress
 from reference.scene.source import Source
 
@@ -173,7 +170,7 @@ def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
 class Check:
     """A scene compared with its baseline: every quantity tested, and those that moved.
 
-    ``level`` is the chance of a false alarm; ``seen`` are the scene's objects, if something moved.
+    ``level`` is the chance of a false alarm.
     """
 
     before: Measurement
@@ -181,7 +178,6 @@ class Check:
     moves: tuple[Move, ...]
     moved: tuple[Move, ...]
     level: float
-    seen: ObjectIds | None = None
 
     @property
     def passed(self) -> bool:
@@ -192,23 +188,6 @@ class Check:
         """Return the colours of a half's blocks before and now, (rows, columns, 3)."""
         before, after = (getattr(one, half) for one in (self.before, self.now.measurement))
         return before.means(), after.means()
-
-    def objects(self, half: str, before: NDArray[np.floating] | None = None) -> dict[str, float]:
-        """Return each object's share of a half's change, the largest first.
-
-        ``before`` is the half's picture when the baseline was made. If it is omitted, or of another
-        size, each block's change is spread evenly over its pixels.
-        """
-        if self.seen is None:
-            return {}
-        now = self.now.pictures[half]
-        if before is None or before.shape != now.shape:
-            old, new = self.blocks(half)
-            rows, columns = (np.diff(block_edges(side)) for side in now.shape[:2])
-            spread = luminance(np.abs(new - old)).repeat(rows, axis=0).repeat(columns, axis=1)
-        else:
-            spread = luminance(np.abs(now - before))
-        return shares(spread, self.seen)
 
     def causes(self) -> list[str]:
         """Return sentences on which half moved, where and how."""
@@ -258,6 +237,4 @@ def check(
             f" by {new[1]}. Write it again with --update."
         )
     moves = differences(before, after)
-    those = tuple(moved(moves, level))
-    objects = gbuffer(now.scene, *image_size(now.scene)).shape if those else None
-    return Check(before, now, moves, those, level, objects)
+    return Check(before, now, moves, tuple(moved(moves, level)), level)

@@ -160,15 +160,6 @@ def find_objects(
     ), found
 
 
-def shares(change: NDArray, owners: ObjectIds) -> dict[str, float]:
-    """Return the share of each shape in a change (H, W) ≥ 0 of those seen, the largest first.
-
-    Without change there are no shares.
-    """
-    found, _ = find_objects(change, owners.places >= 0, owners)
-    return {each.name: each.share for each in found if each.share > 0}
-
-
 def means(values: NDArray, rows: NDArray, count: int) -> NDArray[np.float64]:
     """Return the means (..., count) of values (..., N) by object; ``rows`` (N,) names it."""
     sums = [np.bincount(rows, each, count) for each in values.reshape(-1, len(rows))]

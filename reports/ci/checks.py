@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta, field, structs
 
 from comparisons.case import Case, open_case
-from comparisons.check.measurement import HALVES, baseline_of, made_small, measure_scene
+from comparisons.check.measurement import baseline_of, made_small, measure_scene
 from comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
 from comparisons.compare import compare
 from comparisons.comparison import versions
@@ -26,7 +26,6 @@ from reports.files import images, results
 from reports.page.scene_view import Before, SceneView
 from reports.run import scene
 from reports.terminal import progress
-from reports.terminal.words import percent
 
 RECORD = "check.json"
 
@@ -70,10 +69,6 @@ class CheckRecord(Record, kw_only=True, omit_defaults=True):
     causes: Annotated[
         tuple[str, ...], Meta(description="Why, as far as the numbers tell, in sentences.")
     ] = ()
-    objects: Annotated[
-        dict[str, dict[str, Share]] | None,
-        Meta(description="By half: each object's share of the change."),
-    ] = None
     pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
 
     @property
@@ -127,12 +122,9 @@ def examine(
     made = _record(file, "passed" if found.passed else "failed", found, begin)
     if found.passed:
         return made, None
-    halves = [half for half in HALVES if any(move.half == half for move in found.moved)]
-    before = pictures or dict.fromkeys(halves)
     made = structs.replace(
         made,
         causes=tuple(found.causes()),
-        objects={half: found.objects(half, before[half]) for half in halves},
         pictures=folder.as_posix() if folder else None,
     )
     if folder is None:
@@ -224,12 +216,8 @@ def _before(made: CheckRecord, found: Check, pictures: baselines.Kept | None) ->
         now = baselines.reduced(found.now.pictures[half], old.shape)
         shown[half] = images.png(images.tonemap(old))
         shown[f"{half}-error"] = images.png(images.error_map(LEADING(now, old), LARGEST_ERROR))
-    sentences = list(made.causes)
-    for half, objects in (made.objects or {}).items():
-        shares = ", ".join(f"{name} {percent(share)}" for name, share in [*objects.items()][:5])
-        sentences += [f"The change in the {half} by object: {shares}."] if shares else []
     return Before(
-        sentences=tuple(filter(None, (*sentences, made.versions_line))),
+        sentences=tuple(filter(None, (*made.causes, made.versions_line))),
         moved=tuple(move.cells() for move in made.moved or ()),
         tested=made.tested or 0,
         pictures=shown,
