@@ -195,9 +195,6 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
     return RenderedHalves(ready, seeds, before.mean, reference, difference, counted, viewing)
 
 
-Starts = list[tuple[float | None, NDArray]]
-"""Places to search from: the exponent of each, None for the paired one, and the parameters."""
-
 FormResult = tuple[FormFit, NDArray, dict[str, NDArray]]
 """The record of a form's fit, its image, and the maps of what it leaves."""
 
@@ -228,7 +225,7 @@ def _form_fit(rendered: RenderedHalves, seen: Surface, form: str, loss: Loss) ->
     return FormFit(form=form, materials=materials, departure=by_metric, **losses), after, maps
 
 
-def form_starts(objective: Objective) -> Starts:
+def form_starts(objective: Objective) -> list[NDArray]:
     """Return the paired parameters, and lobes of several widths with coefficients that suit each.
 
     The latter are the best in linear RGB.
@@ -237,7 +234,7 @@ def form_starts(objective: Objective) -> Starts:
     paired, (low, high) = model.start(phong.parameters), model.bounds(phong.parameters)
     at_n = np.array([parameter.name == "n" for parameter in phong.parameters])
     linear = phong.linear
-    starts: Starts = [(None, paired)]
+    starts = [paired]
     for n in STARTS:
         x = np.where(at_n, log(n * 4 if phong.form == "blinn" else n), paired)
         columns = phong.columns(x)[linear].reshape(linear.sum(), -1)
@@ -245,7 +242,7 @@ def form_starts(objective: Objective) -> Starts:
         x[linear] = bounded_minimum(
             columns @ columns.T, -columns @ target, low[linear], high[linear]
         )
-        starts.append((n, x))
+        starts.append(x)
     return starts
 
 
@@ -267,9 +264,10 @@ def _own_fit(rendered: RenderedHalves, heuristic: Heuristic, loss: Loss) -> Form
     reach, (low, high) = REACH * np.maximum(np.abs(default), 1.0), model.bounds(own.parameters)
     low, high = np.maximum(low, default - reach), np.minimum(high, default + reach)
     random = np.random.default_rng(0).uniform(low, high, (OWN_STARTS, len(default)))
-    starts: Starts = [(None, x) for x in (default, *random)]
     pixels = np.full(len(default), rendered.counted.sum())
-    best, certainties, covariance, losses = _search(rendered, own, loss, lambda _: starts, pixels)
+    best, certainties, covariance, losses = _search(
+        rendered, own, loss, lambda _: [default, *random], pixels
+    )
     spread = COVERAGE * np.sqrt(np.diag(covariance))
     records = tuple(
         parameter_record(
@@ -290,17 +288,17 @@ def _search(
     rendered: RenderedHalves,
     fitted: PhongModel | OwnModel,
     loss: Loss,
-    starts: Callable[[Objective], Starts],
+    starts: Callable[[Objective], list[NDArray]],
     pixels: NDArray,
 ) -> tuple[NDArray, list[Certainty], NDArray, dict[str, Any]]:
     """Return the best parameters, how certain they are, and the fields of the losses."""
     counted = rendered.counted
     objective = Objective(fitted, rendered.reference.mean[counted], loss, rendered.viewing)
-    x, least, searches = search(objective, starts(objective))
+    x, least, converged = search(objective, starts(objective))
     error = rendered.difference.standard_error[counted]
     certainties, covariance = identify(objective, x, pixels, error)
     removed = objective.value_of(rendered.before[counted]) - least
-    losses = {"loss": least, "parameter_error": removed, "convergence": searches}
+    losses = {"loss": least, "parameter_error": removed, "converged": converged}
     return x, certainties, covariance, losses
 
 

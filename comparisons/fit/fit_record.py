@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from comparisons.departure.colour import Viewing
 from comparisons.fit.model import FitParameter, PhongModel
-from comparisons.fit.search import AT_BOUND, COVERAGE, Certainty, SearchStart
+from comparisons.fit.search import AT_BOUND, COVERAGE, Certainty
 from heuristic.terms import normalisation
 from reference.records import VERSION, Amount, Count, Pixels, Record, Resolution, Size, Versions
 from reference.scene.graph import Graph
@@ -70,7 +70,7 @@ class FormFit(Record, kw_only=True):
     parameter_error: Annotated[float, Meta(description="What better parameters remove of it.")]
     departure: Annotated[dict[str, FitDeparture], Meta(description="By metric.")]
     materials: tuple[FittedMaterial, ...] = ()
-    convergence: tuple[SearchStart, ...]
+    converged: Annotated[bool, Meta(description="Whether the search that found them did.")]
     own: tuple[FittedParameter, ...] = ()
 
 

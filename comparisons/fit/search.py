@@ -27,16 +27,14 @@ the inverse of its second derivative moves the minimum.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from msgspec import Meta
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from comparisons.departure.colour import Viewing, cam16ucs_unclipped
 from comparisons.fit.model import bounds
-from reference.records import Amount, Count, Record
 
 STEP, SMALLEST_STEP = 1e-4, 1e-8
 """Relative step of the finite differences of colour spaces; their own error is its square."""
@@ -98,16 +96,6 @@ LOSSES = {
 }
 
 
-class SearchStart(Record):
-    """One search: where it began, where it ended, and its cost."""
-
-    n: Annotated[float | None, Meta(description="Exponent; null for the paired parameters.")]
-    loss: Amount
-    final_loss: Annotated[Amount | None, Meta(description="Null if others began better.")] = None
-    evaluations: Count = 0
-    converged: bool = False
-
-
 class Objective:
     """The loss of a model against a reference (N, 3): the mean over pixels of ``r(d)``.
 
@@ -164,42 +152,31 @@ class Objective:
         return gradient / len(slopes), second / len(slopes)
 
 
-def search(
-    objective: Objective, starts: Sequence[tuple[float | None, NDArray]]
-) -> tuple[NDArray, float, tuple[SearchStart, ...]]:
-    """Return the parameters of least loss, the loss there, and all searches.
+def search(objective: Objective, starts: Sequence[NDArray]) -> tuple[NDArray, float, bool]:
+    """Return the parameters of least loss, the loss there, and whether that search converged.
 
-    Each start has its exponent; the paired one, which is the first, and the best others are
-    followed to their minimum.
+    The paired start, which is the first, and the best others are followed to their minimum.
     """
-    losses = [objective.value(x) for _, x in starts]
+    losses = [objective.value(x) for x in starts]
     followed = {0, *(1 + np.argsort(losses[1:], kind="stable")[:FOLLOWED])}
-    searches, best = [], (inf, starts[0][1])
-    for place, (n, x) in enumerate(starts):
-        if place not in followed:
-            searches.append(SearchStart(n=n, loss=losses[place]))
-            continue
-        x, _, before, _ = descend(objective.smoothed(), x)
-        x, loss, evaluations, converged = descend(objective, x)
-        best = min(best, (loss, x), key=lambda pair: pair[0])
-        searches.append(
-            SearchStart(n=n, loss=losses[place], final_loss=loss, converged=converged,
-                        evaluations=before + evaluations)
-        )  # fmt: skip
-    return best[1], best[0], tuple(searches)
+    found = [
+        descend(objective, descend(objective.smoothed(), starts[place])[0])
+        for place in sorted(followed)
+    ]
+    return min(found, key=lambda each: each[1])
 
 
-def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, int, bool]:
-    """Return the minimum that a search from ``x`` finds, its loss, evaluations and convergence."""
+def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, bool]:
+    """Return the minimum that a search from ``x`` finds, its loss, and whether it converged."""
     low, high = bounds(objective.model.parameters)
     loss, damping = objective.value(x), 1e-3
     gradient, second = objective.quadratic(x)
-    for evaluations in range(1, LARGEST_COUNT):
+    for _ in range(1, LARGEST_COUNT):
         damped = second + damping * np.diag(np.diag(second))
         step = bounded_minimum(damped, gradient, low - x, high - x)
         expected = -(gradient @ step + step @ damped @ step / 2)
         if expected <= max(TOLERANCE * loss, SMALLEST_GAIN) or damping > LARGEST_DAMPING:
-            return x, loss, evaluations, True
+            return x, loss, True
         trial = np.clip(x + step, low, high)
         gained = loss - objective.value(trial)
         if gained > 0:
@@ -208,7 +185,7 @@ def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, int, bool
             damping *= 0.1 if gained > 0.5 * expected else 1
         if gained <= 0.1 * expected:
             damping *= 8
-    return x, loss, LARGEST_COUNT, False
+    return x, loss, False
 
 
 def bounded_minimum(second: NDArray, gradient: NDArray, low: NDArray, high: NDArray) -> NDArray:
