@@ -9,7 +9,7 @@ import pytest
 from scipy.special import erf
 
 from comparisons.processes.pool import Pool
-from comparisons.study import dataset, design, running, surface
+from comparisons.study import dataset, design, running, scenes
 from heuristic.errors import InputError
 from reference.pairing import albedo, factors
 from reference.pairing.albedo import RoughPlastic
@@ -368,13 +368,13 @@ def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path):
 
 def test_a_point_that_fails_is_a_row_that_says_why(rgb, tmp_path, monkeypatch):
     study = design.parse(part("alpha = [0.1, 0.2, 0.3]"))
-    lobe = surface.lobe
+    lobe = scenes.lobe
 
     def fails_once(point, convention):
         return 1 / 0 if point["alpha"] == 0.2 else lobe(point, convention)
 
     with monkeypatch.context() as patch:
-        patch.setattr(surface, "lobe", fails_once)
+        patch.setattr(scenes, "lobe", fails_once)
         table, _ = running.run(study, tmp_path)
     assert table["error"].to_pylist() == [None, "ZeroDivisionError: division by zero", None]
     assert table["dE2000"].to_pylist()[1] is None

@@ -5,7 +5,6 @@ TOML text) and ``versions`` (JSON). No time or place is recorded, so equal studi
 """
 
 import json
-from collections.abc import Iterable
 from math import isclose
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -27,7 +26,6 @@ from comparisons.departure.metrics import (
 from comparisons.study.design import OWN, StudyFile
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
 from heuristic.errors import InputError, unknown
-from reference.pairing.factors import Miss
 from reference.planning.effects import EFFECTS
 
 Row: TypeAlias = dict[str, Any]
@@ -134,11 +132,6 @@ def measure(
         "exposure": summary.after_exposure.exposure,
         RATIO.name: ratio.mean,
     }
-
-
-def largest_miss(misses: Iterable[Miss]) -> float:
-    """Return the largest relative miss of a pairing, 0 if it is exact."""
-    return max((abs(miss.reached / miss.wanted - 1) for miss in misses if miss.wanted), default=0.0)
 
 
 # --- The file -------------------------------------------------------------------------------------

@@ -22,10 +22,10 @@ from comparisons.case import RGB, open_case
 from comparisons.comparison import versions
 from comparisons.prepared import guarded
 from comparisons.processes.pool import Pool, Task
-from comparisons.study import dataset, surface
-from comparisons.study.dataset import STEPPED, STEPS, Row, largest_miss, measure
+from comparisons.study import dataset, scenes
+from comparisons.study.dataset import STEPPED, STEPS, Row, measure
 from comparisons.study.design import OWN, StudyFile, StudyPart
-from comparisons.study.scenes import RENDERED, SCENES, Point, bsdf
+from comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, largest_miss
 from heuristic import plugins
 from heuristic.errors import FotismosError, InputError, unknown
 from heuristic.heuristics import named
@@ -158,7 +158,8 @@ def row(point: StudyPoint) -> Row:
     _prepare()
     try:
         if point.part.scene == "lobe":
-            columns = surface.lobe(point.values, point.part.options.convention)
+            columns, *images = scenes.lobe(point.values, point.part.options.convention)
+            columns |= measure(*images, np.ones(images[0].shape[:2], bool))
         else:
             columns = _rendered(point)
     # A failing point must not end a study of thousands.
