@@ -287,11 +287,9 @@ WHITE: dict[str, dict[str, Any]] = {
 }
 """Parameters that make BSDFs white; other types keep Mitsuba's defaults."""
 
-NARROWEST = {"alpha": 0.1, "alpha_u": 0.1, "alpha_v": 0.1, "roughness": 0.32}
-"""Roughness below which neither quadrature nor the cells of χ² resolve the lobe."""
-
-SHARPEST = 50.0
-"""Phong's exponent above which they do not."""
+ROUGH = ("alpha", "alpha_u", "alpha_v", "roughness")
+RESOLVED = {**dict.fromkeys(ROUGH[:3], (0.1, 1.0)), "roughness": (0.32, 1.0), "n": (0.0, 50.0)}
+"""Parameters of which both the quadrature and the cells of χ² resolve the lobe."""
 
 LEVEL = 0.001
 """Chance that correct densities fail, over all angles together."""
@@ -310,11 +308,16 @@ class ScatteringSubject(Subject):
     def __init__(self, plugin: str, parameters: Mapping[str, Any]) -> None:
         super().__init__()
         self.plugin, self.parameters = plugin, dict(parameters)
-        self._require_resolved()
+        for name, (least, most) in RESOLVED.items():
+            value = self.parameters.get(name)
+            if isinstance(value, float) and not least <= value <= most:
+                raise InputError(
+                    f"BSDF {plugin!r}: {name} = {value:g} makes a lobe too narrow for the audit, or"
+                    f" too wide: give {least:g} to {most:g}."
+                )
         self.bsdf = self._made()
-        if mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Transmission) or mi.has_flag(
-            self.bsdf.flags(), mi.BSDFFlags.Delta
-        ):
+        refused = mi.BSDFFlags.Transmission, mi.BSDFFlags.Delta
+        if any(mi.has_flag(self.bsdf.flags(), flag) for flag in refused):
             raise InputError(
                 f"BSDF {plugin!r} transmits light or reflects it as a mirror; an audit needs"
                 " reflection with a density: give roughplastic, roughconductor or the like."
@@ -322,13 +325,14 @@ class ScatteringSubject(Subject):
         self.bsdfs = {plugin: self.bsdf}
         self.materials: dict[str, float | None] = {plugin: None}
         self.keys = {key.partition(".")[0] for key, _ in mi.traverse(self.bsdf)}
-        keys = set() if NARROWEST.keys() & self.parameters.keys() else self.keys
-        if keys & NARROWEST.keys():
-            self.bsdfs, self.materials = {}, {}
-            for alpha in ALPHAS:
-                name = f"{plugin}, alpha {alpha:g}"
-                rough = {"roughness": alpha**0.5} if "roughness" in keys else {"alpha": alpha}
-                self.bsdfs[name], self.materials[name] = self._made(**rough), alpha
+        if self.keys.intersection(ROUGH) and not self.parameters.keys() & set(ROUGH):
+            by_root = "roughness" in self.keys
+            of = {f"{plugin}, alpha {alpha:g}": alpha for alpha in ALPHAS}
+            self.materials = {**of}
+            self.bsdfs = {
+                name: self._made(**({"roughness": alpha**0.5} if by_root else {"alpha": alpha}))
+                for name, alpha in of.items()
+            }
 
     def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
         return furnace.of_bsdf(self.bsdfs[material])(light, view)
@@ -399,18 +403,3 @@ class ScatteringSubject(Subject):
         parameters[key] = kind(number)
         parameters.update()
         return dr.mean(furnace.evaluate(bsdf, light, view))
-
-    def _require_resolved(self) -> None:
-        """Reject lobes that the quadrature would miss."""
-        narrow = [
-            (name, f"{least:g} or more")
-            for name, least in NARROWEST.items()
-            if isinstance(value := self.parameters.get(name), float) and not value >= least
-        ]
-        if isinstance(n := self.parameters.get("n"), float) and not n <= SHARPEST:
-            narrow.append(("n", f"{SHARPEST:g} or less"))
-        for name, needed in narrow:
-            raise InputError(
-                f"BSDF {self.plugin!r}: {name} = {self.parameters[name]:g} makes a lobe too narrow"
-                f" for the audit: give {needed}."
-            )
