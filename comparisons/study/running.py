@@ -29,7 +29,6 @@ from comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, largest_miss
 from heuristic import plugins
 from heuristic.errors import FotismosError, InputError, unknown
 from heuristic.heuristics import named
-from reference.pairing.halves import Pair
 from reference.planning.effects import EFFECTS
 from reference.planning.plan import Plan, physical_integrator
 from reference.rendering import direct
@@ -157,11 +156,14 @@ def row(point: StudyPoint) -> Row:
     """
     _prepare()
     try:
+        convention = point.part.options.convention
         if point.part.scene == "lobe":
-            columns, *images = scenes.lobe(point.values, point.part.options.convention)
+            columns, *images = scenes.lobe(point.values, convention)
             columns |= measure(*images, np.ones(images[0].shape[:2], bool))
         else:
             columns = _rendered(point)
+        if point.part.scene in SCENES:
+            columns |= scenes.columns(point.values, convention)
     # A failing point must not end a study of thousands.
     except Exception as failure:
         kind = "" if isinstance(failure, FotismosError) else f"{type(failure).__name__}: "
@@ -209,7 +211,7 @@ def _rendered(point: StudyPoint) -> Row:
         sizes[name] = float(np.sqrt(np.mean(change**2)))
     result |= sizes | {"dominant": max(sizes, key=sizes.__getitem__)}
     result["miss"] = largest_miss(ready.pair.pairing.misses)
-    return result | (_derived(ready.pair) if part.scene in SCENES else {})
+    return result
 
 
 def split(point: Point) -> tuple[Point, Point]:
@@ -244,20 +246,6 @@ def _plans(chosen: Plan) -> dict[str, Plan]:
         if more != list(plans.values())[-1]:
             plans[effect.label] = more
     return plans
-
-
-def _derived(pair: Pair) -> Row:
-    """Return a study's parameters of the material that pairing derived; its colours are grey."""
-    names = {
-        ("roughplastic", "phong"): {"n": "n", "k_d": "k_d", "k_s": "k_s"},
-        ("phong", "roughplastic"): {
-            "alpha": "alpha", "int_ior": "int_ior", "reflectance": "diffuse_reflectance"
-        },
-    }  # fmt: skip
-    for each in pair.pairing.bsdfs:
-        if own := names.get((each.given, each.derived)):
-            return {name: float(np.ravel(each.parameters[key])[0]) for name, key in own.items()}
-    return {}
 
 
 def set_values(graph: Graph, values: dict[str, float]) -> None:

@@ -181,6 +181,20 @@ def material(
     return phong, *to_roughplastic(phong, convention)
 
 
+def columns(point: Point, convention: Convention) -> dict[str, float]:
+    """Return the parameters of a point's material in both models, and the largest miss."""
+    phong, plastic, misses = material(tuple(point.items()), convention)
+    return {
+        "miss": largest_miss(misses),
+        "alpha": plastic.alpha,
+        "int_ior": plastic.int_ior,
+        "reflectance": plastic.diffuse_reflectance[0],
+        "n": phong.n,
+        "k_d": phong.k_d[0],
+        "k_s": phong.k_s[0],
+    }
+
+
 def direction(theta: ArrayLike, phi: ArrayLike) -> np.ndarray:
     """Return unit vectors (3, N) from polar angles and azimuths in degrees."""
     return furnace.direction(np.deg2rad(theta), np.deg2rad(phi))
@@ -259,22 +273,14 @@ def lobe(point: Point, convention: Convention) -> tuple[dict[str, float], np.nda
 
     The views have equal projected solid angles.
     """
-    phong, plastic, misses = material(tuple(point.items()), convention)
+    phong, plastic, _ = material(tuple(point.items()), convention)
     angle = point["light_angle"]
     plane, mirror = direction(np.arange(0, 90, PEAK_STEP), 0.0), direction(angle, 0.0)
     parts = (views(), hemisphere()[0], plane, mirror)
     view = np.concatenate(parts, axis=1)
     light = np.broadcast_to(direction(angle, 180.0), view.shape)
     splits = np.cumsum([part.shape[1] for part in parts])[:-1]
-    result = {
-        "miss": largest_miss(misses),
-        "alpha": plastic.alpha,
-        "int_ior": plastic.int_ior,
-        "reflectance": plastic.diffuse_reflectance[0],
-        "n": phong.n,
-        "k_d": phong.k_d[0],
-        "k_s": phong.k_s[0],
-    }
+    result = {}
     images = []
     for half, (total, lobe_alone) in (
         ("heuristic", heuristic_radiance(phong, light, view)),
