@@ -41,8 +41,9 @@ TERMS = ("emission", "ambient", "diffuse", "specular")
 class Model:
     """The textbook's model at points: vectors and colours are (P, 3), numbers (P, 1).
 
-    ``lights`` have a direction, a distance and an intensity each. ``along``, ``incident`` and
-    ``lobe`` are the lobe's cosine, the diffuse term's function of ``N.L``, and the lobe.
+    ``toward`` (L, P, 3), ``distance`` and ``intensity`` (L, P, 1) are of the lights. ``along``,
+    ``incident`` and ``lobe`` are the lobe's cosine, the diffuse term's function of ``N.L``, and the
+    lobe.
     """
 
     position: Array
@@ -53,7 +54,9 @@ class Model:
     k_d: Array
     k_s: Array
     ambient: Array
-    lights: tuple[tuple[Array, Array, Array], ...]
+    toward: Array
+    distance: Array
+    intensity: Array
     along: Callable[[Array, Array, Array], Array] = mirrored
     incident: Callable[[Array], Array] = clamped
     lobe: Callable[[Array, Array, Array], Array] = lobe
@@ -64,12 +67,10 @@ class Model:
         ``changes`` are other values of the model's fields.
         """
         m = replace(self, **changes)
-        diffuse = specular = np.zeros_like(m.k_d)
-        for toward, _, intensity in m.lights:
-            incidence = dot(m.normal, toward)
-            along = m.along(m.normal, toward, m.view)
-            diffuse = diffuse + intensity * m.incident(incidence)
-            specular = specular + intensity * m.lobe(along, m.n, incidence)
+        incidence = dot(m.normal, m.toward)
+        along = m.along(m.normal, m.toward, m.view)
+        diffuse = (m.intensity * m.incident(incidence)).sum(axis=0)
+        specular = (m.intensity * m.lobe(along, m.n, incidence)).sum(axis=0)
         return np.stack([m.k_i, m.ambient * m.k_d, m.k_d * diffuse, m.k_s * specular])
 
 
@@ -105,7 +106,7 @@ def _describe(heuristic: Heuristic) -> Iterator[str]:
         yield "Its values end at 1: brighter light is cut off."
     if words:
         yield f"A likely mistake: {words}."
-    yield from _factors(fit, len(model.lights))
+    yield from _factors(fit, len(model.toward))
 
 
 def _explain(model: Model, seen: Array, counts: Array) -> tuple[str, TermFit] | None:
@@ -191,12 +192,8 @@ def sample(along: Callable[[Array, Array, Array], Array]) -> Model:
     position = random.uniform(-1, 1, (POINTS, 3))
     normal, view = (unit(random.normal(size=(POINTS, 3))) for _ in range(2))
     view *= np.sign(dot(normal, view))
-    lights = []
-    for place, intensity in zip(LAMPS, INTENSITIES, strict=True):
-        away = np.array(place) - position
-        square = dot(away, away)
-        arriving = np.broadcast_to(intensity / square, position.shape)
-        lights.append((unit(away), np.sqrt(square), arriving))
+    away = np.array(LAMPS)[:, None] - position
+    distance = np.sqrt(dot(away, away))
     return Model(
         position=position,
         normal=normal,
@@ -206,7 +203,9 @@ def sample(along: Callable[[Array, Array, Array], Array]) -> Model:
         k_d=colour(),
         k_s=colour(),
         ambient=np.array([0.3, 0.2, 0.4]),
-        lights=tuple(lights),
+        toward=away / distance,
+        distance=distance,
+        intensity=np.array(INTENSITIES)[:, None, None] / distance**2,
         along=along,
     )
 
@@ -241,11 +240,6 @@ def _spaces() -> Iterator[Mistake]:
             )
 
 
-def _relit(model: Model, change: Callable[..., tuple[Array, Array, Array]]) -> dict[str, Any]:
-    """Return the lights, with each one's direction, distance and intensity changed."""
-    return {"lights": tuple(change(*light) for light in model.lights)}
-
-
 def _without_gate(cosine: Array, n: Array, incidence: Array) -> Array:
     return clamped(cosine) ** n
 
@@ -258,15 +252,15 @@ BEHIND = "light from behind counts: N.L has lost its sign"
 
 MISTAKES: tuple[Mistake, ...] = (
     ("the light vector is reversed: it leads from the light to the surface",
-     lambda m: _relit(m, lambda to, away, light: (-to, away, light))),
+     lambda m: {"toward": -m.toward}),
     ("the view vector or the mirrored one is reversed (GLSL's reflect takes the direction in"
      " which light travels)", lambda m: {"view": -m.view}),
     ("the lobe is about the half vector, with the exponent for the mirrored one: too wide",
      lambda m: {"along": halfway}),
     ("the intensity falls off with the square of the distance a second time",
-     lambda m: _relit(m, lambda to, away, light: (to, away, light / away**2))),
+     lambda m: {"intensity": m.intensity / m.distance**2}),
     ("the fall-off with the square of the distance is missing",
-     lambda m: _relit(m, lambda to, away, light: (to, away, light * away**2))),
+     lambda m: {"intensity": m.intensity * m.distance**2}),
     ("the view vector is the position reversed, which is right only in view space",
      lambda m: {"view": unit(-m.position)}),
     ("the view vector is the position reversed, and not normalised",
@@ -279,7 +273,8 @@ MISTAKES: tuple[Mistake, ...] = (
     ("lights below the horizon cause highlights", lambda m: {"lobe": _without_gate}),
     ("the lobe is multiplied by N.L, as in a BRDF; the textbook's is not",
      lambda m: {"lobe": lambda *words: lobe(*words) * clamped(words[-1])}),
-    ("only the first light is used", lambda m: {"lights": m.lights[:1]}),
+    ("only the first light is used",
+     lambda m: {"toward": m.toward[:1], "intensity": m.intensity[:1]}),
     ("the lobe is normalised by n + 2, which the paired k_s already includes",
      lambda m: {"k_s": m.k_s * (m.n + 2)}),
     ("the lobe is normalised by n + 8, which the paired k_s already includes",
@@ -301,7 +296,7 @@ SCALED: tuple[Mistake, ...] = (
     ("the normal is not normalised: it has a length of {}",
      lambda m, by: {"normal": m.normal * by}),
     ("the light vector is not normalised: it has a length of {}",
-     lambda m, by: _relit(m, lambda to, *light: (to * by, *light))),
+     lambda m, by: {"toward": m.toward * by}),
     ("the view vector is not normalised: it has a length of {}",
      lambda m, by: {"view": m.view * by}),
 )  # fmt: skip
