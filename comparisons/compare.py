@@ -118,17 +118,17 @@ def _compare(
     done("scene and pairing", ready.planning_seconds + guard.seconds)
     stages |= {"planning": ready.planning_seconds, "guard": guard.seconds}
     width, height = image_size(ready.scene)
-    if options.image:  # before any long rendering: a picture may be flipped
-        from comparisons import pictures  # loaded late: few comparisons have any
-
-        place = pictures.located(heuristic, ready.scene)
     estimates = render(ready, options, ready.counted, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
     exact = ready.plan.exact and not options.image
     numbers, images = _measure(estimates, ready.surface, options, exact)
     shown = images.heuristic, images.reference, images.counted
     caution = require_light(*shown, source.name, options)
-    picture = pictures.picture_record(place, options, images) if options.image else None
+    picture = None
+    if options.image:
+        from comparisons import pictures  # loaded late: few comparisons have any
+
+        picture = pictures.picture_record(heuristic, ready.scene, options, images)
     done("metrics")
     traced: Terms = None, "Terms are traced with --why."
     if why:

@@ -7,7 +7,7 @@ The position is found by edges: a shift looks like wrong shading. Geometric edge
 or the hit changes, are in any picture of the same scene, however it is shaded. The heuristic half
 mostly shares its edges too: it shows where light ends. The picture's edges are correlated with both
 at all shifts up to :data:`REACH`, and the better agreement counts; a parabola through the highest
-values gives the fraction of a pixel. A flipped picture correlates better once it is flipped back.
+values gives the fraction of a pixel.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -231,12 +231,6 @@ def _counted(wrong: np.ndarray) -> str:
 
 # --- Position ----------------------------------------------------------------------------------
 
-TURNED = {
-    "upside down": lambda image: image[::-1],
-    "mirrored left to right": lambda image: image[:, ::-1],
-    "turned by 180 degrees": lambda image: image[::-1, ::-1],
-}
-
 TEMPLATE_SPP = 16
 """Samples per pixel of the image whose edges are compared with a picture's."""
 
@@ -244,22 +238,12 @@ REACH, FINER = 8, 4
 """Largest shift considered in pixels, at most a quarter of the picture's smaller side; and rays
 along each side of a pixel."""
 
-LEAST, CLEARLY = 0.08, 1.5
-"""Correlation below which edges are uninformative, and the factor by which flipping a picture
-raises it if the picture is flipped."""
+LEAST = 0.08
+"""Correlation below which edges are uninformative."""
 
 Place = tuple[tuple[float, float] | None, float]
 """By how many pixels (x, y) a picture's content is too far right and too low, if its edges show it,
 and the correlation of the edges there."""
-
-
-def located(half: PictureHalf, scene: mi.Scene) -> Place:
-    """Return the position of pictures relative to a scene's camera; refuse flipped ones."""
-    mean = np.mean(half.images, axis=0)
-    half.half.spp = TEMPLATE_SPP
-    template = np.array(half.half.render(0), float)
-    edges = geometry_edges(scene, mean.shape[1], mean.shape[0])
-    return measure(mean, [edges, picture_edges(template)])
 
 
 def geometry_edges(scene: mi.Scene, width: int, height: int) -> np.ndarray:
@@ -277,24 +261,12 @@ def picture_edges(image: np.ndarray) -> np.ndarray:
 
 
 def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Place:
-    """Return the position of an image (H, W, 3), encoded in any way; refuse a flipped one.
+    """Return the position of an image (H, W, 3), encoded in any way.
 
     ``expected`` are maps (H, W) of edges that it may contain; the best agreement counts.
     """
-
-    def place(seen: np.ndarray) -> Place:
-        return max((_shift(edges, seen) for edges in expected), key=lambda each: each[1])
-
     seen = picture_edges(image)
-    best = place(seen)
-    for how, turn in TURNED.items():
-        other = place(turn(seen))
-        if other[1] > max(CLEARLY * best[1], 2 * LEAST):
-            raise InputError(
-                f"the picture is {how}: corrected, its edges would correlate with the scene's by"
-                f" {other[1]:.2f} instead of {best[1]:.2f}. Correct it, and compare again."
-            )
-    return best
+    return max((_shift(edges, seen) for edges in expected), key=lambda each: each[1])
 
 
 def _edges(layers: np.ndarray) -> np.ndarray:
@@ -357,6 +329,12 @@ MISREADINGS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 }
 """Mistakes in encoding colours: their symptoms, and their inverses."""
 
+TURNED = {
+    "upside down": lambda image: image[::-1],
+    "mirrored left to right": lambda image: image[:, ::-1],
+    "turned by 180 degrees": lambda image: image[::-1, ::-1],
+}
+
 CURES = {
     "values look sRGB-encoded": ": give --transfer srgb, or write linear values",
     "values look decoded twice": ": give --transfer linear",
@@ -386,10 +364,15 @@ BETTER = 0.5
 """Largest share of the difference that a credible other reading of the values leaves."""
 
 
-def picture_record(place: Place, options: Options, images: Images) -> PictureRecord:
+def picture_record(
+    half: PictureHalf, scene: mi.Scene, options: Options, images: Images
+) -> PictureRecord:
     """Return the record of the pictures that replace a heuristic half, with its warnings."""
     shown, reference = (each[images.counted] for each in (images.heuristic, images.reference))
-    shift, edges = place
+    half.half.spp = TEMPLATE_SPP
+    template, (height, width) = np.array(half.half.render(0), float), images.counted.shape
+    expected = [geometry_edges(scene, width, height), picture_edges(template)]
+    shift, edges = measure(np.mean(half.images, axis=0), expected)
     record = PictureRecord(
         files=options.image,
         transfer=options.transfer,

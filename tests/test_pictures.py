@@ -16,7 +16,6 @@ from comparisons.comparison import PictureRecord
 from comparisons.departure.colour import from_srgb, to_srgb
 from comparisons.departure.metrics import METRICS
 from comparisons.options import Options
-from comparisons.pictures import TURNED
 from comparisons.prepared import prepare
 from heuristic.errors import InputError, NonFiniteError
 
@@ -132,19 +131,6 @@ def test_shifts_are_measured_to_a_fraction_of_a_pixel(cornell):
         moved = (1 - part) * kernel + part * np.roll(kernel, 1, 1)
         shift, _ = pictures.measure(moved, expected)
         assert shift == pytest.approx((part, 0), abs=0.2)
-
-
-def test_a_picture_that_is_turned_over_is_refused_by_its_edges(rgb):
-    case = open_case("fig-6-14", Options(resolution=(SIDE, SIDE), spp=64))
-    ready = prepare(case.source, case.options)
-    image = np.array(ready.heuristic.render(1), float)
-    expected = [pictures.geometry_edges(ready.scene, SIDE, SIDE)]
-    for picture in (image, TURNED["mirrored left to right"](image)):  # the triangle is symmetric
-        pictures.measure(picture, expected)
-    # Turned by 180 degrees it is the same as upside down, for the same reason.
-    for how in ("upside down", "turned by 180 degrees"):
-        with pytest.raises(InputError, match="the picture is upside down: corrected, its edges"):
-            pictures.measure(TURNED[how](image), expected)
 
 
 # --- What is odd, in words -----------------------------------------------------------------------
