@@ -158,8 +158,8 @@ def row(point: StudyPoint) -> Row:
     try:
         convention = point.part.options.convention
         if point.part.scene == "lobe":
-            columns, *images = scenes.lobe(point.values, convention)
-            columns |= measure(*images, np.ones(images[0].shape[:2], bool))
+            columns, image, truth = scenes.lobe(point.values, convention)
+            columns |= measure(image, truth, np.ones(image.shape[:2], bool))
         else:
             columns = _rendered(point)
         if point.part.scene in SCENES:
