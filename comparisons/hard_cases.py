@@ -23,7 +23,11 @@ ABSENT = 1e-3
 
 @dataclass(frozen=True)
 class HardCase:
-    """A case; ``exactly`` replaces the formula in extended precision."""
+    """A case; ``exactly`` replaces the formula in extended precision.
+
+    Errors are known once it is evaluated: infinite for a NaN, an infinity, or light where there is
+    none.
+    """
 
     name: str
     group: str
@@ -31,30 +35,21 @@ class HardCase:
     setting: Setting
     difficulty: str
     exactly: NDArray | None = None
-
-    def exact(self) -> NDArray:
-        """Return the exact values, (N,)."""
-        return textbook.shade_exactly(self.setting) if self.exactly is None else self.exactly
-
-
-@dataclass(frozen=True)
-class HardOutcome:
-    """The errors of a case; infinite for a NaN, an infinity, or light where there is none."""
-
-    name: str
-    difficulty: str
-    bound: float
-    naive_error: float
-    our_error: float
+    naive_error: float = np.inf
+    our_error: float = np.inf
 
     @property
     def holds(self) -> bool:
         """Whether ours keeps the bound."""
         return self.our_error <= self.bound
 
+    def exact(self) -> NDArray:
+        """Return the exact values, (N,)."""
+        return textbook.shade_exactly(self.setting) if self.exactly is None else self.exactly
 
-HardCases = dict[str, list[HardOutcome]]
-"""Outcomes by group, in the order of the page."""
+
+HardCases = dict[str, list[HardCase]]
+"""Evaluated cases by group, in the order of the page."""
 
 
 def collect() -> HardCases:
@@ -65,13 +60,13 @@ def collect() -> HardCases:
     return groups
 
 
-def evaluate(case: HardCase) -> HardOutcome:
-    """Return the errors of a case."""
+def evaluate(case: HardCase) -> HardCase:
+    """Return a case with its errors."""
     with np.errstate(all="ignore"):  # cases provoke NaN and infinities
         exact = np.asarray(case.exact(), np.longdouble)
-        images = textbook.shade(case.setting, NAIVE), by_kernel(case.setting)
-        errors = [error(values, exact) for values in images]
-    return HardOutcome(case.name, case.difficulty, case.bound, *errors)
+        naive = error(textbook.shade(case.setting, NAIVE), exact)
+        ours = error(by_kernel(case.setting), exact)
+    return replace(case, naive_error=naive, our_error=ours)
 
 
 def error(values: ArrayLike, exact: np.ndarray) -> float:

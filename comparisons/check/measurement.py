@@ -205,16 +205,11 @@ def _half(images: Array) -> Half:
 
     whole, blocks = estimate(images.mean(axis=(1, 2))), estimate(block_means(images))
     rows = zip(*(part.tolist() for part in blocks), strict=True)
-    return Half(
-        mean=tuple(whole[0].tolist()),
-        error=tuple(whole[1].tolist()),
-        blocks=tuple(
-            tuple(
-                Block(mean=tuple(mean), error=tuple(error))
-                for mean, error in zip(*row, strict=True)
-            )
-            for row in rows
-        ),
+    plain = [
+        [{"mean": mean, "error": error} for mean, error in zip(*row, strict=True)] for row in rows
+    ]
+    return msgspec.convert(
+        {"mean": whole[0].tolist(), "error": whole[1].tolist(), "blocks": plain}, Half
     )
 
 
