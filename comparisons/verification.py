@@ -31,20 +31,18 @@ class Verification(Record, kw_only=True):
     """A planned scene against everything simulated.
 
     ``significant`` of ``pixels`` that see a surface are shown to differ
-    (:mod:`comparisons.departure.marks`). ``largest`` is the largest difference of the two means,
-    linear, and ``heuristic_largest`` that of the two heuristic images, whose kernels differ in
-    terms that are 0. Times are medians per pass, noise the root mean square over the pixels of the
-    standard error of one pass. ``gain`` is ``everything_s everything_noise^2 / (planned_s
-    planned_noise^2)``: how many times faster the planned reference reaches the same noise.
+    (:mod:`comparisons.departure.marks`). ``heuristic_largest`` is the largest difference of the two
+    heuristic images, linear, whose kernels differ in terms that are 0. Times are medians per pass,
+    noise the root mean square over the pixels of the standard error of one pass. ``gain`` is
+    ``everything_s everything_noise^2 / (planned_s planned_noise^2)``: how many times faster the
+    planned reference reaches the same noise.
     """
 
     scene: str
     planned: str
-    everything: str
     resolution: tuple[int, int]
     significant: int
     pixels: int
-    largest: float
     heuristic_largest: float
     planned_s: float
     everything_s: float
@@ -81,9 +79,9 @@ def verify(
     own, apart = (Accumulator(DEVIATION), Accumulator(DEVIATION)), DifferenceSums(counted)
     for both in zip(*streams, strict=True):
         add_difference((*own, apart), [one.images[0] for one in both])
-    difference, mean = apart.estimate(), sum(total.mean() for total in own) / 2
+    mean = sum(total.mean() for total in own) / 2
     distance = leading_distance(options.viewing)
-    marked = marks.find(difference, mean, counted, distance, level=level)
+    marked = marks.find(apart.estimate(), mean, counted, distance, level=level)
     seconds = [side.reference.pass_times().median_s for side in sides]
     # A plan without noise would divide by zero.
     noise = [
@@ -92,11 +90,9 @@ def verify(
     return Verification(
         scene=source.name,
         planned=_words(planned.plan),
-        everything=_words(everything.plan),
         resolution=(width, height),
         significant=int((marked == marks.MARKED).sum()),
         pixels=int(counted.sum()),
-        largest=float(np.abs(difference.mean).max()),
         heuristic_largest=_kernel_difference(planned, everything, options.seed),
         planned_s=seconds[1],
         everything_s=seconds[0],

@@ -216,10 +216,10 @@ def test_details_have_what_was_checked_and_every_metric():
     numbers = {
         "significant": 3, "pixels": 1436, "planned_s": 0.0032, "planned_noise": 0.5,
         "everything_s": 0.25, "everything_noise": 0.125,
-        "heuristic_largest": 0.0, "resolution": (96, 80), "largest": 0.5,
+        "heuristic_largest": 0.0, "resolution": (96, 80),
         "gain": 91.5,
     }  # fmt: skip
-    verification = Verification(scene=HOSTILE, planned="direct_all", everything="path", **numbers)
+    verification = Verification(scene=HOSTILE, planned="direct_all", **numbers)
     machine = Machine(processor=HOSTILE, cores=2, system="Linux")
     run = RunRecord(command="", stages={"page": 1.5}, failures=(), machine=machine, versions={})
     html = page.details(1, [verification], run=run)
