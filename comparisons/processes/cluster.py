@@ -15,7 +15,7 @@ from threading import Lock
 from typing import Any
 from uuid import uuid4
 
-from comparisons.processes.pool import Task
+from comparisons.processes.pool import Task, once
 from heuristic import program
 from heuristic.errors import FotismosError, InstallationError, LostProcessError
 
@@ -29,15 +29,12 @@ TIMEOUT = 20
 """Seconds in which a scheduler must answer."""
 
 _one_at_a_time = Lock()
-_prepared: list[Callable[[], object]] = []
 
 
 def work(prepare: Callable[[], object], function: Callable[..., Any], *arguments: Any) -> Any:
     """Do a task in a worker, one at a time per process: Mitsuba uses all threads."""
     with _one_at_a_time:
-        while prepare not in _prepared:
-            prepare()
-            _prepared.append(prepare)
+        once(prepare)
         return function(*arguments)
 
 

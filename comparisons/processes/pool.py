@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from itertools import islice
 from math import inf
 from multiprocessing import connection, get_context, parent_process, resource_tracker
@@ -38,6 +39,12 @@ def end_after_task() -> None:
     """End this process of a pool once its task is done: other tasks need a clean one."""
     global _is_spent
     _is_spent = True
+
+
+@cache
+def once(prepare: Callable[[], object]) -> None:
+    """Prepare this process once; again if that failed."""
+    prepare()
 
 
 def cores() -> int:
@@ -234,13 +241,12 @@ def _work(pipe: Any, prepare: Callable[[], object]) -> NoReturn:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent gets it too, and ends this process
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
-    preparations = [prepare]
     while True:
         try:
             call = pipe.recv()
         except (EOFError, OSError):
             os._exit(0)  # the parent is gone
-        _send(pipe, *_answer(pipe, preparations, *call))
+        _send(pipe, *_answer(pipe, prepare, *call))
         del call
 
 
@@ -253,7 +259,7 @@ def _end_with_parent() -> None:
 
 def _answer(
     pipe: Any,
-    preparations: list[Callable[[], object]],
+    prepare: Callable[[], object],
     function: Callable[..., Any],
     arguments: tuple[Any, ...],
     with_progress: bool,
@@ -261,9 +267,7 @@ def _answer(
     """Do a task; return the method of its outcome to call, and the argument."""
     progress = [lambda *words: _send(pipe, "progress", words)] if with_progress else []
     try:
-        while preparations:  # until they succeed
-            preparations[0]()
-            preparations.pop()
+        once(prepare)
         return "set_result", function(*arguments, *progress)
     except FotismosError as error:
         return "set_exception", error
