@@ -113,7 +113,7 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
     ``word`` is the path of a file, or ``FILE.exr:LAYER``. Without a ``transfer`` function,
     an EXR is linear.
     """
-    path, layer = _parts(word)
+    path, layer = parts(word)
     if not path.is_file():
         raise InputError(f"{path}: there is no such file. Give a {' or '.join(SUFFIXES)} picture.")
     image = _exr(path, layer) if path.suffix.lower() == ".exr" else _png(path, transfer)
@@ -131,12 +131,8 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
     return np.ascontiguousarray(image, np.float32)
 
 
-def path_of(word: str) -> Path:
-    """Return the file that a word names."""
-    return _parts(word)[0]
-
-
-def _parts(word: str) -> tuple[Path, str]:
+def parts(word: str) -> tuple[Path, str]:
+    """Return the file and the layer that a word names."""
     file, _, layer = word.rpartition(":")
     if file.lower().endswith(SUFFIXES):
         return Path(file), layer

@@ -233,9 +233,9 @@ def sampling(subject: Subject) -> Checked:
     bound = 1 - (1 - LEVEL) ** (1 / len(INCIDENT))  # Šidák
     expected = f"p of χ² at least {bound:.2g}"
     if not isinstance(subject, ScatteringSubject):
-        return _not_asked("sampling", expected, "a heuristic is not sampled")
+        return _checked("sampling", None, None, expected, "a heuristic is not sampled")
     if (least := subject.sampling()) is None:
-        return _not_asked("sampling", expected, "it reflects nothing")
+        return _checked("sampling", None, None, expected, "it reflects nothing")
     return _checked("sampling", least[0] >= bound, least[0], expected, least[1])
 
 
@@ -248,13 +248,11 @@ def values(subject: Subject) -> Checked:
     return _checked("values", not subject.faults, len(subject.faults), expected, worst)
 
 
-def _checked(name: str, holds: bool, value: float, expected: str, worst: str) -> Checked:
-    verdict: Literal["holds", "does not hold"] = "holds" if holds else "does not hold"
+def _checked(
+    name: str, holds: bool | None, value: float | None, expected: str, worst: str
+) -> Checked:
+    verdict: Any = {True: "holds", False: "does not hold", None: "not asked"}[holds]
     return Checked(name=name, verdict=verdict, value=value, expected=expected, worst=worst)
-
-
-def _not_asked(name: str, expected: str, why: str) -> Checked:
-    return Checked(name=name, verdict="not asked", value=None, expected=expected, worst=why)
 
 
 def _largest(
@@ -288,7 +286,7 @@ def gradient(subject: Subject, derivatives: Mapping[str, float]) -> Checked:
     """Check that Dr.Jit's derivatives by all numbers are right."""
     expected = f"at most {AGREES} of it at {QUANTILE:.0%} of the points"
     if not derivatives:
-        return _not_asked("gradient", expected, subject.untuned)
+        return _checked("gradient", None, None, expected, subject.untuned)
     worst = max(derivatives, key=derivatives.__getitem__)
     value = derivatives[worst]
     return _checked("gradient", value <= AGREES, value, expected, f"by {worst}")

@@ -122,9 +122,9 @@ def key_of(case: Case, job: Job) -> str | None:
         return None
     files = []
     if case.options.image:
-        from comparisons.pictures import path_of  # loaded late: few have pictures
+        from comparisons import pictures  # loaded late: few have any
 
-        files = [path_of(word) for word in case.options.image]
+        files = [pictures.parts(word)[0] for word in case.options.image]
     parts: dict[str, Any] = {
         "record": VERSION,
         "metrics": list(METRICS),
