@@ -303,7 +303,7 @@ def test_a_gain_is_that_of_least_squares(rgb, written):
     found = fit(builtin("fig-8-9").source(), options, "linear")
     h, r = found.before, found.reference
     (nearest,) = found.record.fits
-    gain, tint = nearest.own
+    gain, tint = nearest.materials[0].parameters
     assert gain.fitted == pytest.approx(np.sum(h * r) / np.sum(h * h), rel=1e-3)
     assert gain.fitted != pytest.approx(1, abs=0.02)
     assert gain.interval[0] <= gain.fitted <= gain.interval[1]

@@ -29,14 +29,11 @@ from comparisons.fit.fit_record import (
     FittedMaterial,
     FormFit,
     parameter_record,
-    phong_record,
     physical_materials,
 )
-from comparisons.fit.model import OwnModel, PhongModel, Surface
+from comparisons.fit.model import OwnModel, PhongModel
 from comparisons.fit.search import (
-    COVERAGE,
     LOSSES,
-    Certainty,
     Loss,
     Objective,
     bounded_minimum,
@@ -46,7 +43,7 @@ from comparisons.fit.search import (
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
 from heuristic.errors import InputError, unknown
-from heuristic.heuristics import PHONG, Heuristic, Interpolation, named
+from heuristic.heuristics import PHONG, Interpolation, named
 from heuristic.materials import FORMS
 from reference.records import Pixels
 from reference.rendering.renderer import Progress, pass_seed, passes, variant
@@ -121,9 +118,12 @@ def fit(
     if heuristic is PHONG:
         with variant(VARIANT):
             seen = model.see(rendered.ready.heuristic, rendered.seeds)
-            fits = [_form_fit(rendered, seen, form, LOSSES[loss]) for form in forms]
+            models = [PhongModel(seen, form, rendered.counted.ravel()) for form in forms]
+            fits = [_best(rendered, each, form_starts, LOSSES[loss]) for each in models]
     else:
-        fits = [_own_fit(rendered, heuristic, LOSSES[loss])]
+        half, seeds = rendered.ready.heuristic, rendered.seeds
+        own = OwnModel(half, heuristic, seeds, rendered.counted)
+        fits = [_best(rendered, own, own_starts, LOSSES[loss])]
     best = min(range(len(fits)), key=lambda place: fits[place][0].loss)
     ready = rendered.ready
     record = FitRecord(
@@ -150,7 +150,8 @@ def fit(
 def _completed(options: Options) -> Options:
     """Fill in a fit's own defaults."""
     options.require_model("a fit")
-    if options.heuristic != PHONG.name and named(options.heuristic).is_own:
+    heuristic = named(options.heuristic)
+    if heuristic is not PHONG and heuristic.is_own:
         raise InputError(
             f"heuristic {options.heuristic} cannot be fitted: --form has the built-in lobes,"
             f" {' and '.join(FORMS)}. Omit --heuristic."
@@ -159,6 +160,17 @@ def _completed(options: Options) -> Options:
         raise InputError(
             f"interpolation {options.polygon_shading.value} cannot be fitted: it shades vertices or"
             " faces. Give --interpolation phong."
+        )
+    advice = "`def shade(point, gloss: Range(0, 1) = 0.5)`"
+    if not heuristic.traced:
+        raise InputError(
+            f"heuristic {heuristic.name} has no derivatives, which a fit needs. Write it in Python:"
+            f" {advice} has a parameter to fit."
+        )
+    if heuristic is not PHONG and not heuristic.parameters:
+        raise InputError(
+            f"heuristic {heuristic.name} has no parameters to fit. Declare one with its bounds:"
+            f" {advice}."
         )
     resolution, spp = options.resolution or RESOLUTION, options.spp or SPP
     return options.changed(resolution=resolution, spp=spp, allow_empty=False)
@@ -195,34 +207,44 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
     return RenderedHalves(ready, seeds, before.mean, reference, difference, counted, viewing)
 
 
-FormResult = tuple[FormFit, NDArray, dict[str, NDArray]]
-"""The record of a form's fit, its image, and the maps of what it leaves."""
-
-
-def _form_fit(rendered: RenderedHalves, seen: Surface, form: str, loss: Loss) -> FormResult:
-    """Fit one form of the lobe."""
-    counted = rendered.counted.ravel()
-    phong = PhongModel(seen, form, counted)
-    reached = [int(counted[np.unique(samples["pixel"])].sum()) for samples in seen.samples]
-    pixels = np.array([reached[parameter.owner] for parameter in phong.parameters])
-    x, certainties, covariance, losses = _search(rendered, phong, loss, form_starts, pixels)
+def _best(
+    rendered: RenderedHalves,
+    fitted: PhongModel | OwnModel,
+    starts: Callable[[Objective], list[NDArray]],
+    loss: Loss,
+) -> tuple[FormFit, NDArray, dict[str, NDArray]]:
+    """Return the record of a fit, its image, and the maps of what it leaves."""
+    counted = rendered.counted
+    objective = Objective(fitted, rendered.reference.mean[counted], loss, rendered.viewing)
+    x, least, converged = search(objective, starts(objective))
+    pixels = np.array([fitted.reached[parameter.owner] for parameter in fitted.parameters])
+    error = rendered.difference.standard_error[counted]
+    certainties, covariance = identify(objective, x, pixels, error)
     physical = physical_materials(rendered.ready.pair.physical)
     materials = tuple(
         FittedMaterial(
             name=name,
             reference=physical.get(name),
-            pixels=reached[owner],
+            pixels=fitted.reached[owner],
             parameters=tuple(
-                phong_record(phong, place, x, certainties, covariance)
-                for place, parameter in enumerate(phong.parameters)
+                parameter_record(fitted, place, x, certainties, covariance)
+                for place, parameter in enumerate(fitted.parameters)
                 if parameter.owner == owner
             ),
         )
-        for owner, name in enumerate(seen.names)
+        for owner, name in enumerate(fitted.names)
     )
-    after = phong.whole(x).reshape(rendered.before.shape)
+    after = fitted.whole(x).reshape(rendered.before.shape)
     by_metric, maps = departures(rendered, after)
-    return FormFit(form=form, materials=materials, departure=by_metric, **losses), after, maps
+    record = FormFit(
+        form=fitted.form,
+        loss=least,
+        parameter_error=objective.value_of(rendered.before[counted]) - least,
+        departure=by_metric,
+        materials=materials,
+        converged=converged,
+    )
+    return record, after, maps
 
 
 def form_starts(objective: Objective) -> list[NDArray]:
@@ -246,60 +268,13 @@ def form_starts(objective: Objective) -> list[NDArray]:
     return starts
 
 
-def _own_fit(rendered: RenderedHalves, heuristic: Heuristic, loss: Loss) -> FormResult:
-    """Fit the parameters that a heuristic declares, from places within their bounds."""
-    advice = "`def shade(point, gloss: Range(0, 1) = 0.5)`"
-    if not heuristic.traced:
-        raise InputError(
-            f"heuristic {heuristic.name} has no derivatives, which a fit needs. Write it in Python:"
-            f" {advice} has a parameter to fit."
-        )
-    if not heuristic.parameters:
-        raise InputError(
-            f"heuristic {heuristic.name} has no parameters to fit. Declare one with its bounds:"
-            f" {advice}."
-        )
-    own = OwnModel(rendered.ready.heuristic, heuristic, rendered.seeds, rendered.counted)
-    default = np.array([each.paired for each in own.parameters])
-    reach, (low, high) = REACH * np.maximum(np.abs(default), 1.0), model.bounds(own.parameters)
+def own_starts(objective: Objective) -> list[NDArray]:
+    """Return the defaults of a heuristic's parameters, and places within their bounds."""
+    parameters = objective.model.parameters
+    default = np.array([each.paired for each in parameters])
+    reach, (low, high) = REACH * np.maximum(np.abs(default), 1.0), model.bounds(parameters)
     low, high = np.maximum(low, default - reach), np.minimum(high, default + reach)
-    random = np.random.default_rng(0).uniform(low, high, (OWN_STARTS, len(default)))
-    pixels = np.full(len(default), rendered.counted.sum())
-    best, certainties, covariance, losses = _search(
-        rendered, own, loss, lambda _: [default, *random], pixels
-    )
-    spread = COVERAGE * np.sqrt(np.diag(covariance))
-    records = tuple(
-        parameter_record(
-            parameter,
-            certainties[i],
-            (parameter.paired, x, x - spread[i], x + spread[i]),
-            (parameter.low, parameter.high),
-            [own.parameters[other].name for other in certainties[i].partners],
-        )
-        for i, (parameter, x) in enumerate(zip(own.parameters, best.tolist(), strict=True))
-    )
-    after, form = own.whole(best), rendered.ready.pair.shading
-    by_metric, maps = departures(rendered, after)
-    return FormFit(form=form, own=records, departure=by_metric, **losses), after, maps
-
-
-def _search(
-    rendered: RenderedHalves,
-    fitted: PhongModel | OwnModel,
-    loss: Loss,
-    starts: Callable[[Objective], list[NDArray]],
-    pixels: NDArray,
-) -> tuple[NDArray, list[Certainty], NDArray, dict[str, Any]]:
-    """Return the best parameters, how certain they are, and the fields of the losses."""
-    counted = rendered.counted
-    objective = Objective(fitted, rendered.reference.mean[counted], loss, rendered.viewing)
-    x, least, converged = search(objective, starts(objective))
-    error = rendered.difference.standard_error[counted]
-    certainties, covariance = identify(objective, x, pixels, error)
-    removed = objective.value_of(rendered.before[counted]) - least
-    losses = {"loss": least, "parameter_error": removed, "converged": converged}
-    return x, certainties, covariance, losses
+    return [default, *np.random.default_rng(0).uniform(low, high, (OWN_STARTS, len(default)))]
 
 
 def departures(

@@ -9,7 +9,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from comparisons.departure.colour import Viewing
-from comparisons.fit.model import FitParameter, PhongModel
+from comparisons.fit.model import OwnModel, PhongModel
 from comparisons.fit.search import AT_BOUND, COVERAGE, Certainty
 from heuristic.terms import normalisation
 from reference.records import VERSION, Amount, Count, Pixels, Record, Resolution, Size, Versions
@@ -61,7 +61,7 @@ class FittedMaterial(Record):
 
 
 class FormFit(Record, kw_only=True):
-    """The best fit of one form of the lobe, or of a heuristic's own parameters, in ``own``."""
+    """The best fit of one form of the lobe, or of the parameters of a heuristic."""
 
     form: Annotated[str, Meta(description="``phong`` or ``blinn``, or the heuristic.")]
     loss: Annotated[
@@ -69,9 +69,11 @@ class FormFit(Record, kw_only=True):
     ]
     parameter_error: Annotated[float, Meta(description="What better parameters remove of it.")]
     departure: Annotated[dict[str, FitDeparture], Meta(description="By metric.")]
-    materials: tuple[FittedMaterial, ...] = ()
+    materials: Annotated[
+        tuple[FittedMaterial, ...],
+        Meta(description="Or the heuristic, with its own parameters."),
+    ]
     converged: Annotated[bool, Meta(description="Whether the search that found them did.")]
-    own: tuple[FittedParameter, ...] = ()
 
 
 class FitRecord(Record, kw_only=True):
@@ -121,53 +123,43 @@ def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
     return materials
 
 
-def phong_record(
-    phong: PhongModel,
+def parameter_record(
+    model: PhongModel | OwnModel,
     place: int,
     x: NDArray,
     certainties: list[Certainty],
     covariance: NDArray,
 ) -> FittedParameter:
-    """Return one parameter in the chapters' units; ``k_s`` as its material has it."""
-    parameter, certainty = phong.parameters[place], certainties[place]
-    albedo, spread = float(x[place]), COVERAGE * sqrt(covariance[place, place])
-    raw: tuple[float, ...] = (parameter.paired, albedo, albedo - spread, albedo + spread)
+    """Return one parameter at the best vector ``x``, ``k_s`` and ``n`` in the chapters' units."""
+    parameter, certainty = model.parameters[place], certainties[place]
+    value, spread = float(x[place]), COVERAGE * sqrt(covariance[place, place])
+    raw: tuple[float, ...] = (parameter.paired, value, value - spread, value + spread)
     limits: tuple[float, ...] = (parameter.low, parameter.high)
-    if parameter.name == "k_s" and not phong.surface.materials[parameter.owner].normalised:
+    phong = model if isinstance(model, PhongModel) else None
+    if phong and parameter.name == "n":
+        raw, limits = tuple(map(exp, raw)), tuple(map(exp, limits))
+    elif (
+        phong
+        and parameter.name == "k_s"
+        and not phong.surface.materials[parameter.owner].normalised
+    ):
         at_n, step = phong.place_of_exponent(parameter.owner), 1e-5
         per_albedo, below, above = (
             normalisation(phong.form, exp(x[at_n] + shift)) for shift in (0, -step, step)
         )
         slopes = np.zeros(len(x))
-        slopes[[place, at_n]] = per_albedo, albedo * (above - below) / (2 * step)
+        slopes[[place, at_n]] = per_albedo, value * (above - below) / (2 * step)
         spread = COVERAGE * sqrt(max(slopes @ covariance @ slopes, 0))
-        paired = parameter.paired * normalisation(phong.form, exp(phong.parameters[at_n].paired))
-        fitted = albedo * per_albedo
-        raw, limits = (paired, fitted, fitted - spread, fitted + spread), (0.0, per_albedo)
-        if not certainty.reason and certainties[at_n].reason and albedo > AT_BOUND:
+        at_pairing = normalisation(phong.form, exp(phong.parameters[at_n].paired))
+        k_s, limits = value * per_albedo, (0.0, per_albedo)
+        raw = parameter.paired * at_pairing, k_s, k_s - spread, k_s + spread
+        if not certainty.reason and certainties[at_n].reason and value > AT_BOUND:
             reason = "follows from its albedo and n, which is not identifiable"
             certainty = Certainty(reason, (), certainty.at_bound)
-    elif parameter.name == "n":
-        raw, limits = tuple(map(exp, raw)), tuple(map(exp, limits))
-    partners = []
-    for other in certainty.partners:
-        one = phong.parameters[other]
-        name = f"{one.name} {one.channel}".strip()
-        partners.append(f"{name} of {phong.surface.names[one.owner]}")
-    return parameter_record(parameter, certainty, raw, limits, partners)
-
-
-def parameter_record(
-    parameter: FitParameter,
-    certainty: Certainty,
-    values: tuple[float, ...],
-    limits: tuple[float, ...],
-    partners: list[str],
-) -> FittedParameter:
-    """Return a parameter of which these are the paired and fitted value, and the interval."""
-    paired, fitted, below, above = map(float, values)
+    paired, fitted, least, most = map(float, raw)
     low, high = map(float, limits)
     has_interval = not (certainty.reason or certainty.at_bound)
+    others = (model.parameters[other] for other in certainty.partners)
     return FittedParameter(
         name=parameter.name,
         channel=parameter.channel,
@@ -175,10 +167,13 @@ def parameter_record(
         paired=paired,
         fitted=None if certainty.reason else fitted,
         stopped_at=fitted,
-        interval=(max(below, low), min(above, high)) if has_interval else None,
+        interval=(max(least, low), min(most, high)) if has_interval else None,
         bounds=(low if isfinite(low) else None, high if isfinite(high) else None),
         at_bound=certainty.at_bound,
         identifiable=not certainty.reason,
         reason=certainty.reason,
-        partners=tuple(partners),
+        partners=tuple(
+            f"{f'{each.name} {each.channel}'.strip()} of {model.names[each.owner]}"
+            for each in others
+        ),
     )

@@ -276,15 +276,17 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
 class PhongModel:
     """The heuristic half of a scene as a function of its parameters, for one form of the lobe.
 
-    An image is that of the pixels of a mask (N). ``vector`` is the type of the kernel's arrays,
+    An image is that of the pixels of a mask (N), of which each material reaches some. ``vector`` is the type of the kernel's arrays,
     such as one of double precision.
     """
 
     def __init__(
         self, surface: Surface, form: str, counted: NDArray | None = None, vector: Any = None
     ) -> None:
-        self.surface, self.form = surface, form
+        self.surface, self.form, self.names = surface, form, surface.names
         self.counted = np.ones(len(surface.fixed), bool) if counted is None else counted
+        seen = (np.unique(samples["pixel"]) for samples in surface.samples)
+        self.reached = [int(self.counted[pixels].sum()) for pixels in seen]
         self.parameters = phong_parameters(surface, form)
         self.linear = np.array([one.name in COEFFICIENTS for one in self.parameters], bool)
         self._vector = vector or mi.Vector3f
@@ -387,6 +389,11 @@ class OwnModel:
         self.parameters = tuple(
             FitParameter(each.name, 0, each.default, each.low, each.high)
             for each in heuristic.parameters
+        )
+        self.form, self.names, self.reached = (
+            heuristic.name,
+            (heuristic.name,),
+            [int(counted.sum())],
         )
         self._renderer, self._seeds, self._counted = renderer, seeds, counted
         self._kept = lru_cache(maxsize=2 + len(self.parameters))(self._rendered)

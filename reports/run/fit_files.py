@@ -92,7 +92,7 @@ def _departures(record: FitRecord) -> Iterator[Cells]:
 def _parameters(fit: FormFit) -> Iterator[Cells]:
     yield "material", "parameter", "paired", "fitted", "95 %, by noise", ""
     owned = [(each.name, parameter) for each in fit.materials for parameter in each.parameters]
-    for owner, parameter in [*owned, *((fit.form, parameter) for parameter in fit.own)]:
+    for owner, parameter in owned:
         interval, note = parameter.interval, "at its bound" if parameter.at_bound else ""
         if parameter.reason:
             partners = f" ({', '.join(parameter.partners)})" if parameter.partners else ""
