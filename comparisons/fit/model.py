@@ -276,8 +276,8 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
 class PhongModel:
     """The heuristic half of a scene as a function of its parameters, for one form of the lobe.
 
-    An image is that of the pixels of a mask (N), of which each material reaches some. ``vector`` is the type of the kernel's arrays,
-    such as one of double precision.
+    An image is that of the pixels of a mask (N), of which each material has ``reached`` some.
+    ``vector`` is the type of the kernel's arrays, such as one of double precision.
     """
 
     def __init__(
@@ -390,11 +390,8 @@ class OwnModel:
             FitParameter(each.name, 0, each.default, each.low, each.high)
             for each in heuristic.parameters
         )
-        self.form, self.names, self.reached = (
-            heuristic.name,
-            (heuristic.name,),
-            [int(counted.sum())],
-        )
+        self.form, self.names = heuristic.name, (heuristic.name,)
+        self.reached = [int(counted.sum())]
         self._renderer, self._seeds, self._counted = renderer, seeds, counted
         self._kept = lru_cache(maxsize=2 + len(self.parameters))(self._rendered)
 
