@@ -134,8 +134,6 @@ class Contribution(Record):
 
     Attributes
     ----------
-    effect
-        Its label.
     removes
         Mean ΔE2000 that it removes; negative if it increases the departure.
     alone, last
@@ -158,8 +156,6 @@ class ObjectContribution(Record):
 
     Attributes
     ----------
-    name
-        Id of the shape.
     pixels
         Number of counted pixels that see it.
     share
@@ -206,8 +202,6 @@ class Attribution(Record):
         Orders of the effects that were drawn; 0 if every subset was rendered.
     hybrids
         All images that were rendered, fewest effects first.
-    objects
-        What the effects remove on each shape.
     """
 
     effects: tuple[Contribution, ...]
@@ -244,12 +238,8 @@ class PictureRecord(Record):
 
     Attributes
     ----------
-    files
-        The files as given.
     transfer
         Transfer function of their values, as stated; null for EXR's own, which is linear.
-    repeats
-        Number of the pictures.
     shift
         Pixels by which their content is too far right and too low; null if their edges are
         uninformative.

@@ -5,9 +5,7 @@ in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, 
 *Attributes* of the docstring, and both go into the schema.
 """
 
-import inspect
 import json
-import re
 from typing import Annotated, Any, TypeVar, dataclass_transform
 
 import msgspec
@@ -76,14 +74,6 @@ def to_json(record: Any) -> str:
     return json.dumps(plain(record), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def schema(kind: type) -> dict[str, Any]:
-    """Return the JSON Schema of a type of record."""
-    made = msgspec.json.schema(kind)
-    for definition in made["$defs"].values():
-        _describe(definition)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
-
-
 def read(kind: type[Kind], text: str, where: str) -> Kind:
     """Read a record from JSON; InputError names the file ``where`` if it holds none."""
     try:
@@ -114,44 +104,7 @@ def _of_version_2(kind: type[Kind], content: dict[str, Any], where: str) -> Kind
         ) from error
 
 
-def _describe(definition: dict[str, Any]) -> None:
-    docstring = inspect.cleandoc(
-        re.sub(r":\w+:`([^`]*)`", r"\1", definition.get("description", ""))
-    )
-    text, _, attributes = docstring.partition("\n\nAttributes\n----------\n")
-    if text:
-        definition["description"] = " ".join(text.split())
-    for names, meaning in re.findall(r"^(\S.*)\n((?:    .*\n?)+)", attributes, re.MULTILINE):
-        for name in names.split(", "):
-            definition["properties"][name].setdefault("description", " ".join(meaning.split()))
-
-
 def _numpy(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     raise NotImplementedError(f"{type(value).__name__} cannot be in a record")
-
-
-WIDTH = 110
-"""Columns: enough for the colours of a block of pixels with their errors."""
-
-
-def laid_out(value: Any, depth: int = 0, before: str = "") -> str:
-    """Return JSON with one line per entry of the outer two levels, and of others if too long.
-
-    ``before`` is the text already on the line; ``ValueError`` for a NaN or an infinity.
-    """
-    line = json.dumps(value, ensure_ascii=False, allow_nan=False)
-    is_empty = not isinstance(value, (dict, list, tuple)) or not value
-    if is_empty or (depth > 1 and len(before) + len(line) <= WIDTH):
-        return line
-    indent = "  " * (depth + 1)
-    if isinstance(value, dict):
-        keys, items = [f"{json.dumps(key)}: " for key in value], list(value.values())
-    else:
-        keys, items = [""] * len(value), list(value)
-    lines = [
-        indent + key + laid_out(item, depth + 1, indent + key)
-        for key, item in zip(keys, items, strict=True)
-    ]
-    return line[0] + "\n" + ",\n".join(lines) + f"\n{indent[2:]}{line[-1]}"

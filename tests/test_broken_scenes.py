@@ -51,9 +51,9 @@ def changed(before, after):
     "runs", "A scene with impossible values, or nothing in view, is rejected with a message."
 )
 def test_what_cannot_be_meant_is_refused_by_name(rgb, tmp_path):
-    rows = [*TABLE["broken"], ("point", "p\0int", "NUL byte"), ("point", "p\udce9int", "not UTF-8")]
+    odd = [("point", f"p{each}int", "not XML in UTF-8") for each in "\0\udce9"]
     wrong = []
-    for before, after, message in rows:
+    for before, after, message in [*TABLE["broken"], *odd]:
         is_film = any(word in message for word in ("crop", "width", "height"))
         words = {"resolution": None} if is_film else {}
         try:
@@ -177,16 +177,6 @@ def test_a_damaged_mesh_is_named_and_a_sound_one_compared(rgb, tmp_path):
         assert compared(tmp_path, text).record.pixels.counted
 
 
-def test_a_measured_material_is_refused_wherever_it_is_cut(rgb, corpus):
-    path, scene = corpus / "measured.bsdf", (CORPUS / "bsdf-measured.xml").read_text()
-    whole = path.read_bytes()
-    assert compared(corpus, scene).record.pixels.counted
-    for size in (0, 5, 14, 30, 150, *range(200, len(whole), 97), len(whole) - 1):
-        path.write_bytes(whole[:size])
-        with pytest.raises(InputError, match="measured"):
-            compared(corpus, scene)
-
-
 SPECTRUM = '<bsdf type="diffuse"><spectrum name="reflectance" filename="{}"/></bsdf>'
 READERS = (
     '<include filename="{}"/>',
@@ -201,13 +191,12 @@ READERS = (
 def test_special_files_are_refused_before_they_are_opened(rgb, tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "sub").mkdir()
-    kinds = {"a pipe": tmp_path / "pipe", "a folder": tmp_path / "sub", "a device": "/dev/zero"}
-    for kind, path in kinds.items():
+    for path in (tmp_path / "pipe", tmp_path / "sub", "/dev/zero"):
         for reader in READERS:
-            with pytest.raises(InputError, match=f"{path} is {kind}"):
+            with pytest.raises(InputError, match=f"{path} is not a regular file"):
                 compared(tmp_path, SCENE.replace(END, reader.format(path) + END))
     spectrum = {"type": "spectrum", "filename": str(tmp_path / "pipe")}
-    with pytest.raises(InputError, match="is a pipe"):
+    with pytest.raises(InputError, match="is not a regular file"):
         open_case({"type": "scene", "part": {"type": "diffuse", "reflectance": spectrum}})
 
 
@@ -230,7 +219,7 @@ def test_no_spelling_hides_a_file_from_its_check(rgb, tmp_path):
         os.mkfifo(tmp_path / name)
     for spelling in HIDDEN:
         begin = perf_counter()
-        with pytest.raises(InputError, match=r"is a pipe|this is not XML"):
+        with pytest.raises(InputError, match=r"is not a regular file|this is not XML"):
             case_of(tmp_path, SCENE.replace(END, spelling + END))
         assert perf_counter() - begin < 2
 
@@ -266,13 +255,6 @@ def test_comments_may_have_hyphens(rgb, tmp_path):
     assert case_of(tmp_path, SCENE.replace(END, f"<!-- -- Lights --- -->{END}")).source.parse()
 
 
-def test_text_without_end_is_refused(rgb, tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "LONGEST", 4200)
-    (tmp_path / "part.xml").write_text(f'<scene version="3.0.0"><!--{4000 * "x"}--></scene>')
-    with pytest.raises(InputError, match=r"part.xml: .*4200 are allowed"):
-        compared(tmp_path, SCENE.replace(END, '<include filename="part.xml"/>' + END))
-
-
 def test_a_chain_of_includes_ends(rgb, tmp_path, monkeypatch):
     monkeypatch.setattr(files, "DEEPEST", 5)
     for place in range(6):
@@ -283,15 +265,6 @@ def test_a_chain_of_includes_ends(rgb, tmp_path, monkeypatch):
         compared(tmp_path, SCENE.replace(END, '<include filename="0.xml"/>' + END))
     included = files.included(tmp_path / "4.xml")
     assert [path.name for path in included.paths] == ["4.xml", "5.xml", "6.xml"]
-
-
-def test_includes_that_fan_out_end(rgb, tmp_path):
-    for depth in range(10):
-        inner = f'<include filename="{depth + 1}.xml"/>' * 6
-        (tmp_path / f"{depth}.xml").write_text(f'<scene version="3.0.0">{inner}</scene>')
-    (tmp_path / "10.xml").write_text('<scene version="3.0.0"/>')
-    with pytest.raises(InputError, match=f"more than {files.MOST_INCLUDES} times"):
-        compared(tmp_path, SCENE.replace(END, '<include filename="0.xml"/>' + END))
 
 
 def test_names_that_no_file_has_are_refused(rgb, tmp_path):

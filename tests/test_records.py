@@ -28,7 +28,7 @@ class Toy(Record):
 
 
 def test_a_docstring_describes_the_attributes_in_the_schema():
-    toy = records.schema(Toy)["$defs"]["Toy"]
+    toy = schemas.schema(Toy)["$defs"]["Toy"]
     assert toy["description"] == "A toy. It is small."
     described = {name: field.get("description") for name, field in toy["properties"].items()}
     words = "Of its skin, as tests.Skin."

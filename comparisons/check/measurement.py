@@ -10,6 +10,7 @@ digits, far finer than rounding errors, and errors 3.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -30,7 +31,7 @@ from heuristic import program
 from heuristic.errors import InputError
 from reference import records
 from reference.pairing.prepare import film_size
-from reference.records import VERSION, Amount, Record, Versions, laid_out
+from reference.records import VERSION, Amount, Record, Versions
 from reference.rendering.renderer import Progress, passes
 from reference.rendering.sums import jackknife_error
 from reference.scene.source import Source
@@ -328,3 +329,28 @@ def _rounded(value: Any, digits: int = 8) -> Any:
     if isinstance(value, (list, tuple)):
         return [_rounded(one, digits) for one in value]
     return float(f"{value:.{digits}g}") if isinstance(value, float) else value
+
+
+WIDTH = 110
+"""Columns: enough for the colours of a block of pixels with their errors."""
+
+
+def laid_out(value: Any, depth: int = 0, before: str = "") -> str:
+    """Return JSON with one line per entry of the outer two levels, and of others if too long.
+
+    ``before`` is the text already on the line; ``ValueError`` for a NaN or an infinity.
+    """
+    line = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    is_empty = not isinstance(value, (dict, list, tuple)) or not value
+    if is_empty or (depth > 1 and len(before) + len(line) <= WIDTH):
+        return line
+    indent = "  " * (depth + 1)
+    if isinstance(value, dict):
+        keys, items = [f"{json.dumps(key)}: " for key in value], list(value.values())
+    else:
+        keys, items = [""] * len(value), list(value)
+    lines = [
+        indent + key + laid_out(item, depth + 1, indent + key)
+        for key, item in zip(keys, items, strict=True)
+    ]
+    return line[0] + "\n" + ",\n".join(lines) + f"\n{indent[2:]}{line[-1]}"

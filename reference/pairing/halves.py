@@ -5,18 +5,13 @@ replaces physical parts, the physical half replaces heuristic parts, and parts o
 stay. Both keep the scene's geometry, cameras and films.
 """
 
-import shutil
-import weakref
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
-from tempfile import mkdtemp
 
 import mitsuba as mi
 import numpy as np
 
-from heuristic.convention import Scene
-from heuristic.errors import FotismosError, InputError, OutputError
+from heuristic.errors import FotismosError, InputError
 from heuristic.heuristics import PHONG, Interpolation, named
 from heuristic.plugins import register
 from reference.pairing import bsdfs, emitters
@@ -32,7 +27,7 @@ from reference.pairing.factors import (
 from reference.pairing.prepare import Override, prepare
 from reference.records import Record
 from reference.rendering.gbuffer import gbuffer
-from reference.scene.graph import Graph, Reference, properties
+from reference.scene.graph import Graph, properties
 from reference.scene.source import Source
 
 BSDF, INTEGRATOR, MEDIUM, SHAPE = (
@@ -125,7 +120,9 @@ def _paired(
     ambient = settings.ambient if settings.ambient is not None else radiance
     _set_integrator(half, ambient, settings, interpolation, prune, model)
     if interpolation is not Interpolation.PHONG or tessellation is not None:
-        replace_shapes(half, geometry(), tessellation, interpolation)
+        from reference.pairing import polygons  # loaded late: few scenes are made into triangles
+
+        polygons.replace_shapes(half, geometry(), tessellation, interpolation)
 
     physical = graph.copy()
     emitters.add_glowing_shapes(physical, replaced)
@@ -196,56 +193,3 @@ def _energy_warnings(graph):
                 f"{graph.label(index)}: reflects {reflected:.3g} times the light that it receives"
                 " at normal incidence (k_d and the lobe's albedo): no physical material does."
             )
-
-
-def replace_shapes(
-    graph: Graph, scene: Scene, resolution: int | None, interpolation: Interpolation
-) -> None:
-    """Replace every shape of a graph by a mesh of the same place, name, material and light.
-
-    ``scene`` has the same shapes, instantiated; ids identify them. Gouraud shading needs one normal
-    per vertex, hence separate faces if the mesh has ``face_normals``.
-    """
-    # Loaded late: few scenes are made into triangles.
-    from heuristic import tessellation
-    from heuristic.plugins.interpolated import viewpoint
-
-    if interpolation is not Interpolation.PHONG:
-        viewpoint(scene.sensors()[0])  # raises before anything renders
-    folder = _Folder()
-    shapes = {shape.id(): shape for shape in scene.shapes()}
-    for index in graph.nodes(SHAPE):
-        given = graph.props(index)
-        if given.id() not in shapes or graph.plugin(index) == "instance":
-            raise InputError(
-                f"{graph.name}: {graph.label(index)}: instances and their groups cannot become"
-                " separate meshes. Use --interpolation phong."
-            )
-        mesh = tessellation.to_mesh(shapes[given.id()], resolution or tessellation.RESOLUTION)
-        if mesh.has_face_normals():
-            if interpolation is Interpolation.GOURAUD:
-                mesh = tessellation.split_faces(mesh)
-        elif not mesh.has_vertex_normals():
-            mesh = tessellation.with_vertex_normals(mesh)
-        path = folder.path / f"{index}.ply"
-        try:
-            mesh.write_ply(str(path))
-        except RuntimeError as error:
-            raise OutputError(
-                f"{graph.name}: {error}. Free some space, or set TMPDIR to another folder."
-            ) from error
-        children = {key: value for key, value in given.items() if isinstance(value, Reference)}
-        # The file holds world coordinates; a mesh without vertex normals has flat faces.
-        derived = properties("ply", filename=str(path), **children)
-        if mesh.has_face_normals():
-            derived["face_normals"] = True
-        graph.replace(index, derived)
-    graph.folders.append(folder)
-
-
-class _Folder:
-    """A temporary folder that goes away with the last graph; ``TemporaryDirectory`` would warn."""
-
-    def __init__(self):
-        self.path = Path(mkdtemp(prefix="fotismos-"))
-        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)

@@ -101,27 +101,21 @@ class Plan(Record):
     ----------
     kernel_terms
         Coefficients whose terms the heuristic kernel holds.
-    integrator
-        Mitsuba integrator of the reference.
     stock_integrator, scene_depth
         The integrator and the depth of paths that Mitsuba's users get.
     sampler
         Mitsuba sampler of both renderings.
     spp
-        Samples per pixel, over all passes.
+        Over all passes.
     exact
         Whether only camera rays are random: both halves are then functions of the ray alone, and
         their difference has no noise.
     rr_depth
         Depth at which Russian roulette of paths begins.
-    shadows
-        Whether the reference traces shadow rays.
     bsdf_samples
-        Samples of the BSDF that look for lights.
+        Those that look for lights.
     tabulated_environment
         Whether a constant environment comes from a table of albedos.
-    rules
-        Which rules of pruning apply.
     heuristic_reads
         What the heuristic reads of each point that it shades.
     """

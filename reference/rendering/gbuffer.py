@@ -86,15 +86,10 @@ def resize(scene: Scene, size: tuple[int, int]) -> None:
         parameters.update()
 
 
-def camera_rays(scene: Scene, width: int, height: int, sensor: int = 0) -> Any:
-    """Return the rays through the centres of ``width`` by ``height`` cells of the film."""
+def gbuffer(scene: Scene, width: int = GRID, height: int = GRID) -> GBuffer:
+    """Trace rays through the centres of ``width`` by ``height`` cells of the film."""
     places = np.meshgrid(np.arange(width), np.arange(height))
-    return pixel_rays(scene, (width, height), *places, sensor)
-
-
-def gbuffer(scene: Scene, width: int = GRID, height: int = GRID, sensor: int = 0) -> GBuffer:
-    """Trace the rays of :func:`camera_rays`."""
-    si = scene.ray_intersect(camera_rays(scene, width, height, sensor))
+    si = scene.ray_intersect(pixel_rays(scene, (width, height), *places))
     hit = si.is_valid()
     normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
     points, normals = (
@@ -131,11 +126,9 @@ def _object_ids(pointers, seen):
     return ObjectIds(np.where(seen, places.reshape(seen.shape), -1), names)
 
 
-def pixel_rays(
-    scene: Scene, size: tuple[int, int], x: np.ndarray, y: np.ndarray, sensor: int = 0
-) -> Any:
+def pixel_rays(scene: Scene, size: tuple[int, int], x: np.ndarray, y: np.ndarray) -> Any:
     """Return the camera rays through the cells in columns ``x`` and rows ``y`` of a film."""
     places = (np.ravel(place) + 0.5 for place in (x, y))
     across, down = (mi.Float(place / side) for place, side in zip(places, size, strict=True))
     film = mi.Point2f(across, down)
-    return scene.sensors()[sensor].sample_ray_differential(0.0, 0.5, film, mi.Point2f(0.5))[0]
+    return scene.sensors()[0].sample_ray_differential(0.0, 0.5, film, mi.Point2f(0.5))[0]

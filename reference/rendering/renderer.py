@@ -11,7 +11,6 @@ from contextlib import contextmanager, suppress
 from copy import copy
 from dataclasses import dataclass
 from enum import IntEnum
-from math import isqrt
 from pathlib import Path
 from statistics import median
 from time import perf_counter, process_time
@@ -329,20 +328,13 @@ def _wrong(image, right, what):
 
 
 def require_memory(name: str, width: int, height: int) -> None:
-    """Reject an image that does not fit into memory, and name the largest that does."""
+    """Reject an image that does not fit into memory."""
     free, need = available_memory(), BASE + BYTES_A_PIXEL * width * height
-    if free is None or need <= free:
-        return
-    pixels = max(free - BASE, 0) // BYTES_A_PIXEL
-    wide = isqrt(pixels * width // height)
-    high = wide * height // width
-    advice = "Not even a small one fits:"
-    if wide and high:
-        advice = f"At most {wide}x{high} pixels of this shape fit: give such a --resolution, or"
-    raise InputError(
-        f"{name}: an image of {width}x{height} pixels needs {need / 1e9:.2g} GB of memory, and"
-        f" {free / 1e9:.2g} GB are free. {advice} free some memory."
-    )
+    if free is not None and need > free:
+        raise InputError(
+            f"{name}: an image of {width}x{height} pixels needs {need / 1e9:.2g} GB of memory, and"
+            f" {free / 1e9:.2g} GB are free. Give a smaller --resolution, or free some memory."
+        )
 
 
 def available_memory() -> int | None:

@@ -5,7 +5,6 @@ missing, an infinite index of refraction is black. A pipe blocks whoever opens i
 """
 
 from collections.abc import Iterator, Mapping
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -25,21 +24,13 @@ SMALLEST_RATIO = 1e-14
 
 PICTURES = ("filename", "bitmap", "data")
 CHILDREN = {"blendbsdf": (mi.ObjectType.BSDF, 2), "volume": (mi.ObjectType.Volume, 1)}
-CAMERAS, FILMS = "perspective thinlens orthographic", "hdrfilm specfilm"
 
-ABOVE_0, BELOW_180 = float(np.nextafter(0, 1)), float(np.nextafter(180, 0))
-ANY, INFINITY = None, float("inf")
+ABOVE_0, ANY, INFINITY = float(np.nextafter(0, 1)), None, float("inf")
 
 RANGES = (
     ("radius", "sphere cylinder", ANY, "a radius other than 0"),
-    (
-        "fov",
-        "perspective thinlens projector",
-        (ABOVE_0, BELOW_180),
-        "an angle between 0 and 180 degrees, both excluded",
-    ),
     ("cutoff_angle", "spot", (ABOVE_0, 180), "an angle above 0 and up to 180 degrees"),
-    ("near_clip far_clip focus_distance", CAMERAS, (ABOVE_0, INFINITY), "a distance above 0"),
+    ("focus_distance", "thinlens", (ABOVE_0, INFINITY), "a distance above 0"),
     ("int_ior ext_ior", "", (ABOVE_0, INFINITY), "an index of refraction above 0"),
     ("eta", "principled principledthin", (ABOVE_0, INFINITY), "an index of refraction above 0"),
     ("eta k", "conductor roughconductor", (0, INFINITY), "values of 0 or more"),
@@ -50,8 +41,7 @@ RANGES = (
         ANY,
         "a vector of any length but 0",
     ),
-    ("width height crop_width crop_height", FILMS, (1, INFINITY), "1 or more pixels"),
-    ("crop_offset_x crop_offset_y", FILMS, (0, INFINITY), "0 or more pixels"),
+    ("width height crop_width crop_height", "hdrfilm specfilm", (1, INFINITY), "1 or more pixels"),
 )
 """Parameters, the plugins that have them (all if empty), their range, or ANY but 0, and its words.
 
@@ -63,7 +53,7 @@ def check(graph: Graph) -> None:
     """Reject values that make no sense, and damaged files, in all elements in use."""
     for index in graph.nodes_in_use():
         check_node(graph, index)
-        if graph.plugin(index) in ("measured", "ply", "serialized"):
+        if graph.plugin(index) in ("ply", "serialized"):
             from reference.scene import files  # loaded late: most scenes have no such files
 
             if objection := files.damage(graph, index):
@@ -76,7 +66,7 @@ def check_node(graph: Graph, index: int) -> None:
     for key, value in props.items():
         for allowed in _objections(plugin, key, value):
             raise _refusal(graph, index, f"{key} = {_shown(value)} is not allowed: give {allowed}.")
-    for objection in (*_conflicts(plugin, props), *_missing(graph, index)):
+    for objection in _missing(graph, index):
         raise _refusal(graph, index, objection)
 
 
@@ -148,27 +138,10 @@ def _missing(graph: Graph, index: int) -> Iterator[str]:
         found = len(graph.children(index, kind))
         if found != count:
             yield f"it needs {count} {kind.name} elements, and has {found}."
-
-
-def _conflicts(plugin: str, props: mi.Properties) -> Iterator[str]:
     if plugin == "cylinder" and "p0" in props and "p1" in props:
         ends = [np.ravel(np.asarray(props[key], float)) for key in ("p0", "p1")]
         if (ends[0] == ends[1]).all():
             yield "p0 and p1 are the same point: give the two ends of the axis."
-    if plugin in CAMERAS.split():
-        near, far = props.get("near_clip", 0.01), props.get("far_clip", 10000.0)
-        if isinstance(near, Real) and isinstance(far, Real) and near >= far:
-            yield f"near_clip = {near:g} is not below far_clip = {far:g}: give a smaller one."
-    if plugin not in FILMS.split():
-        return
-    for side, axis, usual in zip(("width", "height"), "xy", FILM_SIZE, strict=True):
-        size, begin = props.get(side, usual), props.get(f"crop_offset_{axis}", 0)
-        count = props.get(f"crop_{side}", size)
-        if all(isinstance(number, int) for number in (size, begin, count)) and begin + count > size:
-            yield (
-                f"crop_offset_{axis} = {begin} and crop_{side} = {count} reach beyond {side} ="
-                f" {size}: give a crop within the film."
-            )
 
 
 def _shown(value: Any) -> str:

@@ -3,16 +3,13 @@
 Mitsuba's parser recurses and can crash, a pipe blocks whoever opens it, and includes can fan out
 forever. So another parser of XML reads a scene's files first, and names files by Mitsuba's rules:
 placeholders and their ``<default>``, and the folders of ``<path>``. Only faults that would end or
-hang the process are rejected here, and text that is not XML, which the two parsers could read
-differently; Mitsuba rejects the others.
+hang the process are rejected here, and text that is not XML; Mitsuba rejects the others.
 """
 
 import re
-import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import prod
 from pathlib import Path
 from xml.parsers import expat
 
@@ -22,12 +19,6 @@ import numpy as np
 from heuristic import meshes
 from heuristic.errors import InputError
 from reference.scene.graph import DEEPEST, FILENAME, Graph, find_file, require_file
-
-MOST_INCLUDES = 1000
-"""Files that a scene includes, each as often as it is included."""
-
-LONGEST = 2**26
-"""Bytes of a scene's text, with its includes. Meshes and images are separate files."""
 
 PLACEHOLDER = re.compile(r"\$(\w+)")
 COMMENT = re.compile(rb"<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?(?:\?>|\Z)|<!--(.*?)(?:-->|\Z)", re.DOTALL)
@@ -42,7 +33,6 @@ class Files:
     parameters: dict[str, str]
     paths: list[Path] = field(default_factory=list)
     placeholders: set[str] = field(default_factory=set)
-    size: int = 0
 
     def read(self, path: Path, outer: tuple[Path, ...], resolver: mi.FileResolver) -> None:
         """Check a file, included by the ``outer`` ones, and everything that it includes."""
@@ -50,12 +40,12 @@ class Files:
             raise InputError(f"{path}: it includes itself. Remove the <include> that leads back.")
         if len(outer) >= DEEPEST:
             raise InputError(f"{path}: more than {DEEPEST} files include each other.")
-        if len(self.paths) > MOST_INCLUDES:
-            raise InputError(
-                f"{path}: the scene includes files more than {MOST_INCLUDES} times. Join them."
-            )
-        content = _content(path, self.size)
-        self.size += len(content)
+        if not path.is_file():
+            raise InputError(f"{path}: there is no such regular file. Give a Mitsuba scene (.xml).")
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"{path}: {error.strerror}. Ensure that it can be read.") from error
         self.paths.append(path.resolve())
         resolver = mi.FileResolver(resolver)
         resolver.prepend(str(path.parent))
@@ -81,9 +71,7 @@ class Files:
 def included(path: Path, parameters: Mapping[str, str] | None = None) -> Files:
     """Return a scene's :class:`Files`, after ensuring that all can be read.
 
-    ``parameters`` are values for placeholders. :class:`heuristic.errors.InputError` if a file is
-    none or cannot be read, is not XML, includes itself, or is too deep, or if there are more than
-    :data:`MOST_INCLUDES` or :data:`LONGEST` allow.
+    ``parameters`` are values for placeholders.
     """
     files = Files(dict(parameters or {}))
     files.read(path, (), mi.file_resolver())
@@ -93,32 +81,6 @@ def included(path: Path, parameters: Mapping[str, str] | None = None) -> Files:
 def placeholders(path: Path) -> set[str]:
     """Return the names of the placeholders in a scene file and what it includes; none in others."""
     return included(path).placeholders if path.suffix == ".xml" and path.is_file() else set()
-
-
-def _content(path: Path, before: int) -> bytes:
-    """Return a file's bytes, if the scene's text stays short enough, with so many ``before``."""
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such regular file. Give a Mitsuba scene (.xml).")
-    try:
-        size = before + path.stat().st_size
-        if size > LONGEST:
-            raise InputError(
-                f"{path}: with it the scene has {size} bytes of text; at most {LONGEST} are"
-                " allowed. Put meshes and images into separate files."
-            )
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: {error.strerror}. Ensure that it can be read.") from error
-    if b"\0" in content:
-        raise InputError(f"{path}: it holds a NUL byte. Save it as XML in UTF-8.")
-    try:
-        content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        byte = error.object[error.start]
-        raise InputError(
-            f"{path}: it holds {byte:#04x}, which is not UTF-8. Save it in UTF-8."
-        ) from error
-    return content
 
 
 def _elements(path: Path, content: bytes) -> list[Element]:
@@ -138,21 +100,13 @@ def _elements(path: Path, content: bytes) -> list[Element]:
         nonlocal depth
         depth -= 1
 
-    def declared(version, encoding, standalone):
-        if encoding and encoding.lower() not in ("utf-8", "utf8") and not content.isascii():
-            raise InputError(f"{path}: it declares the encoding {encoding}. Save it in UTF-8.")
-
-    def doctype(*_):
-        raise InputError(f"{path}: it has a DOCTYPE, which scenes do not need. Remove it.")
-
     parser = expat.ParserCreate("utf-8")
     parser.StartElementHandler, parser.EndElementHandler = begin, end
-    parser.XmlDeclHandler, parser.StartDoctypeDeclHandler = declared, doctype
     try:
         parser.Parse(COMMENT.sub(_without_hyphens, content), True)
     except expat.ExpatError as error:
         raise InputError(
-            f"{path}: line {error.lineno}, column {error.offset + 1}: this is not XML:"
+            f"{path}: line {error.lineno}, column {error.offset + 1}: this is not XML in UTF-8:"
             f" {expat.ErrorString(error.code)}."
         ) from error
     return elements
@@ -168,28 +122,22 @@ def _without_hyphens(comment: re.Match[bytes]) -> bytes:
 
 
 def damage(graph: Graph, index: int) -> str:
-    """Return what is wrong with the file of a mesh or a table; empty if nothing is.
+    """Return what is wrong with the file of a mesh; empty if nothing is.
 
-    Mitsuba does not check whether the faces of PLY and serialized meshes name vertices that exist,
-    and whether tensor files of `measured` materials are as long as they say: it reads
-    memory beyond them.
+    Mitsuba does not check whether the faces of PLY and serialized meshes name vertices that exist:
+    it reads memory beyond them.
     """
-    plugin = graph.plugin(index)
-    path = graph.file(index) if plugin in ("measured", "ply", "serialized") else None
+    plugin, path = graph.plugin(index), graph.file(index)
     if path is None:
         return ""
     state, number = path.stat(), graph.props(index).get("shape_index", 0)
     stamp = state.st_mtime_ns, state.st_size, mi.variant()
-    fault = _damage_of_file(plugin, str(path), number, stamp)
+    fault = _wrong_mesh(plugin, str(path), number, stamp)
     return f"{path}: {fault} Write the file again." if fault else ""
 
 
 @lru_cache(maxsize=1024)
-def _damage_of_file(plugin: str, path: str, number: int, stamp: tuple) -> str:
-    return _torn_tensor(Path(path)) if plugin == "measured" else _wrong_mesh(plugin, path, number)
-
-
-def _wrong_mesh(plugin: str, path: str, number: int) -> str:
+def _wrong_mesh(plugin: str, path: str, number: int, stamp: tuple) -> str:
     # With face normals nothing is computed at vertices, which may not exist.
     description = {"type": plugin, "filename": path, "face_normals": True}
     if plugin == "serialized":
@@ -207,39 +155,4 @@ def _wrong_mesh(plugin: str, path: str, number: int) -> str:
             f"the position of vertex {lost.argmax()} is not finite, and that of"
             f" {np.count_nonzero(lost)} vertices in all."
         )
-    return ""
-
-
-MAGIC = b"tensor_file\0"
-
-BYTES = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 8, 8: 8, 9: 2, 10: 4, 11: 8}
-"""Bytes of a number, by type: integers of 8 to 64 bits, unsigned and signed, and floats."""
-
-
-def _torn_tensor(path: Path) -> str:
-    """Return what a tensor file lacks; empty for one that Mitsuba itself rejects.
-
-    It has a version of two bytes, the number of fields (uint32), and for each field the length of
-    its name (uint16), the name, the number of axes (uint16), the type (uint8), the offset (uint64)
-    and the lengths of its axes (uint64).
-    """
-    with path.open("rb") as file:
-
-        def unpacked(form: str) -> tuple:
-            return struct.unpack(form, file.read(struct.calcsize(form)))
-
-        if file.read(len(MAGIC)) != MAGIC:
-            return ""
-        size = path.stat().st_size
-        try:
-            _, count = unpacked("<HI")
-            for _ in range(count):
-                (length,) = unpacked("<H")
-                name = file.read(length).decode("ascii", "replace")
-                axes, kind, offset = unpacked("<HBQ")
-                end = offset + BYTES.get(kind, 0) * prod(unpacked(f"<{axes}Q"))
-                if end > size:
-                    return f"the field {name} ends at byte {end}, and the file has {size}."
-        except struct.error:
-            return "the file ends within its table of contents."
     return ""

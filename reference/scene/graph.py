@@ -250,16 +250,8 @@ def find_file(resolver: mi.FileResolver | None, name: str) -> Path | None:
 
 def require_file(where: str, path: Path) -> None:
     """Reject a folder, pipe, socket or device in place of a file."""
-    if path.is_file():
-        return
-    kinds = {
-        "a folder": path.is_dir,
-        "a pipe": path.is_fifo,
-        "a socket": path.is_socket,
-        "a device": lambda: path.is_char_device() or path.is_block_device(),
-    }
-    kind = next((kind for kind, holds in kinds.items() if holds()), "not a file")
-    raise InputError(f"{where}: {path} is {kind}, which cannot be read as a file. Give a file.")
+    if not path.is_file():
+        raise InputError(f"{where}: {path} is not a regular file. Give one.")
 
 
 @contextmanager

@@ -1,16 +1,18 @@
 """Write the published schemas: ``python -m reports.schemas``."""
 
+import inspect
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from comparisons.audit.checks import Audit
-from comparisons.check.measurement import Baseline
+from comparisons.check.measurement import Baseline, laid_out
 from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.fit.fit_record import FitRecord
-from reference import records
-from reference.records import laid_out
 from reports.ci.checks import Checks
 from reports.files.results import RunRecord
 
@@ -30,7 +32,27 @@ PUBLISHED: dict[str, Any] = {
 
 def text(name: str) -> str:
     """Return the content of a schema's file."""
-    return laid_out(records.schema(PUBLISHED[name])) + "\n"
+    return laid_out(schema(PUBLISHED[name])) + "\n"
+
+
+def schema(kind: type) -> dict[str, Any]:
+    """Return the JSON Schema of a type of record."""
+    made = msgspec.json.schema(kind)
+    for definition in made["$defs"].values():
+        _describe(definition)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
+
+
+def _describe(definition: dict[str, Any]) -> None:
+    docstring = inspect.cleandoc(
+        re.sub(r":\w+:`([^`]*)`", r"\1", definition.get("description", ""))
+    )
+    text, _, attributes = docstring.partition("\n\nAttributes\n----------\n")
+    if text:
+        definition["description"] = " ".join(text.split())
+    for names, meaning in re.findall(r"^(\S.*)\n((?:    .*\n?)+)", attributes, re.MULTILINE):
+        for name in names.split(", "):
+            definition["properties"][name].setdefault("description", " ".join(meaning.split()))
 
 
 if __name__ == "__main__":

@@ -1,0 +1,80 @@
+"""The indirect part of the integrator ``direct_all``, sampled."""
+
+from typing import Any
+
+import drjit as dr
+import mitsuba as mi
+
+from heuristic.convention import Colour, Interaction, Mask, Scene
+
+SURVIVAL = 0.95
+"""Largest chance that Russian roulette lets a path continue, as in Mitsuba's ``path``."""
+
+
+@dr.syntax
+def indirect_light(
+    scene: Scene,
+    sampler: Any,
+    si: Interaction,
+    bsdf: Any,
+    max_depth: int,
+    rr_depth: int,
+    active: Mask,
+    shadows: bool,
+    bsdf_samples: int,
+) -> Colour:
+    """Estimate the light that has been reflected at least once before it reaches ``si``.
+
+    Paths begin with a sample of the BSDF there. Direct light takes every light in turn; this picks
+    one at random at each later vertex, as Mitsuba's ``path`` does everywhere. ``max_depth`` counts
+    like Mitsuba's: 2 is direct light, for which the result is 0; -1 is no limit. Beyond
+    ``rr_depth`` Russian roulette may end a path.
+    """
+    context = mi.BSDFContext()
+    limit = mi.UInt32(max_depth if max_depth >= 0 else 0xFFFFFFFF)
+    light = mi.Spectrum(0)
+    bs, throughput = bsdf.sample(
+        context, si, sampler.next_1d(active), sampler.next_2d(active), active
+    )
+    ray = si.spawn_ray(si.to_world(bs.wo))
+    depth = mi.UInt32(2)  # of the ray's hit, seen from the camera
+    previous = mi.Interaction3f(si)
+    previous_pdf = mi.Float(bs.pdf)
+    previous_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+    active = mi.Bool(active) & (bs.pdf > 0) & (depth < limit)
+
+    while active:
+        si = scene.ray_intersect(ray, active)
+        # The first ray's hit shines directly on the surface that it left, which is not ours.
+        emitter = si.emitter(scene, active)
+        ds = mi.DirectionSample3f(scene, si, previous)
+        seen = active & (depth > 2) & (previous_delta | (bsdf_samples > 0))
+        # Emitter samples never take the direction that a mirror, glass or a mask needs.
+        emitter_pdf = scene.pdf_emitter_direction(previous, ds, seen & ~previous_delta)
+        share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
+        light += dr.select(seen, throughput * emitter.eval(si, seen) * share, 0)
+
+        active &= si.is_valid() & (depth < limit)
+        vertex = si.bsdf(ray)
+        direct = active & mi.has_flag(vertex.flags(), mi.BSDFFlags.Smooth)
+        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), shadows, direct)
+        direct &= ds.pdf > 0
+        wo = si.to_local(ds.d)
+        value, bsdf_pdf = vertex.eval_pdf(context, si, wo, direct)
+        share = dr.select(ds.delta | (bsdf_samples == 0), 1, ds.pdf / (ds.pdf + bsdf_pdf))
+        light += dr.select(direct, throughput * value * weight * share, 0)
+
+        bs, weight = vertex.sample(
+            context, si, sampler.next_1d(active), sampler.next_2d(active), active
+        )
+        throughput *= weight
+        previous = mi.Interaction3f(si)
+        previous_pdf = mi.Float(bs.pdf)
+        previous_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
+        ray = si.spawn_ray(si.to_world(bs.wo))
+        depth += 1
+        largest = dr.max(throughput)
+        survival = dr.select(depth > rr_depth, dr.minimum(largest, SURVIVAL), 1)
+        active &= (largest > 0) & (sampler.next_1d(active) < survival)
+        throughput *= dr.rcp(dr.maximum(survival, 1e-6))
+    return light
