@@ -67,23 +67,17 @@ class GridLight:
 
     name: str
     intensity: Colour
-    attenuation: NDArray[np.float64]
-    cos_incidence: NDArray[np.float64]
-    cos_view: NDArray[np.float64]
-    lobe: NDArray[np.float64]
+    attenuation: Any
+    cos_incidence: Any
+    cos_view: Any
+    lobe: Any
 
 
 @dataclass(frozen=True)
-class LightTerms:
-    """The terms of one light at a point; ``diffuse`` and ``specular`` are RGB, display-linear."""
+class LightTerms(GridLight):
+    """One light at one point, with its terms as RGB, display-linear; arrays are numbers here."""
 
-    name: str
-    intensity: Colour
-    attenuation: float
-    cos_incidence: float
-    cos_view: float
     cos_reflection: float
-    lobe: float
     diffuse: Colour
     specular: Colour
 
@@ -170,18 +164,13 @@ class TermGrid:
 
     def _light(self, light: GridLight, material: TermMaterial, place: tuple) -> LightTerms:
         arrays = ("attenuation", "cos_incidence", "cos_view", "lobe")
-        f_att, n_l, l_v, lobe = (float(getattr(light, name)[place]) for name in arrays)
-        arriving = np.multiply(light.intensity, f_att)
+        here = vars(light) | {name: float(getattr(light, name)[place]) for name in arrays}
+        n_l, arriving = here["cos_incidence"], np.multiply(light.intensity, here["attenuation"])
         return LightTerms(
-            name=light.name,
-            intensity=light.intensity,
-            attenuation=f_att,
-            cos_incidence=n_l,
-            cos_view=l_v,
-            cos_reflection=2 * n_l * float(self.cos_view[place]) - l_v,
-            lobe=lobe,
+            **here,
+            cos_reflection=2 * n_l * float(self.cos_view[place]) - here["cos_view"],
             diffuse=_colour(arriving * material.k_d * max(n_l, 0)),
-            specular=_colour(arriving * material.k_s * lobe),
+            specular=_colour(arriving * material.k_s * here["lobe"]),
         )
 
 

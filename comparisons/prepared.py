@@ -21,11 +21,11 @@ from heuristic.heuristics import named
 from reference.pairing.halves import Pair
 from reference.pairing.prepare import Override
 from reference.planning.guard import examine_plan
-from reference.planning.plan import Guard, Plan, physical_integrator, plan, sampler
+from reference.planning.plan import Guard, Plan, physical_integrator, plan
 from reference.planning.rules import SAMPLED_AS_HIT, loses_light
 from reference.rendering.gbuffer import GBuffer, gbuffer, image_size, require_surface
 from reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
-from reference.rendering.sampler import with_sampler
+from reference.rendering.sampler import SAMPLER, STOCK_SAMPLER, with_sampler
 from reference.scene.source import Source
 
 WAVEFRONT = 2**24
@@ -142,7 +142,8 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
 
         options = pictures.at_size_of_pictures(source, options)
     pair = options.pair(source)
-    physical = with_sampler(pair.physical, sampler(options.everything)).instantiate()
+    sampler = STOCK_SAMPLER if options.everything else SAMPLER
+    physical = with_sampler(pair.physical, sampler).instantiate()
     width, height = image_size(physical)
     if width * height > LARGEST_PASS:
         raise InputError(

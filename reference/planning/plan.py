@@ -190,11 +190,6 @@ class Plan(Record):
 SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
 
 
-def sampler(everything: bool = False) -> str:
-    """Return the sampler of a plan; it is known before the scene, which is made with it."""
-    return STOCK_SAMPLER if everything else SAMPLER
-
-
 def plan(
     pair: Pair,
     scene: mi.Scene,
