@@ -406,7 +406,7 @@ def requests(whole: Options, scenes: Sequence[str]) -> list[Options]:
     """Return the request for each scene: with values only for the placeholders that it has."""
     if len(scenes) == 1 or not whole.define:
         return [whole] * len(scenes)
-    from reference.scene.files import placeholders
+    from reference.scene.source import placeholders
 
     known = (placeholders(Path(scene)) for scene in scenes)
     own = [{key: value for key, value in whole.define.items() if key in names} for names in known]

@@ -67,7 +67,6 @@ def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -
         plugin = graph.plugin(index)
         colour = "intensity" if lights.is_heuristic(plugin) else lights.of(plugin).colour
         values.check_colours(graph, index, (colour,))
-    checks.require_files(graph)
     checks.check(graph)
     for shape in graph.nodes(SHAPE):
         if not graph.props(shape).id():

@@ -1,18 +1,19 @@
 """Values of a scene that Mitsuba renders in silence, or that end the process.
 
 Mitsuba rejects some values that make no sense, and renders others: a sphere of radius NaN is
-missing, an infinite index of refraction is black. A pipe blocks whoever opens it.
+missing, an infinite index of refraction is black.
 """
 
-from collections.abc import Iterator, Mapping
-from pathlib import Path
+from collections.abc import Iterator
+from functools import lru_cache
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
+from heuristic import meshes
 from heuristic.errors import InputError
-from reference.scene.graph import DEEPEST, FILENAME, Graph, require_file
+from reference.scene.graph import Graph
 
 LARGEST = float(np.finfo(np.float32).max)
 
@@ -53,11 +54,9 @@ def check(graph: Graph) -> None:
     """Reject values that make no sense, and damaged files, in all elements in use."""
     for index in graph.nodes_in_use():
         check_node(graph, index)
-        if graph.plugin(index) in ("ply", "serialized"):
-            from reference.scene import files  # loaded late: most scenes have no such files
-
-            if objection := files.damage(graph, index):
-                raise _refusal(graph, index, objection)
+        is_mesh = graph.plugin(index) in ("ply", "serialized")
+        if is_mesh and (objection := damage(graph, index)):
+            raise _refusal(graph, index, objection)
 
 
 def check_node(graph: Graph, index: int) -> None:
@@ -151,24 +150,38 @@ def _shown(value: Any) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def require_files(graph: Graph) -> None:
-    """Reject elements that name a folder, pipe, socket or device instead of a file."""
-    for index in graph.nodes_in_use():
-        if path := graph.file(index):
-            require_file(f"{graph.name}: {graph.label(index)}", path)
+def damage(graph: Graph, index: int) -> str:
+    """Return what is wrong with the file of a mesh; empty if nothing is.
+
+    Mitsuba does not check whether the faces of PLY and serialized meshes name vertices that exist:
+    it reads memory beyond them.
+    """
+    plugin, path = graph.plugin(index), graph.file(index)
+    if path is None:
+        return ""
+    state, number = path.stat(), graph.props(index).get("shape_index", 0)
+    stamp = state.st_mtime_ns, state.st_size, mi.variant()
+    fault = _wrong_mesh(plugin, str(path), number, stamp)
+    return f"{path}: {fault} Write the file again." if fault else ""
 
 
-def require_named_files(description: Mapping[str, Any], depth: int = 1) -> None:
-    """Reject the same in a dictionary, whose spectra are read during parsing."""
-    if depth > DEEPEST:
-        raise InputError(f"the scene is nested more than {DEEPEST} deep. Write it flatter.")
-    for key, value in description.items():
-        if isinstance(value, Mapping):
-            require_named_files(value, depth + 1)
-        elif key == FILENAME and isinstance(value, str) and "\0" not in value:
-            path = Path(value)
-            try:
-                if path.exists():
-                    require_file("the scene", path)
-            except OSError as error:  # a name that is too long
-                raise InputError(f"{value[:60]!r}: {error.strerror}. Give a file.") from error
+@lru_cache(maxsize=1024)
+def _wrong_mesh(plugin: str, path: str, number: int, stamp: tuple) -> str:
+    # With face normals nothing is computed at vertices, which may not exist.
+    description = {"type": plugin, "filename": path, "face_normals": True}
+    if plugin == "serialized":
+        description["shape_index"] = number
+    try:
+        mesh = mi.load_dict(description)
+    except Exception:  # making the scene raises it again
+        return ""
+    faces, count = meshes.rows(mesh, meshes.FACES), mesh.vertex_count()
+    if len(faces) and faces.max() >= count:
+        return f"a face names vertex {faces.max()}, and there are {count}, numbered from 0."
+    lost = ~np.isfinite(meshes.rows(mesh, meshes.POSITIONS)).all(axis=1)
+    if lost.any():
+        return (
+            f"the position of vertex {lost.argmax()} is not finite, and that of"
+            f" {np.count_nonzero(lost)} vertices in all."
+        )
+    return ""

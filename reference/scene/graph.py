@@ -23,9 +23,6 @@ FILENAME = "filename"
 SCRIPT = "scene"
 """Name of a Python file's dictionary, or of the function that returns it."""
 
-DEEPEST = 100
-"""Nested elements. Scenes need about ten; some thousands fill the parser's stack."""
-
 CONTENT = re.compile(r'((?:of spectrum file "[^"]*"|PLY header: unknown token))[: ]*".*', re.DOTALL)
 """Ends of messages that repeat a line of a file, which may be any file."""
 
@@ -246,12 +243,6 @@ def find_file(resolver: mi.FileResolver | None, name: str) -> Path | None:
         return path if path.exists() else None
     except OSError:  # a name that is too long
         return None
-
-
-def require_file(where: str, path: Path) -> None:
-    """Reject a folder, pipe, socket or device in place of a file."""
-    if not path.is_file():
-        raise InputError(f"{where}: {path} is not a regular file. Give one.")
 
 
 @contextmanager

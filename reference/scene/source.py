@@ -5,6 +5,7 @@ so a record can state them.
 """
 
 import hashlib
+import re
 import runpy
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -17,9 +18,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError, suggestion
+from heuristic.errors import InputError
 from heuristic.user_code import contained
-from reference.scene.checks import require_named_files
 from reference.scene.graph import (
     SCRIPT,
     Graph,
@@ -33,6 +33,20 @@ from reference.scene.graph import (
 Parser = mi.parser
 Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
 Edit = Callable[[Graph], None]
+
+
+def text_of(path: Path) -> str:
+    """Return the text of a scene file, without its includes."""
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: {error}. Give a file in UTF-8 that can be read.") from error
+
+
+def placeholders(path: Path) -> set[str]:
+    """Return the names of the placeholders ``$name`` in a scene file; none in other files."""
+    is_scene = path.suffix == ".xml" and path.is_file()
+    return set(re.findall(r"\$(\w+)", text_of(path))) if is_scene else set()
 
 
 @dataclass(frozen=True)
@@ -118,13 +132,10 @@ class Source:
             content = self.made[0]
         try:
             if isinstance(content, Mapping):
-                require_named_files(content)
                 state = Parser.parse_dict(config, dict(content))
             else:
-                from reference.scene.files import included  # loaded late: a dictionary has none
-
                 path = Path(content)
-                self._require_placeholders(included(path, self.parameters).placeholders)
+                text_of(path)  # Mitsuba takes any bytes, which later are no names
                 resolver = files_from(path.resolve().parent)
                 with resolving(resolver):
                     state = Parser.parse_file(config, str(path), **self.parameters)
@@ -137,13 +148,6 @@ class Source:
         graph = Graph(self.name, config, state)
         graph.resolver = resolver
         return graph
-
-    def _require_placeholders(self, known: set[str]) -> None:
-        for name in sorted(set(self.parameters) - known):
-            raise InputError(
-                f"{self.name}: it has no placeholder ${name}{suggestion(name, known)}. Write it"
-                " into the file, or leave the option -D out."
-            )
 
 
 class _Listener(mi.Appender):
