@@ -108,12 +108,12 @@ def methods(records: Sequence[Cost]) -> Iterator[str]:
     for names, group in alike.items():
         times = [[_ratio(record, one) for one in chosen] for record, chosen in group]
         cells = (
-            name if name in (NONE, KERNEL) else f"{name} ({median(ratios):.2g})"
+            name if name in (NONE, KERNEL) else f"{name} ({number(median(ratios))})"
             for name, *ratios in zip(names, *times, strict=True)
         )
         full = median(_ratio(record, _longest(record)) for record, _ in group)
         scenes = ", ".join(record.scene for record, _ in group)
-        rows.append((scenes, *cells, f"{full:.3g}"))
+        rows.append((scenes, *cells, number(full)))
     head = "Scenes", *(f"within {parameter(t)}" for t in TOLERANCES), "Full plan"
     yield from markdown([head, *rows], right=4)
 
