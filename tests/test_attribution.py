@@ -63,12 +63,6 @@ def test_drawn_shares_lie_within_their_error_and_add_up():
             assert (missed < 4 * np.array(errors)).all()
 
 
-def test_a_player_without_influence_gets_nothing_and_equals_share_alike():
-    found, _, _ = of("abc", lambda subset: 6.0 if {"a", "b"} <= subset else 0.0)
-    assert found == pytest.approx((3.0, 3.0, 0.0))
-    assert of((), lambda subset: 1.0)[0] == ()
-
-
 # -- Errors without noise --------------------------------------------------------------------------
 
 SIZE, REPLICATES, NOISE = 32, 8, 0.05

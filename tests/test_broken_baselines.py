@@ -24,39 +24,33 @@ def other(folder, name, **changes):
     (folder / f"{name}.json").write_text(json.dumps(data))
 
 
-def sparse(path, size):
-    with path.open("wb") as file:
-        file.truncate(size)
-
-
 def break_all(folder):
     """Put baselines that are broken in many ways into a folder, and return their names."""
-    before = {path.name for path in folder.glob("*.json")}
+    before = set(folder.glob("*.json"))
     whole = (folder / "fig-8-6a.json").read_text()
-    (folder / "nul.json").write_text(whole.replace("fig-8-6a", "a\\u0000b"))
+    for name, text in {
+        "nul": whole.replace("fig-8-6a", "a\\u0000b"),
+        "deep": "[" * 200_000 + "]" * 200_000,
+        "digits": whole.replace('"passes": 16', f'"passes": {"9" * 10_000}'),
+        "large": " " * 100_000_000,
+    }.items():
+        (folder / f"{name}.json").write_text(text)
     (folder / "bytes.json").write_bytes(whole.encode("utf-16"))
-    (folder / "deep.json").write_text("[" * 200_000 + "]" * 200_000)
-    (folder / "digits.json").write_text(whole.replace('"passes": 16', f'"passes": {"9" * 10_000}'))
-    sparse(folder / "large.json", 100_000_000)
     (folder / "folder.json").mkdir()
-    os.mkfifo(folder / "fifo.json")
     (folder / "loop.json").symlink_to("loop.json")
     (folder / "gone.json").symlink_to("nowhere.json")
-    other(folder, "version", record_version=9)
-    other(folder, "scene", scene="fig-0")
-    other(folder, "file", scene="../nowhere.xml")
-    other(folder, "options", options={"spp": "many"})
-    other(folder, "script", scene="raises.py")
     (folder / "raises.py").write_text("raise SystemExit(0)")
-    for name, content in (("garbage", b"garbage" * 100), ("cut", None), ("fifo", "fifo")):
-        picture = folder / f"picture-{name}.exr"
-        if content == "fifo":
-            os.mkfifo(picture)
-        else:
-            picture.write_bytes(content or (folder / "fig-8-6a.exr").read_bytes()[:300])
-        other(folder, f"exr-{name}", images=picture.name)
-    other(folder, "exr-missing", images="missing.exr")
-    return {path.stem for path in folder.glob("*.json") if path.name not in before}
+    (folder / "garbage.exr").write_bytes(b"garbage" * 100)
+    (folder / "cut.exr").write_bytes((folder / "fig-8-6a.exr").read_bytes()[:300])
+    for name in ("fifo.json", "fifo.exr"):
+        os.mkfifo(folder / name)
+    for scene in ("fig-0", "../nowhere.xml", "raises.py"):
+        other(folder, f"scene-{Path(scene).stem}", scene=scene)
+    for name in ("garbage", "cut", "fifo", "missing"):
+        other(folder, f"exr-{name}", images=f"{name}.exr")
+    other(folder, "version", record_version=9)
+    other(folder, "options", options={"spp": "many"})
+    return {path.stem for path in {*folder.glob("*.json")} - before}
 
 
 @pytest.mark.guarantee(

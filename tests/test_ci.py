@@ -6,7 +6,6 @@ import shutil
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
-import click
 import jsonschema
 import numpy as np
 import OpenEXR
@@ -18,7 +17,6 @@ from comparisons.check.moved import Check, Move, differences, moved
 from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.departure.metrics import METRICS
 from comparisons.departure.noise import VisibleShare
-from reports import jobs
 from reports.ci import checks, summary
 from tests import records
 from tests.programs import command_line
@@ -41,14 +39,6 @@ def test_a_gate_is_undecided_where_noise_may_be_the_reason():
     assert summary.gates([record], None) == []
     outcome = summary.gate_outcome([summary.gates([record], bound)[0] for bound in states])
     assert outcome.startswith("gates: 1 failed, 2 undecided, 1 passed. More samples")
-
-
-def test_percentages_are_read_with_their_sign():
-    words = {"5%": 0.05, "0%": 0, "100 %": 1, " 2.5% ": 0.025}
-    assert {word: jobs.percentage(word) for word in words} == pytest.approx(words)
-    for word in ("5", "0.05", "-1%", "101%", "nan%", "inf%", "%", "5%%", "5%x", ""):
-        with pytest.raises(click.BadParameter, match="from 0% to 100%, such as 5%"):
-            jobs.percentage(word)
 
 
 def test_a_run_beyond_its_bounds_ends_with_1_and_says_so_everywhere(two_scenes):
@@ -169,6 +159,7 @@ def test_bad_words_are_refused(run, tmp_path, monkeypatch):
         ("check", "nix.json", "--significance", "nan"): "range",
         ("compare", "fig-8-9", "--within", "2.1"): "2.1 is not a threshold",
         ("compare", "fig-8-9", "--max-visible", "5"): "such as 5%",
+        ("compare", "fig-8-9", "--max-visible", "101%"): "from 0% to 100%",
     }.items():
         code, _, messages = run(*words)
         assert (code, bool(re.search(expected, messages))) == (2, True), (words, messages)

@@ -303,15 +303,6 @@ def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(monkey
         monkeypatch.setenv("NO_COLOR", "1")
 
 
-def test_completion_prints_what_the_shell_sources(run):
-    for shell in ("bash", "zsh", "fish"):
-        code, printed, messages = run("completion", shell)
-        assert (code, messages) == (0, "")
-        assert f"_FOTISMOS_COMPLETE={shell}_complete" in printed
-    code, _, messages = run("completion", "tcsh")
-    assert (code, "bash" in messages) == (2, True)
-
-
 def test_bash_completes_scenes(tmp_path):
     # Under the name of the run script, which the shell calls to complete itself.
     program = tmp_path / "run"

@@ -61,9 +61,7 @@ def test_a_study_has_its_effects_files_and_tables(name):
     record, whole = study.record, study.record.attribution
     made = cost_files.documents(study)
     jsonschema.Draft202012Validator(SCHEMA).validate(json.loads(made["cost.json"]))
-    assert made["cost.svg"].startswith(b"<svg")
-    pictures = [name for name in made if name.startswith("cost-method-")]
-    assert len(pictures) == len(record.methods)
+    assert sum(name.startswith("cost-method-") for name in made) == len(record.methods)
     text = "\n".join(cost_tables.lines(record))
     for named in (*(m.name for m in record.methods), *(e.effect for e in whole.effects)):
         assert named.split(",")[0] in text

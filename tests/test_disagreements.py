@@ -16,6 +16,12 @@ from tests.misplanned import BLACK, DIFFUSE, lamp, octahedron, scene
 PASSES = 8
 
 
+def shining(to_world, **emitter):
+    """A black rectangle that shines."""
+    emitter = {"type": "area", "radiance": 4.0, **emitter}
+    return {"type": "rectangle", "to_world": to_world, "bsdf": BLACK, "emitter": emitter}
+
+
 def estimate(render):
     """The mean of passes over all pixels, and its standard error."""
     passes = [float(np.mean(np.array(render(pass_seed(0, number))))) for number in range(PASSES)]
@@ -86,12 +92,7 @@ def behind_a_lamp(shape, integrator, near_clip=None):
         integrator={"type": integrator, "hide_emitters": near_clip is None},
         camera={"near_clip": near_clip} if near_clip else {},
         body={"bsdf": DIFFUSE, **shape},
-        lamp={
-            "type": "rectangle",
-            "to_world": towards_it.scale(1.5),
-            "bsdf": BLACK,
-            "emitter": {"type": "area", "radiance": 4.0},
-        },
+        lamp=shining(towards_it.scale(1.5)),
     )
 
 
@@ -122,19 +123,15 @@ def planned_whole(description, spp=256):
 
 def mirrored(integrator, sampling_weight=1.0):
     """A mirror that shows a lamp, on a floor."""
-    mirror = mi.ScalarTransform4f().look_at((0, 1, 0), (0, -4, 0), (0, 0, 1))
-    above = mi.ScalarTransform4f().look_at((0, -2, 1.5), (0, 1, 0), (0, 1, 0)).scale(0.7)
-    emitter = {"type": "area", "radiance": 4.0, "sampling_weight": sampling_weight}
+    at = mi.ScalarTransform4f()
+    mirror, below = at.look_at((0, 1, 0), (0, -4, 0), (0, 0, 1)), at.translate((0, 0, -1)).scale(4)
+    above = at.look_at((0, -2, 1.5), (0, 1, 0), (0, 1, 0)).scale(0.7)
     return scene(
         integrator=integrator,
         mirror={"type": "rectangle", "to_world": mirror, "bsdf": {"type": "conductor"}},
-        lamp={"type": "rectangle", "to_world": above, "bsdf": BLACK, "emitter": emitter},
+        lamp=shining(above, sampling_weight=sampling_weight),
         point=lamp((0, -3, 0)),
-        floor={
-            "type": "rectangle",
-            "to_world": mi.ScalarTransform4f().translate((0, 0, -1)).scale(4),
-            "bsdf": DIFFUSE,
-        },
+        floor={"type": "rectangle", "to_world": below, "bsdf": DIFFUSE},
     )
 
 

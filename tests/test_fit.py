@@ -4,7 +4,6 @@ import json
 import re
 import shlex
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 
 import jsonschema
@@ -28,6 +27,7 @@ from heuristic.terms import normalisation
 from reference.rendering.gbuffer import gbuffer
 from reference.rendering.renderer import Renderer
 from reference.scene.source import Source
+from tests.misplanned import scene as described
 from tests.schemas import schema
 
 SIZE = 20
@@ -47,27 +47,24 @@ def bsdf(name, form="phong", **coefficients):
 
 def spheres(form="phong", red=RED, grey=GREY, floor=FLOOR, lights=LIGHTS, **integrator):
     """Two spheres over a floor, each of its own material."""
-    camera = mi.ScalarTransform4f().look_at((0, -8, 3), (0, 0, 0), (0, 0, 1))
-    film = {"type": "hdrfilm", "width": SIZE, "height": SIZE, "rfilter": {"type": "box"}}
-    sampler = {"type": "multijitter", "sample_count": 4}
-    sensor = {"type": "perspective", "fov": 40.0, "film": film, "sampler": sampler}
-    scene = {
-        "type": "scene",
-        "integrator": {"type": "heuristic", "ambient": 1.0, **integrator},
-        "sensor": {**sensor, "to_world": camera},
+    below = mi.ScalarTransform4f().translate((0, 0, -1)).scale(4)
+    shapes = {
         "a": {"type": "sphere", "center": (-1.2, 0, 0), "bsdf": bsdf("red", form, **red)},
         "b": {"type": "sphere", "center": (1.2, 0, 0), "bsdf": bsdf("grey", form, **grey)},
-        "c": {
-            "type": "rectangle",
-            "to_world": mi.ScalarTransform4f().translate((0, 0, -1)).scale(4),
-            "bsdf": bsdf("floor", form, **floor),
-        },
+        "c": {"type": "rectangle", "to_world": below, "bsdf": bsdf("floor", form, **floor)},
     }
     for number, (position, colour) in enumerate(lights):
         intensity = {"type": "rgb", "value": colour}
         light = {"type": "heuristic_point", "position": position, "intensity": intensity}
-        scene[f"light {number}"] = light
-    return scene
+        shapes[f"light {number}"] = light
+    sampler = {"type": "multijitter", "sample_count": 4}
+    return described(
+        (0, -8, 3),
+        integrator={"type": "heuristic", "ambient": 1.0, **integrator},
+        camera={"type": "perspective", "sampler": sampler},
+        size=SIZE,
+        **shapes,
+    )
 
 
 def surface_of(scene, passes=2, spp=4):
@@ -330,8 +327,8 @@ def test_the_command_writes_a_record_and_a_picture_and_repeats_itself(run, tmp_p
     assert losses[data["best"]] == min(losses)
     for word in ("paired", "blinn", "noise floor", "parameter error", "model error"):
         assert word in printed
-    picture = np.array(Image.open(BytesIO((tmp_path / "a/fit/fig-8-6a/fit.png").read_bytes())))
-    tiles = np.split(picture[-200:-20, 8:], 4, axis=1)
+    with Image.open(tmp_path / "a/fit/fig-8-6a/fit.png") as picture:
+        tiles = np.split(np.array(picture)[-200:-20, 8:], 4, axis=1)
     assert len(np.unique([tile.mean() for tile in tiles])) == 4
     code, printed, _ = run(*shlex.split(data["command"])[1:], "--json", "-o", tmp_path / "b")
     (again,) = json.loads(printed)

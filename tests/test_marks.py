@@ -66,13 +66,10 @@ def test_few_passes_leave_everything_open(rgb):
 @pytest.mark.guarantee("marks", "Pixels that no light reached are undetermined, not marked.")
 def test_pixels_that_no_light_has_reached_are_left_open(rgb):
     """Both a whole image, and a corner of one where rare large contributions come elsewhere."""
-    dark = np.zeros((8, 16, 16, 3))
-    test = np.full((16, 16, 3), 0.3)
-    assert (noisy.found(test - dark, test) == UNDETERMINED).all()
-
+    rare, test = np.zeros((8, 16, 16, 3)), np.full((16, 16, 3), 0.3)
+    assert (noisy.found(test - rare, test) == UNDETERMINED).all()
     rng = np.random.default_rng(6)
-    rare = dark.copy()
-    rare[:, 8:] = np.where(rng.random((8, 8, 16, 1)) < 0.01, 40.0, 0.0)
+    rare[:, 8:] = 40.0 * (rng.random((8, 8, 16, 1)) < 0.01)
     marks = noisy.found(test - rare, test)
     assert (marks[rare.mean(axis=0)[..., 0] == 0.0] == UNDETERMINED).all()
 

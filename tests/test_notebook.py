@@ -51,11 +51,9 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
     ((tag, attributes),) = tags_of(shown["data"]["text/html"])
     assert (tag, attributes["sandbox"]) == ("iframe", "allow-scripts")
     page = attributes["srcdoc"]
-    assert page.lstrip().startswith("<!")
     pictures = [one for tag, one in tags_of(page) if tag == "img" and "hidden" not in one]
     captions = [one["alt"].rpartition(", ")[2] for one in pictures]
     assert captions == ["Textbook shading", "Physical reference", "ΔE2000"]
-    assert all(one["src"].startswith("data:image/webp") for one in pictures)
     assert "box <b>" not in page
     assert "box &lt;b&gt;" in page
 

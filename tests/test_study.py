@@ -294,19 +294,12 @@ def test_the_dataset_says_units_meanings_and_where_it_comes_from(finished, tmp_p
 
 
 def test_other_values_and_options_are_other_points(rgb):
-    keys = []
-    for scene, parameters, more in (
-        *(("sphere", "alpha = 0.1", more) for more in ("", "seed = 1", "spp = 16",
-                                                       "resolution = [8, 8]",
-                                                       "pairing = 'literal'")),
-        ("sphere", "alpha = 0.2", ""),
-        ("enclosure", "alpha = 0.1", ""),
-        ("sphere", "alpha = 0.1", "name = 'other'"),
-    ):  # fmt: skip
-        (point,) = running.all_points(design.parse(part(parameters, scene, more)))
-        keys.append(point.key)
-    assert keys[-1] == keys[0]
-    assert len(set(keys)) == len(keys) - 1
+    others = "seed = 1", "spp = 16", "resolution = [8, 8]", "pairing = 'literal'"
+    texts = [part("alpha = 0.1", "sphere", more) for more in ("name = 'other'", "", *others)]
+    texts += [part("alpha = 0.2", "sphere"), part("alpha = 0.1", "enclosure")]
+    first, second, *keys = (running.all_points(design.parse(text))[0].key for text in texts)
+    assert first == second
+    assert len({first, *keys}) == len(keys) + 1
 
 
 FILES = """<scene version="3.0.0"><integrator type="path"/>
@@ -319,16 +312,12 @@ FILES = """<scene version="3.0.0"><integrator type="path"/>
 
 @pytest.mark.guarantee("runs", "A study is done again once a file of its scene changes.")
 def test_a_study_is_done_again_once_a_file_of_its_scene_changes(rgb, tmp_path):
-    def write(size):
+    text = part("'paint.reflectance' = 0.4", "s.xml", SMALL)
+    study, values = design.parse(text, folder=tmp_path), []
+    for size, intensity in ((1, 9), (2, 9), (2, 3)):
         lines = [f"v {x * size} {y * size} 3" for x, y in ((-1, -1), (1, -1), (0, 2))]
         (tmp_path / "m.obj").write_text("\n".join([*lines, "f 1 2 3", "f 3 2 1", ""]))
-
-    text = part("'paint.reflectance' = 0.4", "s.xml", SMALL)
-    study, values, scene = design.parse(text, folder=tmp_path), [], tmp_path / "s.xml"
-    for change in (lambda: scene.write_text(FILES), lambda: write(2),
-                   lambda: scene.write_text(FILES.replace('"9"', '"3"'))):  # fmt: skip
-        write(1) if not values else None
-        change()
+        (tmp_path / "s.xml").write_text(FILES.replace('"9"', f'"{intensity}"'))
         table, done = running.run(study, tmp_path / "out")
         assert (done, failed(table)) == (1, [])
         assert running.run(study, tmp_path / "out")[1] == 0
@@ -354,14 +343,14 @@ class Ending:
 
 @pytest.mark.guarantee("runs", "A study that ended early goes on, and repeats nothing.")
 def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path):
-    study = design.parse(part("alpha = [0.1, 0.2, 0.3, 0.4]\nlight_angle = [0, 60]"))
+    study = design.parse(part("alpha = [0.1, 0.2]\nlight_angle = [0, 60]"))
     whole, _ = running.run(study, tmp_path / "whole")
     with pytest.raises(KeyboardInterrupt):
-        running.run(study, tmp_path / "cut", Ending(3))
+        running.run(study, tmp_path / "cut", Ending(2))
     half = next((tmp_path / "cut/points").glob("*.json"))
-    half.write_text(half.read_text(encoding="utf-8")[:40], encoding="utf-8")
+    half.write_text(half.read_text()[:40])
     table, done = running.run(study, tmp_path / "cut")
-    assert done == 6  # the damaged one again
+    assert done == 3  # the damaged one again
     assert table.equals(whole)
     assert running.run(study, tmp_path / "cut")[1] == 0
 
@@ -388,15 +377,15 @@ def test_a_point_that_fails_is_a_row_that_says_why(rgb, tmp_path, monkeypatch):
 
 def test_the_command_writes_dataset_and_figures(run, tmp_path):
     file, out = tmp_path / "small.toml", tmp_path / "out"
-    file.write_text(part("alpha = [0.2, 0.4]\nlight_angle = [0, 60]"), encoding="utf-8")
+    file.write_text(part("alpha = [0.2, 0.4]\nlight_angle = [0, 60]"))
     code, printed, messages = run("study", file, "-o", out)
     assert (code, messages) == (0, "")
     assert dataset.read(out / "study/small/small.parquet").num_rows == 4
-    assert "<svg" in (out / "study/small/figures/lobe.svg").read_text(encoding="utf-8")
+    assert "<svg" in (out / "study/small/figures/lobe.svg").read_text()
     assert "4       0" in printed
     code, printed, _ = run("study", file, "-o", out)
     assert (code, "4 points were kept" in printed) == (0, True)
-    file.write_text(part("alfa = 1"), encoding="utf-8")
+    file.write_text(part("alfa = 1"))
     code, printed, messages = run("study", file, "-o", out)
     assert (code, printed) == (2, "")
     assert "small.toml: part 1: 'alfa' is not known" in messages
@@ -457,17 +446,14 @@ def test_the_shipped_dataset_is_that_of_its_study(shipped, rgb):
 def test_the_page_says_what_the_dataset_says(shipped, monkeypatch):
     study, table = shipped
     monkeypatch.syspath_prepend(ROOT / "docs")
-    findings, text = importlib.import_module("findings"), PAGE.read_text(encoding="utf-8")
+    findings, text = importlib.import_module("findings"), PAGE.read_text()
     assert findings.page(study, table) == text
     column = table.column_names.index("dE2000")
     changed = table.set_column(column, table.schema.field("dE2000"), table["rmse"])
     assert findings.page(study, changed) != text
-    items = re.findall(r"^- (.*?)(?=^- |^$)", text, re.MULTILINE | re.DOTALL)
-    assert len(items) >= 12
-    assert all(re.search(r"\(figure \d+( against figure \d+)?\)\.\s*$", item) for item in items)
     shown = re.findall(r"!\[Figure (\d+): .*?\]\((.*?)\)", text)
     assert [int(number) for number, _ in shown] == list(range(1, len(study.figures) + 1))
-    assert all("<svg" in (PAGE.parent / path).read_text(encoding="utf-8") for _, path in shown)
+    assert all("<svg" in (PAGE.parent / path).read_text() for _, path in shown)
 
 
 def test_every_figure_has_its_points_and_says_what_it_averages(shipped):
@@ -482,6 +468,6 @@ def test_every_figure_has_its_points_and_says_what_it_averages(shipped):
     )
     spec = study_charts.chart(figure, table, study)
     assert spec["title"]["subtitle"] == "mean over light angle"
-    for cell in spec["data"]["values"][::9]:
-        found = dataset.rows(table, "energy", {"k_s": cell["x"], "n": cell["y"]})
-        assert cell["value"] == pytest.approx(np.mean([row["dE2000"] for row in found]))
+    cell = spec["data"]["values"][9]
+    found = dataset.rows(table, "energy", {"k_s": cell["x"], "n": cell["y"]})
+    assert cell["value"] == pytest.approx(np.mean([row["dE2000"] for row in found]))

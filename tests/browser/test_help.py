@@ -81,11 +81,3 @@ def test_the_first_tab_skips_to_the_results(visitor):
     page.keyboard.press("Enter")
     assert visitor.state()["scene"] == NOISY_ID
     page.wait_for_function("() => document.activeElement.id === 'main'")
-
-
-@pytest.mark.parametrize("visitor", [PHONE], indirect=True)
-@pytest.mark.parametrize(("fragment", "sentence"), [("", "#headline"), (SCENE, ".scene h1")])
-def test_the_first_screen_of_a_phone_has_the_verdict(visitor, fragment, sentence):
-    page = visitor.open(fragment)
-    box = page.locator(f"{sentence}:visible").bounding_box()
-    assert box["y"] + box["height"] < 500
