@@ -62,12 +62,9 @@ def test_the_notebook_runs():
     notebook = nbformat.read(ROOT / "docs/tutorial.ipynb", as_version=4)
     client = NotebookClient(notebook, timeout=60, resources={"metadata": {"path": str(ROOT)}})
     client.execute()  # raises where a cell does
-    printed = "".join(
-        output.get("text", "") for cell in notebook.cells for output in cell.get("outputs", ())
-    )
-    assert "mean ΔE2000" in printed
-    shown = [out for cell in notebook.cells for out in cell.get("outputs", ()) if "data" in out]
-    assert sum("image/png" in out["data"] for out in shown) == 2
+    shown = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    assert any("mean ΔE2000" in output.get("text", "") for output in shown)
+    assert sum("image/png" in output.get("data", ()) for output in shown) == 2
 
 
 def test_the_readmes_example_runs(tmp_path):

@@ -55,17 +55,14 @@ def test_every_case_has_its_row_and_a_violated_bound_is_said(record):
 # --- An oracle of 50 digits ------------------------------------------------------------------
 
 
-def vector(value):
-    return [mpmath.mpf(float(component)) for component in value]
-
-
-def dot(a, b):
-    return mpmath.fsum(x * y for x, y in zip(a, b, strict=True))
+def digits(value):
+    """Return a number or a vector of 50 digits."""
+    return np.vectorize(lambda one: mpmath.mpf(float(one)), otypes=[object])(value)[()]
 
 
 def unit(v):
-    length = mpmath.sqrt(dot(v, v))
-    return [x / length for x in v] if length else None
+    length = mpmath.sqrt(v @ v)
+    return v / length if length else None
 
 
 def with_50_digits(setting, row):
@@ -73,32 +70,23 @@ def with_50_digits(setting, row):
 
     def at(value, length):
         value = np.asarray(value)
-        return value[row % len(value)] if value.ndim == length + 1 else value
+        return digits(value[row % len(value)] if value.ndim == length + 1 else value)
 
-    normal, view = (unit(vector(at(v, 1))) for v in (setting.normal, setting.view))
-    offset = [
-        a - b
-        for a, b in zip(vector(at(setting.light, 1)), vector(at(setting.position, 1)), strict=True)
-    ]
-    toward = unit(offset)
-    if None in (normal, view, toward):
+    offset = at(setting.light, 1) - at(setting.position, 1)
+    normal, view, toward = map(unit, (at(setting.normal, 1), at(setting.view, 1), offset))
+    if normal is None or view is None or toward is None or normal @ toward <= 0:
         return mpmath.mpf(0)
-    cosine = dot(normal, toward)
-    if cosine <= 0:
-        return mpmath.mpf(0)
-    mirrored = [2 * cosine * n - t for n, t in zip(normal, toward, strict=True)]
-    reflection = dot(mirrored, view)
-    n = mpmath.mpf(float(at(setting.n, 0)))
-    lobe = reflection**n if reflection > 0 else mpmath.mpf(0)
-    distance = mpmath.sqrt(dot(offset, offset))
-    k0, k1, k2 = vector(setting.attenuation)
-    arriving = mpmath.mpf(float(at(setting.intensity, 0))) / (k0 + k1 * distance + k2 * distance**2)
+    cosine = normal @ toward
+    reflection = (2 * cosine * normal - toward) @ view
+    lobe = reflection ** at(setting.n, 0) if reflection > 0 else 0
+    distance = mpmath.sqrt(offset @ offset)
+    arriving = at(setting.intensity, 0) / (digits(setting.attenuation) @ distance ** np.arange(3))
     if setting.direction is not None:
-        cos_axis = -dot(toward, unit(vector(setting.direction)))
-        if cos_axis < mpmath.cos(mpmath.mpf(float(setting.cutoff)) * mpmath.pi / 180):
+        cos_axis = -toward @ unit(digits(setting.direction))
+        if cos_axis < mpmath.cos(digits(setting.cutoff) * mpmath.pi / 180):
             return mpmath.mpf(0)
-        arriving *= max(cos_axis, 0) ** mpmath.mpf(float(setting.m))
-    return arriving * (float(setting.k_d) * cosine + float(setting.k_s) * lobe)
+        arriving *= max(cos_axis, 0) ** digits(setting.m)
+    return arriving * (digits(setting.k_d) * cosine + digits(setting.k_s) * lobe)
 
 
 def test_the_exact_values_are_those_of_50_digits():

@@ -49,21 +49,14 @@ def test_a_comparison_without_a_study_of_cost_does_not_wait_for_altair():
 
 
 def test_two_charts_on_a_page_share_no_id():
-    pictures = [
-        f'<svg width="{width}"><clipPath id="clip0"/><g clip-path="url(#clip0)"/></svg>'
-        for width in (100, 200)
-    ]
-    charts = [vega._inline(picture) for picture in pictures]
-    ids = [re.findall(r'\bid="([^"]+)"', svg) for svg in charts]
-    assert ids[0] != ids[1]
-    for svg, own in zip(charts, ids, strict=True):
-        assert re.findall(r"url\(#([^)]+)\)", svg) == own
-    clipped = bars()
-    clipped["mark"] = {"type": "bar", "clip": True}
-    svg = vega.figure("Price", clipped).svg
-    used = set(re.findall(r"url\(#([^)]+)\)", svg))
-    assert used
-    assert used <= set(re.findall(r'\bid="([^"]+)"', svg))
+    ids = []
+    for effect in ("shadow", "gloss"):
+        svg = vega.figure("Price", bars(effect) | {"mark": {"type": "bar", "clip": True}}).svg
+        ids.append(set(re.findall(r'\bid="([^"]+)"', svg)))
+        used = set(re.findall(r"url\(#([^)]+)\)", svg))
+        assert used
+        assert used <= ids[-1]
+    assert not ids[0] & ids[1]
 
 
 def test_text_in_a_chart_stays_text():
