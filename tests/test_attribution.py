@@ -65,7 +65,7 @@ def test_drawn_shares_lie_within_their_error_and_add_up():
 
 # -- Errors without noise --------------------------------------------------------------------------
 
-SIZE, REPLICATES, NOISE = 32, 8, 0.05
+SIZE, REPLICATES, NOISE = 20, 8, 0.05
 """Noise of one replicate, linear, on a grey of 0.3: ΔE2000 of some 4."""
 
 DRAWN = {

@@ -180,9 +180,7 @@ def test_jackknife_errors_are_those_of_metrics_drawn_again():
     truth = rng.uniform(0.2, 0.6, (2, 8, 8, 3))
     counted = np.ones((8, 8), bool)
     drawn = [
-        measurement(
-            truth + 0.05 * rng.normal(size=(PASSES, *truth.shape)), counted, DEFAULT_VIEWING
-        )
+        measurement(truth + 0.05 * rng.normal(size=(8, *truth.shape)), counted, DEFAULT_VIEWING)
         for _ in range(30)
     ]
     for name in (*METRICS, RATIO.name):
