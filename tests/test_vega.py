@@ -25,7 +25,7 @@ def bars(effect="shadow", **extra):
 
 
 def test_a_chart_takes_the_texts_colour_and_has_a_transparent_ground():
-    svg = vega.figure("Price", bars(drawn)).svg
+    svg = vega.figure("Price", bars()).svg
     assert svg.startswith("<svg")
     assert 'fill="currentColor"' in svg
     assert 'fill="white"' not in svg
