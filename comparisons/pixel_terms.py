@@ -286,8 +286,6 @@ class _Points:
 
     def _row(self, material: Material) -> NDArray[np.float64]:
         k_i, k_a, k_d, k_s = (self.colours(getattr(material, name)) for name in COEFFICIENTS)
-        if material.normalised:
-            k_s *= self.floats(terms.normalisation(material.form, material.n))[:, None]
         form = np.full(len(self.hit), FORMS.index(material.form))
         return np.column_stack((k_i, k_a, k_d, k_s, self.floats(material.n), form))
 

@@ -164,13 +164,13 @@ def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict:
     point.uv = mi.Point2f(0.5)
     material = bsdf.material(point, True, False, None, True)
     textures = {name: getattr(bsdf, name) for name in (*COEFFICIENTS, "n", "base_color")}
-    colours = {name: getattr(material, name) for name in (*COEFFICIENTS, "base_color")}
+    colours = {name: textures[name].eval(point) for name in (*COEFFICIENTS, "base_color")}
     return {
         "name": bsdf.id() or f"material {number + 1}",
         **{name: numbers(mi.Color3f(colour)) for name, colour in colours.items()},
         **{name: numbers(getattr(material, name))[0] for name in ("n", *PHYSICAL[1:])},
         "form": material.form,
-        "normalised": material.normalised,
+        "normalised": bsdf.normalised,
         "twosided": bool(bsdf.twosided),
         "varies": [
             name

@@ -12,7 +12,7 @@ import pkgutil
 import re
 import sys
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 from hashlib import sha256
@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from heuristic import kernel, terms, vectors
+from heuristic import kernel, vectors
 from heuristic.convention import Array
 from heuristic.declared import Declared
 from heuristic.errors import InputError
@@ -139,11 +139,7 @@ class Point:
         ``k_i``, ``k_a``, ``k_d``, ``k_s`` and ``n`` as paired, for a lobe without normalisation;
         ``base_color``, ``alpha``, ``ior`` and ``metallic`` as the physical half has them.
         """
-        material = self.arguments.material
-        if not material.normalised:
-            return material
-        k_s = material.k_s * terms.normalisation(material.form, material.n)
-        return replace(material, k_s=k_s, normalised=False)
+        return self.arguments.material
 
     @_input
     def ambient(self) -> Array:

@@ -21,7 +21,7 @@ the same points, which keeps the image's mean.
 own ``I_a``, it stays, and the light reflected by surfaces is added.
 """
 
-from typing import Any, ClassVar
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -43,25 +43,17 @@ RAYS = GRID**2 * STRATA**2
 REFLECTIONS = 16
 """Longest path. Mitsuba ends most paths sooner, by Russian roulette after five."""
 
-KNOTS = 16
-"""Wavelengths of a tabulated spectrum, in steps of 31 nm: a multiple of a ray's number."""
-
 
 def gather(scene: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the light at points that the camera sees, in K channels or wavelengths.
+    """Return the light at points that the camera sees, in K channels.
 
     ``normal`` (N, 3), ``arriving`` (N, K): ``E / pi``, the value of a white surface, and ``k_d``
     (N, K): the weight of each in the image.
     """
-    arriving, weights = [], []
-    for wavelengths in _batches():
-        si, normal, k_d = _seen(scene, wavelengths)
-        light = _arriving(scene, si, normal)
-        dr.eval(light, k_d, normal)
-        arriving.append(_by_point(light))
-        weights.append(_by_point(k_d))
-    normals = np.array(normal, float).T[:: STRATA**2]
-    return normals, np.hstack(arriving), np.hstack(weights)
+    si, normal, k_d = _seen(scene)
+    light = _arriving(scene, si, normal)
+    dr.eval(light, k_d, normal)
+    return np.array(normal, float).T[:: STRATA**2], _by_point(light), _by_point(k_d)
 
 
 def weighted_mean(arriving: np.ndarray, k_d: np.ndarray) -> np.ndarray:
@@ -73,40 +65,6 @@ def weighted_mean(arriving: np.ndarray, k_d: np.ndarray) -> np.ndarray:
     return np.divide(total, weight, out=np.zeros_like(total), where=weight > 0)
 
 
-class Table:
-    """A colour at all wavelengths: RGB, or one value at each of :data:`KNOTS` wavelengths."""
-
-    DRJIT_STRUCT: ClassVar = {"values": object}  # what dr.freeze must know of
-
-    def __init__(self, values: np.ndarray) -> None:
-        self.values = mi.Float(np.asarray(values, float))
-        dr.eval(self.values)  # as a literal it would compile a kernel for every scene
-
-    def at(self, wavelengths: Any) -> Any:
-        """Return the colour at the wavelengths of rays, linear between those tabulated."""
-        if not mi.is_spectral:
-            numbers = range(dr.size_v(mi.Spectrum))
-            return mi.Spectrum([dr.gather(mi.Float, self.values, n) for n in numbers])
-        step = (mi.MI_CIE_MAX - mi.MI_CIE_MIN) / (KNOTS - 1)
-        place = dr.clip((wavelengths - mi.MI_CIE_MIN) / step, 0, KNOTS - 1)
-        below = dr.minimum(mi.UInt32(0) + dr.uint32_array_t(type(place))(place), KNOTS - 2)
-        share = place - type(place)(below)
-        low, high = (
-            mi.Spectrum([dr.gather(mi.Float, self.values, n + more) for n in below])
-            for more in (0, 1)
-        )
-        return dr.lerp(low, high, share)
-
-
-def _batches() -> list[Any]:
-    """Return the wavelengths (nm) to gather light at, a batch per ray; [[]] for RGB and mono."""
-    if not mi.is_spectral:
-        return [[]]
-    size = dr.size_v(mi.Spectrum)
-    knots = np.linspace(mi.MI_CIE_MIN, mi.MI_CIE_MAX, KNOTS).reshape(-1, size)
-    return [mi.Spectrum(*map(float, batch)) for batch in knots]
-
-
 def _by_point(value: Any) -> np.ndarray:
     """Return the means of the directions of each point, (N, channels)."""
     value = mi.Spectrum(value) + dr.zeros(mi.Spectrum, RAYS)
@@ -114,7 +72,7 @@ def _by_point(value: Any) -> np.ndarray:
     return rows.reshape(GRID**2, STRATA**2, -1).mean(axis=1)
 
 
-def _seen(scene: Any, wavelengths: Any) -> tuple[Any, Any, Any]:
+def _seen(scene: Any) -> tuple[Any, Any, Any]:
     """Return the interactions of the grid's rays, the normals of the sides seen, and their k_d.
 
     Each point is repeated for its directions; where nothing is seen ``k_d`` is 0.
@@ -123,8 +81,6 @@ def _seen(scene: Any, wavelengths: Any) -> tuple[Any, Any, Any]:
     x, y = (np.repeat(side.ravel(), STRATA**2) for side in np.meshgrid(cells, cells))
     place = mi.Point2f(mi.Float(x), mi.Float(y))
     ray, _ = scene.sensors()[0].sample_ray(0.0, 0.5, place, mi.Point2f(0.5))
-    if mi.is_spectral:
-        ray.wavelengths = mi.Spectrum(wavelengths)
     si = scene.ray_intersect(ray)
     active = si.is_valid()
     bsdfs = SceneMaterials(scene)
@@ -198,36 +154,43 @@ def fit(
     return np.maximum(level + slope, 0), np.maximum(level - slope, 0)
 
 
-def prepare_mean(scene: Any) -> tuple[Table, Table, list[float], bool]:
-    """Return the same sky and ground: the mean of the indirect light of a scene."""
-    _, arriving, k_d = gather(scene)
-    mean = Table(weighted_mean(arriving, k_d))
-    return mean, mean, [0.0, 0.0, 1.0], scene.environment() is not None
+def prepare_mean(scene: Any) -> tuple[Array, Array, list[float], bool]:
+    """Return sky and ground that are the same, since no direction is up."""
+    return prepare(scene, np.zeros(3))
 
 
-def prepare(scene: Any) -> tuple[Table, Table, list[float], bool]:
+def prepare(scene: Any, up: np.ndarray | None = None) -> tuple[Array, Array, list[float], bool]:
     """Return sky, ground, the upward direction, and whether they replace ``I_a``."""
-    up = upward(scene)
-    sky, ground = fit(*gather(scene), up)
-    return Table(sky), Table(ground), up.tolist(), scene.environment() is not None
+    up = upward(scene) if up is None else up
+    sky, ground = (mi.Spectrum(end.tolist()) for end in fit(*gather(scene), up))
+    dr.make_opaque(sky, ground)  # as literals they would compile a kernel for every scene
+    return sky, ground, up.tolist(), scene.environment() is not None
+
+
+def refuse(scene: Any) -> str:
+    """Return why the light cannot be gathered; empty if it can."""
+    return f"{mi.variant()} has wavelengths in place of RGB" if mi.is_spectral else ""
 
 
 def shade(point: Point) -> Array:
     """Return the chapters' model plus ``k_d`` times the light ``E / pi`` from sky and ground."""
     sky, ground, up, replaces_ambient = point.prepared
-    high, low = sky.at(point.wavelengths), ground.at(point.wavelengths)
-    arriving = high
-    if sky is not ground:
-        cosine = dr.dot(point.normal, mi.Vector3f(up))
-        arriving = high * (0.5 + 0.5 * cosine) + low * (0.5 - 0.5 * cosine)
+    cosine = dr.dot(point.normal, mi.Vector3f(up))
+    arriving = sky * (0.5 + 0.5 * cosine) + ground * (0.5 - 0.5 * cosine)
     ambient = materials.checked_colour("ambient", point.arguments.ambient)
     stays = not (replaces_ambient or materials.is_zero(ambient))
     colour = point.textbook(ambient=ambient if stays else 0)
     return colour + point.material.k_d * arriving
 
 
-_NEEDS = frozenset(INPUTS) - {"uv", "visible"}
-MEAN = Heuristic("mean-ambient", shade, "mean ambient light", _NEEDS, prepare=prepare_mean)
-HEMISPHERE = Heuristic(
-    "hemisphere-ambient", shade, "hemisphere ambient light", _NEEDS, prepare=prepare
+MEAN, HEMISPHERE = (
+    Heuristic(
+        f"{name}-ambient",
+        shade,
+        f"{name} ambient light",
+        frozenset(INPUTS) - {"uv", "visible"},
+        prepare=ready,
+        refuse=refuse,
+    )
+    for name, ready in (("mean", prepare_mean), ("hemisphere", prepare))
 )

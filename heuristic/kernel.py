@@ -149,26 +149,7 @@ def _blocks(
     for group in alike.values():
         for begin in range(0, len(group), BLOCK):
             block = group[begin : begin + BLOCK]
-            yield _opaque(block, vector_type) if is_shared else block
-
-
-def _opaque(lights: Sequence[Light], vector_type: type) -> list[Light]:
-    """Move the numbers of a block of lights out of the kernel's code, into one small array.
-
-    The layout of the array is the same for all blocks of one structure, and so is the kernel.
-    """
-    values = [value for light in lights for value in light.numbers().values()]
-    flat = [number for value in values for number in np.ravel(value)]
-    buffer = dr.leaf_t(vector_type)(flat)
-    dr.eval(buffer)
-    place = iter(range(len(flat)))
-
-    def fetched(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(map(fetched, value))
-        return dr.gather(type(buffer), buffer, next(place))
-
-    return [light.with_numbers(fetched, vector_type) for light in lights]
+            yield [light.opaque(vector_type) for light in block] if is_shared else block
 
 
 def checked_vectors(position: Any, normal: Any, view: Any) -> tuple[Any, ...]:

@@ -90,24 +90,22 @@ class Light:
         """Return what determines the light's instructions, apart from its numbers; hashable."""
         return type(self), materials.wavelength_count(self.intensity), *self.compiled().items()
 
-    def numbers(self) -> dict[str, Any]:
-        """Return the fields that are numbers, or tuples of them, and not compiled in."""
-        return {
-            name: value
-            for name, value in vars(self).items()
-            if name not in self.compiled()
-            and all(isinstance(v, Real) for v in (value if isinstance(value, tuple) else (value,)))
-        }
+    def opaque(self, vector_type: type) -> Self:
+        """Return the light with its numbers out of the kernel's code, as opaque Dr.Jit values."""
 
-    def with_numbers(self, fetch: Callable[[Any], Any], vector_type: type) -> Self:
-        """Return the light with its :meth:`numbers` replaced by the Dr.Jit values of ``fetch``."""
-        fetched = {name: fetch(value) for name, value in self.numbers().items()}
-        for name in {"position", "direction"} & fetched.keys():
-            fetched[name] = vector_type(fetched[name])
-        if "intensity" in fetched:
-            fetched["intensity"] = materials.as_array(fetched["intensity"], vector_type)
+        def moved(value: Any) -> Any:
+            if isinstance(value, tuple):
+                return tuple(map(moved, value))
+            return dr.opaque(float_type, value) if isinstance(value, Real) else value
+
+        float_type = dr.value_t(vector_type)
+        compiled = self.compiled()
+        values = {name: moved(own) for name, own in vars(self).items() if name not in compiled}
+        for name in {"position", "direction"} & values.keys():
+            values[name] = vector_type(values[name])
+        values["intensity"] = materials.as_array(values["intensity"], vector_type)
         light: Any = self
-        return replace(light, **fetched)
+        return replace(light, **values)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ from heuristic.normals import WEIGHTINGS
 from heuristic.plugins.interpolated import (
     Interpolation,
     between,
-    face_corners,
     scan_line_normal,
     shade_mesh,
     shading_points,
@@ -164,45 +163,6 @@ def test_large_meshes_are_stored_whole(rgb, interpolation):
     assert float(dr.max(abs(stored.y - expected))[0]) < 1e-6
 
 
-@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
-@pytest.mark.parametrize("flipped", [False, True])
-def test_evaluating_at_the_corners_of_the_face_gives_what_is_stored(variant, flipped):
-    """Several meshes and a sphere, with texture coordinates and normals or without."""
-    ball = mi.load_dict({"type": "sphere", "center": (0, 0, -5)})
-    mesh = tessellation.to_mesh(mi.load_dict({"type": "sphere", "flip_normals": flipped}), 6)
-    few = triangle_mesh(np.add(CORNERS, (3, 3, 0)), TILTED)
-    roof = triangle_mesh(np.add(ROOF, (-4, 3, 0)), faces=ROOF_FACES)
-    roof = tessellation.with_vertex_normals(roof)
-    faceted = triangle_mesh(CORNERS - (6, 6, 0), face_normals=True)
-    smooth = (mesh, few, roof)
-    for each in smooth:
-        shade_mesh(each, GOURAUD, (1, 1, 9), COLOURED, LIGHTS, 1.0)
-    shapes = {"a": ball, "b": mesh, "c": few, "d": roof, "e": faceted}
-    scene = mi.load_dict({"type": "scene", **shapes}, optimize=False)
-    xy = np.random.default_rng(4).uniform(-6, 8, (5000, 2))
-    si = scene.ray_intersect(looking_down(xy))
-    corners = face_corners(si, si.is_valid())
-    total = mi.Color3f(0)
-    for weight, at in corners:
-        position = mi.Vector3f(at.p)
-        view = mi.Vector3f(1, 1, 9) - position
-        colour = shade(position, mi.Vector3f(at.sh_frame.n), view, COLOURED, LIGHTS, 1.0)
-        total += weight * mi.Color3f(colour)
-    stored = mi.Color3f(stored_shade(si, GOURAUD, twosided=False, active=si.is_valid()))
-    for each in smooth:
-        where = np.array(si.shape == mi.ShapePtr(each))
-        assert where.sum() > 30
-        if flipped and each is mesh:  # rays from above meet its outside, which is its back
-            assert not rows(stored)[where].any()
-        else:
-            np.testing.assert_allclose(rows(total)[where], rows(stored)[where], atol=2e-6)
-    where = np.array(si.shape == mi.ShapePtr(faceted))
-    assert where.sum() > 30
-    np.testing.assert_allclose(rows(corners[0][1].n)[where], rows(si.n)[where], atol=1e-6)
-    assert np.isfinite(rows(total)).all()
-    assert not rows(total)[np.array(si.shape == mi.ShapePtr(ball))].any()
-
-
 @pytest.mark.parametrize("plugin", ["sphere", "disk", "cylinder", "rectangle"])
 @pytest.mark.parametrize("flipped", [False, True])
 def test_shapes_become_meshes_that_look_like_them(rgb, plugin, flipped):
@@ -342,9 +302,7 @@ def two_balls(twosided):
     }
 
 
-@pytest.mark.parametrize(
-    "variant", ["llvm_ad_rgb", "llvm_ad_mono", "llvm_ad_spectral"], indirect=True
-)
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_mono"], indirect=True)
 @pytest.mark.parametrize("twosided", [False, True])
 def test_the_integrator_shades_each_face_at_its_centroid(variant, twosided):
     """Of the face's own normal, on the side that is seen; the corners are those of the mesh."""
@@ -352,11 +310,9 @@ def test_the_integrator_shades_each_face_at_its_centroid(variant, twosided):
     names = ("outward", "inward")
     given |= {name: tessellation.to_mesh(given[name], 3) for name in names}
     scene = mi.load_dict(given, optimize=False)
-    mi.render(scene, spp=1)  # stores the values, in variants that do
+    mi.render(scene, spp=1)  # stores the values
     x, z = np.random.default_rng(6).uniform(-2, 2, (2, 400))
     ray = mi.Ray3f(mi.Point3f(1, -6, 2), dr.normalize(mi.Vector3f(x - 1, 6, z - 2)))
-    if mi.is_spectral:
-        ray.wavelengths = mi.Spectrum(450, 500, 550, 600)
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(0, len(x))
     found, valid, _ = scene.integrator().sample(scene, sampler, mi.RayDifferential3f(ray))
@@ -378,6 +334,11 @@ def test_the_integrator_shades_each_face_at_its_centroid(variant, twosided):
         if mesh is given["inward"] and not twosided:
             expected = 0 * expected
         np.testing.assert_allclose(found[where], expected + 0 * found[where], atol=1e-5)
+
+
+def test_flat_and_gouraud_shading_are_refused_by_wavelength(spectral):
+    with pytest.raises(RuntimeError, match="flat and Gouraud shading need RGB"):
+        mi.load_dict(two_balls(twosided=False))
 
 
 # --- A scene's shapes become meshes ---------------------------------------------------------------

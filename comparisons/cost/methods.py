@@ -24,6 +24,7 @@ from comparisons.prepared import Prepared
 from heuristic.convention import Scene
 from heuristic.errors import InputError
 from heuristic.heuristics import PHONG, Interpolation, named
+from heuristic.plugins.interpolated import require_colours
 from heuristic.tessellation import RESOLUTION
 from reference.pairing.halves import INTEGRATOR
 from reference.planning.effects import (
@@ -324,6 +325,7 @@ class Ladder:
             own = self._shapes(Interpolation.PHONG)
             for interpolation in (Interpolation.FLAT, Interpolation.GOURAUD):
                 try:
+                    require_colours()
                     if self._shapes(interpolation) != own:
                         refused[interpolation.value] = (
                             "it needs a mesh, and the others have the scene's own shapes: give"

@@ -9,7 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic import materials, terms
+from heuristic import materials
 from heuristic.convention import Array, Colour, Direction, Interaction, Mask, Scene
 from heuristic.errors import InputError
 from heuristic.materials import COEFFICIENTS, PHYSICAL, Material, PairedMaterial
@@ -103,9 +103,6 @@ class SceneMaterials:
         """
         if not self.bsdfs:
             return []  # a scene without shapes
-        if len(self.bsdfs) == 1:
-            chosen = self.prune, self.form, self.physical
-            return [(self.bsdfs[0].material(si, active, *chosen), True)]
         present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
         present = present if self.prune else list(COEFFICIENTS)
         readers = [partial(self._read, bsdf, present) for bsdf in self.bsdfs]
@@ -124,11 +121,8 @@ class SceneMaterials:
         ]
 
     def _read(self, bsdf, present, si, active):
-        """Return the values of one BSDF, normalisation included."""
         material = bsdf.material(si, active, form=self.form, physical=self.physical)
         values = {name: mi.Spectrum(getattr(material, name)) for name in present}
-        if bsdf.normalised and "k_s" in values:
-            values["k_s"] *= terms.normalisation(material.form, material.n)
         if self.physical:
             values["base_color"] = mi.Spectrum(material.base_color)
             values |= {name: mi.Float(getattr(material, name)) for name in PHYSICAL[1:]}

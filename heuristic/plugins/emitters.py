@@ -38,14 +38,15 @@ emission and ambient light do not travel.
 """
 
 from dataclasses import fields
+from math import inf
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import numerics, terms, vectors
+from heuristic import terms
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.lights import FAR, UNATTENUATED, DirectionalLight, Light, PointLight, SpotLight
+from heuristic.lights import FAR, PLUGINS, UNATTENUATED, DirectionalLight
 from heuristic.plugins.coefficients import coefficient, emitted
 
 
@@ -60,13 +61,12 @@ def define() -> dict[str, Any]:
     }
     coefficients = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
 
-    class HeuristicEmitter(mi.Emitter):
-        """Base of all kinds: a delta light without a position, never hit by a ray."""
-
-        model: type[Light]
+    class HeuristicLight(mi.Emitter):
+        """One of the kinds in :data:`heuristic.lights.PLUGINS`, never hit by a ray."""
 
         def __init__(self, props):
             super().__init__(props)
+            self.model = PLUGINS[props.plugin_name()]
             self.intensity = emitted(props, "intensity", 1.0)
             self.numbers = []  # names of the parameters that are opaque numbers
             names = {field.name for field in fields(self.model)}
@@ -81,6 +81,9 @@ def define() -> dict[str, Any]:
             self.shell = 0
             if "shell" in names and props.get("shell", 0.0) > 0:
                 self._keep(props, "shell", mi.Float, 0.0)
+            self.m_flags = +mi.EmitterFlags.DeltaPosition
+            if self.model is DirectionalLight:
+                self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection
 
         def parameters_changed(self, keys=()):
             """Make edited numbers opaque, so new values compile nothing."""
@@ -92,18 +95,31 @@ def define() -> dict[str, Any]:
             for name in ("intensity", *self.numbers):
                 callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
 
-        def light(self, si, active=True):
-            """Return the kernel's form of this light."""
-            given = {"intensity": self._spectrum(si, active)}
-            for field in fields(self.model):
-                if field.name not in given:
-                    given[field.name] = getattr(self, field.name)
-            return self.model(**given)
+        def light(self, it, active=True):
+            """Return the kernel's form of this light, at the wavelengths of an interaction."""
+            si = dr.zeros(mi.SurfaceInteraction3f)
+            si.wavelengths = it.wavelengths
+            own = {field.name for field in fields(self.model)} - {"intensity"}
+            return self.model(
+                intensity=self.scale * self.intensity.eval(si, active),
+                **{name: getattr(self, name) for name in own},
+            )
 
         @property
         def attenuation(self):
             """The coefficients of 6.1; plain numbers if they are 1, 0 and 0."""
             return UNATTENUATED if self.unattenuated else (self.k0, self.k1, self.k2)
+
+        def sample_direction(self, it, sample, active=True):
+            toward, intensity, distance = self.light(it, active).illuminate(mi.Vector3f(it.p))
+            ds = dr.zeros(mi.DirectionSample3f)
+            ds.d, ds.dist = toward, FAR if distance is inf else distance
+            ds.p, ds.n = it.p + toward * ds.dist, -toward
+            ds.time = it.time
+            ds.pdf = 1.0
+            ds.delta = True
+            ds.emitter = mi.EmitterPtr(self)
+            return ds, IRRADIANCE_PER_INTENSITY * mi.Spectrum(intensity) & active
 
         def eval(self, si, active=True):
             return mi.Spectrum(0)
@@ -114,8 +130,13 @@ def define() -> dict[str, Any]:
         def eval_direction(self, it, ds, active=True):
             return mi.Spectrum(0)
 
+        def bbox(self):
+            if self.model is DirectionalLight:
+                return mi.ScalarBoundingBox3f()
+            return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(*(c[0] for c in self.position)))
+
         def to_string(self):
-            return f"{type(self).__name__}[intensity = {self.intensity}]"
+            return f"{self.model.__name__}[intensity = {self.intensity}]"
 
         def _keep(self, props, name, kind, default):
             """Read a parameter as an opaque number."""
@@ -123,86 +144,6 @@ def define() -> dict[str, Any]:
             dr.make_opaque(value)
             setattr(self, name, value)
             self.numbers.append(name)
-
-        def _spectrum(self, it, active):
-            si = dr.zeros(mi.SurfaceInteraction3f)
-            si.wavelengths = it.wavelengths
-            return self.scale * self.intensity.eval(si, active)
-
-        def _direction_sample(self, it, position, direction, distance):
-            ds = dr.zeros(mi.DirectionSample3f)
-            ds.p, ds.d, ds.dist = position, direction, distance
-            ds.n = -direction
-            ds.time = it.time
-            ds.pdf = 1.0
-            ds.delta = True
-            ds.emitter = mi.EmitterPtr(self)
-            return ds
-
-    class HeuristicPoint(HeuristicEmitter):
-        """Equation 6.1, and both forms of attenuation of 8.6."""
-
-        model: type[Light] = PointLight
-
-        def __init__(self, props):
-            super().__init__(props)
-            self.m_flags = +mi.EmitterFlags.DeltaPosition
-
-        def sample_direction(self, it, sample, active=True):
-            # Divided by its largest component first: its square may be out of the type's range.
-            half = 0.5 * self.position - 0.5 * it.p
-            size = dr.max(abs(half))
-            is_away = size >= numerics.smallest(size)
-            half /= dr.select(is_away, size, 1)
-            length = dr.norm(half)
-            direction = half * dr.select(is_away, dr.rcp(length), 0)
-            distance = numerics.at_most(2 * length * size, numerics.largest(length))
-            end = self.position
-            if "shell" in self.numbers:  # shadow rays end there
-                end = end - direction * dr.minimum(self.shell, distance)
-            ds = self._direction_sample(it, end, direction, distance)
-            law = terms.clamped_attenuation if self.clamped else terms.attenuation
-            weight = law(distance, *self.attenuation, self._spectrum(it, active))
-            return ds, IRRADIANCE_PER_INTENSITY * weight & active
-
-        def bbox(self):
-            return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(*(c[0] for c in self.position)))
-
-    class HeuristicSpot(HeuristicPoint):
-        """Equations 6.2-6.4."""
-
-        model: type[Light] = SpotLight
-
-        def sample_direction(self, it, sample, active=True):
-            ds, weight = super().sample_direction(it, sample, active)
-            frame = mi.Frame3f(vectors.normalise(self.direction))
-            local = frame.to_local(-ds.d)
-            # 1 - cos and 1 + cos as halves of squared distances from the axis' two ends.
-            away = dr.square(local.x) + dr.square(local.y)
-            cos_axis = numerics.Cosine(
-                local.z,
-                0.5 * (away + dr.square(1 - local.z)),
-                0.5 * (away + dr.square(1 + local.z)),
-            )
-            cone = terms.spot_cone(cos_axis, numerics.cosine_of_degrees(self.cutoff))
-            return ds, weight * cone * terms.spot_falloff(cos_axis, self.exponent)
-
-    class HeuristicDirectional(HeuristicEmitter):
-        """A directional light: parallel rays of constant intensity."""
-
-        model = DirectionalLight
-
-        def __init__(self, props):
-            super().__init__(props)
-            self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection
-
-        def sample_direction(self, it, sample, active=True):
-            direction = -vectors.normalise(self.direction)
-            ds = self._direction_sample(it, it.p + direction * FAR, direction, FAR)
-            return ds, self._spectrum(it, active) * IRRADIANCE_PER_INTENSITY & active
-
-        def bbox(self):
-            return mi.ScalarBoundingBox3f()
 
     class HeuristicGlow(mi.Emitter):
         """See the module's docstring."""
@@ -240,5 +181,4 @@ def define() -> dict[str, Any]:
         def to_string(self):
             return f"HeuristicGlow[k_i = {self.k_i}, k_a = {self.k_a}, ambient = {self.ambient}]"
 
-    lights = (HeuristicPoint, HeuristicSpot, HeuristicDirectional)
-    return {light.model.plugin: light for light in lights} | {"heuristic_glow": HeuristicGlow}
+    return dict.fromkeys(PLUGINS, HeuristicLight) | {"heuristic_glow": HeuristicGlow}

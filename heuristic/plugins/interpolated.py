@@ -8,9 +8,8 @@ where perspective would need a correction.
 
 :func:`shade_mesh` evaluates the model once per vertex (Gouraud) or face (flat), and stores the
 values in the mesh. :func:`stored_shade` reads them where a ray hits, interpolated by Mitsuba. They
-hold for one viewer and one set of lights and wavelengths. :func:`face_corners` serves spectral
-variants, whose wavelengths change from ray to ray: three evaluations per ray, at the vertices of
-the face that it hits. Phong shading needs neither: Mitsuba interpolates the vertex normals.
+hold for one viewer and one set of lights; spectral variants, whose wavelengths change from ray to
+ray, have none. Phong shading needs neither: Mitsuba interpolates the vertex normals.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +19,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import meshes, normals, tessellation, vectors
+from heuristic import meshes, tessellation, vectors
 from heuristic.convention import (
     Colour,
     Direction,
@@ -59,26 +58,6 @@ def scan_line_normal(
     It is zero where opposite normals cancel, and such a point receives no light.
     """
     return vectors.normalise(between(normal_d, normal_e, x_d, x_e, x))
-
-
-def barycentric_coordinates(
-    point: Position, p0: Position, p1: Position, p2: Position
-) -> tuple[Number, Number, Number]:
-    """Return the weights ``b0, b1, b2`` with ``point = b0 p0 + b1 p1 + b2 p2`` and sum 1.
-
-    A point outside the triangle's plane is projected onto it. For a triangle without area the
-    weights are ``1, 0, 0``.
-    """
-    # Over the largest component: the fourth power of a length would leave the type's range.
-    (edge_1, _, back), largest = normals.scaled_edges(p0, p1, p2)
-    edge_2 = -back
-    offset = (point - p0) / dr.select(largest > 0, largest, 1)
-    product = dr.cross(edge_1, edge_2)
-    squared = dr.squared_norm(product)
-    inverse = dr.select(squared > 0, dr.rcp(squared), 0)
-    b1 = dr.dot(dr.cross(offset, edge_2), product) * inverse
-    b2 = dr.dot(dr.cross(edge_1, offset), product) * inverse
-    return 1 - b1 - b2, b1, b2
 
 
 def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
@@ -176,104 +155,48 @@ def _name(interpolation, back):
     return f"{element}_heuristic" + ("_back" if back else "")
 
 
-def face_corners(si: Interaction, active: Mask = True) -> list[tuple[Number, Interaction]]:
-    """Return three pairs of a weight and an interaction, one per vertex of the face hit.
-
-    The Gouraud-shaded value (see 6.36) is ``sum(weight * value)``, where each value is that of
-    :func:`heuristic.shade` at ``p`` with the normal ``sh_frame.n``: the vertex's own, or the face's
-    if the mesh has no others. On shapes that are not meshes all weights are zero.
-    """
-    rows, is_mesh = dr.dispatch(si.shape, _corners, si.prim_index, si.n, active)
-    weights = barycentric_coordinates(mi.Vector3f(si.p), *(mi.Vector3f(row[0]) for row in rows))
-    corners = []
-    for weight, (point, normal, uv) in zip(weights, rows, strict=True):
-        corner = mi.SurfaceInteraction3f(si)
-        corner.p, corner.uv = point, uv
-        corner.n = corner.sh_frame.n = normal
-        corners.append((dr.select(active & is_mesh, weight, 0), corner))
-    return corners
-
-
-def _corners(mesh, face, flat, active):
-    """Return positions, normals and texture coordinates of a shape's face; whether it is a mesh."""
-    if not mesh.is_mesh():
-        return [(mi.Point3f(0), mi.Normal3f(0), mi.Point2f(0))] * 3, mi.Bool(False)
-    vertices, rows = mesh.face_indices(face, active), []
-    for i in range(3):
-        normal, uv = flat, mi.Point2f(0)
-        if mesh.has_vertex_normals() and not mesh.has_face_normals():
-            own = mesh.vertex_normal(vertices[i], active)
-            normal = -own if mesh.has_flipped_normals() else own
-        if mesh.has_vertex_texcoords():
-            uv = mesh.vertex_texcoord(vertices[i], active)
-        rows.append((mesh.vertex_position(vertices[i], active), mi.Normal3f(normal), uv))
-    return rows, mi.Bool(True)
-
-
 @cache
 def derived(base: type) -> type:
     """Return a variant's integrator ``heuristic`` with ``flat`` or ``gouraud`` (6.35, 6.36).
 
-    In RGB variants the heuristic runs once per vertex or face before the rendering, for the sensor
-    that renders, and Mitsuba interpolates the stored values. Spectral variants draw other
-    wavelengths for each ray; there it runs at the corners of the face that a ray hits.
+    The heuristic runs once per vertex or face before the rendering, for the sensor that renders.
     """
+    require_colours()
 
     class InterpolatingIntegrator(base):
         """See :mod:`heuristic.plugins.integrator`."""
 
         def render(self, scene, sensor=0, seed=0, spp=0, develop=True, evaluate=True):
-            if not mi.is_spectral:
-                self._store(scene, scene.sensors()[sensor] if isinstance(sensor, int) else sensor)
-            return super().render(scene, sensor, seed, spp, develop, evaluate)
-
-        def surface_colour(self, scene, si, view, active):
-            if mi.is_spectral:
-                return self._at_corners(scene, si, view, active)
-            twosided = any(shape.bsdf().twosided for shape in scene.shapes())
-            value = stored_shade(si, self.interpolation, twosided, active)
-            return value if mi.is_rgb else mi.Spectrum(value.x)
-
-        def _store(self, scene, sensor):
-            viewer = viewpoint(sensor)
+            viewer = viewpoint(scene.sensors()[sensor] if isinstance(sensor, int) else sensor)
+            # Stored for all shapes alike, because reading cannot distinguish them.
+            twosided = _is_twosided(scene)
             for mesh in _meshes(scene):
                 at = shading_points(mesh, self.interpolation)
+                material = mesh.bsdf().material(
+                    at, True, self.prune, self.model.form, not self.model.is_own
+                )
                 shade_mesh(
                     mesh,
                     self.interpolation,
                     viewer,
-                    mesh.bsdf().material(
-                        at, True, self.prune, self.model.form, not self.model.is_own
-                    ),
+                    material,
                     self.lights(scene, at, True),
                     self.ambient_at(at, True),
                     self.visibility(scene, at, True),
-                    # Stored for all, because reading cannot distinguish the shapes.
-                    twosided=any(shape.bsdf().twosided for shape in scene.shapes()),
+                    twosided,
                     model=self.model_at(scene, at),
                 )
+            return super().render(scene, sensor, seed, spp, develop, evaluate)
 
-        def _at_corners(self, scene, si, view, active):
-            _meshes(scene)
-            corners = face_corners(si, active)
-            viewer = si.p + view * si.t
-            front = dr.dot(si.n, view) > 0
-            if self.interpolation is Interpolation.FLAT:
-                # One point: the centroid, with the face's own normal.
-                centroid = mi.SurfaceInteraction3f(si)
-                centroid.p = sum(corner.p for _, corner in corners) / 3
-                centroid.uv = sum(corner.uv for _, corner in corners) / 3
-                centroid.sh_frame.n = centroid.n = si.n
-                corners = [(mi.Float(1), centroid)]
-            colour = mi.Spectrum(0)
-            for weight, corner in corners:
-                normal = dr.select(front, mi.Vector3f(corner.sh_frame.n), -corner.sh_frame.n)
-                value = self.shaded(scene, corner, viewer - corner.p, normal, active)
-                colour += weight * value
-            twosided = self.twosided(scene, si, active)
-            return dr.select(active & (twosided | front), colour, 0)
+        def surface_colour(self, scene, si, view, active):
+            value = stored_shade(si, self.interpolation, _is_twosided(scene), active)
+            return value if mi.is_rgb else mi.Spectrum(value.x)
 
     return InterpolatingIntegrator
+
+
+def _is_twosided(scene):
+    return any(shape.bsdf().twosided for shape in scene.shapes())
 
 
 def _meshes(scene):
@@ -296,3 +219,12 @@ def viewpoint(sensor: Any) -> Position:
             " and Gouraud shading need: use perspective or thinlens, or phong interpolation."
         )
     return sensor.world_transform().translation()
+
+
+def require_colours() -> None:
+    """Reject spectral variants, whose wavelengths change from ray to ray."""
+    if mi.is_spectral:
+        raise InputError(
+            f"{mi.variant()} has wavelengths, and flat and Gouraud shading need RGB: give"
+            " --heuristic-variant llvm_ad_rgb, or use phong interpolation."
+        )

@@ -74,25 +74,24 @@ def define() -> dict[str, Any]:
         def material(self, si, active=True, prune=True, form=None, physical=False):
             """Return the material at a surface interaction; absent terms are plain zeros.
 
-            With ``physical`` it is a :class:`heuristic.materials.PairedMaterial`.
+            ``k_s`` is that of a lobe without normalisation. With ``physical`` it is a
+            :class:`heuristic.materials.PairedMaterial`.
             """
+            form, n = form or self.form, self.exponent(si, active)
             coefficients = {
                 name: getattr(self, name).eval(si, active)
                 for name in (self.present if prune else COEFFICIENTS)
             }
+            if self.normalised and "k_s" in coefficients:
+                coefficients["k_s"] = coefficients["k_s"] * terms.normalisation(form, n)
             if physical:
                 coefficients["base_color"] = self.base_color.eval(si, active)
                 coefficients |= {
                     name: value.eval_1(si, active) if isinstance(value, mi.Texture) else value
                     for name, value in self.partner.items()
                 }
-            return (PairedMaterial if physical else Material)(
-                **coefficients,
-                n=self.exponent(si, active),
-                form=form or self.form,
-                normalised=self.normalised,
-                n_is_moderate=self.n_is_moderate,
-            )
+            kind = PairedMaterial if physical else Material
+            return kind(**coefficients, n=n, form=form, n_is_moderate=self.n_is_moderate)
 
         def exponent(self, si, active=True):
             """Return ``n`` at a surface interaction."""
@@ -193,9 +192,7 @@ def define() -> dict[str, Any]:
             """
             for name in (*COEFFICIENTS, "transmittance"):
                 require_positive(f"phong: {name}", getattr(self, name))
-            self.present = {
-                name for name in ("k_i", "k_a", "k_d", "k_s") if may_be_nonzero(getattr(self, name))
-            }
+            self.present = {name for name in COEFFICIENTS if may_be_nonzero(getattr(self, name))}
             self.is_clear = may_be_nonzero(self.transmittance)
             self._set_components()
             self.n_is_moderate = False
@@ -220,9 +217,7 @@ def define() -> dict[str, Any]:
             self.m_flags = reduce(or_, self.m_components)
 
         def to_string(self):
-            parts = ", ".join(
-                f"{name} = {getattr(self, name)}" for name in ("k_i", "k_a", "k_d", "k_s", "n")
-            )
+            parts = ", ".join(f"{name} = {getattr(self, name)}" for name in (*COEFFICIENTS, "n"))
             return f"PhongBSDF[{parts}, twosided = {self.twosided}]"
 
         def _facing(self, wi, *directions):
