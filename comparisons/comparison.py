@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from comparisons.pixel_terms import TermGrid
 
 
-LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
+LIBRARIES = ("mitsuba", "drjit", "numpy", "OpenEXR")
 
 
 def versions() -> dict[str, str]:
