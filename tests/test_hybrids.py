@@ -9,7 +9,7 @@ import pytest
 from comparisons.case import open_case
 from comparisons.cost.cost_record import Method
 from comparisons.cost.methods import Ladder
-from comparisons.departure.metrics import delta_e_2000
+from comparisons.departure.metrics import LEADING
 from comparisons.gallery.builtin import SCENES
 from comparisons.hybrids import attribution
 from comparisons.hybrids.hybrids import HybridImages, HybridScenes
@@ -75,7 +75,7 @@ def test_attributions_add_up_to_the_departure_in_the_mean_and_in_every_pixel(fou
 def test_the_departure_is_that_of_the_kernel_rendered_anew(found):
     """Noise of a few samples on both sides; the mean over all pixels is sharper than one."""
     causes, (kernel, reference) = found.causes, found.images
-    error = delta_e_2000(kernel, reference, Options().viewing)[causes.counted].mean()
+    error = LEADING(kernel, reference, Options().viewing)[causes.counted].mean()
     departure = causes.departure[causes.counted].mean()
     assert departure == pytest.approx(error, abs=0.05 * error + 0.5)
     first, *_, last = causes.record.hybrids

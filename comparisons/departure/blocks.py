@@ -20,10 +20,10 @@ def bands(height: int) -> Iterator[slice]:
     return (slice(start, min(start + _ROWS, height)) for start in range(0, height, _ROWS))
 
 
-def block_sums(image: Array) -> Array:
+def block_sums(image: Array, side: int = BLOCK) -> Array:
     """Return block sums (h, w, ...) of an image (H, W, ...); edge blocks may be smaller."""
     for axis in (0, 1):
-        image = np.add.reduceat(image, np.arange(0, image.shape[axis], BLOCK), axis=axis)
+        image = np.add.reduceat(image, np.arange(0, image.shape[axis], side), axis=axis)
     return image
 
 

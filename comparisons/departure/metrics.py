@@ -319,34 +319,11 @@ RATIO = Ratio(
 """The ratio of `log2_luminance_ratio`."""
 
 
-def delta_e_2000(
-    test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
-) -> Array:
-    """Return CIE DE2000, display-referred; shape (H, W), range 0 to about 110.
-
-    Linear RGB × exposure, clipped to [0, 1] → XYZ → CIE L*a*b* (D65, 2° observer) → ΔE00 with
-    k_L = k_C = k_H = 1. About 1 is just noticeable side by side; black to white is 100.
-
-    A display clips, too: two colours brighter than white compare equal, as do two negative
-    (out-of-gamut) ones. ``dE_ITP`` is for differences above white.
-
-    Source: CIE 142-2001; Sharma, Wu and Dalal, Color Res. Appl. 30(1), 2005.
-    Raises `NonFiniteError`, and `InputError` for different shapes.
-
-    White against black, and two colours that a display shows as white:
-
-    >>> delta_e_2000([[[1, 1, 1], [2, 2, 2]]], [[[0, 0, 0], [1, 1, 1]]]).round(6).tolist()
-    [[100.0, 0.0]]
-    """
-    return LEADING(test, reference, viewing)
-
-
 def log2_luminance_ratio(test: ArrayLike, reference: ArrayLike) -> Array:
     """Return the signed ratio of luminances in stops; shape (H, W).
 
     ``log2((max(Y_t, 0) + ε) / (max(Y_r, 0) + ε))`` with ε = 1e-4 of display white: positive
     where the test image is brighter, one stop is a factor of 2, and black against black is 0.
-    Raises as `delta_e_2000`.
 
     >>> test, reference = [[[0.5, 0.5, 0.5]]], [[[0.25, 0.25, 0.25]]]
     >>> log2_luminance_ratio(test, reference).round(2).tolist()

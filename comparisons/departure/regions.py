@@ -19,6 +19,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
+from comparisons.departure.blocks import block_sums
 from reference.records import Amount, Count, Record, Share, Size
 from reference.rendering.gbuffer import ObjectIds
 
@@ -78,7 +79,8 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
     if not total > 0.0:
         return ()
     cell = -(-max(error.shape) // CELLS)
-    worth = _cells(error, cell) - CONTRAST * total / pixels * _cells(counted, cell)
+    sums, sizes = (block_sums(image.astype(np.float64), cell) for image in (error, counted))
+    worth = sums - CONTRAST * total / pixels * sizes
     found: list[Region] = []
     while len(found) < MOST:
         rows, columns, value = _best_box(worth)
@@ -92,12 +94,6 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
         elif value < LEAST_SHARE * total / MOST:  # only specks are left
             break
     return tuple(found)
-
-
-def _cells(image: NDArray, side: int) -> NDArray[np.float64]:
-    """Return sums over square cells; those at the right and the bottom may be smaller."""
-    rows = np.add.reduceat(image.astype(np.float64), np.arange(0, image.shape[0], side), axis=0)
-    return np.add.reduceat(rows, np.arange(0, image.shape[1], side), axis=1)
 
 
 def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:

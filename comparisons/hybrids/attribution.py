@@ -37,7 +37,7 @@ from comparisons.comparison import (
 )
 from comparisons.departure.blocks import ratio
 from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import LEADING, delta_e_2000
+from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import contrasts, without_noise
 from comparisons.departure.regions import Region, find_objects, means
 from comparisons.hybrids.hybrids import (
@@ -243,7 +243,7 @@ def attribute(
 
     departure, left = error(nothing), error(everything)
     kernel, plugin = (images.of(key).images.mean(axis=0) for key in (images.plain_kernel, nothing))
-    rounding = delta_e_2000(plugin, kernel, meter.viewing)[meter.counted]
+    rounding = LEADING(plugin, kernel, meter.viewing)[meter.counted]
     return Causes(
         record=Attribution(
             effects=contributions,

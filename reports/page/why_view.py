@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import delta_e_2000
+from comparisons.departure.metrics import LEADING
 from comparisons.hybrids.attribution import dominating
 from reports.charts.theme import EFFECT_COLOURS
 from reports.files import images
@@ -55,7 +55,7 @@ def why_view(
         return WhyView(found)
     times = len(previews[0]) // len(counted)
     shown = counted.repeat(times, axis=0).repeat(times, axis=1)
-    levels = [np.rint(delta_e_2000(each, previews[-1], viewing) / STEP) for each in previews]
+    levels = [np.rint(LEADING(each, previews[-1], viewing) / STEP) for each in previews]
     left = [np.where(shown, np.minimum(each, UNCOUNTED - 1), UNCOUNTED) for each in levels]
     return WhyView(
         found,
