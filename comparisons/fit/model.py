@@ -186,7 +186,7 @@ def _eye(shading):
                 "position": mi.Vector3f(si.p),
                 "normal": mi.Vector3f(normal),
                 "view": mi.Vector3f(view),
-                "facing": active & (self.twosided(scene, si, active) | (si.wi.z > 0)),
+                "facing": active & (materials.twosided(si, active) | (si.wi.z > 0)),
                 "material": number + dr.zeros(mi.UInt32, dr.width(si.p)),
             }
             for name in {name for bsdf in materials.bsdfs for name in _textured(bsdf)}:

@@ -93,8 +93,8 @@ def define() -> dict[str, Any]:
 
         def seen_side(self, scene, si, active):
             """Return the normal of the side that is seen, and whether that side is shaded."""
-            twosided = self.twosided(scene, si, active)
-            normal = self.known(scene).materials.normal(si, active)
+            materials = self.known(scene).materials
+            normal, twosided = materials.normal(si, active), materials.twosided(si, active)
             if twosided is not False:
                 normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
             return normal, twosided | (si.wi.z > 0)
@@ -142,8 +142,18 @@ def define() -> dict[str, Any]:
             self.known(scene)
 
         def lights(self, scene, si, active):
-            """Return the kernel's form of the scene's lights."""
-            return [emitter.light(si, active) for emitter in _lights(scene)]
+            """Return the kernel's form of the lights; reject those that it does not know."""
+            lights = []
+            for emitter in scene.emitters():
+                if hasattr(emitter, "light"):
+                    lights.append(emitter.light(si, active))
+                elif not (emitter.is_environment() or hasattr(emitter, "k_a")):
+                    raise InputError(
+                        f"emitter {emitter.id()!r} ({emitter.class_name()}) has no heuristic form."
+                        " The integrator heuristic renders the heuristic half of a pair, which"
+                        " reference.pair makes."
+                    )
+            return lights
 
         def ambient_at(self, si, active):
             """Return ``I_a``, a plain 0 if there is none."""
@@ -161,10 +171,6 @@ def define() -> dict[str, Any]:
                 return ~scene.ray_test(si.spawn_ray_to(si.p + toward * distance), active)
 
             return visible
-
-        def twosided(self, scene, si, active):
-            """Return whether the surface is two-sided; a plain False if none of the scene is."""
-            return self.known(scene).materials.twosided(si, active)
 
         def traverse(self, callback):
             for name, value in {"ambient": self.ambient, **self.parameters}.items():
@@ -212,18 +218,3 @@ def _through_layers(integrator, scene, ray, active):
         active = hit & (dr.max(throughput) > 0)
         layer += 1
     return colour, hit_any
-
-
-def _lights(scene):
-    """Return the emitters that light the scene; reject those that the model does not know."""
-    lights = []
-    for emitter in scene.emitters():
-        if hasattr(emitter, "light"):
-            lights.append(emitter)
-        elif not (emitter.is_environment() or hasattr(emitter, "k_a")):
-            raise InputError(
-                f"emitter {emitter.id()!r} ({emitter.class_name()}) has no heuristic form. The"
-                " integrator heuristic renders the heuristic half of a pair, which reference.pair"
-                " makes."
-            )
-    return lights
