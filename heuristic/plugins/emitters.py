@@ -38,7 +38,6 @@ emission and ambient light do not travel.
 """
 
 from dataclasses import fields
-from math import inf
 from typing import Any
 
 import drjit as dr
@@ -113,7 +112,7 @@ def define() -> dict[str, Any]:
         def sample_direction(self, it, sample, active=True):
             toward, intensity, distance = self.light(it, active).illuminate(mi.Vector3f(it.p))
             ds = dr.zeros(mi.DirectionSample3f)
-            ds.d, ds.dist = toward, FAR if distance is inf else distance
+            ds.d, ds.dist = toward, FAR if isinstance(distance, float) else distance
             ds.p, ds.n = it.p + toward * ds.dist, -toward
             ds.time = it.time
             ds.pdf = 1.0
