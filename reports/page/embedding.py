@@ -38,7 +38,7 @@ Codes = NDArray[np.uint16]
 
 
 class Embedded(Record):
-    """Named planes of ``width`` by ``height`` codes, whose pixels are means over ``block ** 2`` others."""
+    """Named planes of ``width`` by ``height`` codes, means over squares of ``block``."""
 
     width: int
     height: int
