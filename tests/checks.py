@@ -6,6 +6,7 @@ of wrong kernels (`test_mutations`) run the very same ones.
 
 from dataclasses import dataclass
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 
@@ -83,37 +84,33 @@ def kernel_light(light):
 
 
 def check_kernel(vector_type, tolerance, coefficients="rgb"):
-    """Compare `heuristic.shade` with the oracle over random points, under every kind of light."""
-    points = random_points()
+    """Compare `heuristic.shade` with the oracle over random points, under every kind of light.
+
+    Points of scalar types are shaded one by one, so there are few of them.
+    """
+    is_scalar = not dr.is_dynamic_v(vector_type)
+    points = random_points(50 if is_scalar else POINTS)
     lights = tinted(LIGHTS, TINTS[coefficients])
     values = COEFFICIENTS[coefficients] | {"n": 9}
     ambient = 0.5
-    found = kernel.shade(
-        *(vector_type(vectors.T) for vectors in (points.position, points.normal, points.view)),
-        heuristic.Material(**values),
-        [kernel_light(light) for light in lights],
-        ambient,
-    )
-    expected = oracle.shade(
-        points.position,
-        points.normal,
-        points.view,
-        oracle.Material(**values),
-        lights,
-        ambient,
-    )
+    material, lamps = heuristic.Material(**values), [kernel_light(light) for light in lights]
+    arrays = points.position, points.normal, points.view
+    if is_scalar:
+        rows = (map(vector_type, row) for row in zip(*arrays, strict=True))
+        found = [np.atleast_1d(kernel.shade(*row, material, lamps, ambient)) for row in rows]
+    else:
+        given = (vector_type(vectors.T) for vectors in arrays)
+        found = as_rows(kernel.shade(*given, material, lamps, ambient))
+    expected = oracle.shade(*arrays, oracle.Material(**values), lights, ambient)
     edges = oracle.near_an_edge(points.position, points.normal, lights, 1e-5)
-    assert edges.mean() < 1e-3, "too many points were left out for the comparison to mean much"
-    oracle.require_close(as_rows(found), expected, absolute=tolerance, where=~edges)
+    assert edges.sum() <= 1 + 1e-3 * len(edges), "too many points are left out to mean much"
+    oracle.require_close(found, expected, absolute=tolerance, where=~edges)
 
 
 def as_rows(value):
     """Return a Dr.Jit float or colour as an array (N, C)."""
     array = np.array(value, float)
     return array[:, None] if array.ndim == 1 else array.T
-
-
-# --- Scenes ----------------------------------------------------------------------------------
 
 
 def with_film(scene, resolution, spp):
@@ -126,15 +123,9 @@ def with_film(scene, resolution, spp):
 
 def render(scene, spp, seed, integrator=None):
     """Render a scene dictionary to an array of double precision."""
-    return np.array(
-        mi.render(
-            mi.load_dict(scene, optimize=False),
-            integrator=mi.load_dict(integrator) if integrator else None,
-            spp=spp,
-            seed=seed,
-        ),
-        float,
-    )
+    made = mi.load_dict(scene, optimize=False)
+    integrator = mi.load_dict(integrator) if integrator else None
+    return np.array(mi.render(made, integrator=integrator, spp=spp, seed=seed), float)
 
 
 def check_figure(scene, resolution=96, seed=5, tolerance=1e-5):

@@ -1,9 +1,8 @@
 """Small scenes that rules of pruning without premises get wrong, by 1 % to everything."""
 
-import mitsuba as mi
-
 from reference.pairing.probe import AlbedoTable
 from reference.planning.rules import PruningRule, RuleResult
+from tests.parts import camera, moved
 
 DIFFUSE = {"type": "diffuse", "reflectance": 0.7}
 TWO_SIDED = {"type": "twosided", "bsdf": DIFFUSE}
@@ -27,18 +26,14 @@ def prune_blindly(monkeypatch):
     monkeypatch.setattr(AlbedoTable, "at", at_the_front)
 
 
-def scene(viewer=(0, -4, 0), target=(0, 0, 0), integrator="path", camera=None, size=32, **parts):
-    """A scene seen from a point; ``camera`` has parameters of the sensor."""
-    camera = {"type": "perspective"} | (camera or {})
-    field = {"fov": 40.0} if camera["type"] in ("perspective", "thinlens") else {}
+def scene(viewer=(0, -4, 0), target=(0, 0, 0), integrator="path", lens=None, size=32, **parts):
+    """A scene seen from a point; ``lens`` has parameters of the sensor."""
+    lens = lens or {}
     up = (0, 1, 0) if viewer[:2] == target[:2] else (0, 0, 1)
-    to_world = mi.ScalarTransform4f().look_at(viewer, target, up)
-    if camera["type"] == "orthographic":
-        to_world = to_world.scale((3.0, 3.0, 1.0))
-    film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
-    if camera["type"] == "radiancemeter":
-        film |= {"width": 1, "height": 1}
-    sensor = {"to_world": to_world, "film": film, **field, **camera}
+    size = 1 if lens.get("type") == "radiancemeter" else size
+    sensor = camera(viewer, target, up, size, **lens)
+    if sensor["type"] == "orthographic":
+        sensor["to_world"] = sensor["to_world"].scale((3.0, 3.0, 1.0))
     integrator = integrator if isinstance(integrator, dict) else {"type": integrator}
     return {"type": "scene", "integrator": integrator, "sensor": sensor, **parts}
 
@@ -76,15 +71,14 @@ def _behind():
 
 def _cut_open():
     inside = lamp((0, 0, 0.3))
-    return scene(camera={"near_clip": 4.0}, ball=sphere(TWO_SIDED), light=inside)
+    return scene(lens={"near_clip": 4.0}, ball=sphere(TWO_SIDED), light=inside)
 
 
 def _wide():
     """The camera stands beside the sphere; its ray plane goes through it."""
     inside = lamp((0, 0, 0.3))
-    camera = {"type": "orthographic"}
-    ball = sphere(TWO_SIDED)
-    return scene((2.5, 0, 0), (2.5, 1, 0), camera=camera, ball=ball, light=inside)
+    lens, ball = {"type": "orthographic"}, sphere(TWO_SIDED)
+    return scene((2.5, 0, 0), (2.5, 1, 0), lens=lens, ball=ball, light=inside)
 
 
 def _leaking():
@@ -103,10 +97,10 @@ def _brushed():
 
 def tube(scale, **ends):
     """A floor under a cylinder that shines, seen from above."""
-    around = mi.ScalarTransform4f().translate((0, 0, 1.2)).rotate((1, 0, 0), 40)
+    around = moved((0, 0, 1.2)).rotate((1, 0, 0), 40)
     lamp = {"type": "cylinder", "to_world": around.scale(scale), "bsdf": BLACK, **ends}
     lamp["emitter"] = {"type": "area", "radiance": 3.0}
-    floor = {"type": "rectangle", "bsdf": TWO_SIDED, "to_world": mi.ScalarTransform4f().scale(3)}
+    floor = {"type": "rectangle", "bsdf": TWO_SIDED, "to_world": moved(0, 3)}
     return scene((0, -3, 6), integrator="direct", floor=floor, tube=lamp)
 
 

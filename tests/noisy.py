@@ -20,7 +20,7 @@ from reference.rendering.gbuffer import gbuffer
 from reference.rendering.renderer import pass_seed
 from reference.rendering.sums import Accumulator, DifferenceSums
 from reference.scene.source import Source
-from tests.test_physics import look_at
+from tests.parts import look_at
 
 SIZE = 40
 

@@ -3,6 +3,8 @@
 import mitsuba as mi
 import numpy as np
 
+from tests.parts import camera
+
 
 def two_colours(toward):
     """A blue sky above the plane z = 0, and a brown ground below."""
@@ -12,12 +14,10 @@ def two_colours(toward):
 
 def sky_above(radiance, height=64, k_d=0.8, ambient=0.0):
     """A scene of the heuristic half; ``radiance`` maps directions (N, 3) to colours (N, 3)."""
-    film = {"type": "hdrfilm", "width": 32, "height": 32, "rfilter": {"type": "box"}}
-    to_world = mi.ScalarTransform4f().look_at((0, -5, 0), (0, 0, 0), (0, 0, 1))
     return {
         "type": "scene",
         "integrator": {"type": "heuristic", "ambient": ambient},
-        "sensor": {"type": "perspective", "fov": 32.0, "to_world": to_world, "film": film},
+        "sensor": camera((0, -5, 0), fov=32.0),
         "ball": {"type": "sphere", "bsdf": {"type": "phong", "k_d": k_d, "k_a": k_d}},
         "sky": {"type": "envmap", "bitmap": mi.Bitmap(_pixels(radiance, height))},
     }

@@ -11,18 +11,12 @@ from heuristic.heuristics import named
 from reference.pairing.halves import pair
 from reference.rendering.renderer import Renderer
 from reference.scene.source import Source
+from tests.parts import camera, moved
 from tests.random_scenes import is_sound, random_scene
 from tests.sky import sky_above, two_colours
 
 AMBIENT = ("mean-ambient", "hemisphere-ambient")
 MODELS = (*AMBIENT, "shadow-map")
-
-
-def looking(origin, target, up=(0, 0, 1), size=32, fov=40.0, **others):
-    """A camera with a small film."""
-    film = {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}}
-    to_world = mi.ScalarTransform4f().look_at(origin, target, up)
-    return {"type": "perspective", "fov": fov, "to_world": to_world, "film": film, **others}
 
 
 def image(scene, model, spp=4, **parameters):
@@ -31,16 +25,13 @@ def image(scene, model, spp=4, **parameters):
     return np.array(Renderer(scene, mi.load_dict(integrator), spp, model).render(1), float)
 
 
-# --- Ambient light --------------------------------------------------------------------------------
-
-
 def integrating_sphere(k_d):
     """The inside of a sphere of radius 2 with a lamp in its middle."""
     wall = {"type": "phong", "k_d": k_d}
     return {
         "type": "scene",
         "integrator": {"type": "heuristic"},
-        "sensor": looking((0.5, 0.3, 0.1), (2, 0, 0), fov=80.0),
+        "sensor": camera((0.5, 0.3, 0.1), (2, 0, 0), fov=80.0),
         "wall": {"type": "sphere", "radius": 2.0, "flip_normals": True, "bsdf": wall},
         "lamp": {"type": "heuristic_point", "k0": 0.0, "k2": 1.0}
         | {"intensity": {"type": "uniform", "value": 3.0}},
@@ -84,27 +75,12 @@ def test_an_environment_replaces_ambient_light_and_is_gathered_where_nothing_hid
         assert shown == pytest.approx(0.25 * 0.8, rel=0.01), model
 
 
-def corner():
-    """A floor and a wall of one unit's height at x = 0, both wide."""
-    turned = mi.ScalarTransform4f().translate((0, 0, 0.5)).rotate((0, 1, 0), 90)
-    bsdf = {"type": "phong", "k_a": 0.4, "k_d": 0.5, "twosided": True}
-    return {
-        "type": "scene",
-        "integrator": {"type": "heuristic"},
-        "sensor": looking((2.5, -1, 2.5), (0.3, 0, 0.2), size=96, fov=90.0),
-        "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(300), "bsdf": bsdf},
-        "wall": {
-            "type": "rectangle",
-            "to_world": turned @ mi.ScalarTransform4f().scale((0.5, 300, 1)),
-            "bsdf": bsdf,
-        },
-    }
-
-
 def test_ambient_light_of_its_own_stays_without_an_environment(rgb):
-    scene = mi.load_dict(corner())
+    given = sky_above(two_colours)
+    del given["sky"]
+    scene = mi.load_dict(given)
     plain = image(scene, "phong", ambient=2.0)
-    assert plain.max() == pytest.approx(0.8)
+    assert plain.max() == pytest.approx(1.6)
     for model in AMBIENT:
         np.testing.assert_allclose(image(scene, model, ambient=2.0), plain, atol=1e-6)
 
@@ -132,8 +108,6 @@ def test_a_fit_keeps_the_mean_and_is_not_negative():
         np.testing.assert_allclose(*means, rtol=1e-6, atol=1e-9)
 
 
-# --- Shadow maps ----------------------------------------------------------------------------------
-
 LAMPS = {
     "point": {"type": "heuristic_point", "position": (0.8, -0.7, 2.5)},
     "spot": {
@@ -149,15 +123,13 @@ LAMPS = {
 def still_life(*lamps):
     """A cube and a ball on a floor under lamps."""
     bsdf = {"type": "phong", "k_d": 0.5, "k_s": 0.3, "n": 10}
-    place = mi.ScalarTransform4f()
     return mi.load_dict(
         {
             "type": "scene",
             "integrator": {"type": "heuristic"},
-            "sensor": looking((-0.7, -2.2, 2.2), (0, 0.3, 0), size=128, fov=50.0),
-            "floor": {"type": "rectangle", "to_world": place.scale(3), "bsdf": bsdf},
-            "cube": {"type": "cube", "to_world": place.translate((-0.6, 0.4, 0.3)).scale(0.3)}
-            | {"bsdf": bsdf},
+            "sensor": camera((-0.7, -2.2, 2.2), (0, 0.3, 0), size=128, fov=50.0),
+            "floor": {"type": "rectangle", "to_world": moved(0, 3), "bsdf": bsdf},
+            "cube": {"type": "cube", "to_world": moved((-0.6, 0.4, 0.3), 0.3)} | {"bsdf": bsdf},
             "ball": {"type": "sphere", "center": (0.5, 0, 0.8), "radius": 0.35, "bsdf": bsdf},
         }
         | {name: LAMPS[name] for name in lamps}
@@ -197,7 +169,7 @@ def test_no_plane_hides_itself_with_the_default_bias(rgb):
             {
                 "type": "scene",
                 "integrator": {"type": "heuristic"},
-                "sensor": looking((0, -3, 3), (0, 0, 0), size=64),
+                "sensor": camera((0, -3, 3), (0, 0, 0), size=64),
                 "floor": {"type": "rectangle", "bsdf": {"type": "phong", "k_d": 0.5}},
                 "lamp": {"type": f"heuristic_{kind}"} | lamp,
             }
@@ -212,9 +184,6 @@ def test_no_plane_hides_itself_with_the_default_bias(rgb):
     scene = floor_under("point", float(np.deg2rad(60)))
     bare = image(scene, "shadow-map", 1, bias=0.0)
     assert np.mean(bare < 0.5 * image(scene, "phong", 1)) > 0.1
-
-
-# --- All of them ----------------------------------------------------------------------------------
 
 
 def test_a_scene_without_lamps_or_with_too_many_is_refused_with_the_reason(rgb):

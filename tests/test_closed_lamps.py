@@ -7,6 +7,7 @@ import pytest
 from comparisons.compare import compare
 from comparisons.options import Options
 from reference.scene.source import Source
+from tests.parts import camera, moved
 
 WHITE = {"type": "diffuse", "reflectance": 0.6}
 LAMPS = {
@@ -18,18 +19,11 @@ LAMPS = {
 
 def room(kind):
     """A floor, a small ball on it, and a lamp above that is closed or nearly."""
-    above = mi.ScalarTransform4f().translate((1.5, 0, 3)).scale(0.4)
-    camera = mi.ScalarTransform4f().look_at((0, -6, 4), (0, 0, 0), (0, 0, 1))
-    lamp = LAMPS[kind](above)
+    lamp = LAMPS[kind](moved((1.5, 0, 3), 0.4))
     return {
         "type": "scene",
-        "sensor": {
-            "type": "perspective",
-            "fov": 40,
-            "to_world": camera,
-            "film": {"type": "hdrfilm", "width": 48, "height": 36, "rfilter": {"type": "box"}},
-        },
-        "floor": {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(4), "bsdf": WHITE},
+        "sensor": camera((0, -6, 4), size=(48, 36)),
+        "floor": {"type": "rectangle", "to_world": moved(0, 4), "bsdf": WHITE},
         "ball": {"type": "sphere", "center": (-1, 0, 0.5), "radius": 0.5, "bsdf": WHITE},
         "lamp": lamp | {"bsdf": WHITE, "emitter": {"type": "area", "radiance": 20.0}},
     }

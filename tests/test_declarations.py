@@ -34,8 +34,6 @@ from tests.small_scene import PLAIN
 
 OWN = [name for name, metric in METRICS.items() if METRICS.is_own(metric)]
 
-# -- A metric ------------------------------------------------------------------------------------
-
 
 def blurred(test, reference, viewing):
     """Mean absolute difference of images blurred by boxes of 3 by 3: it knows neighbourhoods."""
@@ -151,9 +149,6 @@ def test_a_metric_from_outside_is_in_fits_and_studies(metric):
     np.testing.assert_array_equal(maps["blurred"], expected)
     assert data["blurred"].after == expected.mean()
     assert dataset.results()["blurred"][1] == "Blurred <difference>, mean"
-
-
-# -- A method and a heuristic in one run ---------------------------------------------------------
 
 
 TONE = Heuristic("flat-tone", lambda point: point.material.k_d, "Flat <tone>")

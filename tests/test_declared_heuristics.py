@@ -22,6 +22,7 @@ from heuristic.heuristics import (
 from reference.pairing import halves
 from reference.rendering.renderer import Renderer
 from tests import checks
+from tests.parts import camera, moved, rgb_of, shown_by
 
 
 def toon(point):
@@ -66,33 +67,10 @@ def declared(monkeypatch):
         declare(heuristic)
 
 
-def rgb_of(*value):
-    return {"type": "rgb", "value": list(value)}
-
-
 def scene(model="phong", **integrator):
     """A sphere under two coloured lights, whose order can be told."""
-    builtin = SCENES["fig-8-9"].make()
     bsdf = {"type": "phong", "k_a": 0.2, "k_d": rgb_of(0.5, 0.4, 0.1), "k_s": 0.4, "n": 9}
-    lights = {
-        "light1": {
-            "type": "heuristic_point",
-            "position": [-4, -2, 3],
-            "intensity": rgb_of(1, 0.5, 0.25),
-        },
-        "light2": {
-            "type": "heuristic_directional",
-            "direction": [-1, 2, -1],
-            "intensity": rgb_of(0.2, 0.4, 0.6),
-        },
-    }
-    camera = {name: builtin[name] for name in ("type", "sensor")}
-    sphere = builtin["sphere"] | {"bsdf": bsdf}
-    chosen = {"type": "heuristic", "model": model, "ambient": 0.5, **integrator}
-    return camera | {"sphere": sphere, "integrator": chosen} | lights
-
-
-# --- The built-in ones ---------------------------------------------------------------------------
+    return shown_by(model, bsdf, ambient=0.5, **integrator)
 
 
 def kernels(loaded):
@@ -125,8 +103,7 @@ def with_form(form, model, normalised=False):
     lobe = {"form": form, "normalised": normalised}
     bsdf = given["sphere"]["bsdf"] | lobe
     plain = given["sphere"]["bsdf"] | {"n": 4, "form": "blinn", "normalised": True}
-    transform = mi.ScalarTransform4f().translate([1, 0, 0.5]).scale(0.4)
-    small = {"type": "sphere", "to_world": transform, "bsdf": plain}
+    small = {"type": "sphere", "to_world": moved((1, 0, 0.5), 0.4), "bsdf": plain}
     return given | {"sphere": given["sphere"] | {"bsdf": bsdf}, "small": small}
 
 
@@ -141,9 +118,6 @@ def test_blinn_is_the_blinn_lobe_whatever_the_material_says(rgb):
         found, expected, other = images
         np.testing.assert_array_equal(found, expected)
         assert abs(found - other).max() > 0.05
-
-
-# --- What a declaration owns ----------------------------------------------------------------------
 
 
 def test_what_is_prepared_is_prepared_once_for_a_scene(rgb, declared):
@@ -161,22 +135,14 @@ def test_what_is_prepared_is_prepared_once_for_a_scene(rgb, declared):
 def test_shadow_rays_are_cast_where_they_are_needed(rgb, declared):
     """Half of a floor is behind a wall, seen from the light."""
     bsdf = {"type": "phong", "k_d": 0.5}
-    up = mi.ScalarTransform4f()
+    roof = moved((1, 0, 1)).rotate([0, 1, 0], 180)
     given = {
         "type": "scene",
         "integrator": {"type": "heuristic", "model": "shadowed"},
         "floor": {"type": "rectangle", "bsdf": bsdf},
-        "roof": {
-            "type": "rectangle",
-            "to_world": up.translate([1, 0, 1]).rotate([0, 1, 0], 180),
-            "bsdf": bsdf,
-        },
+        "roof": {"type": "rectangle", "to_world": roof, "bsdf": bsdf},
         "light": {"type": "heuristic_directional", "direction": [0, 0, -1], "intensity": 0.75},
-        "sensor": {
-            "type": "orthographic",
-            "to_world": up.look_at([0, 0, 0.5], [0, 0, 0], [0, 1, 0]),
-            "film": {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}},
-        },
+        "sensor": camera((0, 0, 0.5), up=(0, 1, 0), size=4, type="orthographic"),
     }
     image = np.array(mi.render(mi.load_dict(given), spp=1))
     assert sorted(set(np.unique(image))) == [0.125, 0.75]
@@ -214,9 +180,6 @@ def test_parameters_can_be_edited_without_a_new_kernel(rgb, declared):
             mi.load_dict({"type": "heuristic", "model": "toon", "outline": value})
 
 
-# --- Messages ------------------------------------------------------------------------------------
-
-
 def test_a_wrong_declaration_is_refused():
     for make, message in (
         (lambda: Heuristic("My toon", toon), "'My toon': a name has lower-case"),
@@ -249,9 +212,6 @@ def test_packages_declare_by_entry_points_that_are_loaded_once(monkeypatch):
     entry.load = lambda: 1 / 0
     with pytest.raises(InputError, match=r"late: the entry point package:LATE .*division by zero"):
         Declared("heuristic", "fotismos.toys").get("other")
-
-
-# --- Along the way to the page --------------------------------------------------------------------
 
 
 def test_a_pair_says_what_its_heuristic_shades_with(rgb, declared):

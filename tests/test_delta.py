@@ -52,7 +52,7 @@ def _scene(ball, light):
     floor = {"type": "rectangle", "to_world": at.translate((0, 0, -2)).scale(2)}
     return described(
         (1.5, -1.7, 0.6),
-        camera={"type": "perspective", "fov": 70.0, "sampler": {"type": "independent"}},
+        lens={"fov": 70.0, "sampler": {"type": "independent"}},
         size=SIDE,
         ball={"type": "sphere", "radius": 0.8, "bsdf": BALLS[ball]},
         light=lights[light],

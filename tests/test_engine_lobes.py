@@ -60,11 +60,6 @@ def bevy(alpha, f0, base, light, view, half):
     return base * burley / np.pi + ggx(alpha, f0, light, view, half) * (1 + f0 * (1 / scale - 1))
 
 
-def gltf(alpha, f0, base, light, view, half):
-    left = 1 - schlick(f0, dot(light, half))
-    return left * base / np.pi + ggx(alpha, f0, light, view, half)
-
-
 def layered(alpha, f0, base, light, view, half):
     scale, bias = karis(np.sqrt(alpha), view[2])
     left = 1 - np.minimum(f0 * scale + bias, 1)
@@ -75,7 +70,6 @@ FORMS = {
     "mesh_phong.py": mesh_phong,
     "standard_material.py:filament": filament,
     "standard_material.py:bevy": bevy,
-    "standard_material.py:gltf": gltf,
     "standard_material.py:layered": layered,
 }
 

@@ -9,6 +9,7 @@ import pytest
 
 from comparisons.gallery.builtin import SCENES, THREE_LIGHTS, VIEWER_C
 from tests import checks
+from tests.parts import rgb_of
 
 FIGURES = [name for name in SCENES if name.startswith("fig-8")]
 
@@ -17,9 +18,9 @@ def everything():
     """What the figures lack: spots, parallel light, attenuation, colours, emission, back light."""
     scene = SCENES["fig-8-11-n9"].make()
     scene["sphere"]["bsdf"] |= {
-        "k_i": {"type": "rgb", "value": (0.02, 0.0, 0.05)},
-        "k_d": {"type": "rgb", "value": (0.5, 0.25, 0.75)},
-        "k_s": {"type": "rgb", "value": (0.7, 0.6, 0.5)},
+        "k_i": rgb_of(0.02, 0.0, 0.05),
+        "k_d": rgb_of(0.5, 0.25, 0.75),
+        "k_s": rgb_of(0.7, 0.6, 0.5),
         "n": 5.5,
     }
     scene["light 2"] |= {"k0": 0.2, "k1": 0.1, "k2": 0.05}
@@ -30,12 +31,12 @@ def everything():
         "direction": (3, -2.2, -2),
         "cutoff": 12.0,
         "exponent": 20.0,
-        "intensity": {"type": "rgb", "value": (0.9, 0.9, 0.4)},
+        "intensity": rgb_of(0.9, 0.9, 0.4),
     }
     scene["light 5"] = {
         "type": "heuristic_directional",
         "direction": (-1, 0.5, -0.5),  # from behind: a highlight at the rim, cut by the horizon
-        "intensity": {"type": "rgb", "value": (0.2, 0.4, 0.8)},
+        "intensity": rgb_of(0.2, 0.4, 0.8),
     }
     return scene
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from reference.planning.facts import Form, geometry
+from tests.parts import mesh_of
 
 pytestmark = pytest.mark.usefixtures("rgb")
 
@@ -79,19 +80,12 @@ def random_mesh(rng, name, smooth, face_normals, flip):
     corners = rng.normal(size=(4, 3))
     faces = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
     points, faces = corners[faces].reshape(-1, 3), np.arange(12).reshape(4, 3)
-    props = mi.Properties()
-    props["flip_normals"], props["face_normals"] = flip, face_normals
-    mesh = mi.Mesh(name, 12, 4, props=props, has_vertex_normals=smooth is not None)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = mi.Float(points.ravel().astype(np.float32))
-    parameters["faces"] = mi.UInt32(faces.ravel().astype(np.uint32))
+    normals = None
     if smooth is not None:
         normal = np.cross(points[1::3] - points[::3], points[2::3] - points[::3])
         normal /= np.linalg.norm(normal, axis=1)[:, None]
-        own = np.repeat(normal, 3, axis=0) + smooth * rng.normal(size=(12, 3))
-        parameters["vertex_normals"] = mi.Float(own.ravel().astype(np.float32))
-    parameters.update()
-    return mesh
+        normals = np.repeat(normal, 3, axis=0) + smooth * rng.normal(size=(12, 3))
+    return mesh_of(points, normals, faces, name, flip_normals=flip, face_normals=face_normals)
 
 
 def rendered(mesh):

@@ -17,10 +17,10 @@ from heuristic import glsl, program, user_shaders
 from heuristic.errors import InputError, InstallationError
 from heuristic.heuristics import INPUTS, Heuristic, named
 from reports.commands import doctor
+from tests.parts import camera
+from tests.test_user_heuristics import SHADERS, SMALL, image
 
-SHADERS = Path(__file__).parents[1] / "docs/shaders"
 PHONG = str(SHADERS / "phong.glsl")
-SMALL = {"resolution": (24, 24), "spp": 8}
 
 
 def without_opengl():
@@ -37,11 +37,6 @@ MISSING = without_opengl()
 opengl = pytest.mark.skipif(bool(MISSING), reason=MISSING)
 
 
-def image(scene, name, **more):
-    case = open_case(scene, Options(heuristic=name, **{**SMALL, **more}))
-    return np.array(prepare(case.source, case.options).heuristic.render(3))
-
-
 def points(text, needs=INPUTS):
     """Return a shader, and the points of a trial."""
     shader = glsl.Shader("mine.glsl", text)
@@ -50,9 +45,6 @@ def points(text, needs=INPUTS):
 
 def returning(expression):
     return f"vec3 shade(Point point) {{ return vec3({expression}); }}"
-
-
-# --- The same as what is built in ----------------------------------------------------------------
 
 
 @opengl
@@ -79,11 +71,7 @@ def room(lights, **bsdf):
         "type": "scene",
         "ball": {"type": "sphere", "bsdf": bsdf or {"type": "diffuse"}},
         "sky": {"type": "constant", "radiance": 0.4},
-        "sensor": {
-            "type": "perspective",
-            "to_world": mi.ScalarTransform4f().look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]),
-            "film": {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}},
-        },
+        "sensor": camera((0, 0, 5), up=(0, 1, 0), size=16),
         **{
             f"light{number}": {
                 "type": "point", "intensity": 3 / lights,
@@ -125,9 +113,6 @@ def test_shadows_are_those_of_a_heuristic_in_python(rgb, written):
     assert abs(bright - glsl).max() > 0.01
 
 
-# --- What a shader is given ----------------------------------------------------------------------
-
-
 def shown(colour):
     """Return a Dr.Jit colour as an array (3, points of the trial)."""
     return np.broadcast_to(np.array(colour, float).reshape(3, -1), (3, user_shaders.POINTS))
@@ -165,8 +150,6 @@ def test_points_are_shaded_in_portions(rgb, monkeypatch):
     np.testing.assert_array_equal(shown(shader(point)), whole)
     assert len(np.unique(whole)) > user_shaders.POINTS
 
-
-# --- Mistakes ------------------------------------------------------------------------------------
 
 MISTAKES = {
     "syntax": (
@@ -235,9 +218,6 @@ def test_places_of_several_compilers_are_read():
         assert "a.glsl, at its end: " in told
     log = "0:1(2): warning: unused\n0:2(9): error: undeclared\n0:2(1): error: no match\n"
     assert glsl.explained(log, "a.glsl", "one\ntwo") == "a.glsl, line 2: undeclared"
-
-
-# --- Where it runs -------------------------------------------------------------------------------
 
 
 @opengl

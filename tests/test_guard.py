@@ -119,4 +119,4 @@ def test_a_fifth_of_the_light_is_seen_through_noise(pruned, monkeypatch, departu
         return 1 - departure + rng.normal(size=count), 1 + rng.normal(size=count)
 
     pretending(monkeypatch, draw)
-    assert rate(pruned, 1, 40) == caught
+    assert rate(pruned, 1, 20) == caught

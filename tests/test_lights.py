@@ -1,15 +1,15 @@
 """Lights in scenes with occluders, by the thousands, and against closed forms."""
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 import pytest
 
 import heuristic
 from heuristic import kernel
 from tests import checks, oracle
+from tests.parts import camera, moved, rgb_of
 
-COLOUR = {"type": "rgb", "value": (1.0, 0.8, 0.6)}
+COLOUR = rgb_of(1.0, 0.8, 0.6)
 PLACE = {"position": (-4.24, -1, 3), "intensity": COLOUR}
 AXIS = {"direction": (4.24, 1, -3)}
 LIGHTS = {
@@ -28,29 +28,18 @@ LIGHTS = {
 
 def with_occluders(light, occlusion=True, **sphere):
     """A sphere and a small ball over a floor, each of another material."""
-    bsdf = {"type": "phong", "k_d": {"type": "rgb", "value": (0.5, 0.3, 0.2)}, "k_s": 0.4, "n": 9}
-    to_world = mi.ScalarTransform4f()
+    bsdf, dark, even = (
+        {"type": "phong", "k_d": k_d, "k_s": k_s, "n": n}
+        for k_d, k_s, n in ((rgb_of(0.5, 0.3, 0.2), 0.4, 9), (0.2, 0.5, 3), (0.5, 0.2, 20))
+    )
+    ball = {"center": (-1.5, -0.8, 0.6), "radius": 0.4}
     return {
         "type": "scene",
         "integrator": {"type": "heuristic", "occlusion": occlusion},
-        "sensor": {
-            "type": "perspective",
-            "fov": 45.0,
-            "to_world": to_world.look_at((-3, 0, 1), (0, 0, 0), (0, 0, 1)),
-            "film": {"type": "hdrfilm", "rfilter": {"type": "box"}},
-        },
+        "sensor": camera((-3, 0, 1), fov=45.0),
         "sphere": {"type": "sphere", "bsdf": {**bsdf, **sphere}},
-        "ball": {
-            "type": "sphere",
-            "center": (-1.5, -0.8, 0.6),
-            "radius": 0.4,
-            "bsdf": {"type": "phong", "k_d": 0.2, "k_s": 0.5, "n": 3},
-        },
-        "floor": {
-            "type": "rectangle",
-            "to_world": to_world.translate((0, 0, -1)).scale(5),
-            "bsdf": {"type": "phong", "k_d": 0.5, "k_s": 0.2, "n": 20},
-        },
+        "ball": {"type": "sphere", "bsdf": dark, **ball},
+        "floor": {"type": "rectangle", "to_world": moved((0, 0, -1), 5), "bsdf": even},
         "light": light,
     }
 

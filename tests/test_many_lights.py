@@ -5,28 +5,20 @@ import mitsuba as mi
 import numpy as np
 
 from reference.rendering import direct
+from tests.parts import camera, look_at, moved, rgb_of
 
 ALBEDO = 0.5
 SIDE = 20
 RAYS = SIDE**2
-T = mi.ScalarTransform4f
 
 
 def floor(**parts):
     """A diffuse floor in z = 0, seen by a camera above it."""
+    diffuse = {"type": "diffuse", "reflectance": ALBEDO}
     return {
         "type": "scene",
-        "floor": {
-            "type": "rectangle",
-            "to_world": T().scale(3),
-            "bsdf": {"type": "diffuse", "reflectance": ALBEDO},
-        },
-        "camera": {
-            "type": "perspective",
-            "fov": 30,
-            "to_world": T().look_at([0, -3, 8], [0, 0, 0], [0, 0, 1]),
-            "film": {"type": "hdrfilm", "width": 20, "height": 20},
-        },
+        "floor": {"type": "rectangle", "to_world": moved(0, 3), "bsdf": diffuse},
+        "camera": camera((0, -3, 8), size=SIDE, fov=30.0),
         **parts,
     }
 
@@ -39,32 +31,32 @@ def places(rng):
     return [*numbers(rng, -3, 3, 2), *numbers(rng, 0.5, 4, 1)]
 
 
+def colour(rng):
+    return rgb_of(*numbers(rng, 0, 1, 3))
+
+
 def point(rng):
-    return {"type": "point", "position": places(rng), "intensity": rgb_of(rng)}
-
-
-def rgb_of(rng):
-    return {"type": "rgb", "value": numbers(rng, 0, 1, 3)}
+    return {"type": "point", "position": places(rng), "intensity": colour(rng)}
 
 
 def directional(rng):
     toward = [*numbers(rng, -1, 1, 2), -1.0]
-    return {"type": "directional", "direction": toward, "irradiance": rgb_of(rng)}
+    return {"type": "directional", "direction": toward, "irradiance": colour(rng)}
 
 
 def spot(rng):
     target = [*numbers(rng, -2, 2, 2), 0.0]
     return {
         "type": "spot",
-        "to_world": T().look_at(places(rng), target, [0, 1, 0]),
-        "intensity": rgb_of(rng),
+        "to_world": look_at(places(rng), target, [0, 1, 0]),
+        "intensity": colour(rng),
         "cutoff_angle": 40.0,
         "beam_width": 30.0,
     }
 
 
 def lamp(rng):
-    emitter = {"type": "area", "radiance": rgb_of(rng)}
+    emitter = {"type": "area", "radiance": colour(rng)}
     return {"type": "sphere", "center": places(rng), "radius": 0.05, "emitter": emitter}
 
 

@@ -33,9 +33,6 @@ def require_units(found, expected, tolerance):
     np.testing.assert_allclose(rows(found), np.atleast_2d(expected), rtol=0, atol=tolerance)
 
 
-# --- Planes and triangles ----------------------------------------------------------------------
-
-
 @EVERY_TYPE
 def test_a_plane_has_its_coefficients_as_normal(vector_type):
     number = dr.value_t(vector_type)
@@ -82,8 +79,6 @@ def test_a_needle_has_the_normal_of_its_points(order):
     found = normals.triangle_normal(*(SINGLE(*points[i].tolist()) for i in order))
     require_units(found, product / np.linalg.norm(product), 4 * rounding(SINGLE))
 
-
-# --- Implicit and parametric surfaces ------------------------------------------------------------
 
 AXES = [(1, 1, 1), (3, 2, 1), (1000, 1, 1), (1, 1, 1000), (1, 1000, 0.03), (1e-3, 1, 0.5)]
 
@@ -134,9 +129,6 @@ def test_what_has_no_direction_has_the_zero_normal(vector_type):
     require_units(normals.parametric_normal(zero, vector_type(1, 2, 3)), (0, 0, 0), 0)
     parallel = normals.parametric_normal(vector_type(0.1, 0.2, 0.3), vector_type(0.3, 0.6, 0.9))
     require_units(parallel, (0, 0, 0), 0)
-
-
-# --- Vertices ------------------------------------------------------------------------------------
 
 
 def cube_corner(cuts):

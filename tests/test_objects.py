@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -13,35 +14,23 @@ from comparisons.options import Options
 from reference.rendering import sums
 from reference.rendering.gbuffer import ObjectIds, gbuffer
 from tests import records
-from tests.test_physics import look_at
+from tests.parts import camera, moved
 
 RADIUS, CENTRE = 0.7, np.array((0, 0, 1.6))
 
 
 def shadowed(size=24):
     """A diffuse sphere above a floor, by direct light: the sphere is exact, its shadow is not."""
-    import mitsuba as mi
-
-    transform = mi.ScalarTransform4f
+    chalk, slate = (
+        {"type": "diffuse", "id": name, "reflectance": grey}
+        for name, grey in (("chalk", 0.6), ("slate", 0.3))
+    )
     return {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 2},
-        "sensor": {
-            "type": "perspective",
-            "fov": 45.0,
-            "to_world": look_at((0, -6, 4)),
-            "film": {"type": "hdrfilm", "width": size, "height": size},
-        },
-        "sphere": {
-            "type": "sphere",
-            "to_world": transform().translate(CENTRE).scale(RADIUS),
-            "bsdf": {"type": "diffuse", "id": "chalk", "reflectance": 0.6},
-        },
-        "floor": {
-            "type": "rectangle",
-            "to_world": transform().scale(2),
-            "bsdf": {"type": "diffuse", "id": "slate", "reflectance": 0.3},
-        },
+        "sensor": camera((0, -6, 4), size=size, fov=45.0),
+        "sphere": {"type": "sphere", "to_world": moved(CENTRE, RADIUS), "bsdf": chalk},
+        "floor": {"type": "rectangle", "to_world": moved(0, 2), "bsdf": slate},
         "light": {"type": "point", "position": (1, -1, 5), "intensity": 30.0},
     }
 
@@ -128,18 +117,12 @@ def test_shares_and_pixels_add_up_to_the_whole(compared):
 
 
 def test_an_instance_is_a_shape_of_its_own():
-    import mitsuba as mi
-
     scene = shadowed()
     sphere = scene.pop("sphere")
     scene["group"] = {"type": "shapegroup", "ball": sphere}
     for name, x in (("left", -1.0), ("right", 1.0)):
-        to_world = mi.ScalarTransform4f().translate((x, 0, 0))
-        scene[name] = {
-            "type": "instance",
-            "to_world": to_world,
-            "group": {"type": "ref", "id": "group"},
-        }
+        group = {"type": "ref", "id": "group"}
+        scene[name] = {"type": "instance", "to_world": moved((x, 0, 0)), "group": group}
     seen = gbuffer(mi.load_dict(scene), 32, 32)
     names = np.array(seen.shape.names)[seen.shape.places[seen.hit]]
     assert set(names) == {"left", "right", "floor"}

@@ -24,6 +24,7 @@ from reference.planning.rules import (
 from reference.rendering.renderer import pass_seed
 from reference.scene.source import Source
 from tests.misplanned import DIFFUSE, SCENES, TWO_SIDED, lamp, prune_blindly, scene, sphere, tube
+from tests.parts import moved
 
 SPP, PASSES = 256, 4
 
@@ -78,10 +79,6 @@ def facts_of(description):
     return Facts.of(ready.pair, ready.scene)
 
 
-def camera(plugin="perspective", **more):
-    return {"type": plugin, **more}
-
-
 def test_a_scene_for_which_all_premises_hold_is_pruned(rgb):
     facts = facts_of(scene(ball=sphere(), sky={"type": "constant"}))
     for rule in (NO_SHADOWS, NO_SECOND_REFLECTION, TABULATED_ENVIRONMENT):
@@ -95,25 +92,29 @@ FOG = {"type": "homogeneous", "albedo": 0.5, "sigma_t": 0.1}
 
 
 def test_a_premise_that_fails_is_named(rgb):
-    beside, lens = {"viewer": (2.5, 0, 0), "target": (2.5, 1, 0)}, {"aperture_radius": 3.0}
-    hollow, near = sphere(bsdf=TWO_SIDED), camera(near_clip=4.0)
+    beside = {"viewer": (2.5, 0, 0), "target": (2.5, 1, 0)}
+    hollow, near = sphere(bsdf=TWO_SIDED), {"near_clip": 4.0}
     for premise, parts in (
         (NO_MEDIUM, {"ball": sphere(bsdf={"type": "null"}, interior=FOG)}),
         (OPAQUE, {"ball": sphere(bsdf=GLASS)}),
         (OPAQUE, {"ball": sphere(bsdf=MASKED)}),
         (OPAQUE, {"ball": sphere(bsdf=BLENDED)}),
         (FEW, {f"ball {i}": sphere() for i in range(MOST_SHAPES + 1)}),
-        (STILL, {"ball": sphere(), "camera": camera(shutter_open=0.0, shutter_close=1.0)}),
+        (STILL, {"ball": sphere(), "lens": {"shutter_open": 0.0, "shutter_close": 1.0}}),
         (CONVEX, {"tube": {"type": "cylinder", "bsdf": DIFFUSE}}),
         (CONVEX, {"box": {"type": "cube", "flip_normals": True, "bsdf": DIFFUSE}}),
         (CONVEX, {"box": {"type": "cube", "bsdf": TWO_SIDED}}),
-        (SEEN_FROM_OUTSIDE, {"ball": hollow, "camera": near}),
-        (SEEN_FROM_OUTSIDE, {"ball": sphere(flip_normals=True), "camera": near}),
+        (SEEN_FROM_OUTSIDE, {"ball": hollow, "lens": near}),
+        (SEEN_FROM_OUTSIDE, {"ball": sphere(flip_normals=True), "lens": near}),
         (
             SEEN_FROM_OUTSIDE,
-            {"ball": hollow, "camera": camera("thinlens", focus_distance=5.0, **lens), **beside},
+            {
+                "ball": hollow,
+                "lens": {"type": "thinlens", "focus_distance": 5.0, "aperture_radius": 3.0},
+                **beside,
+            },
         ),
-        (SEEN_FROM_OUTSIDE, {"ball": hollow, "camera": camera("radiancemeter")}),
+        (SEEN_FROM_OUTSIDE, {"ball": hollow, "lens": {"type": "radiancemeter"}}),
     ):
         facts = facts_of(scene(light=lamp((0, -3, 3)), **parts))
         for rule in (NO_SHADOWS, NO_SECOND_REFLECTION):
@@ -124,7 +125,7 @@ def test_a_premise_that_fails_is_named(rgb):
 
 def test_a_mirrored_transform_turns_the_sides_round(rgb):
     """Mitsuba's sphere then has its normals inside, as with ``flip_normals``."""
-    mirrored = mi.ScalarTransform4f().scale((-1, 1, 1))
+    mirrored = moved(0, (-1, 1, 1))
     shapes = {
         "ball": sphere(),
         "flipped": sphere(flip_normals=True),

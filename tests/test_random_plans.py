@@ -5,7 +5,6 @@ A seed in a test's name can be examined alone: ``python -m tests.random_scenes S
 
 import pytest
 
-from reference.planning.effects import INTERREFLECTION, OCCLUSION
 from tests.misplanned import prune_blindly
 from tests.random_scenes import examine, run
 
@@ -38,18 +37,6 @@ def test_wrong_plans_are_found(rgb, tmp_path, monkeypatch):
     prune_blindly(monkeypatch)
     states = [examine(seed, tmp_path).state for seed in range(FEW // 2)]
     assert states.count("wrong") >= 2
-
-
-def test_the_scenes_differ_in_what_is_called_for(rgb, tmp_path):
-    from comparisons.prepared import prepare
-    from reference.scene.source import Source
-    from tests.random_scenes import random_scene
-
-    found = set()
-    for seed in range(FEW):
-        plan = prepare(Source("random", random_scene(seed, tmp_path))).plan
-        found.add((plan.calls_for(OCCLUSION), plan.calls_for(INTERREFLECTION), plan.integrator))
-    assert len(found) >= 4
 
 
 @pytest.mark.guarantee("plans", "No random scene of 2,000 is planned wrongly.")

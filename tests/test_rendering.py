@@ -14,29 +14,19 @@ from reference.pairing import halves
 from reference.rendering import renderer, sums
 from reference.rendering.renderer import pass_seed
 from tests import checks
-from tests.test_physics import look_at
+from tests.parts import camera, look_at, moved
+
+GLOSSY = {"type": "roughplastic", "alpha": 0.3, "diffuse_reflectance": 0.4}
+DIFFUSE = {"type": "diffuse", "reflectance": 0.6}
 
 
 def scene(size=24, **lights):
     """A diffuse sphere on a floor."""
     return {
         "type": "scene",
-        "sensor": {
-            "type": "perspective",
-            "fov": 40.0,
-            "to_world": look_at((0, -6, 3)),
-            "film": {"type": "hdrfilm", "width": size, "height": size, "rfilter": {"type": "box"}},
-            "sampler": {"type": "multijitter"},
-        },
-        "sphere": {
-            "type": "sphere",
-            "bsdf": {"type": "roughplastic", "alpha": 0.3, "diffuse_reflectance": 0.4},
-        },
-        "floor": {
-            "type": "rectangle",
-            "to_world": mi.ScalarTransform4f().translate((0, 0, -1)).scale(4),
-            "bsdf": {"type": "diffuse", "reflectance": 0.6},
-        },
+        "sensor": camera((0, -6, 3), size=size, sampler={"type": "multijitter"}),
+        "sphere": {"type": "sphere", "bsdf": GLOSSY},
+        "floor": {"type": "rectangle", "to_world": moved((0, 0, -1), 4), "bsdf": DIFFUSE},
         **lights,
     }
 
@@ -60,9 +50,6 @@ def estimate(made, integrator, spp, passes, first_seed=0):
     for seed in range(passes):
         total.add(half.render(first_seed + seed))
     return total.estimate()
-
-
-# --- Common random numbers -------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -120,9 +107,6 @@ def test_means_vary_as_those_of_independent_passes_must(rgb):
     assert of_means.mean() / within.mean() == pytest.approx(1.0, abs=0.1)
 
 
-# --- Direct light ----------------------------------------------------------------------------
-
-
 def check_same_means(made, ours, theirs, passes):
     """Compare two integrators: in no pixel do the means differ by more than the noise.
 
@@ -148,7 +132,7 @@ def check_same_means(made, ours, theirs, passes):
 @pytest.mark.parametrize("hide_emitters", [False, True])
 def test_direct_light_is_that_of_mitsubas_direct(rgb, hide_emitters):
     """Point, area and constant light, each at every sample, which is less noise for the same."""
-    made = mi.load_dict(scene(one=POINT, two=SECOND, lamp=lamp(), sky=CONSTANT))
+    made = mi.load_dict(scene(12, one=POINT, two=SECOND, lamp=lamp(), sky=CONSTANT))
     integrators = (
         {"type": kind, "hide_emitters": hide_emitters} for kind in ("direct_all", "direct")
     )
@@ -159,12 +143,9 @@ def test_direct_light_is_that_of_mitsubas_direct(rgb, hide_emitters):
 @pytest.mark.parametrize("max_depth", [pytest.param(3, marks=pytest.mark.thorough), -1])
 def test_indirect_light_is_that_of_mitsubas_path(rgb, max_depth):
     """Between a sphere and a floor, of points, a lamp and the sky."""
-    made = mi.load_dict(scene(one=POINT, two=SECOND, lamp=lamp(), sky=CONSTANT))
+    made = mi.load_dict(scene(12, one=POINT, two=SECOND, lamp=lamp(), sky=CONSTANT))
     integrators = ({"type": kind, "max_depth": max_depth} for kind in ("direct_all", "path"))
     check_same_means(made, *integrators, passes=32)
-
-
-# --- Standard errors -------------------------------------------------------------------------
 
 
 def coverage(repetitions, passes=8):
@@ -187,9 +168,6 @@ def coverage(repetitions, passes=8):
 def test_standard_errors_are_honest(rgb):
     """95 % intervals hold the truth in 90 to 98 % of pixels, over 30 seeds."""
     assert 0.90 < coverage(30) < 0.98
-
-
-# --- Failures --------------------------------------------------------------------------------
 
 
 def broken_integrator(value, row, column):

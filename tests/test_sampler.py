@@ -10,21 +10,20 @@ from comparisons.case import open_case
 from comparisons.compare import compare
 from comparisons.options import Options
 from reference.rendering.sampler import SAMPLER, cells, register
+from tests.parts import camera
 
 COUNTS = (1, 2, 3, 4, 7, 16, 48, 64)
 
 
 def sphere(reflectance, width):
     """A bright sphere of radius 1, seen from inside, off its centre, where the light is."""
-    view = mi.ScalarTransform4f().look_at((0.3, 0.1, 0.2), (1, 0.2, 0), (0, 1, 0))
-    film = {"type": "hdrfilm", "width": width, "height": width, "rfilter": {"type": "box"}}
     return {
         "type": "scene",
         "integrator": {"type": "path"},
         "sphere": {"type": "sphere", "flip_normals": True,
                    "bsdf": {"type": "diffuse", "reflectance": reflectance}},
         "light": {"type": "point", "position": (0, 0, 0), "intensity": 1.0},
-        "sensor": {"type": "perspective", "fov": 60, "to_world": view, "film": film},
+        "sensor": camera((0.3, 0.1, 0.2), (1, 0.2, 0), (0, 1, 0), width, 60.0),
     }  # fmt: skip
 
 

@@ -123,8 +123,6 @@ def test_odd_values_are_refused_where_a_material_or_light_is_made():
                 make(odd)
 
 
-# -- Gradients -------------------------------------------------------------------------------------
-
 WHERE = {
     "a zero normal": {"normal": (0, 0, 0)},
     "a zero view": {"view": (0, 0, 0)},

@@ -6,6 +6,7 @@ import pytest
 from reference.pairing import lamps
 from reference.pairing.halves import pair
 from reference.scene.source import Source
+from tests.parts import camera, mesh_of
 
 
 def solid_angle_error(cutoff, exponent, beam_width, edge=None):
@@ -84,18 +85,13 @@ def test_spots_keep_their_flux_both_ways(rgb, kind):
 
 def test_a_spot_of_another_attenuation_has_the_mean_irradiance_over_what_is_seen(rgb):
     """With each half's own fall-off within the cone: the two pictures have one mean."""
-    at, to = (0.5, -1, 3), (0, 0, 0)
     scene = {
         "type": "scene",
         "integrator": {"type": "heuristic"},
-        "sensor": {
-            "type": "perspective",
-            "to_world": mi.ScalarTransform4f().look_at((0, 0, 4), to, (0, 1, 0)),
-            "film": {"type": "hdrfilm", "width": 192, "height": 192, "rfilter": {"type": "box"}},
-        },
+        "sensor": camera((0, 0, 4), up=(0, 1, 0), size=192),
         "wall": {"type": "rectangle", "bsdf": {"type": "phong", "k_d": 0.5}},
         "light": {
-            "type": "heuristic_spot", "position": at, "direction": (-0.5, 1, -3),
+            "type": "heuristic_spot", "position": (0.5, -1, 3), "direction": (-0.5, 1, -3),
             "cutoff": 14.0, "exponent": 30.0,
         },
     }  # fmt: skip
@@ -113,11 +109,8 @@ def test_a_lamp_that_is_not_flat_keeps_its_flux_and_its_intensity_ahead(rgb, tmp
     """
     height = np.sqrt(0.5)
     rows = [(-height, 0), (0, height), (height, 0)]
-    mesh = mi.Mesh("roof", 6, 4)
-    made = mi.traverse(mesh)
-    made["vertex_positions"] = np.ravel([(x, y, z) for x, z in rows for y in (0, 1)])
-    made["faces"] = np.ravel([(0, 2, 1), (1, 2, 3), (2, 4, 3), (3, 4, 5)])
-    made.update()
+    points = [(x, y, z) for x, z in rows for y in (0, 1)]
+    mesh = mesh_of(points, faces=[(0, 2, 1), (1, 2, 3), (2, 4, 3), (3, 4, 5)])
     mesh.write_ply(str(tmp_path / "roof.ply"))
     scene = {
         "type": "scene",

@@ -16,6 +16,7 @@ from heuristic.heuristics import HEURISTICS, Heuristic, Parameter, known_as, nam
 from reference.pairing import halves
 from reference.scene.source import Source
 from tests import checks, oracle
+from tests.parts import camera, rgb_of, shown_by
 
 SHADERS = Path(__file__).parents[1] / "docs/shaders"
 SMALL = {"resolution": (24, 24), "spp": 8}
@@ -35,50 +36,24 @@ def image(scene, name, **more):
 GREY = "def shade(point):\n    return point.ambient * 0 + 0.25\n"
 
 
-# --- The same as what is built in ----------------------------------------------------------------
-
-
 @pytest.mark.guarantee("kernel", "Phong's model in a Python file gives the kernel's image to 1e-5.")
 def test_phong_in_a_file_is_phong():
-    scenes = [(name, {"interpolation": kind}) for name, kind in (
-        ("fig-8-9", "phong"), ("fig-8-11-n3", "gouraud"), ("fig-6-5-m40", "flat"),
-        ("fig-6-14", "gouraud"),
-    )]  # fmt: skip
-    scenes += [("plastic-spheres", {}), ("cornell-box", {}), ("narrow-band-lamp", {})]
-    scenes += [("fig-8-9", {"everything": True}), ("fig-8-9", {"pairing": "literal"})]
-    for scene, more in scenes:
+    for scene, more in (
+        ("fig-8-9", {"pairing": "literal"}),
+        ("fig-8-11-n3", {"interpolation": "gouraud"}),
+        ("fig-6-5-m40", {"interpolation": "flat"}),
+        ("cornell-box", {"everything": True}),
+        ("narrow-band-lamp", {}),
+    ):
         own, theirs = (image(scene, name, **more) for name in ("phong", str(SHADERS / "phong.py")))
         assert own.max() > 0.1
         np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5, err_msg=f"{scene} {more}")
 
 
-# --- The shaders of the documentation, against their formulas ------------------------------------
-
-LIGHTS = {
-    "light1": {
-        "type": "heuristic_point", "position": [-4, -2, 3],
-        "intensity": {"type": "rgb", "value": [1, 0.5, 0.25]},
-    },
-    "light2": {
-        "type": "heuristic_directional", "direction": [-1, 2, -1],
-        "intensity": {"type": "rgb", "value": [0.2, 0.4, 0.6]},
-    },
+PAINT = {
+    "type": "phong", "k_a": 0.2, "k_d": 0.5, "k_s": 0.4, "n": 9.0,
+    "base_color": rgb_of(0.6, 0.3, 0.1), "alpha": 0.35, "ior": 1.6, "metallic": 0.25,
 }  # fmt: skip
-
-
-def sphere(shader, **parameters):
-    """A sphere of a glossy metallic paint under two coloured lights, and its parameters."""
-    from comparisons.gallery.builtin import SCENES
-
-    builtin = SCENES["fig-8-9"].make()
-    paint = {
-        "type": "phong", "k_a": 0.2, "k_d": 0.5, "k_s": 0.4, "n": 9.0,
-        "base_color": {"type": "rgb", "value": [0.6, 0.3, 0.1]},
-        "alpha": 0.35, "ior": 1.6, "metallic": 0.25,
-    }  # fmt: skip
-    integrator = {"type": "heuristic", "model": str(shader), "ambient": 0.1, **parameters}
-    scene = {name: builtin[name] for name in ("type", "sensor")} | LIGHTS
-    return scene | {"sphere": builtin["sphere"] | {"bsdf": paint}, "integrator": integrator}
 
 
 def angles(n, v, light):
@@ -126,7 +101,7 @@ FORMULAS = {
 
 
 def require_formula(name, shader, **parameters):
-    given = checks.with_film(sphere(shader, **parameters), 48, 1)
+    given = checks.with_film(shown_by(shader, PAINT, ambient=0.1, **parameters), 48, 1)
     aovs = {"type": "aov", "aovs": "P:position,N:sh_normal", "image": given["integrator"]}
     channels = checks.render(given, 1, 5, aovs).reshape(-1, 9).astype(float)
     colour, p, n = np.split(channels, 3, axis=1)
@@ -162,15 +137,13 @@ def test_a_shader_of_the_documentation_is_its_formula_and_a_wrong_one_is_not(rgb
             require_formula(name, written(text.replace(right, wrong)))
 
 
-# --- What is read of the physical half -----------------------------------------------------------
-
 PARTNERS = {
-    "diffuse": ({"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.1, 0.2, 0.3]}},
+    "diffuse": ({"type": "diffuse", "reflectance": rgb_of(0.1, 0.2, 0.3)},
                 (0.1, 0.2, 0.3), 1, 1, 0),
     "roughplastic": ({"type": "roughplastic", "alpha": 0.3, "int_ior": 1.8, "ext_ior": 1.2,
                       "diffuse_reflectance": 0.4}, 0.4, 0.3, 1.5, 0),
     "plastic": ({"type": "plastic", "int_ior": 1.7, "ext_ior": 1.0}, 0.5, 1e-4, 1.7, 0),
-    "principled": ({"type": "principled", "base_color": {"type": "rgb", "value": [0.7, 0.5, 0.2]},
+    "principled": ({"type": "principled", "base_color": rgb_of(0.7, 0.5, 0.2),
                     "roughness": 0.6, "metallic": 0.25, "eta": 1.4},
                    (0.7, 0.5, 0.2), 0.36, 1.4, 0.25),
     "mirror": ({"type": "conductor", "material": "none"}, 1, 1e-4, 1, 1),
@@ -191,14 +164,12 @@ def test_the_partners_parameters_are_the_physical_ones(rgb, written):
     written("import mitsuba as mi\n" + "".join(
         f"def {one}(point): return mi.Spectrum(point.material.{one})\n" for one in names
     ))  # fmt: skip
-    look = mi.ScalarTransform4f().look_at([0, 0, 2], [0, 0, 0], [0, 1, 0])
-    film = {"type": "hdrfilm", "width": 4, "height": 4, "rfilter": {"type": "box"}}
     for name, (given, *expected) in PARTNERS.items():
         scene = {
             "type": "scene",
             "floor": {"type": "rectangle", "bsdf": given},
             "light": {"type": "point", "position": [0, 0, 3]},
-            "sensor": {"type": "orthographic", "to_world": look, "film": film},
+            "sensor": camera((0, 0, 2), up=(0, 1, 0), size=4, type="orthographic"),
         }
         for one, value in zip(names, expected, strict=True):
             if value is not None:
@@ -206,8 +177,6 @@ def test_the_partners_parameters_are_the_physical_ones(rgb, written):
                 shown = np.array(mi.render(half.instantiate(), spp=1))
                 oracle.require_close(shown.reshape(-1, 3), np.broadcast_to(value, (16, 3)), 2e-3)
 
-
-# --- Mistakes ------------------------------------------------------------------------------------
 
 MISTAKES = {
     "branch": (
@@ -297,9 +266,6 @@ def test_values_that_only_a_scene_shows_name_pixel_and_file(rgb, written):
             image(scene, name)
 
 
-# --- The same everywhere --------------------------------------------------------------------------
-
-
 def record_of(folder):
     (path,) = folder.glob("*/comparison.json")
     return json.loads(path.read_text(encoding="utf-8"))
@@ -363,9 +329,6 @@ def test_the_plan_and_the_record_say_what_is_read(run, written, tmp_path):
     assert "phong, which reads ambient, lights, material, normal, position, view" in said
 
 
-# --- Functions and objects of a program ----------------------------------------------------------
-
-
 def test_a_program_gives_a_function_or_an_object(undeclared):
     from reports.notebook import compare
 
@@ -376,9 +339,10 @@ def test_a_program_gives_a_function_or_an_object(undeclared):
         cosines = [dr.dot(point.normal, light.toward) / 2 + 0.5 for light in point.lights]
         return sum(c * c for c in cosines) * gain * point.material.base_color
 
-    shown = compare("fig-8-9", heuristic=half_lambert, **SMALL).comparison
+    shown = compare("fig-8-9", heuristic=half_lambert, why=False, **SMALL).comparison
     assert shown.record.heuristic == "half-lambert"
     assert shown.images.heuristic.max() > 0.1
     flat = Heuristic("flat-grey", lambda point: 0.5, parameters=(Parameter("x", 0, 0, 1),))
-    assert compare("fig-8-9", heuristic=flat, **SMALL).comparison.images.heuristic.max() == 0.5
+    shown = compare("fig-8-9", heuristic=flat, why=False, **SMALL).comparison
+    assert shown.images.heuristic.max() == 0.5
     assert known_as("blinn") == "blinn"

@@ -54,6 +54,9 @@ SINES = np.sqrt(1 - COSINES * COSINES)
 COARSE, FINE = 32, 128
 """Nodes along each axis of a rule: few into the denser side, many out of it."""
 
+LEAST_SPREAD = 0.01
+"""Of the nodes for the diffuse part: those of smoother lobes would be too few beside the lobe."""
+
 LITERAL_IOR = 1.5
 SMALLEST_IOR = exp(1e-4)
 """Reflects 2.5e-9 at normal incidence; Mitsuba rejects an IOR of 1."""
@@ -97,7 +100,7 @@ def of_roughplastic(plastic: RoughPlastic) -> Albedo:
     """Return the :class:`Albedo` of a :class:`RoughPlastic` at normal incidence."""
     _, alpha, eta = plastic.interface
     transmittance, returned = coat(*plastic.interface)
-    theta, weight = nodes(alpha)
+    theta, weight = nodes(max(alpha, LEAST_SPREAD))
     cosine = np.cos(theta)
     leaving = np.interp(cosine, np.linspace(0, 1, ROWS), transmittance)
     through = transmittance[-1] * (weight @ (leaving * cosine)) / np.pi / eta**2

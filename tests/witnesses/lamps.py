@@ -14,7 +14,6 @@ from tests.witnesses.witness import Witness
 LAMBERT = "Lambert's contour integral"
 CATALOGUE = "Howell's catalogue of configuration factors"
 
-# --- Lamps of a shape --------------------------------------------------------------------------
 
 RECTANGLE = (-0.3, 0.5), (-0.2, 0.6)
 HEIGHT = 0.8
@@ -66,8 +65,6 @@ def _of_a_ball(x, y):
     return GREY * configuration.sphere(height / distance, distance, radius)
 
 
-# --- Spots -------------------------------------------------------------------------------------
-
 SPOT = (0.3, -0.2, 1.2), (0.1, 0.1, 0.0)
 """Place, and where it points."""
 
@@ -108,9 +105,6 @@ def _of_all_of_a_spot(x, y):
     c, b = np.radians((CUTOFF, BEAM))
     flux = 2 * np.pi * INTENSITY * (1 - (np.sin(c) - np.sin(b)) / (c - b))
     return GREY / np.pi * flux / 4
-
-
-# --- Exchange ----------------------------------------------------------------------------------
 
 
 def _opposite_squares():

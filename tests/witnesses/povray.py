@@ -47,20 +47,20 @@ def drawn(text: str, size: int, folder: Path) -> np.ndarray:
 
 def translated(scene: dict) -> str:
     """Return a figure in POV-Ray's language."""
-    ambient = scene["integrator"].get("ambient", 0.0)
-    lines = [
-        "#version 3.7;",
-        f"global_settings {{ assumed_gamma 1.0 ambient_light rgb {_triple(ambient)} }}",
-        "background { rgb 0 }",
-        _camera(scene["sensor"]),
-    ]
+    lines = [_camera(scene["sensor"])]
     for part in scene.values():
         kind = part["type"] if isinstance(part, dict) else ""
         if kind in ("sphere", "rectangle"):
             lines.append(_shape(part))
         elif kind.startswith("heuristic_"):
             lines.append(_light(part))
-    return "\n".join(lines) + "\n"
+    return document(scene["integrator"].get("ambient", 0.0), lines)
+
+
+def document(ambient, lines):
+    """Return a text in POV-Ray's language whose values are linear, of its own lines."""
+    head = f"global_settings {{ assumed_gamma 1.0 ambient_light rgb {triple(ambient)} }}"
+    return "\n".join(["#version 3.7;", head, "background { rgb 0 }", *lines, ""])
 
 
 def _camera(sensor):
@@ -69,8 +69,8 @@ def _camera(sensor):
     place = matrix[:3, 3]
     ahead = place + matrix[:3, 2] * np.linalg.norm(place)
     return (
-        f"camera {{ perspective location {_triple(place)} sky z right -x up y"
-        f" angle {sensor['fov']} look_at {_triple(ahead)} }}"
+        f"camera {{ perspective location {triple(place)} sky z right -x up y"
+        f" angle {sensor['fov']} look_at {triple(ahead)} }}"
     )
 
 
@@ -82,9 +82,9 @@ def _light(light):
     if light["type"] == "heuristic_spot":
         cutoff, target = light["cutoff"], place + np.array(light["direction"], float)
         cone = f"spotlight radius {cutoff} falloff {cutoff} tightness {light['exponent']}"
-        cone += f" point_at {_triple(target)} "
-    colour = _triple(light.get("intensity", 1.0))
-    return f"light_source {{ {_triple(place)} rgb {colour} {cone}}}"
+        cone += f" point_at {triple(target)} "
+    colour = triple(light.get("intensity", 1.0))
+    return f"light_source {{ {triple(place)} rgb {colour} {cone}}}"
 
 
 def _shape(shape):
@@ -99,11 +99,11 @@ def _shape(shape):
         return f"sphere {{ 0, 1 {texture} }}"
     to_world = np.eye(4) if "to_world" not in shape else np.array(shape["to_world"].matrix, float)
     corners = [to_world @ (x, y, 0, 1) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1))]
-    points = ", ".join(_triple(corner[:3]) for corner in corners)
+    points = ", ".join(triple(corner[:3]) for corner in corners)
     return f"polygon {{ 5, {points} {texture} }}"
 
 
-def _triple(value):
+def triple(value):
     """Return a number, colour or vector as POV-Ray writes it."""
     value = value["value"] if isinstance(value, dict) else value
     return "<" + ", ".join(repr(float(part)) for part in np.broadcast_to(value, 3)) + ">"

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from comparisons.plain_scene import PlainScene, Triangles
+from tests.witnesses.povray import document, triple
 
 NEAR = 1e-3
 """``fade_distance``: 2 / (1 + (d / NEAR)^2) is the inverse square but for NEAR^2 / d^2."""
@@ -14,13 +15,7 @@ def translated(scene: PlainScene) -> str:
     """Return a scene in POV-Ray's language, without attenuation or with the inverse square."""
     shapes = [_mesh(shape, scene.materials[shape.material], scene) for shape in scene.shapes]
     lights = [_light(light) for light in scene.lights]
-    head = [
-        "#version 3.7;",
-        "global_settings { assumed_gamma 1.0 ambient_light rgb 1 }",
-        "background { rgb 0 }",
-        _camera(scene.camera),
-    ]
-    return "\n".join([*head, *shapes, *lights]) + "\n"
+    return document(1, [_camera(scene.camera), *shapes, *lights])
 
 
 def _camera(camera: dict) -> str:
@@ -28,8 +23,8 @@ def _camera(camera: dict) -> str:
     right, up, ahead, place = (matrix[:3, column] for column in range(4))
     aspect = camera["width"] / camera["height"]
     return (
-        f"camera {{ perspective location {_triple(place)} direction {_triple(ahead)}"
-        f" right {_triple(-aspect * right)} up {_triple(up)} angle {camera['x_fov_degrees']} }}"
+        f"camera {{ perspective location {triple(place)} direction {triple(ahead)}"
+        f" right {triple(-aspect * right)} up {triple(up)} angle {camera['x_fov_degrees']} }}"
     )
 
 
@@ -43,7 +38,7 @@ def _mesh(shape: Triangles, material: dict, scene: PlainScene) -> str:
 
 
 def _vectors(name: str, rows: np.ndarray) -> str:
-    return f"{name} {{ {len(rows)}, {', '.join(map(_triple, rows))} }}"
+    return f"{name} {{ {len(rows)}, {', '.join(map(triple, rows))} }}"
 
 
 def _texture(material: dict, ambient: tuple[float, ...]) -> str:
@@ -54,7 +49,7 @@ def _texture(material: dict, ambient: tuple[float, ...]) -> str:
     own = np.divide(lit, pigment, out=np.zeros(3), where=pigment > 0)
     k_s, n = np.mean(material["k_s"]), material["n"]
     return (
-        f"pigment {{ rgb {_triple(pigment)} }} finish {{ ambient {_triple(own)}"
+        f"pigment {{ rgb {triple(pigment)} }} finish {{ ambient {triple(own)}"
         f" diffuse {float(k_d.any())} phong {k_s} phong_size {n} }}"
     )
 
@@ -65,17 +60,11 @@ def _light(light: dict) -> str:
     words = list(_cone(light))
     if square:
         words.append(f"fade_distance {NEAR} fade_power 2")
-    return (
-        f"light_source {{ {_triple(light['position'])} rgb {_triple(colour)} {' '.join(words)} }}"
-    )
+    return f"light_source {{ {triple(light['position'])} rgb {triple(colour)} {' '.join(words)} }}"
 
 
 def _cone(light: dict) -> Iterator[str]:
     if light["type"] == "spot":
         target = np.array(light["position"]) + np.array(light["direction"])
         yield f"spotlight radius {light['cutoff']} falloff {light['cutoff']}"
-        yield f"tightness {light['exponent']} point_at {_triple(target)}"
-
-
-def _triple(values: np.ndarray) -> str:
-    return f"<{', '.join(repr(float(value)) for value in values)}>"
+        yield f"tightness {light['exponent']} point_at {triple(target)}"

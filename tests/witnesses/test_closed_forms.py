@@ -9,7 +9,7 @@ from tests.witnesses.witness import deviation
 WITNESSES = (*lamps.WITNESSES, *corners.WITNESSES, *furnaces.WITNESSES)
 BIAS = 3e-3
 
-QUICK = ("below a rectangular lamp", "below a shining ball", "flux", "furnace: diffuse")
+QUICK = ("below a rectangular lamp", "flux", "furnace: diffuse")
 """Parts of names of cases of the quick tier."""
 
 cases = pytest.mark.parametrize(
@@ -45,9 +45,6 @@ def test_the_reference_is_the_closed_form(rgb, witness):
 @pytest.mark.parametrize("witness", WITNESSES, ids=lambda witness: witness.name)
 def test_so_is_the_reference_that_leaves_nothing_out(rgb, witness):
     require_agreement(deviation(witness, everything=True))
-
-
-# --- The formulas themselves, against each other ------------------------------------------------
 
 
 def square_mean(function):
