@@ -10,7 +10,7 @@ from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
 from comparisons.processes.pool import end_after_task
 from heuristic import program
-from heuristic.errors import InputError
+from heuristic.errors import InputError, suggestion
 from reference.planning.plan import wants_spectra
 from reference.scene.graph import set_variant
 from reference.scene.source import Source
@@ -98,8 +98,10 @@ def file_of(scene: str | Path) -> Path | None:
     if path.suffix not in SUFFIXES and not path.exists():
         return None
     if not path.is_file():
+        siblings = map(str, path.parent.glob("*")) if path.parent.is_dir() else ()
         raise InputError(
-            f"{scene}: there is no such file. Give a Mitsuba scene (.xml), a Python file"
+            f"{scene}: there is no such file{suggestion(str(scene), siblings)}. Give a Mitsuba"
+            " scene (.xml), a Python file"
             " that makes one (.py), or the name of a built-in scene"
             f" (listed by `{program.command('scenes')}`)."
         )

@@ -40,7 +40,6 @@ RESULTS: Terms = {
         "How far the mean of the samples is likely to be from the true value, because of noise. At"
         " a pixel it is the mean over a square of 2 by 2."
     ),
-    ("RMS", "root mean square"): "The square root of the mean of the squares.",
     ("of the departure", "of the error"): "Its part of the sum of ΔE2000 over all pixels.",
     ("mostly", "mostly missing", "effect", "worth most", "cause", "causes"): (
         "The difference between the two halves that adds most to the departure there."
@@ -48,7 +47,6 @@ RESULTS: Terms = {
     ("differ visibly", "pixels that differ visibly"): (
         "The share of the pixels whose ΔE2000 is above the threshold."
     ),
-    ("region", "regions"): "The rectangles of the image that hold most of the departure.",
 }
 
 VIEWS: Terms = {
@@ -63,7 +61,6 @@ VIEWS: Terms = {
     ),
     ("exposure",): "A factor on both images, in stops: one stop doubles the light.",
     ("map of the error",): "Which measure of the difference the map shows.",
-    ("split",): "The textbook’s picture to the left of a line, the physical one to its right.",
     ("error",): "Grey where no difference is visible, then the brighter, the larger.",
 }
 
@@ -95,8 +92,8 @@ COSTS: Terms = {
     ("left", "left with all"): (
         "ΔE2000 that remains with all effects: 0 apart from noise, or some effect is missing."
     ),
-    ("per pass, median",): "A pass is one image with a part of the samples.",
     ("compilation",): "Time to turn the rendering program into machine code.",
+    ("per pass, median",): "A pass is one image with a part of the samples.",
 }
 
 PLANS: Terms = {

@@ -9,7 +9,7 @@ import os
 import re
 import shlex
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -22,7 +22,7 @@ from msgspec import inspect
 from comparisons.options import Options
 from comparisons.processes.pool import Pool, cores
 from heuristic import llvm, program
-from heuristic.errors import InputError, suggestion
+from heuristic.errors import InputError
 from reports.terminal.words import echo, level
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -56,27 +56,6 @@ def complete_scene(
     named = [name for name in SCENES if name.startswith(beginning)]
     found = [CompletionItem(name, help=SCENES[name].title) for name in named]
     return found or [CompletionItem(beginning, type="file")]
-
-
-def require_known(names: Iterable[str]) -> None:
-    """Ensure, before anything is loaded, that these files, folders or built-in scenes exist."""
-    from comparisons.gallery.builtin import builtin
-
-    for name in names:
-        path = Path(name)
-        try:
-            if name and path.exists():
-                continue
-        except OSError as error:
-            raise InputError(f"{name[:60]!r}: {error.strerror}. Give a scene.") from error
-        if path.suffix in (".xml", ".py") or path.parent.name:
-            siblings = map(str, path.parent.glob("*")) if path.parent.is_dir() else ()
-            raise InputError(
-                f"{name}: there is no such file{suggestion(name, siblings)}. Give a Mitsuba scene"
-                " (.xml), a Python file that makes one (.py), a folder of scenes, or a built-in"
-                f" scene; `{program.command('scenes')}` lists them."
-            )
-        builtin(name)
 
 
 # --- Help ------------------------------------------------------------------------------------
@@ -324,13 +303,15 @@ def pool(
     """
     if scheduler is None:
         workers = min(workers or cores(), max(1, tasks))
-        return Pool(workers if IN_PROCESSES else 0, Ready.among(workers), timeout)
+        threads = max(1, cores() // workers) if workers > 1 else None
+        return Pool(workers if IN_PROCESSES else 0, Ready(level(), threads), timeout)
     if workers and workers > 1:
         raise click.UsageError("--workers and --scheduler exclude each other.")
     from comparisons.processes import cluster
 
     # As a context it gives a Cluster, which does what a Pool does.
-    return cast(Pool, cluster.connected(scheduler, Ready.far_away()))
+    ready = Ready(level(), None, os.getcwd(), shlex.join(program.program()))
+    return cast(Pool, cluster.connected(scheduler, ready))
 
 
 @dataclass(frozen=True)
@@ -344,16 +325,6 @@ class Ready:
     threads: int | None = None
     folder: str | None = None
     program: str | None = None
-
-    @classmethod
-    def among(cls, workers: int) -> Ready:
-        """Return the preparation of one of this many processes of this machine."""
-        return cls(level(), max(1, cores() // workers) if workers > 1 else None)
-
-    @classmethod
-    def far_away(cls) -> Ready:
-        """Return the preparation of a process on another machine."""
-        return cls(level(), None, os.getcwd(), shlex.join(program.program()))
 
     def __call__(self) -> None:
         """Get this process ready."""

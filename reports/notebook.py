@@ -9,7 +9,7 @@
 Programs use the same functions, which return records.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
@@ -43,7 +43,6 @@ from reports.ci.checks import CheckRecord
 from reports.page import page
 from reports.run.scene import view_of
 from reports.terminal.plan_lines import PlanReport, plan_report
-from reports.terminal.words import number
 
 HEIGHT = 900
 """Height of the frame in pixels: the viewer with its controls fits a wide notebook."""
@@ -77,54 +76,14 @@ class Shown:
         """Show both halves and the map of the error where scripts do not run."""
         return figures.drawn(figures.strip(self.comparison), "png", DENSITY)
 
-    def at(self, x: int, y: int) -> "ShownTerms":
+    def at(self, x: int, y: int) -> PixelTerms:
         """Return the terms of 8.10 at a column and row, or at the nearest that has them."""
         if self.comparison.terms is None:
             raise InputError(f"there are no terms. {self.comparison.no_terms}")
         found = self.comparison.terms.at(x, y)
         if found is None:
             raise InputError(f"pixel {x}, {y} sees no surface. Give one that does.")
-        place, images = found.pixel[::-1], self.comparison.images
-        error = float(images.reference_stderr[place].max())
-        return ShownTerms(found, tuple(images.reference[place].tolist()), error)
-
-
-@dataclass(frozen=True)
-class ShownTerms:
-    """The terms at a pixel, shown as a table.
-
-    `reference` is the physical reference at the pixel, `standard_error` its noisiest channel's.
-    """
-
-    terms: PixelTerms
-    reference: tuple[float, ...]
-    standard_error: float
-
-    def _repr_html_(self) -> str:
-        error = f"physical reference, ± {number(self.standard_error)}"
-        rows = [*_rows(self.terms), (error, self.reference)]
-        body = "".join(
-            f"<tr><th>{escape(name)}</th>"
-            + "".join(f"<td>{number(each)}</td>" for each in values)
-            + "</tr>"
-            for name, values in rows
-        )
-        head = "<tr><th>Term</th><th>R</th><th>G</th><th>B</th></tr>"
-        x, y = self.terms.pixel
-        place = f"Pixel {x}, {y}: {escape(self.terms.material.name)}"
-        return f"<p>{place}</p><table>{head}{body}</table>"
-
-
-def _rows(point: PixelTerms) -> Iterator[tuple[str, tuple[float, ...]]]:
-    yield "emission k_i", point.emission
-    yield "ambient I_a k_a", point.ambient
-    for light in point.lights:
-        factors = f"{light.name}, f_att = {number(light.attenuation)}"
-        yield f"diffuse, {factors}, N·L = {number(light.cos_incidence)}", light.diffuse
-        yield f"specular, {factors}, R·V = {number(light.cos_reflection)}", light.specular
-    if any(point.others):
-        yield "other lights", point.others
-    yield "textbook, the sum", point.total
+        return found
 
 
 def compare(scene: Scene, name: str | None = None, why: bool = True, **options: Any) -> Shown:

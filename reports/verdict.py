@@ -29,6 +29,9 @@ if TYPE_CHECKING:
 NAMED = 3
 """Number of effects that the sentence on a run names."""
 
+NOISE = 2.0
+"""Noise floors by which pixels must pass at the best exposure, where no interval is known."""
+
 EXACT = 0.01
 """ΔE2000: smaller means are rounding, or noise that nobody sees."""
 
@@ -104,7 +107,7 @@ def sentence(
                 f"Too close to call: {percent(found.low)} to {percent(found.high)} of the pixels"
                 f" differ, and {percent(LIMIT)} may. More samples (--spp, --noise) decide."
             )
-    if lead.after_exposure.p95 <= threshold:
+    if lead.after_exposure.p95 + NOISE * lead.noise_floor <= threshold:
         return f"Only the level is off: ×{number(lead.after_exposure.exposure)} makes it pass."
     if record.picture:
         return "The map shows where the picture is wrong."

@@ -68,6 +68,15 @@ def results(metric, run, scene_file, tmp_path):
     return tmp_path / "out"
 
 
+def test_a_metric_from_outside_has_a_map_on_the_page(results):
+    html = (results / "index.html").read_text(encoding="utf-8")
+    data = json.loads(re.search(r'id="page-data">(.*?)</script>', html, re.S)[1])
+    chosen = {"name": "blurred", "title": "Blurred <difference>", "kind": "metric", "top": 0.5}
+    assert chosen in data["maps"]
+    (scene,) = data["scenes"]
+    assert "blurred" in scene["images"]["names"]
+
+
 def layer(results, name):
     """Return a layer of the comparison's EXR file, its channels last."""
     path = str(results / "my-scene/comparison.exr")
@@ -176,6 +185,3 @@ def test_a_method_and_a_heuristic_are_in_json_tables_page_and_chart(
         text = (out / name).read_text(encoding="utf-8")
         assert "no &lt;shadows&gt;" in text
         assert "Phong kernel: Flat &lt;tone&gt;" in text
-    table = (out / "tables/my-scene-cost.csv").read_text(encoding="utf-8")
-    assert "no <shadows>" in table
-    assert "Phong kernel: Flat <tone>" in table

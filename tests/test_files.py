@@ -14,7 +14,7 @@ from heuristic.errors import InputError
 from reference.records import plain
 from reports.files import images
 from reports.terminal import tables
-from tests import cost_records, records
+from tests import records
 
 CONTRACT = {
     *(f"{name}.{c}" for name in ("heuristic", "reference", "reference_stderr") for c in "RGB"),
@@ -103,12 +103,9 @@ def test_tonemap_is_the_srgb_curve():
     np.testing.assert_array_equal(pixels_of(images.tonemap(linear / 8, exposure=8)), expected)
 
 
-def test_png_keeps_small_images_and_shrinks_large_ones_on_request():
+def test_png_keeps_every_pixel():
     pixels = np.random.default_rng(0).integers(0, 256, (6, 8, 3), dtype=np.uint8)
-    picture = Image.fromarray(pixels)
-    for longest in (None, 8):
-        np.testing.assert_array_equal(decode(images.png(picture, longest=longest)), pixels)
-    assert decode(images.png(picture, longest=4)).shape == (3, 4, 3)
+    np.testing.assert_array_equal(decode(images.png(Image.fromarray(pixels))), pixels)
 
 
 def test_error_map_spans_magma_and_stays_in_it():
@@ -160,19 +157,3 @@ def test_csv_holds_every_number_in_full():
             assert float(row[f"visible.{share['threshold']:g}"]) == share["value"]
         assert float(row["significant"]) == record.significant.fraction
     assert {row["visible.5"] for row in rows if row["metric"] == "rmse"} == {""}
-
-
-def test_a_study_of_cost_is_written_with_its_methods_and_attribution(tmp_path):
-    record = cost_records.record()
-    tables.write_cost(tmp_path / "tables", "box", record)
-    for part, made, interval in (
-        ("attribution", record.attribution.effects, "adds_s"),
-        ("cost", record.points, "seconds"),
-        ("methods", record.methods, "ratio"),
-    ):
-        text = (tmp_path / f"tables/box-{part}.csv").read_text()
-        for row, one in zip(csv.DictReader(StringIO(text)), made, strict=True):
-            known = getattr(one, interval)
-            found = [float(row[interval + end]) for end in ("", "_low", "_high")]
-            assert found == [known.value, known.low, known.high]
-            assert next(iter(row.values())) == getattr(one, next(iter(row)))

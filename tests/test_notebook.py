@@ -16,7 +16,6 @@ from comparisons.compare import compare
 from comparisons.options import Options
 from heuristic.errors import InputError
 from reports.notebook import Shown
-from reports.terminal.words import number
 from tests.programs import ROOT
 
 CELL = """
@@ -66,20 +65,12 @@ def shown():
 
 
 @pytest.mark.parametrize("place", [(12, 8), (9, 5)])
-def test_the_terms_at_a_pixel_come_with_the_reference_there(shown, place):
-    found, images = shown.at(*place), shown.comparison.images
-    assert found.terms.pixel == place
-    x, y = place
-    np.testing.assert_array_equal(found.reference, images.reference[y, x])
-    assert found.standard_error == images.reference_stderr[y, x].max() > 0
-    parts = [found.terms.emission, found.terms.ambient, found.terms.others]
-    parts += [part for light in found.terms.lights for part in (light.diffuse, light.specular)]
-    np.testing.assert_allclose(np.sum(parts, axis=0), found.terms.total, rtol=1e-6)
-    html = found._repr_html_()
-    assert f"Pixel {x}, {y}" in html
-    assert f"physical reference, ± {number(found.standard_error)}" in html
-    cells = "".join(f"<td>{number(value)}</td>" for value in images.reference[y, x])
-    assert cells in html
+def test_the_terms_at_a_pixel_add_up(shown, place):
+    found = shown.at(*place)
+    assert found.pixel == place
+    parts = [found.emission, found.ambient, found.others]
+    parts += [part for light in found.lights for part in (light.diffuse, light.specular)]
+    np.testing.assert_allclose(np.sum(parts, axis=0), found.total, rtol=1e-6)
 
 
 def test_pixels_without_terms_say_why(shown):

@@ -84,7 +84,7 @@ def _area(light: LightNode) -> None:
         cone["shell"] = radius
     position = mi.ScalarPoint3f(*centroid)
     derived = heuristic(plugin, factor, **cone, position=position, intensity=radiance)
-    derived.set_id(f"light of {graph.label(shape)}")
+    derived.set_id(f"lamp ‘{graph.label(shape)}’")
     graph.attach(0, f"light_of_{shape}", graph.add(EMITTER, derived))
     note = f"{form}area {area:.6g}, in the far field; the shape keeps its emission as k_i"
     light.replaced.emitter(graph.label(shape), "area", plugin, factor, False, note)

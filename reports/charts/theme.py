@@ -1,6 +1,5 @@
 """How charts look: one theme, in the text's colour on a page and in black on paper."""
 
-from collections.abc import Mapping
 from typing import Any, TypeAlias
 
 from reference.planning.effects import EFFECTS
@@ -20,17 +19,6 @@ NO_EFFECT = "#dee2e6"
 
 FAINT = "#8a8a8a"
 """Colour of guide lines, visible on light and dark grounds."""
-
-
-def themed(spec: Mapping[str, Any], theme: Mapping[str, Any]) -> Spec:
-    """Return a specification in a theme, which the specification's config overrides."""
-    return {**spec, "config": _merged(theme, spec.get("config", {}))}
-
-
-def _merged(theme: Any, own: Any) -> Any:
-    if not isinstance(theme, Mapping):
-        return own
-    return {**theme, **{key: _merged(theme.get(key), value) for key, value in own.items()}}
 
 
 def _theme(ink: str, **own: Any) -> Spec:

@@ -37,32 +37,21 @@ class Figure:
 
 
 def figure(title: str, spec: Mapping[str, Any], note: str = "") -> Figure:
-    """Make a figure of a Vega-Lite specification, whose config overrides the theme.
-
-    Its text may come from users' files: it is escaped in the picture.
-    """
-    spec = theme.themed(spec, theme.PAGE)
-    return Figure(title, note, _drawn(json.dumps(spec)))
+    """Make a figure of a Vega-Lite specification, whose text may come from users' files."""
+    return Figure(title, note, _drawn(json.dumps({**spec, "config": theme.PAGE})))
 
 
-def paper(spec: Mapping[str, Any], kind: str = "svg") -> bytes:
-    """Return the file of a specification for print, as ``svg`` or ``pdf``."""
-    made = _made(f"vegalite_to_{kind}", theme.themed(spec, theme.PAPER))
-    return made.encode() if isinstance(made, str) else made
+def paper(spec: Mapping[str, Any]) -> bytes:
+    """Return the SVG file of a specification for print."""
+    return _svg(json.dumps({**spec, "config": theme.PAPER})).encode()
 
 
-def _made(function: str, argument: Mapping[str, Any] | str) -> Any:
-    """Call a function of vl_convert.
-
-    Raises
-    ------
-    OutputError
-        If files or memory run out; vl_convert then panics, with a ``BaseException``.
-    """
+def _svg(spec: str) -> str:
+    """Draw a specification; vl_convert panics if files or memory run out."""
     import vl_convert
 
     try:
-        return getattr(vl_convert, function)(argument)
+        return vl_convert.vegalite_to_svg(spec)
     except BaseException as error:
         if type(error).__name__ != "PanicException":
             raise
@@ -81,7 +70,7 @@ def specification(chart: altair.TopLevelMixin) -> Spec:
 @lru_cache(maxsize=1024)
 def _drawn(spec: str) -> str:
     """The picture for the page, which is written many times while it grows."""
-    return _inline(_made("vegalite_to_svg", spec))
+    return _inline(_svg(spec))
 
 
 def _inline(svg: str) -> str:

@@ -214,8 +214,9 @@ def _before(made: CheckRecord, found: Check, pictures: baselines.Kept | None) ->
     shown = {}
     for half, old in (pictures or {}).items():
         now = baselines.reduced(found.now.pictures[half], old.shape)
-        shown[half] = images.png(images.tonemap(old))
-        shown[f"{half}-error"] = images.png(images.error_map(LEADING(now, old), LARGEST_ERROR))
+        error = images.error_map(LEADING(now, old), LARGEST_ERROR)
+        for name, picture in ((half, images.tonemap(old)), (f"{half}-error", error)):
+            shown[name] = images.webp(picture, lossless=True)
     return Before(
         sentences=tuple(filter(None, (*made.causes, made.versions_line))),
         moved=tuple(move.cells() for move in made.moved or ()),
@@ -266,25 +267,14 @@ def _each(
     """Return the result of each baseline, in order; its path is the first argument."""
     results = {}
     with progress.shown() as bar:
-        tasks = [
-            Task(call[0].name, judged, (function, *call), bar.of(call[0].stem)) for call in calls
-        ]
+        tasks = [Task(call[0].name, function, call, bar.of(call[0].stem)) for call in calls]
         for task, outcome in pool.each(tasks):
-            path, error = task.arguments[1], outcome.exception()
+            path, error = task.arguments[0], outcome.exception()
             results[path] = (failed(path, error), None) if error else outcome.result()
     return [results[call[0]] for call in calls]
 
 
-def judged(function: Judging, path: Path, *words: Any) -> tuple[CheckRecord, SceneView | None]:
-    """Check or write one baseline in a process of a pool; an exception becomes its result."""
-    begin = perf_counter()
-    try:
-        return function(path, *words)
-    except Exception as error:
-        return failed(path, error, perf_counter() - begin), None
-
-
-def failed(path: Path, error: BaseException, seconds: float = 0.0) -> CheckRecord:
+def failed(path: Path, error: BaseException) -> CheckRecord:
     """Return the result of a baseline that an exception kept from being judged."""
     kind = "" if isinstance(error, FotismosError) else f"{type(error).__name__}: "
     where = "" if str(error).startswith(str(path)) else f"{path}: "
@@ -293,7 +283,7 @@ def failed(path: Path, error: BaseException, seconds: float = 0.0) -> CheckRecor
         scene="",
         status="error",
         passed=False,
-        seconds=round(seconds, 3),
+        seconds=0.0,
         message=f"{where}{kind}{error}",
     )
 

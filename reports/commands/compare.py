@@ -85,7 +85,6 @@ def compare(
       fotismos compare my_scene.xml --image theirs.exr
       fotismos compare my_scenes/*.xml --max-visible 5% --summary summary.md
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.require_known(scenes)
     if rendering["image"] and len(scenes) > 1:
         raise click.UsageError("--image goes with one scene.")
     request = jobs.request(rendering)

@@ -45,9 +45,8 @@ def cost(
 
     Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
     attributes error and time to each effect in which textbook shading differs. Writes a page,
-    cost.json, cost.svg and pictures to OUTPUT/cost/SCENE, and OUTPUT/cost/tables. Without
-    --resolution the film is reduced to a width of 128 pixels; --spp gives the largest count of
-    samples per pixel, 64 if omitted.
+    cost.json, cost.svg and pictures to OUTPUT/cost/SCENE. Without --resolution the film is reduced
+    to a width of 128 pixels; --spp gives the largest count of samples per pixel, 64 if omitted.
 
     \b
     Examples:
@@ -57,21 +56,18 @@ def cost(
     """  # noqa: D301 click reads the \b as: keep these lines
     if is_measured and at is None:
         raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
-    jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
         from reference.records import to_json
-        from reports.files.results import PAGE, TABLES, hold, own, places
-        from reports.terminal import cost_tables, progress, tables
+        from reports.files.results import PAGE, hold, own, places
+        from reports.terminal import cost_tables, progress
 
         with hold(output, jobs.command_line()) as top:
             folder = own(top / "cost")
             (place,) = places(folder, [scene])
-            own(folder / TABLES)
             with progress.shown() as bar:
                 asked = (scene, jobs.request(rendering), rounds, at, is_measured)
                 record = pool.do(Task(place, measured, (*asked, folder / place), bar.of(place)))
-            tables.write_cost(folder / TABLES, place, record)
     if as_json:
         click.echo(to_json(record), nl=False)
         return

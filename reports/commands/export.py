@@ -28,7 +28,6 @@ def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
       fotismos export cornell-box
       fotismos export my_scene.xml --resolution 640x480 -o for_my_engine
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
         from reports.files.results import hold, own, places

@@ -53,7 +53,7 @@ def fit(
     """Find the heuristic parameters nearest to the reference, and the error that remains.
 
     The loss that the best parameters remove is the parameter error. The rest is the model error,
-    which no parameters remove. Writes fit.json and fit.png (before, reference, after, residual) to
+    which no parameters remove. Writes a page (before, reference, after, error left) and fit.json to
     OUTPUT/fit/SCENE. By default it renders 96x96 pixels with 64 samples each.
 
     \b
@@ -61,7 +61,6 @@ def fit(
       fotismos fit fig-8-9
       fotismos fit my_scene.xml --loss linear --form phong
     """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.require_known(scenes)
     with jobs.pool(timeout) as pool:
         pool.start()
         from heuristic.materials import FORMS

@@ -53,7 +53,6 @@ def plan(
     """  # noqa: D301 click reads the \b as: keep these lines
     if verify and within is not None:
         raise click.UsageError("--verify and --within exclude each other: give one.")
-    jobs.require_known([scene])
     with jobs.pool(timeout) as pool:
         pool.start()
         from reference.records import to_json

@@ -30,8 +30,7 @@ README = """# {name}, for another program
   I / (k0 + k1 d + k2 d^2). In glTF a light's intensity is pi times I, as irradiance is.
 - `ambient` in lights.json is added times k_a; in physical terms it is an environment of that
   radiance.
-- Angles are in degrees in JSON, in radians in glTF. `direction` is the direction in which light
-  travels.
+- Angles are in degrees in JSON, in radians in glTF; `direction` is that in which light travels.
 - `alpha` is the root mean square slope of the microfacets; glTF's roughness is its square root.
 - `k_d`, `k_s`, `n` are Phong's, as paired; `base_color`, `alpha`, `ior`, `metallic` are the
   physical material's. Those in `varies` are textures, given by their value in the middle.

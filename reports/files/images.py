@@ -22,7 +22,6 @@ from comparisons.comparison import Images
 from comparisons.departure import marks
 from comparisons.departure.colour import to_srgb
 from comparisons.departure.metrics import LEADING, RATIO, drawn
-from heuristic.errors import InputError
 from reference.records import Record
 
 Bytes = NDArray[np.uint8]
@@ -79,15 +78,8 @@ def colour_table(colormap: str) -> str:
     return _table(colormap).tobytes().hex()
 
 
-def png(picture: Image.Image, longest: int | None = None) -> bytes:
-    """The PNG file of a picture, pixel for pixel; the bytes depend on the pixels alone.
-
-    A picture whose longer side exceeds `longest` is averaged down to it.
-    """
-    if longest is not None and max(picture.size) > longest:
-        scale = longest / max(picture.size)
-        width, height = (max(1, round(side * scale)) for side in picture.size)
-        picture = picture.convert("RGB").resize((width, height), Image.Resampling.BOX)
+def png(picture: Image.Image) -> bytes:
+    """The PNG file of a picture, pixel for pixel; the bytes depend on the pixels alone."""
     buffer = BytesIO()
     # Level 4: half the time of 6 for files 5 % larger.
     picture.save(buffer, "PNG", compress_level=4)
@@ -108,13 +100,19 @@ def pictures(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
 
 
 def thumbnails(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
-    """Small PNG files for cards: both halves, and the map of the leading metric."""
+    """Small WebP files for cards: both halves, and the map of the leading metric."""
     made = {
         "heuristic": tonemap(shown.heuristic, exposure),
         "reference": tonemap(shown.reference, exposure),
         LEADING.name: error_map(shown.maps[LEADING.name], LEADING.map_range[1]),
     }
-    return {name: png(picture, THUMBNAIL) for name, picture in made.items()}
+    return {name: webp(_small(picture)) for name, picture in made.items()}
+
+
+def _small(picture: Image.Image) -> Image.Image:
+    scale = min(1.0, THUMBNAIL / max(picture.size))
+    width, height = (max(1, round(side * scale)) for side in picture.size)
+    return picture.convert("RGB").resize((width, height), Image.Resampling.BOX)
 
 
 def _coloured(fraction: NDArray[np.float64], colormap: str) -> Image.Image:
@@ -163,14 +161,8 @@ def sheet(previews: Sequence[Image.Image], lossless: bool = False) -> Sheet:
 def webp(picture: Image.Image, lossless: bool = False) -> bytes:
     """Return the WebP file of a picture."""
     buffer = BytesIO()
-    picture.save(buffer, "WEBP", quality=QUALITY, method=4, lossless=lossless)
+    picture.convert("RGB").save(buffer, "WEBP", quality=QUALITY, method=4, lossless=lossless)
     return buffer.getvalue()
-
-
-@lru_cache(maxsize=4096)
-def webp_of(png: bytes) -> bytes:
-    """Return a small PNG picture as WebP, kept for the next time that the page is written."""
-    return webp(Image.open(BytesIO(png)).convert("RGB"))
 
 
 def webp_uri(file: bytes) -> str:
@@ -221,32 +213,12 @@ def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
     (H, W), also boolean, becomes ``name.Y``. `FULL_PRECISION`, and values beyond half, are float32.
     """
     result: dict[str, np.ndarray] = {}
-    size = None
     for name, values in layers.items():
         image = np.asarray(values)
-        suffixes = _suffixes(name, image)
-        size = size or image.shape[:2]
-        if image.shape[:2] != size:
-            raise InputError(
-                f"EXR layer {name} is {image.shape[:2]}, the first {size}: make all the same size."
-            )
-        precision = _precision(name, image)
+        is_large = bool(image.size) and np.abs(image).max() > HALF_MAX
+        precision = np.float32 if name in FULL_PRECISION or is_large else np.float16
+        suffixes = "Y" if image.ndim == 2 else "XYZ" if name in VECTORS else "RGB"
         planes = image[..., None] if image.ndim == 2 else image
         for index, suffix in enumerate(suffixes):
-            plane = np.ascontiguousarray(planes[..., index], precision)
-            result[f"{name}.{suffix}"] = plane
+            result[f"{name}.{suffix}"] = np.ascontiguousarray(planes[..., index], precision)
     return result
-
-
-def _suffixes(name: str, image: np.ndarray) -> str:
-    if image.ndim == 2:
-        return "Y"
-    if image.ndim == 3 and image.shape[2] == 3:
-        return "XYZ" if name in VECTORS else "RGB"
-    raise InputError(f"EXR layer {name} has shape {image.shape}: make it (H, W) or (H, W, 3).")
-
-
-def _precision(name: str, image: np.ndarray) -> type[np.floating]:
-    if name in FULL_PRECISION or (image.size and np.abs(image).max() > HALF_MAX):
-        return np.float32
-    return np.float16

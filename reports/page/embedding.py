@@ -16,7 +16,7 @@ from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure import marks
-from comparisons.departure.metrics import LEADING
+from comparisons.departure.metrics import LEADING, METRICS, drawn
 from reference.records import Record, plain
 
 STEP = 4
@@ -65,6 +65,9 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
     error = _means(channels[f"{LEADING.name}.Y"], block)
     # The rounding of exact pairs would fill most of a page.
     planes[LEADING.name] = encode(np.where((error > 0) & (error < LEAST), LEAST / 2, error))
+    for name, metric in drawn().items():
+        if not METRICS.is_own(metric):  # of the package's own, the files have the maps
+            planes[name] = encode(_means(channels[f"{name}.Y"], block))
     deviation = np.stack([channels[f"reference_stderr.{c}"] for c in "RGB"]).max(axis=0)
     planes["standard_error"] = encode(_means(deviation, block), 32 * STEP)
     marked = np.asarray(channels["significant.Y"], np.float64)

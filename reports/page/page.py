@@ -19,14 +19,21 @@ from msgspec import structs
 
 from comparisons.departure.colour import BT709, rgb_to_xyz
 from comparisons.departure.criterion import LIMIT, TOLERANCE, decide
-from comparisons.departure.metrics import LEADING, LOG2_EPSILON, METRICS, RATIO, THRESHOLDS
+from comparisons.departure.metrics import (
+    LEADING,
+    LOG2_EPSILON,
+    METRICS,
+    RATIO,
+    THRESHOLDS,
+    drawn,
+)
 from reference.records import plain
 from reports import glossary, verdict
 from reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT
 from reports.files import images
 from reports.files.results import Failure, RunRecord
-from reports.page import templating
 from reports.page.scene_view import SceneView, WhyView
+from reports.page.templating import HELP, rendered
 from reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
@@ -40,9 +47,6 @@ TITLE = "Textbook shading against physically based rendering"
 DETAILS = "details.html"
 """The file of :func:`details`, beside the page."""
 
-STYLES = ("base", "page", "print")
-HELP = ("page", "help")
-"""The parts of a script that explains terms; those of the whole page follow."""
 SCRIPTS = (
     *HELP, "address", "overview", "images", "viewport", "drawing", "switches", "panels", "viewer",
     "pointer", "keyboard", "terms", "main",
@@ -96,7 +100,7 @@ def render(
         "terms": glossary.meanings(),
         **_drawing(),
     }
-    return _rendered(
+    return rendered(
         "page.html.j2",
         SCRIPTS,
         title=title,
@@ -124,7 +128,7 @@ def details(
 
     Parts that are not given are left out; `run` says where the time went.
     """
-    return _rendered(
+    return rendered(
         "details.html.j2",
         HELP,
         title="Details",
@@ -143,11 +147,6 @@ def details(
             "glossary": True,
         },
     )
-
-
-def _rendered(template: str, scripts: Sequence[str], **content: Any) -> str:
-    content |= {"style": templating.style(STYLES), "scripts": templating.scripts(scripts)}
-    return templating.environment().get_template(template).render(**content)
 
 
 def _runs(text: Callable[[float], str]) -> Runs:
@@ -221,11 +220,13 @@ def _board(why: WhyView | None, found: Attribution | None) -> dict[str, Any] | N
 
 def _drawing() -> dict[str, Any]:
     """Return the maps, their colours, and luminance of linear RGB, under the script's names."""
+    declared = [metric for metric in drawn().values() if not METRICS.is_own(metric)]
     maps = (
         (LEADING.name, LEADING.label, "difference", 0),
         ("effects", EFFECTS_TITLE, "effects", 0),
         (RATIO.name, RATIO.label, "ratio", RATIO.limit),
         ("significant", "Shown to differ", "mask", 0),
+        *((metric.name, metric.label, "metric", metric.map_range[1]) for metric in declared),
     )
     return {
         "maps": [dict(zip(("name", "title", "kind", "top"), each, strict=True)) for each in maps],

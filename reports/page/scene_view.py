@@ -57,8 +57,8 @@ class CostView(Record):
     """A page's data of a study.
 
     ``record`` is a :class:`comparisons.cost.cost_record.Cost`, whose type few pages need to load.
-    ``images`` are PNG files of the methods, by their bare names; ``said`` and ``busy`` are
-    sentences on its sums and on the machine; ``colours`` are those of the effects.
+    ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are sentences on
+    its sums and on the machine; ``colours`` are those of the effects.
     """
 
     record: Any
@@ -67,16 +67,12 @@ class CostView(Record):
     busy: str
     colours: tuple[str, ...]
 
-    def picture(self, kind: str, name: str) -> bytes:
-        """Return the picture of a method."""
-        return self.images[picture_name(kind, name)]
-
 
 class Before(Record):
     """What moved in a scene since its baseline.
 
-    ``moved`` has a name, before, now, standard errors and p. ``pictures`` are PNG files: the halves
-    as they were, and ΔE2000 between then and now.
+    ``moved`` has a name, before, now, standard errors and p. ``pictures`` are WebP files: the
+    halves as they were, and ΔE2000 between then and now.
     """
 
     sentences: tuple[str, ...]
@@ -103,12 +99,3 @@ class SceneView(Record):
     terms: TermsView | None = None
     before: Before | None = None
     why: WhyView | None = None
-
-
-def picture_name(kind: str, name: str) -> str:
-    """Return the name of a picture's file without suffix, such as cost-part-transport."""
-    return f"cost-{kind}-{_plain(name)}"
-
-
-def _plain(name: str) -> str:
-    return "".join(c if c.isalnum() else "-" for c in name.lower()).replace("--", "-")

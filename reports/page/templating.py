@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
@@ -16,18 +17,14 @@ from comparisons.departure.regions import Region
 from reference.records import plain
 from reports import verdict
 from reports.files import images
-from reports.terminal.words import (
-    NOTICEABLE,
-    about_noise,
-    difference,
-    may_be_none,
-    number,
-    parameter,
-    percent,
-    seconds,
-)
+from reports.terminal.words import difference, number, parameter, percent, seconds
 
 TEMPLATES = Path(__file__).parent / "templates"
+
+STYLES = ("base", "page", "print")
+
+HELP = ("page", "help")
+"""The parts of a script that explains terms; those of the whole page follow."""
 
 REGION_SIZE = 420
 """Approximate screen pixels of a region that is opened from its link."""
@@ -39,17 +36,6 @@ FORMS = {form.__name__: form for form in (number, difference, parameter, seconds
 #: A page in a notebook's frame begins with the viewer.
 EARLY = """const framed = location.protocol === "about:" ? " framed" : "";
 document.documentElement.className = `js${framed}`;"""
-
-
-def templates() -> Environment:
-    """Return an environment of the templates of all pages, which escapes everything."""
-    return Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=StrictUndefined,
-    )
 
 
 def style(parts: Iterable[str]) -> Markup:
@@ -69,10 +55,6 @@ def scripts(parts: Iterable[str]) -> list[dict[str, Markup]]:
     ]
 
 
-def _data_uri(png: bytes) -> str:
-    return "data:image/png;base64," + base64.b64encode(png).decode("ascii")
-
-
 def _hash(script: str) -> Markup:
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
     return Markup(f"'sha256-{digest}'")
@@ -84,8 +66,14 @@ def _source(name: str) -> str:
 
 @lru_cache(maxsize=1)
 def environment() -> Environment:
-    """Return the environment of the report's templates, which escapes everything."""
-    environment = templates()
+    """Return the environment of the templates of all pages, which escapes everything."""
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
     environment.filters.update(
         FORMS,
         judged=verdict.judged,
@@ -93,12 +81,10 @@ def environment() -> Environment:
         at=text_at,
         ink=ink,
         plain=plain,
-        uri=_data_uri,
         webp_uri=images.webp_uri,
-        webp_of=images.webp_of,
     )
-    environment.tests.update(about_noise=about_noise, may_be_none=may_be_none, finite=math.isfinite)
-    environment.globals.update(forms=FORMS, noticeable=NOTICEABLE)
+    environment.tests.update(finite=math.isfinite)
+    environment.globals.update(forms=FORMS)
     return environment
 
 
@@ -118,3 +104,9 @@ def ink(colour: str) -> str:
     """Return black or white, whichever is easier to read on a colour ``#rrggbb``."""
     red, green, blue = (int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5))
     return "#000" if 0.2126 * red**2.2 + 0.7152 * green**2.2 + 0.0722 * blue**2.2 > 0.18 else "#fff"
+
+
+def rendered(template: str, parts: Sequence[str] = (), **content: Any) -> str:
+    """Return a page of a template, with the style of all and a script of some parts."""
+    content |= {"style": style(STYLES), "scripts": scripts(parts) if parts else []}
+    return environment().get_template(template).render(**content)

@@ -14,7 +14,7 @@ from reports.charts import vega
 from reports.charts.theme import FAINT, Spec
 from reports.files import results
 from reports.files.results import PAGE
-from reports.page.templating import templates
+from reports.page.templating import rendered
 from reports.terminal import tables
 from reports.terminal.words import number
 
@@ -76,13 +76,9 @@ def write(place: Path, record: Audit) -> None:
 
 def render(record: Audit) -> str:
     """Return the page of an audit: one file, without scripts."""
-    environment = templates()
-    environment.filters["found"] = value_of
-    return environment.get_template("audit.html.j2").render(
-        record=record,
-        headline=headline(record),
-        lobes=vega.figure("Lobes", lobes(record)),
-    )
+    chart = vega.figure("Lobes", lobes(record))
+    title = headline(record)
+    return rendered("audit.html.j2", title=title, record=record, found=value_of, lobes=chart)
 
 
 # --- On a terminal ---------------------------------------------------------------------------

@@ -218,7 +218,7 @@ def _compare(
             batch.views[task.name] = view
             for stage, seconds in spent.items():
                 batch.stages[stage] += seconds
-            remark([*tables.details(view.record), *tables.shape_lines(view.record)])
+            remark(tables.details(view.record))
         finally:
             bar.over(task.progress)
         batch.grow_page()

@@ -11,8 +11,8 @@ from reports import glossary
 from reports.charts import theme, vega
 from reports.files import images, results
 from reports.files.results import PAGE
-from reports.page import templating
-from reports.page.scene_view import CostView, picture_name
+from reports.page.scene_view import CostView
+from reports.page.templating import HELP, rendered
 from reports.terminal.cost_tables import busy, closure, together
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def documents(study: Study) -> dict[str, bytes]:
     from reports.charts import cost_charts  # Altair takes half a second to import
 
     record = study.record
-    pictures = {picture_name("method", name): image for name, image in study.methods.items()}
+    pictures = {f"cost-method-{_plain(name)}": image for name, image in study.methods.items()}
     pictures["cost-reference"] = study.reference
     made = {
         f"{name}.png": images.png(images.tonemap(image, exposure=record.viewing.exposure))
@@ -45,18 +45,16 @@ def write(place: Path, study: Study) -> None:
     """
     results.own(place)
     made = documents(study)
-    page = templating.environment().get_template("cost_page.html.j2")
-    results.write(
-        place / PAGE,
-        page.render(
-            style=templating.style(("base", "page", "print")),
-            scripts=templating.scripts(("page", "help")),
-            cost=view(study, made),
-            r=study.record,
-            charts=figures(study.record),
-            terms=glossary.meanings(),
-        ),
+    page = rendered(
+        "cost_page.html.j2",
+        HELP,
+        title=f"What accuracy costs on {study.record.scene}",
+        data={"terms": glossary.meanings()},
+        cost=view(study),
+        r=study.record,
+        charts=figures(study.record),
     )
+    results.write(place / PAGE, page)
     for name, content in made.items():
         results.write(place / name, content)
 
@@ -69,17 +67,21 @@ def figures(record: Cost) -> list[vega.Figure]:
     return [vega.figure("Error against time", cost_charts.error_over_time(record), note)]
 
 
-def view(study: Study, made: dict[str, bytes]) -> CostView:
-    """Return the :class:`CostView` of a study, with its files ``made`` by :func:`documents`."""
+def _plain(name: str) -> str:
+    return "".join(c if c.isalnum() else "-" for c in name.lower()).replace("--", "-")
+
+
+def view(study: Study) -> CostView:
+    """Return the :class:`CostView` of a study."""
     record = study.record
+    exposure = record.viewing.exposure
     effects = record.attribution.effects
     said = [together(record), closure(record)] if effects else []
     return CostView(
         record=record,
         images={
-            name.removesuffix(".png"): content
-            for name, content in made.items()
-            if name.endswith(".png")
+            name: images.webp(images.tonemap(image, exposure))
+            for name, image in study.methods.items()
         },
         said=re.sub(r"(?<!\d)-(?=\d)", "−", " ".join(said)),
         busy=busy(record) if record.is_busy else "",

@@ -1,76 +1,77 @@
-"""The files of one fit, and fits as tables for a terminal and in Markdown."""
+"""The page and record of one fit, and its tables."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import Any
-
-import matplotlib
-from PIL import Image, ImageDraw, ImageFont
 
 from comparisons.departure.metrics import LEADING, drawn
 from comparisons.fit.fit import Fit
 from comparisons.fit.fit_record import FitRecord, FittedParameter, FormFit
 from reference.records import to_json
 from reports.files import images, results
+from reports.page.templating import rendered
 from reports.terminal import tables
+from reports.terminal.words import percent
 
 Cells = Sequence[str]
 """One row of a table."""
 
-SMALLEST_TILE = 256
-"""Pixels; smaller images are enlarged by a whole factor, so each pixel stays square."""
-
-GAP, CAPTION = 8, 22
-FONT = Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf")
-"""Matplotlib's, since Pillow's has no Greek."""
-
 
 def write(folder: Path, fit: Fit) -> None:
-    """Write ``fit.json`` and ``fit.png`` to a folder."""
+    """Write ``index.html`` and ``fit.json`` to a folder; the record comes last."""
     results.own(folder)
-    results.write(folder / "fit.png", picture(fit))
+    results.write(folder / results.PAGE, page(fit))
     results.write(folder / "fit.json", to_json(fit.record))
 
 
-def picture(fit: Fit) -> bytes:
-    """Return the PNG of a fit: paired, reference, fitted, and the error left.
+def page(fit: Fit) -> str:
+    """Return the page of a fit: pictures, the error left, parameters; without scripts.
 
     The pictures are tone-mapped; the map has the metric's fixed range.
     """
-    exposure, high = fit.record.viewing.exposure, LEADING.map_range[1]
-    tiles = {
+    record, best = fit.record, fit.record.nearest
+    exposure, high = record.viewing.exposure, LEADING.map_range[1]
+    shown = {
         "paired": images.tonemap(fit.before, exposure),
         "reference": images.tonemap(fit.reference, exposure),
-        f"fitted ({fit.record.nearest.form})": images.tonemap(fit.after, exposure),
+        f"fitted ({best.form})": images.tonemap(fit.after, exposure),
         f"{LEADING.label} left, 0 to {high:g}": images.error_map(fit.maps[LEADING.name], high),
     }
-    factor = max(1, -(-SMALLEST_TILE // min(fit.before.shape[:2])))
-    height, width = (side * factor for side in fit.before.shape[:2])
-    sheet = Image.new("RGB", (4 * width + 5 * GAP, height + CAPTION + 2 * GAP), "white")
-    draw, font = ImageDraw.Draw(sheet), ImageFont.truetype(FONT, 14)
-    for place, (caption, tile) in enumerate(tiles.items()):
-        left = GAP + place * (width + GAP)
-        draw.text((left, GAP), caption, "black", font)
-        enlarged = tile.convert("RGB").resize((width, height), Image.Resampling.NEAREST)
-        sheet.paste(enlarged, (left, GAP + CAPTION))
-    buffer = BytesIO()
-    sheet.save(buffer, "PNG")
-    return buffer.getvalue()
+    return rendered(
+        "fit_page.html.j2",
+        title=headline(record),
+        r=record,
+        pictures={name: images.webp(picture, lossless=True) for name, picture in shown.items()},
+        departures=list(_departures(record)),
+        parameters=list(_parameters(best)),
+        sentences=list(_references(best)),
+    )
+
+
+def headline(record: FitRecord) -> str:
+    """Return how much of the loss better parameters remove."""
+    best = record.nearest
+    whole = best.loss + best.parameter_error
+    removed = percent(best.parameter_error / whole) if whole else "none"
+    return f"{record.scene}: the best parameters remove {removed} of the {record.loss['name']} loss"
 
 
 def lines(record: FitRecord) -> Iterator[str]:
     """Yield the lines of a fit: departures by form, then the parameters of the best form."""
     best = record.nearest
-    yield f"{record.scene}: {record.loss['name']} loss, {best.form} comes nearest"
+    yield f"{headline(record)}; {best.form} comes nearest"
     yield ""
     yield from tables.printed(_departures(record))
     yield ""
     yield from tables.printed(_parameters(best))
-    for material in best.materials:
+    yield from _references(best)
+    yield ""
+
+
+def _references(fit: FormFit) -> Iterator[str]:
+    for material in fit.materials:
         if material.reference:
             yield f"reference of {material.name}: {described(material.reference)}"
-    yield ""
 
 
 def _departures(record: FitRecord) -> Iterator[Cells]:

@@ -203,7 +203,7 @@ def write(
         made |= priced
         linked = (*linked, "cost.json")
         charts = tuple(cost_files.figures(study.record))
-        view = structs.replace(view, charts=charts, cost=cost_files.view(study, priced))
+        view = structs.replace(view, charts=charts, cost=cost_files.view(study))
     view = structs.replace(view, files={file: f"{name}/{file}" for file in linked})
     for file, content in made.items():
         results.write(place / file, content)
@@ -226,11 +226,9 @@ def remove(place: Path) -> None:
 def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> SceneView:
     """Return a comparison's part of the page without links; ``layers`` are its images."""
     record, shown = comparison.record, comparison.images
-    exposure = record.viewing.exposure
-    small = images.thumbnails(shown, exposure)
     return SceneView(
         record=record,
-        thumbnails={name: images.webp_of(png) for name, png in small.items()},
+        thumbnails=images.thumbnails(shown, record.viewing.exposure),
         embedded=embedding.embed(images.channels(layers or _layers(shown)), shown.counted),
         terms=_terms(comparison),
         why=_why(comparison),

@@ -7,9 +7,8 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-from msgspec import structs
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -21,9 +20,6 @@ from heuristic.heuristics import PHONG
 from reference.records import plain
 from reports.files import results
 from reports.terminal.words import number, percent, seconds, visible
-
-if TYPE_CHECKING:
-    from comparisons.cost.cost_record import Cost
 
 #: Characters per line of a printed table; longer cells are folded.
 WIDTH = 120
@@ -67,39 +63,6 @@ def write(folder: Path, records: Sequence[ComparisonRecord]) -> None:
     """Write a run's ``metrics.csv`` and ``carriers.csv`` to a folder of ours."""
     results.write(folder / "metrics.csv", metrics_csv(records))
     results.write(folder / "carriers.csv", comma_separated(_shares(records)))
-
-
-def write_cost(folder: Path, name: str, record: Cost) -> None:
-    """Write the tables of a study of cost: ``name-cost``, ``-methods``, ``-attribution``."""
-    results.own(folder)
-    made = {
-        "cost": _interval_rows(record.points, ("method", "spp"), ("seconds", "error", "tolerance")),
-        "methods": _interval_rows(
-            record.methods, ("name", "processor_s"), ("ratio", "per_sample_s", "overhead_s")
-        ),
-        "attribution": _interval_rows(
-            record.attribution.effects, ("effect", "alone", "last"), ("removes", "adds_s")
-        ),
-    }
-    for part, rows in made.items():
-        results.write(folder / f"{name}-{part}.csv", comma_separated(rows))
-
-
-def _interval_rows(
-    records: Iterable[Any], plain_fields: Sequence[str], intervals: Sequence[str]
-) -> list[list[Any]]:
-    """Return a row per record: some fields, and value, low and high of others."""
-    ends = "", "_low", "_high"
-    return [
-        [*plain_fields, *(f"{name}{end}" for name in intervals for end in ends)],
-        *(
-            [
-                *(getattr(one, name) for name in plain_fields),
-                *(end for name in intervals for end in structs.astuple(getattr(one, name))),
-            ]
-            for one in records
-        ),
-    ]
 
 
 def metrics_csv(records: Iterable[ComparisonRecord]) -> str:
@@ -241,18 +204,6 @@ def _noise(record: ComparisonRecord, stop: NoiseTarget) -> str:
         f"{record.scene}: 95 % of pixels have noise under {LEADING.label} = {stop.reached:.3g}"
         f" after {record.plan.spp} samples per pixel ({asked})"
     )
-
-
-def shape_lines(record: ComparisonRecord) -> Iterator[str]:
-    """Yield the table of a scene's shapes; nothing if there is only one."""
-    if len(record.objects) < 2:
-        return
-    rows = [("shape", "mostly", "departure", "pixels", "mean ΔE2000")]
-    for carrier in record.objects:
-        shares = percent(carrier.share), percent(carrier.pixels / record.pixels.counted)
-        rows.append((carrier.name, carrier.effect or "", *shares, number(carrier.mean_dE2000)))
-    yield from ("", *printed(rows, right=2))
-    yield f"  causes took {percent(record.time.share_of_causes)} of the time; --no-why omits them"
 
 
 def _shares(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[Any]]:

@@ -12,15 +12,9 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
-
-if TYPE_CHECKING:  # loads the metrics, and `--help` needs none
-    from comparisons.departure.statistics import Summary
-
-NOTICEABLE = 1.0
-"""A departure of this size, in the leading metric, can be seen."""
 
 LEVEL = "fotismos.verbosity"
 """Key of the level in click's context: -1 quiet, 0 normal, 1 verbose."""
@@ -136,16 +130,6 @@ def seconds(value: float | None) -> str:
 def percent(value: float) -> str:
     """A fraction as a percentage."""
     return f"{number(100 * value)} %"
-
-
-def about_noise(metric: Summary) -> bool:
-    """Whether a mean may be only noise: it may be 0, and is at most `NOTICEABLE`."""
-    return may_be_none(metric) and metric.high <= NOTICEABLE
-
-
-def may_be_none(metric: Summary) -> bool:
-    """Whether a mean may be 0 without its noise, which may also hide a departure."""
-    return metric.noise_floor > 0 and metric.low == 0
 
 
 def _minus(digits: str) -> str:

@@ -129,17 +129,21 @@ class Painter {
   }
 
   /** @param {MapOf} map @param {number} t */
-  map({ kind, top }, t) {
-    return this.picture("map", `${kind} ${t}`, this.colours(kind, top, t));
+  map(map, t) {
+    return this.picture("map", `${map.name} ${t}`, this.colours(map, t));
   }
 
-  /** @param {string} kind @param {number} top @param {number} t @returns {(place: number) => number} */
-  colours(kind, top, t) {
+  /** @param {MapOf} map @param {number} t @returns {(place: number) => number} */
+  colours({ name, kind, top }, t) {
     const flags = this.images.codes.flags;
     const [marked, unmarked, uncounted, undetermined] = page.mask.map(rgba);
     if (kind === "ratio") {
       const table = pixelsOf(page.colours.signed);
       return (place) => table[clamp(Math.floor(128 + (128 * this.ratio(place)) / top), 0, 255)];
+    }
+    if (kind === "metric") {
+      const table = pixelsOf(page.colours.error), codes = this.images.codes[name];
+      return (place) => table[clamp(Math.floor((256 * VALUES[codes[place]]) / top), 0, 255)];
     }
     if (kind === "mask") {
       const unshown = (/** @type {number} */ place) => (flags[place] & UNDETERMINED ? undetermined : unmarked);

@@ -202,19 +202,19 @@ function showLegend(legend, { painter, view, scene }) {
   if (!painter) return;
   const { kind, title, top } = /** @type {MapOf} */ (page.maps.find((map) => map.name === view.map));
   const is = view.on ? "difference" : kind;
-  const hasBar = is === "difference" || is === "ratio";
-  const key = JSON.stringify([scene.id, is, view.t]);
+  const hasBar = ["difference", "ratio", "metric"].includes(is);
+  const key = JSON.stringify([scene.id, is, title, view.t]);
   if (legend.dataset.key === key) return;
   legend.dataset.key = key;
   const [bar, labels, words] = /** @type {HTMLElement[]} */ ([...legend.children]);
   bar.hidden = labels.hidden = !hasBar;
   if (hasBar) {
-    const colour = is === "ratio" ? (/** @type {number} */ part) => pixelsOf(page.colours.signed)[Math.floor(256 * part)] : (/** @type {number} */ part) => differenceColours(view.t, painter.top)(part * painter.top);
-    const strip = painted(256, 1, (pixels) => pixels.forEach((_, place) => { pixels[place] = colour(place / 256); }));
+    const table = pixelsOf(is === "ratio" ? page.colours.signed : page.colours.error), differences = differenceColours(view.t, painter.top);
+    const strip = painted(256, 1, (pixels) => pixels.forEach((_, place) => { pixels[place] = is === "difference" ? differences((place / 256) * painter.top) : table[place]; }));
     /** @type {HTMLCanvasElement} */ (bar).getContext("2d")?.drawImage(strip, 0, 0);
-    const texts = is === "ratio" ? [`≤ −${top}`, "0", `≥ +${top} stops`] : ["0", "", `≥ ${painter.top}`];
+    const texts = is === "ratio" ? [`≤ −${top}`, "0", `≥ +${top} stops`] : ["0", "", `≥ ${is === "metric" ? top : painter.top}`];
     texts.forEach((text, place) => { labels.children[place].textContent = text; });
-    words.textContent = is === "ratio" ? title : `ΔE2000; grey up to ${view.t}, where nothing is visible`;
+    words.textContent = is === "difference" ? `ΔE2000; grey up to ${view.t}, where nothing is visible` : title;
     return;
   }
   const names = is === "mask" ? ["shown to differ, however little", "not shown", "not counted", "undetermined"] : [...(scene.effects?.names ?? []), "none visible"];
