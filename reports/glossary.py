@@ -128,7 +128,7 @@ METHODS: Terms = {
     ("kernel with shadows",): "The textbook’s model with a shadow ray to each light.",
     ("shadow map",): "Shadows from a depth image as each light sees it.",
     ("constant ambient", "hemisphere ambient"): (
-        "Ambient light that stands in for light between surfaces: one colour, or two colours for up"
+        "Ambient light in place of light between surfaces: one colour, or two colours for up"
         " and down."
     ),
     ("phong BSDF, full transport",): "Textbook materials under all light transport.",

@@ -139,7 +139,7 @@ def test_methods_stand_in_order_with_declared_ones_before_the_full_plan(rgb, dec
     # Nothing shadows the one ball of the figure.
     figure = ladder(SCENES["fig-8-9"].source())
     assert figure.methods[-1].names == (*paths, "full plan")
-    reason = "it stands in for interreflection, which the scene does not have"
+    reason = "it replaces interreflection, which the scene does not have"
     assert figure.left_out[HALF.name] == reason
 
 

@@ -28,11 +28,10 @@ def study():
 
 def shown(study, record=None):
     """The page of one scene with its study."""
-    made = cost_files.documents(study)
     view = SceneView(
         record=record or records.record(),
         charts=tuple(cost_files.figures(study.record)),
-        cost=cost_files.view(study, made),
+        cost=cost_files.view(study),
     )
     return page.render([view])
 

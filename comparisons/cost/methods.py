@@ -234,7 +234,7 @@ class Ladder:
         missing = self._effects - (set() if has_background else {ENVIRONMENT.label})
         if method.stands_in_for and not missing.intersection(method.stands_in_for):
             effects = " or ".join(e.label for e in EFFECTS if e.label in method.stands_in_for)
-            return f"it stands in for {effects}, which the scene does not have"
+            return f"it replaces {effects}, which the scene does not have"
         if method.is_kernel:
             found = (refusals.get(name) for name in (method.interpolation.value, method.heuristic))
             return next(filter(None, found), "")

@@ -93,7 +93,7 @@ def headline(record: Audit) -> str:
     title = ", ".join([name, *(f"{key} {value}" for key, value in record.parameters.items())])
     failed = [check.name for check in record.checks if check.verdict == "does not hold"]
     if not failed:
-        return f"{title}: all that was asked holds"
+        return f"{title}: all checks hold"
     return f"{title}: {', '.join(failed)} {'does' if len(failed) == 1 else 'do'} not hold"
 
 
