@@ -12,6 +12,7 @@ from reports.files import images, results
 from reports.page.templating import rendered
 from reports.terminal import tables
 from reports.terminal.words import percent
+from reports.verdict import EXACT
 
 Cells = Sequence[str]
 """One row of a table."""
@@ -51,8 +52,9 @@ def page(fit: Fit) -> str:
 def headline(record: FitRecord) -> str:
     """Return how much of the loss better parameters remove."""
     best = record.nearest
-    whole = best.loss + best.parameter_error
-    removed = percent(best.parameter_error / whole) if whole else "none"
+    if best.departure[LEADING.name].before <= EXACT:
+        return f"{record.scene}: the paired parameters are exact, as far as can be seen"
+    removed = percent(best.parameter_error / (best.loss + best.parameter_error))
     return f"{record.scene}: the best parameters remove {removed} of the {record.loss['name']} loss"
 
 
