@@ -103,6 +103,12 @@ class TimeSpent(Record):
         whole = sum(self.stages.values()) + self.heuristic.total_s + self.reference.total_s
         return self.stages.get(CAUSES, 0.0) / whole if whole else 0.0
 
+    @property
+    def sentence(self) -> str:
+        """What physics costs here, in words: both halves have the same samples in each pass."""
+        ratio = self.reference.median_s / self.heuristic.median_s
+        return f"The physical half took {ratio:.1f} times the textbook's time per sample."
+
 
 class NoiseTarget(Record):
     """Where a run with a noise target ended.

@@ -1,35 +1,40 @@
 """Attribution on numbers: Shapley values, errors without noise, and dominating effects."""
 
-from itertools import permutations
+from itertools import combinations
+from math import comb
 
 import numpy as np
 import pytest
 
 from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.departure.metrics import LEADING
-from comparisons.departure.regions import Region
 from comparisons.hybrids.attribution import (
     LEAST,
     NONE,
     UNCOUNTED,
     ErrorMeter,
     dominating,
-    in_region,
+    in_words,
     shares,
 )
-from comparisons.hybrids.hybrids import subsets
 
 # -- Shapley values --------------------------------------------------------------------------------
 
 
 def by_definition(players, value):
-    """Shapley's value as the mean gain over all orders, written out."""
-    gains = {player: [] for player in players}
-    for order in permutations(players):
-        for place, player in enumerate(order):
-            before = frozenset(order[:place])
-            gains[player].append(value(before | {player}) - value(before))
-    return [np.mean(gains[player], axis=0) for player in players]
+    """Shapley's value as the sum over all subsets without a player."""
+    found, last = [], len(players) - 1
+    for player in players:
+        without = [each for each in subsets(players) if player not in each]
+        gains = [value(each | {player}) - value(each) for each in without]
+        weights = [1 / (len(players) * comb(last, len(each))) for each in without]
+        found.append(np.tensordot(weights, gains, 1))
+    return found
+
+
+def subsets(players):
+    sizes = range(len(players) + 1)
+    return [frozenset(chosen) for size in sizes for chosen in combinations(players, size)]
 
 
 def game(players, shape=()):
@@ -131,10 +136,6 @@ def maps(**values):
     return {name: np.full((4, 6), value, float) for name, value in values.items()}
 
 
-def region(x, y, width, height):
-    return Region(x=x, y=y, width=width, height=height, share=0.5, mean_dE2000=1.0)
-
-
 def test_the_largest_dominates_where_it_can_be_seen():
     effects = maps(shadow=2.0, gloss=1.5)
     effects["gloss"][:, 3:] = 3.0
@@ -149,17 +150,7 @@ def test_the_largest_dominates_where_it_can_be_seen():
     assert (dominating({}, ALL) == NONE).all()
 
 
-def test_a_region_of_a_larger_image_is_found_in_the_smaller_map():
-    effects = maps(shadow=0.0, gloss=2.0)
-    effects["shadow"][2:, 3:] = 8.0
-    size = (60, 40)
-    assert in_region(region(30, 20, 30, 20), size, effects) == "shadow"
-    assert in_region(region(0, 0, 30, 20), size, effects) == "gloss"
-    assert in_region(region(59, 39, 1, 1), size, effects) == "shadow"
-
-
 def test_a_second_effect_is_named_where_it_removes_half_as_much():
-    box = region(0, 0, 6, 4)
     for values, expected in (
         ({"a": 4.0, "b": 2.0, "c": 1.0}, "a, then b"),
         ({"a": 4.0, "b": 1.9}, "a"),
@@ -167,4 +158,4 @@ def test_a_second_effect_is_named_where_it_removes_half_as_much():
         ({"a": 0.9}, None),
         ({}, None),
     ):
-        assert in_region(box, (6, 4), maps(**values)) == expected
+        assert in_words(values) == expected

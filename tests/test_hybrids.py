@@ -1,5 +1,6 @@
 """Hybrids and attributions on real scenes: sums, closure, previews."""
 
+from itertools import combinations
 from types import SimpleNamespace
 
 import mitsuba as mi
@@ -15,7 +16,7 @@ from comparisons.hybrids import attribution
 from comparisons.hybrids.hybrids import HybridImages, HybridScenes
 from comparisons.options import Options
 from comparisons.prepared import guarded, prepare
-from reference.planning.effects import OCCLUSION, labelled
+from reference.planning.effects import EXTENDED, INTERREFLECTION, OCCLUSION, labelled
 from reference.rendering.renderer import Stream, passes
 from reference.scene.graph import set_variant
 from reference.scene.source import Source
@@ -133,7 +134,7 @@ class Shown:
     """Renders the hybrid of some effects: transported light, and the emission pass."""
 
     def __init__(self, scenes, simulated, spp):
-        made = scenes.transport(simulated, spp), scenes.emission(simulated, spp)
+        made = scenes.transport([simulated], spp), scenes.emission(simulated, spp)
         self.parts = [renderer for renderer in made if renderer is not None]
 
     def render(self, seed):
@@ -152,6 +153,21 @@ def test_without_effects_the_plugins_give_the_kernels_image(rgb):
         expected = np.array(ready.heuristic.render(3))
         assert expected.max() > 0.1
         np.testing.assert_allclose(found, expected, atol=2e-5)
+
+
+def test_images_of_one_rendering_are_those_of_a_rendering_each(rgb):
+    """Only light between surfaces without shadows draws other random numbers alone."""
+    _, scenes = hybrid_scenes(SCENES["cornell-box"].source())
+    more = set(), {OCCLUSION}, {INTERREFLECTION}, {OCCLUSION, INTERREFLECTION}
+    sets = [{EXTENDED} | each for each in more]
+    together = np.split(np.array(scenes.transport(sets, 64).render(3)), len(sets), axis=2)
+    for simulated, image in zip(sets, together, strict=True):
+        alone = np.array(scenes.transport([simulated], 64).render(3))
+        if simulated == {EXTENDED, INTERREFLECTION}:
+            assert image.mean() == pytest.approx(alone.mean(), rel=0.01)
+        else:
+            np.testing.assert_allclose(image, alone, rtol=1e-4, atol=1e-5)
+    assert min(abs(one - two).mean() for one, two in combinations(together, 2)) > 0.01
 
 
 def test_with_all_effects_they_give_the_reference(rgb):
@@ -195,18 +211,16 @@ def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
     scene["sensor"]["film"]["rfilter"] = {"type": "box"}
     case = open_case(scene, Options.of({"resolution": (24, 24)}), "shadowed")
     found = Ladder(case.source, case.options, guarded(case.source, case.options))
-    for spp, finer in ((8, 1), (64, 4), (4096, 4), (16, 2)):
-        hybrids = HybridImages(found.pairs, found.scenes, 3, spp, 0, (24, 24))
-        assert hybrids.finer == finer
+    hybrids = HybridImages(found.pairs, found.scenes, 3, 16, 0, (24, 24))
     for effects in ((), ("occlusion",)):
         image = hybrids.simulating({labelled(effect) for effect in effects})
-        assert image.preview.shape == (48, 48, 3)
-        blocks = image.preview.reshape(24, 2, 24, 2, 3).mean(axis=(1, 3))
-        np.testing.assert_allclose(blocks, image.images.mean(axis=0), rtol=1e-5, atol=1e-6)
+        assert image.shape == (3, 48, 48, 3)
+        corner = hybrids.pixels(image)[:, 1, 2]
+        np.testing.assert_allclose(corner, image[:, 2:4, 4:6].mean(axis=(1, 2)), rtol=1e-5)
     for rendered in (found.ready.scene, found.ready.heuristic.scene):
         assert tuple(rendered.sensors()[0].film().size()) == (24, 24)
     shadows = Method(name="shadows", family="kernel", shadows=True)
     loop = passes([found.renderer(shadows, 4, (48, 48))], 0, 3, stream=Stream.REPLICATES)
     expected = np.mean([np.array(one.images[0]) for one in loop], axis=0)
-    np.testing.assert_allclose(image.preview, expected, rtol=1e-3, atol=1e-4)
-    assert abs(image.preview - hybrids.simulating(()).preview).max() > 0.05
+    np.testing.assert_allclose(image.mean(axis=0), expected, rtol=1e-3, atol=1e-4)
+    assert abs(image - hybrids.simulating(())).max() > 0.05

@@ -162,9 +162,11 @@ def test_effects_are_taken_where_the_pixels_of_a_shape_lie():
     carriers, places = regions.find_objects(error, counted, owners)
     effects = {"shadow": np.array([[3.0, 0], [3, 0]]), "gloss": np.array([[0.0, 2], [0, 2]])}
     images = records.images(4, 4, objects=places, materials=places)
-    record = records.record(objects=carriers, materials=carriers, regions=())
+    boxes = [regions.Region(x, 1, 2, 2, share=0.5, mean_dE2000=1.0) for x in (0, 2)]
+    record = records.record(objects=carriers, materials=carriers, regions=tuple(boxes))
     found = named(records.Comparison(record, images), effects)
     assert {each.name: each.effect for each in found.objects} == {
         "left": "shadow",
         "right": "gloss",
     }
+    assert [each.effect for each in found.regions] == ["shadow", "gloss"]

@@ -5,6 +5,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any
 
+import drjit as dr
 import numpy as np
 from msgspec import structs
 
@@ -23,7 +24,6 @@ from comparisons.cost.measure import (
     measure_at,
     measure_ladder,
     reduced,
-    threads,
 )
 from comparisons.cost.methods import FULL_PLAN
 from comparisons.departure.criterion import checked_threshold
@@ -86,14 +86,14 @@ def cost(
     made = Cost(
         scene=source.name,
         variant=ready.reference.variant,
-        heuristic_variant=ladder.heuristic_variant,
+        heuristic_variant=ladder.pairs.heuristic_variant,
         heuristic=options.heuristic,
         interpolation=options.polygon_shading,
         seed=options.seed,
         resolution=found.size,
         rounds=effort.rounds,
-        threads=threads(),
-        processor_share=min(next(iter(found.lines.values())).processors / threads(), 1.0),
+        threads=dr.thread_count(),
+        processor_share=min(next(iter(found.lines.values())).processors / dr.thread_count(), 1.0),
         reference=found.converged,
         methods=found.methods,
         points=fronted(found.points),

@@ -15,7 +15,6 @@ from math import sqrt
 from statistics import NormalDist
 from typing import Any
 
-import drjit as dr
 import numpy as np
 from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
@@ -66,18 +65,11 @@ WARM = 2
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is rendered for a study.
+    """How much is rendered for a study: ``rounds`` of each method, at least 2, and which methods.
 
-    Parameters
-    ----------
-    rounds
-        Timed repeats of each method, at least 2.
-    largest
-        Most samples per pixel at which errors are measured; :data:`LARGEST_CERTAIN` at most for
-        methods without random numbers. The counts are powers of 4, at which the sampler stratifies
-        best.
-    is_short
-        Whether the ladder is short, see :func:`comparisons.cost.methods.all_methods`.
+    Errors are measured up to ``largest`` samples per pixel, at most :data:`LARGEST_CERTAIN` for
+    methods without random numbers. The counts are powers of 4, at which the sampler stratifies
+    best.
     """
 
     rounds: int = 7
@@ -150,19 +142,19 @@ def measure_ladder(
     effort: Effort,
     progress: Progress,
     at: Size | None = None,
-    width: int = WIDTH,
     alone: AbstractContextManager[Any] | None = None,
 ) -> Measurements:
     """Measure every method of a scene's ladder, in the current variant.
 
-    If ``options.resolution`` is omitted, that of ``at``, or of the film, is reduced to ``width``.
+    If ``options.resolution`` is omitted, that of ``at``, or of the film, is reduced to
+    :data:`WIDTH`.
     ``options.spp`` is the largest sample count of a Monte Carlo method. Times are measured within
     the context ``alone``.
     """
     options.require_model("a study of cost")
     if options.resolution is None:
         shaped = options.changed(resolution=at)
-        options = options.changed(resolution=reduced(source, shaped, width))
+        options = options.changed(resolution=reduced(source, shaped, WIDTH))
     if options.spp is not None:
         effort = replace(effort, largest=options.spp)
     ready = guarded(source, options.changed(spp=None, allow_empty=False))
@@ -355,8 +347,3 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
         for (name, spp), renderer in renderers.items()
         if (took := renderer.times[-MEASURED_ROUNDS:])
     )
-
-
-def threads() -> int:
-    """Return the number of threads that render."""
-    return int(dr.thread_count())

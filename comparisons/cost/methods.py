@@ -21,7 +21,6 @@ from comparisons.cost.cost_record import Method
 from comparisons.hybrids.hybrids import HybridScenes, Pairs
 from comparisons.options import Options
 from comparisons.prepared import Prepared
-from heuristic.convention import Scene
 from heuristic.errors import InputError
 from heuristic.heuristics import PHONG, Interpolation, named
 from heuristic.plugins.interpolated import require_colours
@@ -36,7 +35,6 @@ from reference.planning.effects import (
     POLYGONS,
     SPECTRAL,
     TRANSMISSION,
-    Effect,
 )
 from reference.planning.facts import SHAPE
 from reference.planning.plan import physical_integrator
@@ -169,17 +167,12 @@ class Ladder:
                 merged.setdefault(self._form(method), []).append(method)
         self._known = {form: self._merged(form, alike) for form, alike in merged.items()}
         self._kernel_scene = cache(self._make_kernel_scene)
-        self._plan_scenes: dict[frozenset[Effect], Scene] = {}
+        self._plan_scene = cache(self.scenes.of)
 
     @property
     def methods(self) -> tuple[Method, ...]:
         """The methods that differ in the scene, cheapest idea first."""
         return tuple(self._known.values())
-
-    @property
-    def heuristic_variant(self) -> str:
-        """The Mitsuba variant of the kernels."""
-        return self.pairs.heuristic_variant
 
     def _form(self, method: Method) -> Method:
         """Return only what a method renders, without what the scene does not have."""
@@ -245,23 +238,19 @@ class Ladder:
     def renderer(self, method: Method, spp: int, size: tuple[int, int] | None = None) -> Renderer:
         """Return a renderer of a method, with samples per pixel of a pass, and an image size."""
         if method.is_kernel:
-            with variant(method.variant or self.heuristic_variant):
+            with variant(method.variant or self.pairs.heuristic_variant):
                 scene = self._kernel_scene(method.interpolation, mi.variant())
                 return Renderer(scene, self._kernel(method), spp, "image of the kernel", size)
         simulated = {effect for effect in EFFECTS if effect.label not in method.without}
         plan = self.ready.plan.simulating(simulated, method.max_depth)
-        key = self.scenes.key(simulated)
-        if key not in self._plan_scenes:
-            self._plan_scenes[key] = self.scenes.of(key)
-        scene = self._plan_scenes[key]
+        scene = self._plan_scene(self.scenes.key(simulated))
         integrator = physical_integrator(plan, scene, self.ready.pair.hide_emitters)
         return Renderer(scene, integrator, spp, f"image of {method.name}", size)
 
     def forget(self) -> None:
         """Release the scenes of methods."""
         self._kernel_scene.cache_clear()
-        self._plan_scenes.clear()
-        self.scenes.forget()
+        self._plan_scene.cache_clear()
 
     def steps(self) -> Iterator[Step]:
         """Yield the steps from the kernel as requested to the full plan, an effect at a time.
@@ -269,24 +258,19 @@ class Ladder:
         The kernel gains the effects that it can have. Then plans gain the others, half of the
         weight in their order, and half in the reverse one.
         """
-        options, own = self.options, self.ready.reference.variant
-        effects = {effect.label for effect in self.scenes.differences}
-        if options.polygon_shading is not Interpolation.PHONG or options.tessellation is not None:
-            effects.add(POLYGONS.label)
-        if self.heuristic_variant != own:
-            effects.add(SPECTRAL.label)
+        effects = [effect.label for effect in self.pairs.effects(self.scenes.differences)]
         kernel = self._form(KERNELS[2])
-        kernel = structs.replace(kernel, interpolation=options.polygon_shading)
+        kernel = structs.replace(kernel, interpolation=self.options.polygon_shading)
         changes: dict[str, dict[str, Any]] = {
             POLYGONS.label: {"interpolation": Interpolation.PHONG},
             OCCLUSION.label: {"shadows": True},
-            SPECTRAL.label: {"variant": own},
+            SPECTRAL.label: {"variant": self.ready.reference.variant},
         }
         for label, change in changes.items():
             if label in effects:
                 before, kernel = kernel, structs.replace(kernel, **change)
                 yield Step(label, 1.0, self._named(before), self._named(kernel))
-        others = [effect.label for effect in EFFECTS if effect.label in effects - changes.keys()]
+        others = [effect for effect in effects if effect not in changes]
         for order in (others, others[::-1]):
             plans = [
                 self._named(self._form(structs.replace(FULL_PLAN, without=tuple(order[place:]))))
@@ -303,7 +287,7 @@ class Ladder:
         return self._known.get(form) or structs.replace(form, name=name)
 
     def _make_kernel_scene(self, interpolation: Interpolation, name: str) -> mi.Scene:
-        is_own = name == self.heuristic_variant
+        is_own = name == self.pairs.heuristic_variant
         if is_own and interpolation is self.options.polygon_shading:
             return self.ready.heuristic.scene
         graph = self.pairs.of(interpolation).heuristic
@@ -321,7 +305,7 @@ class Ladder:
     def _refused_interpolations(self) -> dict[str, str]:
         """Return why shapes or sensor do not allow interpolations: some cannot be meshes."""
         refused = {}
-        with variant(self.heuristic_variant):
+        with variant(self.pairs.heuristic_variant):
             own = self._shapes(Interpolation.PHONG)
             for interpolation in (Interpolation.FLAT, Interpolation.GOURAUD):
                 try:
@@ -342,7 +326,7 @@ class Ladder:
     def _refused_heuristics(self) -> dict[str, str]:
         """Return why the scene does not allow the heuristics of methods that have their own."""
         refused = {}
-        with variant(self.heuristic_variant):
+        with variant(self.pairs.heuristic_variant):
             for name in {method.heuristic for method in all_methods()} - {""}:
                 refuse = named(name).refuse
                 if refuse:

@@ -13,12 +13,12 @@ the error that remains when all effects are simulated; only a fault can cause it
 Source: L. S. Shapley, *A value for n-person games*, 1953.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from math import comb
+from itertools import permutations
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from msgspec import structs
@@ -44,9 +44,7 @@ from comparisons.hybrids.hybrids import (
     HybridImages,
     HybridScenes,
     Pairs,
-    Player,
     labels,
-    subsets,
 )
 from comparisons.options import Options
 from comparisons.prepared import Prepared
@@ -54,7 +52,7 @@ from heuristic.errors import FotismosError
 from reference.planning.effects import Effect
 from reference.rendering.gbuffer import ObjectIds, gbuffer, image_size, require_surface, resize
 from reference.rendering.renderer import Progress, Renderer, Stream, passes
-from reference.rendering.sums import MEAN, Accumulator, block_numbers, jackknifed
+from reference.rendering.sums import block_numbers, jackknifed
 from reference.scene.source import Source
 
 WIDTH = 48
@@ -74,6 +72,9 @@ ALSO = 0.5
 """Share of what the first effect removes: a second one that removes as much is named too."""
 
 NONE, UNCOUNTED = -1, -2
+
+Player = TypeVar("Player", bound=Hashable)
+"""An effect; in tests of the sums, any name."""
 
 
 def explained(
@@ -126,24 +127,19 @@ def converged(
 ) -> NDArray:
     """Render the reference, with seeds that no hybrid has.
 
-    Returns the means (R, H, W, 3) of as many groups of its passes as a hybrid has replicates, with
-    an even number of passes each.
+    Returns as many passes (R, H, W, 3) as a hybrid has replicates.
     """
     renderer = Renderer(ready.scene, ready.reference.integrator, SPP, "reference image", size)
-    groups = [Accumulator(MEAN) for _ in range(REPLICATES)]
-    count = 2 * REPLICATES * -(-ready.plan.passes // (2 * REPLICATES))
-    for one in passes(
-        [renderer], seed, count, stream=Stream.OTHER_SIDE, progress=progress, stage="reference"
-    ):
-        groups[one.number % REPLICATES].add(one.images[0])
-    return np.stack([group.mean() for group in groups])
+    stream = Stream.OTHER_SIDE
+    loop = passes([renderer], seed, REPLICATES, stream=stream, progress=progress, stage="reference")
+    return np.stack([np.array(one.images[0]) for one in loop])
 
 
 class ErrorMeter:
     """Errors in ΔE2000 against a reference, without the noise of both.
 
-    ``groups`` (R, H, W, 3) are means of groups of the reference's passes, one per replicate of an
-    image. ``counted`` (H, W) are the pixels that count.
+    ``groups`` (R, H, W, 3) are passes of the reference, one per replicate of an image. ``counted``
+    (H, W) are the pixels that count.
     """
 
     def __init__(self, groups: NDArray, counted: NDArray[np.bool_], viewing: Viewing) -> None:
@@ -208,14 +204,22 @@ def attribute(
     """
     effects, everything = images.effects, frozenset(images.effects)
     nothing: frozenset[Effect] = frozenset()
-    if len(effects) <= EXACT_EFFECTS:
-        images.render(key for each in subsets(effects) for key in images.needed(each))
+    # One rendering makes many images, so all that the sums will ask for are rendered at once.
+    sets = [nothing, *(frozenset({effect}) for effect in effects)]
+    sets += [everything - one for one in sets]
+
+    def note(simulated: frozenset[Effect]) -> float:
+        sets.append(simulated)
+        return 0.0
+
+    shares(effects, note, seed, EXACT_EFFECTS, ORDERS)
+    images.render(sets)
     errors: dict[frozenset[Effect], NDArray] = {}
 
     def error(simulated: frozenset[Effect]) -> NDArray:
         """Errors (R + 1, N) in ΔE2000: of all replicates, then leaving out each in turn."""
         if simulated not in errors:
-            errors[simulated] = meter.without_noise(images.simulating(simulated).images)
+            errors[simulated] = meter.without_noise(images.pixels(images.simulating(simulated)))
         return errors[simulated]
 
     gains, sampling_errors, drawn = shares(effects, error, seed, EXACT_EFFECTS, ORDERS)
@@ -242,7 +246,8 @@ def attribute(
         return whole
 
     departure, left = error(nothing), error(everything)
-    kernel, plugin = (images.of(key).images.mean(axis=0) for key in (images.plain_kernel, nothing))
+    both = images.plain_kernel, images.plugin(nothing)
+    kernel, plugin = (images.pixels(each).mean(axis=0) for each in both)
     rounding = LEADING(plugin, kernel, meter.viewing)[meter.counted]
     return Causes(
         record=Attribution(
@@ -261,7 +266,7 @@ def attribute(
         departure=filled(departure[0]),
         left=filled(left[0]),
         counted=meter.counted,
-        previews={labels(effects, each): images.simulating(each).preview for each in errors},
+        previews={labels(effects, each): images.simulating(each).mean(axis=0) for each in errors},
     )
 
 
@@ -300,44 +305,32 @@ def shares(
     """Return the shares of players in a game, their standard errors, and the orders drawn.
 
     ``value`` returns a number or array for a subset; it is called more than once per subset. Up to
-    ``exact_players`` every subset is valued, the standard errors are 0 and no order is drawn. For
-    more players ``orders`` are drawn, an even number of at least 4.
+    ``exact_players`` all orders are taken, and the standard errors are 0. For more players
+    ``orders`` are drawn, an even number of at least 4.
     """
     players = tuple(players)
-    if len(players) <= exact_players:
-        exact = tuple(_exact(player, players, value) for player in players)
-        return exact, (0.0,) * len(players), 0
+    is_exact, rng = len(players) <= exact_players, np.random.default_rng(seed)
+    walks: list[Sequence[int]] = [*permutations(range(len(players)))] if is_exact else []
+    while not is_exact and len(walks) < orders:
+        order = rng.permutation(len(players)).tolist()
+        walks += [order, order[::-1]]  # an order and its reverse, to cancel noise
     gains: dict[Player, list[Any]] = {player: [] for player in players}
-    rng = np.random.default_rng(seed)
-    for _ in range(orders // 2):  # in pairs, each order followed by its reverse, to cancel noise
-        order = rng.permutation(len(players))
-        for way in (order, order[::-1]):
-            subset: frozenset[Player] = frozenset()
-            before = value(subset)
-            for place in way:
-                subset |= {players[place]}
-                after = value(subset)
-                gains[players[place]].append(after - before)
-                before = after
+    for walk in walks:
+        subset: frozenset[Player] = frozenset()
+        before = value(subset)
+        for place in walk:
+            subset |= {players[place]}
+            after = value(subset)
+            gains[players[place]].append(after - before)
+            before = after
+    found = tuple(sum(gain) / len(walks) for gain in gains.values())
+    if is_exact:
+        return found, (0.0,) * len(players), 0
     errors = []
     for gain in gains.values():
         pairs = np.array([np.mean(each) for each in gain]).reshape(-1, 2).mean(axis=1)
         errors.append(float(pairs.std(ddof=1) / np.sqrt(len(pairs))))
-    return tuple(sum(gain) / orders for gain in gains.values()), tuple(errors), orders
-
-
-def _exact(
-    player: Player, players: tuple[Player, ...], value: Callable[[frozenset[Player]], Any]
-) -> Any:
-    others = [other for other in players if other != player]
-    total = 0.0
-    for subset in subsets(others):
-        weight = 1 / (len(players) * comb(len(others), len(subset)))
-        total = total + weight * (value(subset | {player}) - value(subset))
-    return total
-
-
-# --- Which effect dominates where ------------------------------------------------------------
+    return found, tuple(errors), orders
 
 
 def dominating(effects: Mapping[str, NDArray], counted: NDArray[np.bool_]) -> NDArray[np.int64]:
@@ -358,48 +351,37 @@ def named(comparison: Comparison, effects: Mapping[str, NDArray]) -> ComparisonR
     ``effects`` are ``{name: (h, w)}``, the ΔE2000 that each removes; the maps may be smaller.
     """
     record, images = comparison.record, comparison.images
-    regions = tuple(
-        structs.replace(region, effect=in_region(region, record.resolution, effects))
-        for region in record.regions
-    )
+    maps = {name: _enlarged(values, images.counted.shape) for name, values in effects.items()}
 
     def each(objects, places):
         """Name the effects by the maps' cell in which each pixel of an object lies."""
         seen = places >= 0
         found = {
-            name: means(_enlarged(values, places.shape)[seen], places[seen], len(objects))
-            for name, values in effects.items()
+            name: means(values[seen], places[seen], len(objects)) for name, values in maps.items()
         }
         return tuple(
-            structs.replace(one, effect=_in_words({name: of[row] for name, of in found.items()}))
+            structs.replace(one, effect=in_words({name: of[row] for name, of in found.items()}))
             for row, one in enumerate(objects)
         )
 
     return structs.replace(
         record,
-        regions=regions,
+        regions=tuple(
+            structs.replace(one, effect=in_words(in_region(one, maps))) for one in record.regions
+        ),
         objects=each(record.objects, images.objects),
         materials=each(record.materials, images.materials),
     )
 
 
-def in_region(
-    region: Region, resolution: tuple[int, int], effects: Mapping[str, NDArray]
-) -> str | None:
-    """Return the effect that removes most in a region, in words; None if none dominates.
-
-    ``resolution`` is ``(width, height)`` of the region's image; the maps may be smaller.
-    """
-    found = {}
-    for name, values in effects.items():
-        height, width = values.shape
-        columns = _cells(region.x, region.width, width / resolution[0])
-        rows = _cells(region.y, region.height, height / resolution[1])
-        found[name] = float(values[rows, columns].mean())
-    return _in_words(found)
+def in_region(region: Region, effects: Mapping[str, NDArray]) -> dict[str, float]:
+    """Return the mean of each effect's map (H, W) over a region."""
+    rows = slice(region.y, region.y + region.height)
+    columns = slice(region.x, region.x + region.width)
+    return {name: float(values[rows, columns].mean()) for name, values in effects.items()}
 
 
-def _in_words(found: Mapping[str, float]) -> str | None:
+def in_words(found: Mapping[str, float]) -> str | None:
     """Return the effect of the largest mean ``{name: ΔE2000}``, and a second one that has half.
 
     None if no mean reaches :data:`LEAST`.
@@ -411,11 +393,6 @@ def _in_words(found: Mapping[str, float]) -> str | None:
     if others and found[others[0]] >= max(ALSO * found[first], LEAST):
         return f"{first}, then {others[0]}"
     return first
-
-
-def _cells(start, length, scale):
-    first = int(start * scale)
-    return slice(first, max(first + 1, int(np.ceil((start + length) * scale))))
 
 
 def _enlarged(values, shape):

@@ -12,11 +12,9 @@ A box filter gives a preview at no cost: the film has more and smaller pixels, e
 samples, and the mean over a block of them is the pixel that the coarser film would have.
 """
 
-from collections.abc import Callable, Hashable, Iterable, Sequence, Set
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence, Set
 from functools import cached_property
-from itertools import combinations
-from typing import Any, Self, TypeVar
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -37,10 +35,12 @@ from reference.planning.effects import (
 )
 from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
 from reference.planning.plan import Plan, physical_integrator
+from reference.rendering import direct
 from reference.rendering.gbuffer import image_size, resize
 from reference.rendering.renderer import Renderer, Stream, passes, variant
 from reference.rendering.sampler import with_sampler
-from reference.scene.graph import Graph, properties
+from reference.rendering.transport import Transport
+from reference.scene.graph import properties
 from reference.scene.source import Source
 
 REPLACED = tuple(effect for effect in EFFECTS if effect.put)
@@ -50,25 +50,11 @@ IN_SCENE: frozenset[Effect] = frozenset(REPLACED)
 IN_EMISSION = tuple(effect for effect in REPLACED if effect.emission)
 """Effects that change the emission pass."""
 
-KERNEL, PLAIN_KERNEL = "kernel", "kernel with Phong interpolation"
+UNWEIGHTED = "perspective", "orthographic", "thinlens"
+"""Cameras that leave light as it is."""
 
-Key = str | frozenset[Effect]
-"""An image: one of the two names above, or the effects that it simulates."""
-
-Player = TypeVar("Player", bound=Hashable)
-"""An effect; in tests of the sums, any name."""
-
-PREVIEW = 96
-"""Pixels of a preview's longer side, at most."""
-
-LEAST_SPP = 4
-"""Samples per pixel of a preview's replicate, at least: fewer are not stratified."""
-
-
-def subsets(players: Sequence[Player]) -> list[frozenset[Player]]:
-    """Return all sets of some effects, small ones first."""
-    sizes = range(len(players) + 1)
-    return [frozenset(chosen) for size in sizes for chosen in combinations(players, size)]
+FINER = 2
+"""Pixels of a preview per pixel of an image, in each direction."""
 
 
 def labels(effects: Sequence[Effect], simulated: frozenset[Effect]) -> tuple[str, ...]:
@@ -100,6 +86,18 @@ class Pairs:
         """Return the pair with the scene's own geometry, in this variant."""
         return self._of(Interpolation.PHONG, None)
 
+    def effects(self, differences: Iterable[Effect]) -> tuple[Effect, ...]:
+        """Return the effects in which the heuristic half as requested differs from the reference.
+
+        ``differences`` are those of the pair with the scene's own geometry, in this variant.
+        """
+        options, found = self.options, set(differences)
+        if options.polygon_shading is not Interpolation.PHONG or options.tessellation is not None:
+            found.add(POLYGONS)
+        if self.heuristic_variant != self.ready.reference.variant:
+            found.add(SPECTRAL)
+        return tuple(effect for effect in EFFECTS if effect in found)
+
     def _of(self, interpolation: Interpolation, tessellation: int | None) -> Pair:
         key = mi.variant(), interpolation, tessellation
         if key not in self._known:
@@ -113,9 +111,7 @@ class Pairs:
 class HybridScenes:
     """The scenes of hybrids of a pair without tessellation, in the current variant.
 
-    Only the last scene is kept, for sets that differ only in what the integrator does: Dr.Jit
-    traces every BSDF that is alive, in any scene. ``scene`` is the physical half, with the sampler
-    of ``plan``, which is the reference's.
+    ``scene`` is the physical half, with the sampler of ``plan``, which is the reference's.
     """
 
     def __init__(self, pair: Pair, plan: Plan, scene: Scene) -> None:
@@ -125,45 +121,35 @@ class HybridScenes:
             effect for effect in EFFECTS if effect.differs(self.facts, plan.calls_for(effect))
         )
         """The effects in which the halves differ, in their order."""
-        self._last: dict[frozenset[Effect], Scene] = {}
 
     def of(self, simulated: Set[Effect]) -> Scene:
         """Return the scene of some effects, without its emission pass."""
         key = self.key(simulated)
         if key == self.key(set(self.differences)):
             return self.scene
-        if key not in self._last:
-            self._last.clear()
-            graph = with_sampler(self.graph(simulated), self.plan.sampler)
-            self._last[key] = graph.instantiate()
-        return self._last[key]
-
-    def key(self, simulated: Set[Effect]) -> frozenset[Effect]:
-        """Return the effects among them that change the scene."""
-        return IN_SCENE & set(simulated) & set(self.differences)
-
-    def forget(self) -> None:
-        """Release the last scene."""
-        self._last.clear()
-
-    def graph(self, simulated: Set[Effect]) -> Graph:
-        """Return the graph of :meth:`of`."""
         graph = self.pair.physical.copy()
         for effect in REPLACED:
             if effect not in simulated:
                 assert effect.put, "REPLACED has only such effects"
                 effect.put(graph, self.facts, effect.sites(self.facts))
-        return graph
+        return with_sampler(graph, self.plan.sampler).instantiate()
 
-    def transport(self, simulated: Set[Effect], spp: int) -> Renderer:
-        """Return the renderer of transported light, with the effects ``simulated``.
+    def key(self, simulated: Set[Effect]) -> frozenset[Effect]:
+        """Return the effects among them that change the scene."""
+        return IN_SCENE & set(simulated) & set(self.differences)
 
-        All sets share one integrator, which can leave out effects.
+    def transport(self, sets: Sequence[Set[Effect]], spp: int) -> Renderer:
+        """Return the renderer of transported light, with an image for each set of effects.
+
+        All sets have the same scene; one integrator, which can leave out effects, renders them.
         """
-        scene = self.of(simulated)
+        scene = self.of(sets[0])
         alike = set(EFFECTS) - set(self.differences)
-        plan = self.plan.directly().simulating(alike | set(simulated))
-        integrator = physical_integrator(plan, scene, self.pair.hide_emitters)
+        plans = [self.plan.directly().simulating(alike | set(each)) for each in sets]
+        integrator = physical_integrator(plans[0], scene, self.pair.hide_emitters)
+        integrator.transports = tuple(
+            Transport(plan.shadows, plan.bsdf_samples, plan.max_depth) for plan in plans
+        )
         return Renderer(scene, integrator, spp, "image of some effects")
 
     def emission(self, simulated: Set[Effect], spp: int) -> Renderer | None:
@@ -194,36 +180,17 @@ class HybridScenes:
             return None
         scene = with_sampler(graph, self.plan.sampler).instantiate()
         # Hiding emitters would hide the emission; a hidden environment was detached above.
-        integrator = mi.load_dict({"type": "path", "max_depth": 1, "hide_emitters": False})
+        direct.register()
+        integrator = mi.load_dict({"type": "direct_all", "max_depth": 1, "hide_emitters": False})
         return Renderer(scene, integrator, spp, "image of emission and ambient light")
 
 
-@dataclass(frozen=True)
-class Replicates:
-    """The replicates of one image.
-
-    ``images`` are (R, H, W, 3), and ``preview`` is the mean of all in finer pixels (f H, f W, 3),
-    ``f`` per pixel in each direction.
-    """
-
-    images: np.ndarray
-    preview: np.ndarray
-
-    def __add__(self, other: Self) -> Self:
-        return self._with(other, np.add)
-
-    def __sub__(self, other: Self) -> Self:
-        return self._with(other, np.subtract)
-
-    def _with(self, other: Self, operation: Callable[..., NDArray]) -> Self:
-        return type(self)(*map(operation, vars(self).values(), vars(other).values()))
-
-
 class HybridImages:
-    """All images between the heuristic half as requested and the reference, each rendered once.
+    """The images between the heuristic half as requested and the reference, each rendered once.
 
     Of each image there are ``replicates``, at least 3, with ``spp`` samples per pixel, and of a
-    ``size`` of (width, height). ``scenes`` are in the reference's variant.
+    ``size`` of (width, height). ``scenes`` are in the reference's variant. Images are arrays (R,
+    f H, f W, 3) of ``finer`` pixels, ``f`` per pixel in each direction.
     """
 
     def __init__(
@@ -239,124 +206,110 @@ class HybridImages:
         self._pairs, self._ready, self._seed = pairs, pairs.ready, seed
         self._variant = pairs.ready.reference.variant
         self._scenes = {self._variant: scenes}
-        self._known: dict[Key, Replicates] = {}
-        self._emission: dict[tuple[str, Key], Replicates | None] = {}
+        self._known: dict[frozenset[Effect], NDArray] = {}
+        self._emission: dict[tuple[str, frozenset[Effect]], NDArray | None] = {}
+        self.effects = pairs.effects(scenes.differences)
+        rfilter = scenes.scene.sensors()[0].film().rfilter()
+        self.finer = FINER if "Box" in rfilter.class_name() else 1
 
-    @cached_property
-    def effects(self) -> tuple[Effect, ...]:
-        """The effects in which the heuristic half as requested differs from the reference."""
-        options = self._pairs.options
-        found = set(self._scenes[self._variant].differences)
-        if options.polygon_shading is not Interpolation.PHONG or options.tessellation is not None:
-            found.add(POLYGONS)
-        if self._pairs.heuristic_variant != self._variant:
-            found.add(SPECTRAL)
-        return tuple(effect for effect in EFFECTS if effect in found)
+    def render(self, sets: Iterable[Set[Effect]]) -> None:
+        """Render the images of sets of effects, those of one scene at once.
 
-    def render(self, keys: Iterable[Key]) -> None:
-        """Render what is not cached, image by image: every scene that is alive slows all others."""
-        groups: dict[str, list[Key]] = {}
-        for key in dict.fromkeys(keys):
-            if key not in self._known:
-                groups.setdefault(self._variant_of(key), []).append(key)
-        for name, group in groups.items():
+        A scene is released before the next: each that is alive slows all others.
+        """
+        groups: dict[tuple[str, frozenset[Effect]], list[frozenset[Effect]]] = {}
+        for each in dict.fromkeys(frozenset(one) - {POLYGONS} for one in sets):
+            groups.setdefault(self._group(each), []).append(each)
+        for (name, _), group in sorted(groups.items(), key=lambda found: found[0][0]):
             with variant(name):
-                for key in sorted(group, key=self._scene_name):  # equal scenes next to each other
-                    self._known[key] = self._replicates(key)
-        for scenes in self._scenes.values():
-            scenes.forget()
+                self._known |= zip(group, self._rendered(group), strict=True)
 
-    def of(self, key: Key) -> Replicates:
-        """Return the replicates of an image."""
-        self.render([key])
+    def plugin(self, effects: Set[Effect]) -> NDArray:
+        """Return the image of Mitsuba's plugins in which some of ``effects`` are simulated.
+
+        None has the kernel's terms; all are the scene of the reference, edited, which would show
+        faults of the edits.
+        """
+        key = frozenset(effects) - {POLYGONS}
+        if key not in self._known:
+            self.render([key])
         return self._known[key]
 
-    def simulating(self, effects: Set[Effect]) -> Replicates:
-        """Return the image in which some of ``effects`` are simulated.
+    def simulating(self, effects: Set[Effect]) -> NDArray:
+        """Return the image in which some of ``effects`` are simulated; for none it is the kernel's.
 
-        None is the kernel as requested; all are the scene of the reference, edited, which would
-        show faults of the edits. Only the kernel has flat and Gouraud shading; where they remain,
-        an image gets the difference that they make there.
+        Only the kernel has flat and Gouraud shading; where they remain, an image gets the
+        difference that they make there.
         """
-        found = self.of(self.needed(effects)[-1])
-        if not self._keeps_polygons(effects):
-            return found
-        return found + (self.of(KERNEL) - self.of(PLAIN_KERNEL))
-
-    def needed(self, effects: Set[Effect]) -> list[Key]:
-        """Return the images that :meth:`simulating` needs for a set of effects."""
         if not effects:
-            return [KERNEL]
-        kernels: list[Key] = [KERNEL, PLAIN_KERNEL] if self._keeps_polygons(effects) else []
-        return [*kernels, frozenset(effects) - {POLYGONS}]
+            return self.kernel
+        found = self.plugin(effects)
+        if POLYGONS in self.effects and POLYGONS not in effects:
+            return found + (self.kernel - self.plain_kernel)
+        return found
 
-    def _keeps_polygons(self, effects: Set[Effect]) -> bool:
-        return bool(effects) and POLYGONS in self.effects and POLYGONS not in effects
+    @cached_property
+    def kernel(self) -> NDArray:
+        """The kernel as requested."""
+        return self._of_kernel(self._ready.heuristic.scene)
 
-    @property
-    def plain_kernel(self) -> Key:
+    @cached_property
+    def plain_kernel(self) -> NDArray:
         """The kernel with an exact normal at each point."""
-        return PLAIN_KERNEL if POLYGONS in self.effects else KERNEL
+        if POLYGONS not in self.effects:
+            return self.kernel
+        with variant(self._pairs.heuristic_variant):
+            graph = with_sampler(self._pairs.plain().heuristic, self._ready.plan.sampler)
+            return self._of_kernel(graph.instantiate())
 
-    def _variant_of(self, key: Key) -> str:
-        if isinstance(key, str):
-            return self._pairs.heuristic_variant
-        is_current = SPECTRAL in key or SPECTRAL not in self.effects
-        return self._variant if is_current else self._pairs.heuristic_variant
+    def _of_kernel(self, scene: Scene) -> NDArray:
+        with variant(self._pairs.heuristic_variant):
+            (found,) = self._passes(Renderer(scene, None, self._finer_spp, "image of the kernel"))
+            return found
 
-    def _scene_name(self, key: Key) -> str:
-        if isinstance(key, str):
-            return key
-        scene = self._scenes[self._variant].key(key)
-        return " ".join(sorted(effect.label for effect in scene))
+    def _group(self, effects: frozenset[Effect]) -> tuple[str, frozenset[Effect]]:
+        """Return the variant and what all images of one rendering have in common."""
+        is_current = SPECTRAL in effects or SPECTRAL not in self.effects
+        name = self._variant if is_current else self._pairs.heuristic_variant
+        scenes = self._scenes[self._variant]
+        # Only the first image has the weight that the camera gives to light.
+        is_weighted = "spectral" in name or scenes.facts.camera.plugin not in UNWEIGHTED
+        return name, effects if is_weighted else scenes.key(effects)
 
-    def _replicates(self, key: Key) -> Replicates:
-        """Render an image in its variant, which is current."""
-        if isinstance(key, str):
-            return self._passes(self._kernel(key))
+    def _rendered(self, sets: Sequence[frozenset[Effect]]) -> list[NDArray]:
+        """Render images of one scene, in their variant, which is current."""
         if mi.variant() not in self._scenes:
             pair = self._pairs.plain()
             physical = with_sampler(pair.physical, self._ready.plan.sampler).instantiate()
             self._scenes[mi.variant()] = HybridScenes(pair, self._ready.plan, physical)
         scenes = self._scenes[mi.variant()]
-        transport = self._passes(scenes.transport(key, self._finer_spp))
-        pass_key = mi.variant(), frozenset(IN_EMISSION) & key
-        if pass_key not in self._emission:
-            renderer = scenes.emission(key, self._finer_spp)
-            self._emission[pass_key] = self._passes(renderer) if renderer else None
-        emission = self._emission[pass_key]
-        return transport + emission if emission else transport
-
-    def _kernel(self, key: str) -> Renderer:
-        """Return the renderer of a kernel."""
-        ready, spp = self._ready, self._finer_spp
-        scene = ready.heuristic.scene
-        if key == PLAIN_KERNEL:
-            scene = with_sampler(self._pairs.plain().heuristic, ready.plan.sampler).instantiate()
-        return Renderer(scene, None, spp, "image of the kernel")
-
-    @cached_property
-    def finer(self) -> int:
-        """Pixels of a preview per pixel of an image, in each direction."""
-        scene: Scene = self._ready.scene
-        factor, even = 1, 4 * LEAST_SPP
-        if "Box" not in scene.sensors()[0].film().rfilter().class_name():
-            return factor
-        while 2 * factor * max(self.size) <= PREVIEW and self.spp % (even * factor**2) == 0:
-            factor *= 2
-        return factor
+        found = self._passes(scenes.transport(sets, self._finer_spp), len(sets))
+        key = mi.variant(), frozenset(IN_EMISSION) & sets[0]
+        if key not in self._emission:
+            renderer = scenes.emission(sets[0], self._finer_spp)
+            self._emission[key] = self._passes(renderer)[0] if renderer else None
+        emission = self._emission[key]
+        return found if emission is None else [each + emission for each in found]
 
     @property
     def _finer_spp(self) -> int:
         return self.spp // self.finer**2
 
-    def _passes(self, renderer: Renderer) -> Replicates:
-        """Render the replicates on a film of the preview's size, then restore the film's."""
+    def _passes(self, renderer: Renderer, count: int = 1) -> list[NDArray]:
+        """Render the replicates on a film of the preview's size, then restore the film's.
+
+        The channels of a pass are those of ``count`` images.
+        """
         (width, height), whole = self.size, image_size(renderer.scene)
         renderer.size = self.finer * width, self.finer * height
         loop = passes([renderer], self._seed, self.replicates, stream=Stream.REPLICATES)
-        fine = np.stack([np.array(one.images[0]) for one in loop])
+        made = np.stack([np.array(one.images[0]) for one in loop])
         resize(renderer.scene, whole)
-        blocks = fine.reshape(len(fine), height, self.finer, width, self.finer, -1)
-        images = blocks.mean(axis=(2, 4))
-        return Replicates(images, fine.mean(axis=0))
+        # An image in grey has one channel.
+        return [np.broadcast_to(one, (*one.shape[:3], 3)) for one in np.split(made, count, axis=3)]
+
+    def pixels(self, fine: NDArray) -> NDArray:
+        """Return the images (R, H, W, 3): means over blocks of finer pixels."""
+        width, height = self.size
+        blocks = fine.reshape(len(fine), height, self.finer, width, self.finer, 3)
+        return blocks.mean(axis=(2, 4))

@@ -19,13 +19,17 @@ Parameter           Type (default)      Meaning
                                         ray hits what hides a light: without shadows, 0 if something
                                         does. Mirrors and glass still take theirs, since nothing
                                         else finds a light in them
-``max_depth``       integer (2)         as in Mitsuba's ``path``: more than 2, or -1 for no limit,
-                                        adds indirect light (:mod:`reference.rendering.indirect`)
+``max_depth``       integer (2)         as in Mitsuba's ``path``: 1 is only what shines by itself;
+                                        more than 2, or -1 for no limit, adds indirect light
+                                        (:mod:`reference.rendering.indirect`)
 ==================  ==================  ===========================================================
+
+One rendering can make several images, which share camera rays, paths and kernel: those of
+``transports``, set after construction. All but the first are AOVs, without the camera's weight.
 """
 
 from collections.abc import Callable, Sequence
-from functools import cache, partial
+from functools import cache, partial, reduce
 from typing import Any
 
 import drjit as dr
@@ -33,6 +37,13 @@ import mitsuba as mi
 
 from heuristic import numerics
 from heuristic.convention import Colour
+from reference.rendering.transport import (
+    Transport,
+    any_bsdf_samples,
+    found_by_bsdf,
+    sums,
+    visibility,
+)
 
 UNROLLED = 16
 """Lights of a kind that have their own code."""
@@ -54,9 +65,8 @@ def _define(_variant: str) -> None:
 
         def __init__(self, props):
             super().__init__(props)
-            self.shadows = props.get("shadows", True)
-            self.bsdf_samples = props.get("bsdf_samples", 1)
-            self.max_depth = props.get("max_depth", 2)
+            own = (props.get(name, value) for name, value in Transport()._asdict().items())
+            self.transports = (Transport(*own),)
             self.environment_albedo = None
             """An `AlbedoTable` (:mod:`reference.pairing.probe`) in place of samples of the
             environment, for one BSDF and nothing that hides it; set after construction."""
@@ -77,8 +87,12 @@ def _define(_variant: str) -> None:
                 seen = active & (si.is_valid() | (not self.hide_emitters))
                 colour = dr.select(seen, si.emitter(scene).eval(si, seen), 0)
             hit = active & si.is_valid()
+            environment = scene.environment() is not None and not self.hide_emitters
+            valid = active if environment else hit
+            if self.transports[0].max_depth == 1:
+                return colour, valid, []
             bsdf = si.bsdf(ray)
-            given = scene, si, bsdf, sampler, hit, self.shadows, self.bsdf_samples
+            given = scene, si, bsdf, sampler, hit, self.transports
             extended = []
             for emitter in others:
                 if self.environment_albedo is not None and emitter.is_environment():
@@ -86,18 +100,28 @@ def _define(_variant: str) -> None:
                     colour += dr.select(hit, albedo * emitter.eval(si, hit), 0)
                 else:
                     extended.append(emitter)
-            colour += _of_all(delta, True, *given)
-            colour += _of_all(extended, False, *given)
-            if extended and (self.bsdf_samples or _has_delta(scene)):
-                colour += _from_bsdf(scene, si, bsdf, sampler, hit, self.bsdf_samples)
-            if self.max_depth != 2:
+            colours = [colour] * len(self.transports)
+            colours = sums(colours, _of_all(delta, True, *given))
+            colours = sums(colours, _of_all(extended, False, *given))
+            if extended and (any_bsdf_samples(self.transports) or _has_delta(scene)):
+                colours = sums(colours, _from_bsdf(*given))
+            deep = [each for each in self.transports if each.max_depth != 2]
+            if deep:
                 # Loaded late: most plans have direct light alone.
                 from reference.rendering.indirect import indirect_light
 
-                parameters = self.max_depth, RR_DEPTH, hit, self.shadows, self.bsdf_samples
-                colour += indirect_light(scene, sampler, si, bsdf, *parameters)
-            environment = scene.environment() is not None and not self.hide_emitters
-            return colour, active if environment else hit, []
+                (max_depth,) = {each.max_depth for each in deep}
+                parameters = max_depth, RR_DEPTH, hit, deep
+                indirect = indirect_light(scene, sampler, si, bsdf, *parameters)
+                added = dict(zip(deep, indirect, strict=True))
+                colours = sums(colours, [added.get(each, 0) for each in self.transports])
+            return colours[0], valid, [channel for each in colours[1:] for channel in each]
+
+        def aov_names(self):
+            channels = range(len(mi.Spectrum(0)))
+            return [
+                f"{i}.{channel}" for i in range(1, len(self.transports)) for channel in channels
+            ]
 
         def to_string(self):
             return f"DirectAllIntegrator[hide_emitters = {self.hide_emitters}]"
@@ -126,26 +150,36 @@ def _has_delta(scene):
     return any(bsdf and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) for bsdf in bsdfs)
 
 
-def _of_all(lights, is_delta, scene, si, bsdf, sampler, active, shadows, bsdf_samples):
-    """Return the contribution of lights; points and directions need no random numbers."""
+def _of_all(lights, is_delta, scene, si, bsdf, sampler, active, transports):
+    """Return the contribution of lights to each image; points and directions are not random."""
+    is_weighted = not is_delta and any_bsdf_samples(transports)
 
     def one(sample_direction, sampler):
         sample = mi.Point2f(0.5) if is_delta else sampler.next_2d(active)
         point, direction, density, weight = sample_direction(si, sample, active)
-        seen = active & (density > 0)
-        if shadows:
-            seen &= ~scene.ray_test(si.spawn_ray_to(point), seen)
+        facing = active & (density > 0)
+        seen = visibility(scene, si, point, facing, transports)
         wo, context = si.to_local(direction), mi.BSDFContext()
-        if is_delta or not bsdf_samples:
-            return dr.select(seen, bsdf.eval(context, si, wo, seen) * weight, 0)
-        # The balance heuristic: a sample of the BSDF can also find the light.
-        value, bsdf_density = bsdf.eval_pdf(context, si, wo, seen)
-        return dr.select(seen, value * weight * density / (density + bsdf_density), 0)
+        is_mixed = len({each.shadows for each in transports}) > 1
+        evaluated = facing if is_mixed else seen[0]
+        if is_weighted:
+            value, bsdf_density = bsdf.eval_pdf(context, si, wo, evaluated)
+        else:
+            value = bsdf.eval(context, si, wo, evaluated)
+        found = []
+        for each, own in zip(transports, seen, strict=True):
+            term = value * weight
+            if is_weighted and each.bsdf_samples:
+                # The balance heuristic: a sample of the BSDF can also find the light.
+                term = term * density / (density + bsdf_density)
+            found.append(dr.select(own, term, 0))
+        return found
 
     targets = [partial(_sampled, light) for light in lights]
+    nothing = [mi.Spectrum(0)] * len(transports)
     if len(lights) > UNROLLED:
-        return _looped(targets, one, sampler)
-    return sum((one(target, sampler) for target in targets), mi.Spectrum(0))
+        return _looped(targets, one, sampler, nothing)
+    return reduce(sums, (one(target, sampler) for target in targets), nothing)
 
 
 def _sampled(light, si, sample, active):
@@ -154,24 +188,29 @@ def _sampled(light, si, sample, active):
 
 
 @dr.syntax
-def _looped(targets: Sequence[Callable], one: Callable, sampler: Any) -> Colour:
-    """Sum over lights in a loop.
+def _looped(
+    targets: Sequence[Callable], one: Callable, sampler: Any, nothing: list[Colour]
+) -> list[Colour]:
+    """Sum over lights in a loop, for each image.
 
     Through the emitters' pointers Dr.Jit would trace every live emitter, including the heuristic
     half's. The sampler is an argument since it changes in the loop.
     """
     number = mi.UInt32(0)
     # A sum of thousands would lose terms below its last digit (Neumaier).
-    total, lost = mi.Spectrum(0), mi.Spectrum(0)
+    total = list(zip(nothing, nothing, strict=True))
     while number < len(targets):
-        given = one(partial(dr.switch, number, targets), sampler)
-        total, lost = numerics.add(total, lost, given)
+        total = _added(total, one(partial(dr.switch, number, targets), sampler))
         number += 1
-    return numerics.summed(total, lost)
+    return [numerics.summed(*each) for each in total]
 
 
-def _from_bsdf(scene, si, bsdf, sampler, active, bsdf_samples):
-    """One sample of the BSDF, for the emitter that it happens to hit.
+def _added(totals, terms):
+    return [numerics.add(*each, term) for each, term in zip(totals, terms, strict=True)]
+
+
+def _from_bsdf(scene, si, bsdf, sampler, active, transports):
+    """One sample of the BSDF, for the emitter that it happens to hit, for each image.
 
     Without ``bsdf_samples`` only directions that emitter sampling never takes count.
     """
@@ -184,6 +223,8 @@ def _from_bsdf(scene, si, bsdf, sampler, active, bsdf_samples):
     ds.emitter = emitter
     emitter_pdf = emitter.pdf_direction(si, ds, active)
     is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-    active &= is_delta | (bsdf_samples > 0)
+    if not any_bsdf_samples(transports):
+        active &= is_delta
     share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
-    return dr.select(active, weight * emitter.eval(hit, active) * share, 0)
+    value = weight * emitter.eval(hit, active) * share
+    return found_by_bsdf(active, is_delta, value, transports)

@@ -1,11 +1,13 @@
 """The indirect part of the integrator ``direct_all``, sampled."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from heuristic.convention import Colour, Interaction, Mask, Scene
+from reference.rendering.transport import Transport, found_by_bsdf, sums, visibility
 
 SURVIVAL = 0.95
 """Largest chance that Russian roulette lets a path continue, as in Mitsuba's ``path``."""
@@ -20,19 +22,18 @@ def indirect_light(
     max_depth: int,
     rr_depth: int,
     active: Mask,
-    shadows: bool,
-    bsdf_samples: int,
-) -> Colour:
+    transports: Sequence[Transport],
+) -> list[Colour]:
     """Estimate the light that has been reflected at least once before it reaches ``si``.
 
     Paths begin with a sample of the BSDF there. Direct light takes every light in turn; this picks
     one at random at each later vertex, as Mitsuba's ``path`` does everywhere. ``max_depth`` counts
     like Mitsuba's: 2 is direct light, for which the result is 0; -1 is no limit. Beyond
-    ``rr_depth`` Russian roulette may end a path.
+    ``rr_depth`` Russian roulette may end a path. Each of ``transports`` has a result.
     """
     context = mi.BSDFContext()
     limit = mi.UInt32(max_depth if max_depth >= 0 else 0xFFFFFFFF)
-    light = mi.Spectrum(0)
+    light = [mi.Spectrum(0) for _ in transports]
     bs, throughput = bsdf.sample(
         context, si, sampler.next_1d(active), sampler.next_2d(active), active
     )
@@ -48,21 +49,23 @@ def indirect_light(
         # The first ray's hit shines directly on the surface that it left, which is not ours.
         emitter = si.emitter(scene, active)
         ds = mi.DirectionSample3f(scene, si, previous)
-        seen = active & (depth > 2) & (previous_delta | (bsdf_samples > 0))
+        seen = active & (depth > 2)
         # Emitter samples never take the direction that a mirror, glass or a mask needs.
         emitter_pdf = scene.pdf_emitter_direction(previous, ds, seen & ~previous_delta)
         share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
-        light += dr.select(seen, throughput * emitter.eval(si, seen) * share, 0)
+        value = throughput * emitter.eval(si, seen) * share
+        light = sums(light, found_by_bsdf(seen, previous_delta, value, transports))
 
         active &= si.is_valid() & (depth < limit)
         vertex = si.bsdf(ray)
         direct = active & mi.has_flag(vertex.flags(), mi.BSDFFlags.Smooth)
-        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), shadows, direct)
+        ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), False, direct)
         direct &= ds.pdf > 0
-        wo = si.to_local(ds.d)
-        value, bsdf_pdf = vertex.eval_pdf(context, si, wo, direct)
-        share = dr.select(ds.delta | (bsdf_samples == 0), 1, ds.pdf / (ds.pdf + bsdf_pdf))
-        light += dr.select(direct, throughput * value * weight * share, 0)
+        value, bsdf_pdf = vertex.eval_pdf(context, si, si.to_local(ds.d), direct)
+        reached = visibility(scene, si, ds.p, direct, transports)
+        share = dr.select(ds.delta, 1, ds.pdf / (ds.pdf + bsdf_pdf))
+        value = throughput * value * weight
+        light = sums(light, _weighted(reached, value, share, transports))
 
         bs, weight = vertex.sample(
             context, si, sampler.next_1d(active), sampler.next_2d(active), active
@@ -78,3 +81,11 @@ def indirect_light(
         active &= (largest > 0) & (sampler.next_1d(active) < survival)
         throughput *= dr.rcp(dr.maximum(survival, 1e-6))
     return light
+
+
+def _weighted(reached, value, share, transports):
+    """Return the light of a sampled emitter, for each image; samples of the BSDF find the rest."""
+    return [
+        dr.select(seen, value * (share if each.bsdf_samples else 1), 0)
+        for each, seen in zip(transports, reached, strict=True)
+    ]

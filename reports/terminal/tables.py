@@ -143,6 +143,8 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
         )
     yield from printed(rows, right=1)
     yield f"differ: above {LEADING.label} {threshold:g}; shape: the mean at the best exposure"
+    if len(records) == 1 and not records[0].picture:
+        yield records[0].time.sentence
     for record in records:
         if record.heuristic != PHONG.name and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"

@@ -1,0 +1,45 @@
+"""The images that one rendering makes: the transport of each, and the light that they share."""
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import drjit as dr
+
+from heuristic.convention import Colour, Interaction, Mask, Scene
+
+
+class Transport(NamedTuple):
+    """The transport of light in one image, as parameters of ``direct_all`` of the same names."""
+
+    shadows: bool = True
+    bsdf_samples: int = 1
+    max_depth: int = 2
+
+
+def any_bsdf_samples(transports: Iterable[Transport]) -> bool:
+    """Return whether samples of the BSDF look for lights in any image."""
+    return any(each.bsdf_samples for each in transports)
+
+
+def sums(colours: Iterable[Colour], others: Iterable[Colour]) -> list[Colour]:
+    """Add light to each image."""
+    return [colour + other for colour, other in zip(colours, others, strict=True)]
+
+
+def visibility(
+    scene: Scene, si: Interaction, point: Any, active: Mask, transports: Sequence[Transport]
+) -> list[Mask]:
+    """Return where each image sees a point of a light: with shadows only where nothing hides it."""
+    visible = active
+    if any(each.shadows for each in transports):
+        visible = active & ~scene.ray_test(si.spawn_ray_to(point), active)
+    return [visible if each.shadows else active for each in transports]
+
+
+def found_by_bsdf(
+    active: Mask, is_delta: Mask, value: Colour, transports: Iterable[Transport]
+) -> list[Colour]:
+    """Return the light that samples of the BSDF find, for each image."""
+    return [
+        dr.select(active & (is_delta | (each.bsdf_samples > 0)), value, 0) for each in transports
+    ]
