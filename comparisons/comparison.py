@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from comparisons.pixel_terms import TermGrid
 
 
-LIBRARIES = ("mitsuba", "drjit", "numpy", "OpenEXR")
+LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
 
 
 def versions() -> dict[str, str]:

@@ -4,7 +4,9 @@ import colour
 import numpy as np
 import pytest
 
+from comparisons.departure import definitions
 from comparisons.departure.colour import Viewing, cam16ucs_unclipped, ciede2000
+from comparisons.departure.definitions import AGREEMENT, DEFINED
 from comparisons.departure.metrics import (
     LEADING,
     LOG2_EPSILON,
@@ -18,11 +20,10 @@ from comparisons.departure.statistics import (
     summarise,
     summarise_log2_luminance,
 )
-from heuristic.errors import InputError, NonFiniteError
+from heuristic.errors import InputError, InstallationError, NonFiniteError
 from reference.records import plain
 from reference.rendering.renderer import require_finite
-from tests import colour_definitions
-from tests.colour_definitions import AGREEMENT, DEFINED
+from reports.commands import doctor
 
 ALL = pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS.keys())
 POINTWISE = pytest.mark.parametrize(
@@ -153,7 +154,7 @@ def test_the_published_pairs_have_their_difference():
 def test_brighter_than_white(quiet):
     rgb = np.random.default_rng(7).uniform(0.0, 12.0, (5000, 3))
     found = cam16ucs_unclipped(rgb, VIEWINGS[0])
-    wanted = colour_definitions.cam16ucs(rgb, VIEWINGS[0], white=np.inf)
+    wanted = definitions.cam16ucs(rgb, VIEWINGS[0], white=np.inf)
     np.testing.assert_allclose(found, wanted, atol=AGREEMENT)
 
 
@@ -312,3 +313,16 @@ def test_noise_floor_is_what_noise_alone_gives(metric):
     assert noise_floor(metric, reference, second, mask) == pytest.approx(floor, rel=0.05)
     assert noise_floor(metric, reference, 2 * first, mask) == pytest.approx(2 * floor, rel=0.02)
     assert noise_floor(metric, reference, 0 * first, mask) == 0.0
+
+
+# --- Metrics from outside, and the doctor ---------------------------------------------------------
+
+
+def test_the_doctor_finds_the_metrics_as_defined(monkeypatch):
+    assert 0 < doctor.compared() <= AGREEMENT
+    space, _ = DEFINED["dE_ITP"]
+    monkeypatch.setitem(
+        DEFINED, "dE_ITP", (space, lambda a, b: np.linalg.norm(a - b, axis=-1) + 2e-4)
+    )
+    with pytest.raises(InstallationError, match="from colour-science's"):
+        doctor.compared()

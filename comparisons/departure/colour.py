@@ -1,8 +1,9 @@
 """Colour: viewing conditions, nearly uniform spaces and differences, compiled by Dr.Jit.
 
 Images are linear light with the sRGB primaries (ITU-R BT.709, D65); 1.0 is display white.
-They agree with colour-science to 1e-4. In NumPy they take as long as rendering, here a tenth (512 x
-512 pixels, ΔE2000: 14 against 133 ms of processor time).
+colour-science defines the formulas, and tests require agreement to 1e-4 of a colour difference. In
+NumPy they take as long as rendering, here a tenth (512 x 512 pixels, ΔE2000: 14 against 133 ms of
+processor time).
 
 Sources: CIE 15:2018 (L*a*b*), ITU-R BT.2100-2 (ICtCp), Li et al., Color Res. Appl. 42(6), 2017
 (CAM16), Sharma, Wu and Dalal, Color Res. Appl. 30(1), 2005 (CIE DE2000).
@@ -11,6 +12,7 @@ Sources: CIE 15:2018 (L*a*b*), ITU-R BT.2100-2 (ICtCp), Li et al., Color Res. Ap
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from math import cos, exp, inf, pi, radians, sin
 from typing import Annotated, Literal, TypeVar
@@ -27,7 +29,6 @@ from reference.records import Positive, Record
 Array = NDArray[np.float64]
 Colour = TypeVar("Colour", Array3f, Array3f64)
 Formula = Callable[[Array3f64], Array3f64]
-Difference = Callable[[ArrayLike, ArrayLike], Array]
 
 PQ_PEAK = 10_000.0
 """ITU-R BT.2100: the largest luminance that the PQ curve encodes, cd/m²."""
@@ -260,28 +261,33 @@ def opaque(value: float) -> Float64:
 # --- Arrays ---
 
 
-def _space(formula: Callable[[Viewing], Formula]) -> Callable[[ArrayLike, Viewing], Array]:
-    """Return a colour space: a function of linear RGB (..., 3) and the viewing conditions."""
+@dataclass(frozen=True)
+class Space:
+    """A colour space as a compiled formula.
 
-    def convert(rgb: ArrayLike, viewing: Viewing) -> Array:
+    ``formula(viewing)`` returns a function of Dr.Jit colours. A call converts linear RGB (..., 3).
+    """
+
+    formula: Callable[[Viewing], Formula]
+
+    def __call__(self, rgb: ArrayLike, viewing: Viewing) -> Array:
         rgb = np.asarray(rgb)
         if not rgb.size:
             return np.zeros(rgb.shape)
-        return np.asarray(dr.ravel(formula(viewing)(_colours(rgb)))).reshape(rgb.shape)
-
-    return convert
+        return np.asarray(dr.ravel(self.formula(viewing)(_colours(rgb)))).reshape(rgb.shape)
 
 
-def _distance(formula: Callable[[Array3f64, Array3f64], Float64]) -> Difference:
-    """Return a distance: a function of two arrays of colours (..., 3)."""
+@dataclass(frozen=True)
+class Distance:
+    """A distance of two Dr.Jit colours as a compiled formula. A call takes arrays (..., 3)."""
 
-    def measure(a: ArrayLike, b: ArrayLike) -> Array:
+    formula: Callable[[Array3f64, Array3f64], Float64]
+
+    def __call__(self, a: ArrayLike, b: ArrayLike) -> Array:
         a, b = np.asarray(a), np.asarray(b)
         if not a.size:
             return np.zeros(a.shape[:-1])
-        return formula(_colours(a), _colours(b)).numpy().reshape(a.shape[:-1])
-
-    return measure
+        return self.formula(_colours(a), _colours(b)).numpy().reshape(a.shape[:-1])
 
 
 def _colours(pixels: Array) -> Array3f64:
@@ -324,26 +330,26 @@ def _to_itp(viewing: Viewing) -> Formula:
     return convert
 
 
-lab = _space(_to_lab)
+lab = Space(_to_lab)
 """CIE L*a*b* (D65, 2°) of linear RGB as displayed; L* is 0 to 100."""
 
-cam16ucs = _space(_to_cam16ucs)
+cam16ucs = Space(_to_cam16ucs)
 """CAM16-UCS J'a'b' of linear RGB as displayed; J' is 0 to 100."""
 
-cam16ucs_unclipped = _space(partial(_to_cam16ucs, white=inf))
+cam16ucs_unclipped = Space(partial(_to_cam16ucs, white=inf))
 """CAM16-UCS of a display without a largest value; above white, J' exceeds 100."""
 
-itp = _space(_to_itp)
+itp = Space(_to_itp)
 """720 · (I, T, P) of linear RGB, whose Euclidean distance is ΔE_ITP."""
 
-linear = _space(lambda viewing: lambda rgb: rgb)
+linear = Space(lambda viewing: lambda rgb: rgb)
 """Linear RGB itself."""
 
-ciede2000 = _distance(delta_e_00)
+ciede2000 = Distance(delta_e_00)
 """ΔE00 between CIE L*a*b* colours, with k_L = k_C = k_H = 1."""
 
-euclidean = _distance(lambda a, b: dr.norm(a - b))
+euclidean = Distance(lambda a, b: dr.norm(a - b))
 """The distance between points."""
 
-root_mean_square = _distance(lambda a, b: dr.sqrt(dr.squared_norm(a - b) / 3.0))
+root_mean_square = Distance(lambda a, b: dr.sqrt(dr.squared_norm(a - b) / 3.0))
 """The root mean square difference of three values."""

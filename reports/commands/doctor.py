@@ -18,7 +18,7 @@ from reports import jobs
 TIMEOUT_S = 300
 """Seconds for a test rendering, which takes about ten if no kernel is compiled yet."""
 
-LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "OpenEXR")
+LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
 
 PROJECT = Path(__file__).parents[2] / "pyproject.toml"
 
@@ -35,7 +35,7 @@ BROKEN = "cannot be "
 
 @jobs.command()
 def doctor() -> None:
-    """Check the installation: versions, LLVM, OpenGL, a rendering in each variant.
+    """Check the installation: versions, LLVM, OpenGL, a rendering in each variant, metrics.
 
     \b
     Examples:
@@ -46,7 +46,7 @@ def doctor() -> None:
 
 
 def examine(variants: Iterable[str]) -> Iterator[str]:
-    """Yield lines on versions, LLVM, test renderings and OpenGL."""
+    """Yield lines on versions, LLVM, test renderings, OpenGL and metrics."""
     yield f"fotismos        {__version__}"
     yield f"python          {platform.python_version()} on {platform.platform()}"
     yield from version_lines()
@@ -58,6 +58,8 @@ def examine(variants: Iterable[str]) -> Iterator[str]:
             yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
         parts = {"GLSL": pool.do(Task("GLSL", shaded, ()))}
         yield from (f"{part:<15} {state}" for part, state in parts.items())
+        apart = pool.do(Task("colour differences", compared, ()))
+        yield f"metrics         at most {apart:.0e} from those of colour-science"
     broken = [part for part, state in parts.items() if state.startswith(BROKEN)]
     yield ""
     yield "fotismos works here" + (
@@ -88,6 +90,19 @@ def shaded() -> str:
         return f"cannot be run; only --heuristic FILE.glsl needs it: {error}"
     glsl.of_text("doctor.glsl", "vec3 shade(Point point) { return vec3(0.5); }")
     return f"runs on {renderer}{', a software GPU' if is_software else ''}"
+
+
+def compared() -> float:
+    """Return how far the compiled colour differences are from colour-science's."""
+    from comparisons.departure import definitions
+
+    apart = definitions.farthest()
+    if not apart <= definitions.AGREEMENT:
+        raise InstallationError(
+            f"colour differences are {apart:.1e} from colour-science's, and"
+            f" {definitions.AGREEMENT:g} is allowed. Install the pinned versions: `./run` does."
+        )
+    return apart
 
 
 def pinned() -> dict[str, str]:

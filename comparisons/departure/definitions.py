@@ -1,10 +1,15 @@
-"""The colour differences as colour-science defines them."""
+"""The colour differences as colour-science defines them.
+
+They take as long as rendering does, so the compiled ones (`comparisons.departure.colour`) are used
+instead; the tests and ``fotismos doctor`` compare them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+import colour
 import numpy as np
 from colour.appearance import VIEWING_CONDITIONS_CAM16, XYZ_to_CAM16
 from colour.difference import delta_E_CIE2000
@@ -16,7 +21,8 @@ from colour.models import (
     XYZ_to_Lab,
 )
 
-from comparisons.departure.colour import PQ_PEAK, Array, Viewing
+from comparisons.departure.colour import DEFAULT_VIEWING, PQ_PEAK, Array, Viewing
+from comparisons.departure.metrics import METRICS
 
 AGREEMENT = 1e-4
 """Largest allowed deviation of the compiled colour differences from colour-science's."""
@@ -65,3 +71,15 @@ DEFINED: dict[str, tuple[Callable[..., Array], Callable[..., Any]]] = {
     "dE_CAM16UCS": (cam16ucs, _distance),
 }
 """Space and difference of each metric that colour-science defines."""
+
+
+def farthest(count: int = 4096) -> float:
+    """Return the largest deviation of the compiled differences, over random colours."""
+    test, reference = np.random.default_rng(0).random((2, count, 3))
+    viewing, apart = DEFAULT_VIEWING, 0.0
+    with np.errstate(all="ignore"), colour.utilities.suppress_warnings(python_warnings=True):
+        for name, (space, difference) in DEFINED.items():
+            defined = difference(space(test, viewing), space(reference, viewing))
+            compiled = METRICS[name](test[None], reference[None], viewing)[0]
+            apart = max(apart, float(np.abs(compiled - defined).max()))
+    return apart
