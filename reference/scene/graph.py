@@ -28,6 +28,9 @@ CONTENT = re.compile(r'((?:of spectrum file "[^"]*"|PLY header: unknown token))[
 
 LONG = re.compile(r'("[^"]{60})[^"]+([^"]{20})(?=")')
 
+INCLUDES = re.compile(r"(?:.* while processing <include>:\n)+(?=.* while processing <include>:\n)")
+"""All but the innermost of the files that include each other, a line each."""
+
 KINDS = {
     "bsdf": mi.ObjectType.BSDF,
     "integrator": mi.ObjectType.Integrator,
@@ -272,7 +275,7 @@ def plain_message(error: Exception) -> str:
     if "Traceback" in text:
         place, _, trace = text.partition(": failed to instantiate")
         text = f"{place}: {trace.splitlines()[-1].partition(': ')[2]}"
-    return LONG.sub(r"\1…\2", CONTENT.sub(r"\1", text))
+    return LONG.sub(r"\1…\2", CONTENT.sub(r"\1", INCLUDES.sub("", text)))
 
 
 def properties(plugin: str, **values: Any) -> Any:
