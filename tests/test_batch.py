@@ -85,7 +85,10 @@ BOMB = f'<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa">{"".join(ENTITIES)}]>'
 HOSTILE = {
     "entities": (BOMB + SCENE.replace('value="0.2"/>', 'value="&j;"/>'), "could not parse"),
     "nesting": (_nested(100_000), "tags mismatch"),
-    "itself": (SCENE.replace("</scene>", '<include filename="x.xml"/></scene>'), "maximum include recursion"),
+    "itself": (
+        SCENE.replace("</scene>", '<include filename="x.xml"/></scene>'),
+        "maximum include recursion",
+    ),
     "malformed": (SCENE[:300], r"line \d+|byte offset \d+"),
     "unknown BSDF": (SCENE.replace("roughplastic", "roughplastik"), '"roughplastik" not found'),
     "NaN": (SCENE.replace('"alpha" value="0.2"', '"alpha" value="nan"'), "alpha = nan"),

@@ -1,24 +1,14 @@
 """Flat, Gouraud and Phong shading: 6.35-6.38, their convergence, and Mitsuba's mesh attributes."""
 
 import drjit as dr
-import drjit.llvm.ad
 import mitsuba as mi
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from heuristic import DirectionalLight, Material, PointLight, meshes, shade, tessellation
 from heuristic.errors import InputError
 from heuristic.normals import WEIGHTINGS
-from heuristic.plugins.interpolated import (
-    Interpolation,
-    between,
-    scan_line_normal,
-    shade_mesh,
-    shading_points,
-    stored_shade,
-)
+from heuristic.plugins.interpolated import Interpolation, shade_mesh, shading_points, stored_shade
 from reference import Source
 from reference.pairing.halves import pair
 from reference.scene.source import collect_messages
@@ -26,50 +16,6 @@ from tests import oracle
 from tests.test_normals import rows
 
 FLAT, GOURAUD, PHONG = Interpolation.FLAT, Interpolation.GOURAUD, Interpolation.PHONG
-Float64, Array3f64 = drjit.llvm.ad.Float64, drjit.llvm.ad.Array3f64
-
-# --- On a triangle: scan lines -------------------------------------------------------------------
-
-TRIANGLE = ((0.0, 4.0), (-3.0, 0.5), (2.0, -1.0))  # A, B, C, from top to bottom
-place = st.floats(0.05, 0.95)
-
-
-def scan(values, point, turn, along_edge, along_line):
-    """Interpolate three values at a point by a scan line, after turning the picture by an angle.
-
-    The scan line through the point meets the edge to the vertex that is alone on its side twice.
-    """
-    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    corners, (x, y) = np.array(TRIANGLE) @ rotation.T, rotation @ point
-    above = corners[:, 1] > y
-    alone = int(np.flatnonzero(above == (above.sum() == 1))[0])
-    crossings = []
-    for other in ((alone + 1) % 3, (alone + 2) % 3):
-        (x_a, y_a), (x_b, y_b) = corners[alone], corners[other]
-        value = along_edge(values[alone], values[other], Float64(y_a), Float64(y_b), Float64(y))
-        crossings.append((value, x_a + (x_b - x_a) * (y - y_a) / (y_b - y_a)))
-    (value_d, x_d), (value_e, x_e) = crossings
-    return along_line(value_d, value_e, Float64(x_d), Float64(x_e), Float64(x))
-
-
-def inside(s, t):
-    """Weights of a point inside the triangle, and the point."""
-    weights = np.array([1 - s, s * (1 - t), s * t])
-    return weights, weights @ np.array(TRIANGLE)
-
-
-@settings(max_examples=60, deadline=None)
-@given(s=place, t=place, turn=st.floats(0, 2 * np.pi))
-def test_scan_lines_of_any_direction_give_the_barycentric_mean(s, t, turn):
-    weights, point = inside(s, t)
-    intensities = [Float64(value) for value in (0.2, 0.9, 0.5)]
-    found = scan(intensities, point, turn, between, between)
-    assert float(found[0]) == pytest.approx(weights @ [0.2, 0.9, 0.5], rel=1e-9)
-    vectors = np.array([(0.6, 0, 0.8), (0, -0.6, 0.8), (0, 0, 1)])
-    found = scan([Array3f64(*v) for v in vectors.tolist()], point, turn, between, scan_line_normal)
-    mean = weights @ vectors
-    np.testing.assert_allclose(rows(found)[0], mean / np.linalg.norm(mean), atol=1e-9)
-
 
 INNER = np.random.default_rng(5).dirichlet((1, 1, 1), 20)
 """Where in every triangle the ways of shading are compared."""

@@ -17,7 +17,7 @@ def graph_of(plugin, **parameters):
     if plugin == "envmap":
         light["bitmap"] = mi.Bitmap(np.ones((4, 8, 3), np.float32))
     scene = {"type": "scene", "ball": {"type": "sphere"}}
-    if lights.of(plugin).on_shapes:
+    if plugin == "area":
         scene["ball"]["emitter"] = light
     else:
         scene["light"] = light
@@ -31,7 +31,6 @@ def test_facts_are_mitsubas_own(rgb):
         # A projector is one point, but which of its rays is taken is drawn from its picture.
         is_delta = mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta)
         assert kind.exact is (is_delta and plugin != "projector")
-        assert kind.on_shapes is mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface)
     assert lights.of("a user's own").surrounds
     assert not lights.is_heuristic("a user's own")
 

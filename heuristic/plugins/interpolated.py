@@ -19,45 +19,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import meshes, tessellation, vectors
-from heuristic.convention import (
-    Colour,
-    Direction,
-    Interaction,
-    Mask,
-    Mesh,
-    Number,
-    Position,
-)
+from heuristic import meshes, tessellation
+from heuristic.convention import Colour, Interaction, Mask, Mesh, Position
 from heuristic.errors import InputError
 from heuristic.heuristics import Interpolation
 from heuristic.kernel import shade
 from heuristic.lights import Light
 from heuristic.materials import Material
-
-
-def between(value_a: Any, value_b: Any, place_a: Number, place_b: Number, place: Number) -> Any:
-    """Equations 6.35-6.37: ``I_D = [I_A (y_D - y_B) + I_B (y_A - y_D)] / (y_A - y_B)``.
-
-    The intensity (6.35) or normal (6.37) where the scan line at the height ``y_D`` meets the edge
-    from A to B; E likewise on the other edge. Between them, 6.36 is the same along x: the chapter's
-    text says I_D and I_C, which can only mean I_D and I_E. A scan line never crosses an edge
-    parallel to it; there the result is the value at A. Normals stay as they are here: normalised,
-    the result at P would depend on the scan line's direction.
-    """
-    length = place_b - place_a
-    fraction = dr.select(length != 0, (place - place_a) / dr.select(length != 0, length, 1), 0)
-    return value_a * (1 - fraction) + value_b * fraction
-
-
-def scan_line_normal(
-    normal_d: Direction, normal_e: Direction, x_d: Number, x_e: Number, x: Number
-) -> Direction:
-    """Equation 6.38: ``n_P = [n_D (x_E - x_P) + n_E (x_P - x_D)] / |...|``, a unit vector.
-
-    It is zero where opposite normals cancel, and such a point receives no light.
-    """
-    return vectors.normalise(between(normal_d, normal_e, x_d, x_e, x))
 
 
 def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:

@@ -119,24 +119,6 @@ def define() -> dict[str, Any]:
             ]
             return self.operation(si, *values)
 
-    return dict.fromkeys(OPERATIONS, Computed) | {"heuristic_tilt": _tilt()}
-
-
-def _operand(props, name):
-    """Read an operand; plain numbers and colours may be larger than a reflectance."""
-    value = props[name]
-    if name in NUMBERS:
-        return value
-    is_colour = isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d)
-    components = tuple(value) if is_colour else (value,)
-    if all(isinstance(part, (int, float)) for part in components) and max(components) > 1:
-        return props.get_unbounded_texture(name)
-    return props.get_texture(name)
-
-
-def _tilt():
-    """Return the class of ``heuristic_tilt`` for the current variant."""
-
     class Tilt(mi.Texture):
         """See the module's docstring."""
 
@@ -150,7 +132,8 @@ def _tilt():
         def eval_3(self, si, active=True):
             normal = self._mapped(si, active) if self.normals else self._displaced(si, active)
             if self.flip:
-                normal = dr.select(dr.dot(normal, si.wi) * si.wi.z > 0, normal, _mirrored(normal))
+                mirrored = mi.Vector3f(-normal.x, -normal.y, normal.z)
+                normal = dr.select(dr.dot(normal, si.wi) * si.wi.z > 0, normal, mirrored)
             return mi.Color3f(normal)
 
         def is_spatially_varying(self):
@@ -178,8 +161,16 @@ def _tilt():
             normal = dr.mulsign(normal, dr.dot(si.n, normal))
             return si.to_local(normal)
 
-    return Tilt
+    return dict.fromkeys(OPERATIONS, Computed) | {"heuristic_tilt": Tilt}
 
 
-def _mirrored(normal):
-    return mi.Vector3f(-normal.x, -normal.y, normal.z)
+def _operand(props, name):
+    """Read an operand; plain numbers and colours may be larger than a reflectance."""
+    value = props[name]
+    if name in NUMBERS:
+        return value
+    is_colour = isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d)
+    components = tuple(value) if is_colour else (value,)
+    if all(isinstance(part, (int, float)) for part in components) and max(components) > 1:
+        return props.get_unbounded_texture(name)
+    return props.get_texture(name)

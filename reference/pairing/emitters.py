@@ -44,8 +44,12 @@ def to_heuristic(
         light = LightNode(
             graph, index, shape, geometry, hide_emitters=hide_emitters, replaced=replaced
         )
-        if light.plugin in TO_HEURISTIC and shape is None:
-            TO_HEURISTIC[light.plugin](light)
+        if light.plugin == "point" and shape is None:
+            place, intensity = mi.ScalarPoint3d(*light.position()), light.value("intensity", 1.0)
+            light.replace(heuristic("heuristic_point", position=place, intensity=intensity))
+        elif light.plugin == "directional" and shape is None:
+            travel, intensity = mi.ScalarVector3f(*light.travel()), light.value("irradiance", 1.0)
+            light.replace(heuristic("heuristic_directional", direction=travel, intensity=intensity))
         else:
             from reference.pairing import lamps  # loaded late: most scenes have points alone
 
@@ -58,8 +62,16 @@ def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements
     """Replace heuristic lights by physical ones; ``surface()`` returns the visible `GBuffer`."""
     for index in [i for i in graph.nodes(EMITTER) if is_heuristic(graph.plugin(i))]:
         light = LightNode(graph, index, surface=surface, replaced=replaced)
-        if light.plugin in TO_PHYSICAL:
-            TO_PHYSICAL[light.plugin](light)
+        if light.plugin == "heuristic_point":
+            factor, note = level(light, lambda travel: 1.0, lambda travel: 1.0, 1.0)
+            place, intensity = mi.ScalarPoint3d(*light.position()), light.scaled_intensity(factor)
+            props = properties("point", position=place, intensity=intensity)
+            light.replace(props, factor, not note, note)
+        elif light.plugin == "heuristic_directional":
+            travel = light.value("direction", mi.ScalarVector3f(0, 0, 1))
+            irradiance = light.scaled_intensity(IRRADIANCE_PER_INTENSITY)
+            props = properties("directional", direction=travel, irradiance=irradiance)
+            light.replace(props, IRRADIANCE_PER_INTENSITY)
         else:
             from reference.pairing import lamps  # loaded late: see to_heuristic
 
@@ -80,31 +92,6 @@ def _physical(graph: Graph) -> Iterator[tuple[int | None, str, int]]:
     for shape, key, index in on_shapes:
         if graph.plugin(index) != "heuristic_glow":
             yield shape, key, index
-
-
-def _point_to_heuristic(light: LightNode) -> None:
-    position, intensity = mi.ScalarPoint3d(*light.position()), light.value("intensity", 1.0)
-    light.replace(heuristic("heuristic_point", position=position, intensity=intensity))
-
-
-def _point_to_physical(light: LightNode) -> None:
-    factor, note = level(light, lambda travel: 1.0, lambda travel: 1.0, 1.0)
-    position, intensity = mi.ScalarPoint3d(*light.position()), light.scaled_intensity(factor)
-    light.replace(
-        properties("point", position=position, intensity=intensity), factor, not note, note
-    )
-
-
-def _directional_to_heuristic(light: LightNode) -> None:
-    direction, intensity = mi.ScalarVector3f(*light.travel()), light.value("irradiance", 1.0)
-    light.replace(heuristic("heuristic_directional", direction=direction, intensity=intensity))
-
-
-def _directional_to_physical(light: LightNode) -> None:
-    direction = light.value("direction", mi.ScalarVector3f(0, 0, 1))
-    irradiance = light.scaled_intensity(IRRADIANCE_PER_INTENSITY)
-    props = properties("directional", direction=direction, irradiance=irradiance)
-    light.replace(props, IRRADIANCE_PER_INTENSITY)
 
 
 def add_glowing_shapes(graph: Graph, replaced: Replacements) -> None:
@@ -152,15 +139,3 @@ def _ambient_ratio(graph: Graph) -> tuple[np.ndarray, bool]:
     ratio = np.where(weight > 0, np.sum(k_a * k_d, axis=0) / np.where(weight > 0, weight, 1), 1.0)
     fits = np.abs(k_a - ratio * k_d) <= 1e-6 * np.maximum(k_a, 1e-6)
     return ratio, bool(fits.all() and not k_s.any())
-
-
-TO_HEURISTIC: dict[str, Callable[[LightNode], None]] = {
-    "point": _point_to_heuristic,
-    "directional": _directional_to_heuristic,
-}
-"""By plugin; other lights are in :mod:`reference.pairing.lamps`."""
-
-TO_PHYSICAL: dict[str, Callable[[LightNode], None]] = {
-    "heuristic_point": _point_to_physical,
-    "heuristic_directional": _directional_to_physical,
-}

@@ -116,8 +116,7 @@ class LightKind:
     None if the heuristic has no light of this kind. ``colour`` is the parameter that holds the
     intensity, if the kind is paired by its parameters. ``place`` returns ``position`` or
     ``toward``, the direction to the light, (3,) each, if it has one. It may be ``exact`` (it needs
-    no random numbers), shine from everywhere (``surrounds``), evenly so (``uniform``), or belong to
-    a shape.
+    no random numbers), or shine from everywhere (``surrounds``), evenly so (``uniform``).
     """
 
     plugins: tuple[str, ...]
@@ -127,7 +126,6 @@ class LightKind:
     exact: bool = False
     surrounds: bool = False
     uniform: bool = False
-    on_shapes: bool = False
 
     def has(self, name: str) -> bool:
         """Return whether its heuristic form has a field, such as ``attenuation`` or ``cutoff``."""
@@ -141,7 +139,7 @@ def _at_point(light: LightNode) -> dict[str, Any]:
 ENVIRONMENT = LightKind(plugins=("envmap",), surrounds=True)
 
 KINDS = (
-    LightKind(plugins=("area",), colour="radiance", on_shapes=True),
+    LightKind(plugins=("area",), colour="radiance"),
     ENVIRONMENT,
     LightKind(plugins=("constant",), colour="radiance", surrounds=True, uniform=True),
     LightKind(plugins=("sunsky", "timed_sunsky"), surrounds=True),

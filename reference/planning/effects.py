@@ -110,12 +110,6 @@ def _coefficient(name: str) -> Callable[[Facts], tuple[bool, str]]:
     return rule
 
 
-def _ambient(facts: Facts) -> tuple[bool, str]:
-    if "ambient" not in facts.kernel:
-        return False, "no ambient light"
-    return _coefficient("k_a")(facts)
-
-
 EMISSION = Effect(
     label="emission",
     heuristic="k_i (8.1)",
@@ -129,7 +123,9 @@ AMBIENT = Effect(
     heuristic="I_a k_a (8.2)",
     reference="see environment",
     cost="an addition",
-    rule=_ambient,
+    rule=lambda facts: (
+        _coefficient("k_a")(facts) if "ambient" in facts.kernel else (False, "no ambient light")
+    ),
 )
 
 DIFFUSE = Effect(
@@ -252,10 +248,6 @@ def _detach(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
         graph.detach(0, key)
 
 
-def _emitted(phong: mi.Properties, facts: Facts) -> dict:
-    return {"k_i": phong["k_i"]} if "k_i" in phong else {}
-
-
 def _ambient_light(phong: mi.Properties, facts: Facts) -> dict:
     if "k_a" not in phong or "ambient" not in facts.kernel:
         return {}
@@ -297,7 +289,7 @@ EXTENDED = Effect(
     sampled=True,
     sites=_shining,
     put=_put_far_lights,
-    emission=_emitted,
+    emission=lambda phong, facts: {"k_i": phong["k_i"]} if "k_i" in phong else {},
 )
 
 ENVIRONMENT = Effect(

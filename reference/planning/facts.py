@@ -204,11 +204,6 @@ class ShapeFacts:
         return self.form is not Form.CONVEX or not self.inner
 
     @property
-    def is_hollow(self) -> bool:
-        """Whether it is closed and reflects inside, which only a camera inside sees."""
-        return self.form is Form.CLOSED and self.inner
-
-    @property
     def hides_itself(self) -> bool:
         """Whether it may block its own light."""
         return self.form is Form.OTHER or not (self.form is Form.FLAT or self.shines_outwards)
@@ -367,7 +362,8 @@ class Facts:
 
     def may_be_seen_from_inside(self, shape: ShapeFacts) -> bool:
         """Return whether a camera ray may begin inside a closed shape that reflects there."""
-        return shape.is_hollow and not self.camera.is_outside(shape)
+        is_hollow = shape.form is Form.CLOSED and shape.inner
+        return is_hollow and not self.camera.is_outside(shape)
 
     @cached_property
     def kernel(self) -> mi.Properties:

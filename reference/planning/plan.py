@@ -187,9 +187,6 @@ class Plan(Record):
         )
 
 
-SPECTRAL_TEXTURES = ("regular", "irregular", "blackbody")
-
-
 def plan(
     pair: Pair,
     scene: mi.Scene,
@@ -289,7 +286,8 @@ def wants_spectra(graph: Graph) -> bool:
     """
     if any(graph.plugin(i) == "specfilm" for i in graph.nodes(mi.ObjectType.Film)):
         return True
-    if any(graph.plugin(i) in SPECTRAL_TEXTURES for i in graph.nodes(mi.ObjectType.Texture)):
+    tabulated = ("regular", "irregular", "blackbody")
+    if any(graph.plugin(i) in tabulated for i in graph.nodes(mi.ObjectType.Texture)):
         return True
     return any(
         hasattr(value, "is_uniform") and not value.is_uniform()

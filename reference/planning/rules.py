@@ -77,6 +77,11 @@ class PruningRule:
             )
         return facts.rule_results[self.name]
 
+    def objection(self, facts: Facts) -> str | None:
+        """Return why the rule does not apply; None if it does."""
+        result = self.check(facts)
+        return None if result.applies else result.evidence
+
 
 # --- Premises of several rules ---------------------------------------------------------------
 
@@ -84,15 +89,6 @@ class PruningRule:
 def _clear(facts: Facts) -> str | None:
     found = (shape.name for shape in facts.shapes if not shape.opaque)
     return next((f"{name}: its BSDF may let light through" for name in found), None)
-
-
-def _media(facts: Facts) -> str | None:
-    return next((f"{name}: a participating medium" for name, _ in facts.pair.media), None)
-
-
-def _crowded(facts: Facts) -> str | None:
-    count = len(facts.shapes)
-    return f"{count:,} shapes" if count > MOST_SHAPES else None
 
 
 def _seen_from_inside(facts: Facts) -> str | None:
@@ -116,10 +112,13 @@ OPAQUE = Premise(
     " known.",
     _clear,
 )
-NO_MEDIUM = Premise("No participating medium is in the scene.", _media)
+NO_MEDIUM = Premise(
+    "No participating medium is in the scene.",
+    lambda facts: next((f"{name}: a participating medium" for name, _ in facts.pair.media), None),
+)
 FEW = Premise(
     f"The scene has at most {MOST_SHAPES} shapes: comparing more takes longer than it saves.",
-    _crowded,
+    lambda facts: f"{len(facts.shapes):,} shapes" if len(facts.shapes) > MOST_SHAPES else None,
 )
 STILL = Premise(
     "The shutter opens for an instant, so nothing moves.",
@@ -145,11 +144,6 @@ KNOWN_SURFACES = (NO_MEDIUM, OPAQUE, FEW, STILL, CONVEX, SEEN_FROM_OUTSIDE)
 def _shallow(facts: Facts) -> str | None:
     depth = facts.pair.max_depth
     return f"the scene's depth is {depth}" if 0 <= depth < 2 else None
-
-
-def _many(facts: Facts) -> str | None:
-    count = len(facts.lights)
-    return f"{count:,} lights" if count > MOST_LIGHTS else None
 
 
 def _sampled_elsewhere(facts: Facts) -> str | None:
@@ -187,7 +181,9 @@ LIGHT_BY_LIGHT = PruningRule(
         Premise(
             f"The scene has at most {MOST_LIGHTS:,} lights: with more, evaluating each costs more"
             " than the noise of picking one.",
-            _many,
+            lambda facts: (
+                f"{len(facts.lights):,} lights" if len(facts.lights) > MOST_LIGHTS else None
+            ),
         ),
         Premise(
             "No closed shape that shines and reflects inside is seen from inside: Mitsuba's"
@@ -358,16 +354,6 @@ def _uneven(facts: Facts) -> str | None:
     return None
 
 
-def _hidden(facts: Facts) -> str | None:
-    result = NO_SHADOWS.check(facts)
-    return None if result.applies else result.evidence
-
-
-def _lit_twice(facts: Facts) -> str | None:
-    result = NO_SECOND_REFLECTION.check(facts)
-    return None if result.applies or facts.pair.max_depth == 2 else result.evidence
-
-
 TABULATED_ENVIRONMENT = PruningRule(
     name="environment from a table",
     absent="noise: the reflected environment is its radiance times an albedo",
@@ -384,11 +370,16 @@ TABULATED_ENVIRONMENT = PruningRule(
         Premise(
             "The variant is RGB.", lambda facts: None if mi.is_rgb else f"variant {mi.variant()}"
         ),
-        Premise("No light can be hidden, by the premises of leaving out shadow rays.", _hidden),
+        Premise(
+            "No light can be hidden, by the premises of leaving out shadow rays.",
+            NO_SHADOWS.objection,
+        ),
         Premise(
             "Light is reflected once, by the premises of direct light alone or by the scene's own"
             " depth.",
-            _lit_twice,
+            lambda facts: (
+                None if facts.pair.max_depth == 2 else NO_SECOND_REFLECTION.objection(facts)
+            ),
         ),
     ),
 )

@@ -37,13 +37,7 @@ import mitsuba as mi
 
 from heuristic import numerics
 from heuristic.convention import Colour
-from reference.rendering.transport import (
-    Transport,
-    any_bsdf_samples,
-    found_by_bsdf,
-    sums,
-    visibility,
-)
+from reference.rendering.transport import Transport, found_by_bsdf, sums, visibility
 
 UNROLLED = 16
 """Lights of a kind that have their own code."""
@@ -103,7 +97,8 @@ def _define(_variant: str) -> None:
             colours = [colour] * len(self.transports)
             colours = sums(colours, _of_all(delta, True, *given))
             colours = sums(colours, _of_all(extended, False, *given))
-            if extended and (any_bsdf_samples(self.transports) or _has_delta(scene)):
+            looks = any(each.bsdf_samples for each in self.transports)
+            if extended and (looks or _has_delta(scene)):
                 colours = sums(colours, _from_bsdf(*given))
             deep = [each for each in self.transports if each.max_depth != 2]
             if deep:
@@ -152,7 +147,7 @@ def _has_delta(scene):
 
 def _of_all(lights, is_delta, scene, si, bsdf, sampler, active, transports):
     """Return the contribution of lights to each image; points and directions are not random."""
-    is_weighted = not is_delta and any_bsdf_samples(transports)
+    is_weighted = not is_delta and any(each.bsdf_samples for each in transports)
 
     def one(sample_direction, sampler):
         sample = mi.Point2f(0.5) if is_delta else sampler.next_2d(active)
@@ -223,7 +218,7 @@ def _from_bsdf(scene, si, bsdf, sampler, active, transports):
     ds.emitter = emitter
     emitter_pdf = emitter.pdf_direction(si, ds, active)
     is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-    if not any_bsdf_samples(transports):
+    if not any(each.bsdf_samples for each in transports):
         active &= is_delta
     share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
     value = weight * emitter.eval(hit, active) * share

@@ -138,10 +138,12 @@ class Renderer:
             require_finite(np.array(image), layer)
         if self._is_users and dr.any(image.array < -ROUNDING):
             plugin = self.scene.sensors()[0].film().rfilter().class_name()
-            if any(
-                kind in plugin for kind in ("Box", "Tent", "Gaussian")
-            ):  # without negative lobes
-                _reject_negative(np.array(image), layer)
+            if any(kind in plugin for kind in ("Box", "Tent", "Gaussian")):  # no negative lobes
+                pixels = np.array(image)
+                raise InputError(
+                    f"{layer}: {_wrong(pixels, pixels >= -ROUNDING, 'negative')}. Light must be 0"
+                    " or more: clamp what can be negative, such as drjit.maximum(cosine, 0)."
+                )
         return image
 
     @property
@@ -308,13 +310,6 @@ def require_finite(image: np.ndarray, layer: str) -> None:
             f"{layer}: {_wrong(image, np.isfinite(image), 'NaN or infinite')}. Look at the surface"
             " and the lights seen there: an infinite light or a degenerate mesh is the usual cause."
         )
-
-
-def _reject_negative(image, layer):
-    raise InputError(
-        f"{layer}: {_wrong(image, image >= -ROUNDING, 'negative')}. Light must be 0 or more: clamp"
-        " what can be negative, such as drjit.maximum(cosine, 0)."
-    )
 
 
 def _wrong(image, right, what):

@@ -16,11 +16,6 @@ class Transport(NamedTuple):
     max_depth: int = 2
 
 
-def any_bsdf_samples(transports: Iterable[Transport]) -> bool:
-    """Return whether samples of the BSDF look for lights in any image."""
-    return any(each.bsdf_samples for each in transports)
-
-
 def sums(colours: Iterable[Colour], others: Iterable[Colour]) -> list[Colour]:
     """Add light to each image."""
     return [colour + other for colour, other in zip(colours, others, strict=True)]

@@ -118,7 +118,10 @@ class Graph:
                 node.props.mark_queried(key, False)
         # A Python plugin that evaluates something while several threads make plugins would wait
         # forever for a thread that waits for Python.
-        self.config.parallel = not any(map(_is_python, state.nodes))
+        self.config.parallel = not any(
+            node.type == mi.ObjectType.Unknown or node.props.plugin_name() in PLUGINS
+            for node in state.nodes
+        )
         with resolving(self.resolver):
             made = Parser.instantiate(self.config, state)
         return made[0] if isinstance(made, list) else made
@@ -168,12 +171,10 @@ class Graph:
 
     def label(self, index: int) -> str:
         """Return a short name of a node for records and messages: its id, or else its location."""
-        identifier = self.props(index).id()
-        return identifier or f"{self.plugin(index)} at {self.location(index)}"
-
-    def location(self, index: int) -> str:
-        """Return where a node was written, in readable form."""
-        return Parser.file_location(self.state, self.state.nodes[index])
+        if identifier := self.props(index).id():
+            return identifier
+        place = Parser.file_location(self.state, self.state.nodes[index])
+        return f"{self.plugin(index)} at {place}"
 
     def file(self, index: int) -> Path | None:
         """Return where Mitsuba finds the file that a node names, None if nothing is there."""
@@ -260,11 +261,6 @@ def resolving(resolver: Any) -> Iterator[None]:
         yield
     finally:
         mi.set_file_resolver(before)
-
-
-def _is_python(node):
-    is_unknown = node.type == mi.ObjectType.Unknown
-    return is_unknown or node.props.plugin_name() in PLUGINS
 
 
 def plain_message(error: Exception) -> str:
