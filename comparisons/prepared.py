@@ -178,22 +178,18 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
     surface raises `InputError`, unless the options allow it.
     """
     options = options or Options()
-    ready = _probed(source, options)
-    if not options.allow_empty:
-        require_surface(ready.counted, source.name)
-    return ready
-
-
-def _probed(source: Source, options: Options) -> Prepared:
     ready = prepare(source, options)
     width, height = image_size(ready.scene)
     samples = ready.reference.spp * ready.passes * width * height
     hidden = ready.pair.hide_emitters
     found = examine_plan(ready.plan, ready.scene, hidden, samples, options.seed)
-    if found.state != "disagreed":
-        return replace(ready, guard=found)
-    whole = prepare(source, options.changed(everything=True))
-    return replace(whole, plan=whole.plan.unpruned("guard", found.words), guard=found)
+    if found.state == "disagreed":
+        ready = prepare(source, options.changed(everything=True))
+        ready = replace(ready, plan=ready.plan.unpruned("guard", found.words))
+    ready = replace(ready, guard=found)
+    if not options.allow_empty:
+        require_surface(ready.counted, source.name)
+    return ready
 
 
 def require_light(

@@ -140,36 +140,27 @@ def xyz_to_lab(xyz: Colour, white: Sequence[float]) -> Colour:
     return type(xyz)(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
 
 
-def rgb_to_ictcp(rgb: Array3f64, peak: float) -> Array3f64:
-    """Return ICtCp of linear BT.2020 RGB from 0 to `peak`, with the PQ curve."""
-    power = dr.power(times(_LMS, rgb) / peak, _PQ_M1)
-    return times(_ICTCP, dr.power((_PQ_C1 + _PQ_C2 * power) / (1.0 + _PQ_C3 * power), _PQ_M2))
-
-
-def xyz_to_cam16ucs(
-    white: Sequence[float], adapting: float, background: float
-) -> Callable[[Array3f64], Array3f64]:
-    """Return a function from XYZ to J'a'b' of CAM16-UCS, in an average surround.
-
-    XYZ and `white` have Y = 100 for white; `adapting` is the adapting luminance in cd/m², and
-    `background` the relative luminance Y_b.
-    """
+def _to_cam16ucs(viewing: Viewing, largest: float = 1.0) -> Formula:
+    """Return a function from linear RGB to J'a'b' of CAM16-UCS, in an average surround."""
+    shown = _displayed(viewing, largest)
+    white = 100.0 * rgb_to_xyz(BT709).sum(axis=1)
+    adapting = 0.2 * viewing.ambient_illuminance / np.pi  # cd/m²
     degree = min(max(_F * (1.0 - exp((-adapting - 42.0) / 92.0) / 3.6), 0.0), 1.0)
-    sharp = _M16 @ np.asarray(white)
+    sharp = _M16 @ white
     gain = degree * white[1] / sharp + 1.0 - degree
     k = 1.0 / (5.0 * adapting + 1.0)
     level = 0.2 * k**4 * 5.0 * adapting + 0.1 * (1.0 - k**4) ** 2 * (5.0 * adapting) ** (1 / 3)
-    n = background / white[1]
+    n = viewing.background / white[1]
     induction = 0.725 * n**-0.2
     power = (gain * sharp * level / 100.0) ** 0.42
-    largest = np.array([2.0, 1.0, 0.05]) @ (400.0 * power / (power + 27.13))
+    achromatic = np.array([2.0, 1.0, 0.05]) @ (400.0 * power / (power + 27.13))
     # Viewing conditions are inputs of the kernel, so one kernel serves them all.
     numbers = (
-        1.0 / largest, _C * (1.48 + n**0.5), 50_000.0 / 13.0 * _N_C * induction,
+        1.0 / achromatic, _C * (1.48 + n**0.5), 50_000.0 / 13.0 * _N_C * induction,
         (1.64 - 0.29**n) ** 0.73 * level**0.25,
     )  # fmt: skip
     sensitivity, scales = Array3f64(*map(opaque, gain * level / 100.0)), tuple(map(opaque, numbers))
-    return lambda xyz: _cam16ucs(times(_M16, xyz) * sensitivity, *scales)
+    return lambda rgb: _cam16ucs(times(_M16, 100.0 * shown(rgb)) * sensitivity, *scales)
 
 
 def _cam16ucs(
@@ -304,43 +295,34 @@ def _displayed(viewing: Viewing, white: float = 1.0) -> Formula:
     return lambda rgb: times(matrix, dr.clip(rgb * exposure, 0.0, largest))
 
 
-def _to_lab(viewing: Viewing) -> Formula:
+@Space
+def lab(viewing: Viewing) -> Formula:
+    """CIE L*a*b* (D65, 2°) of linear RGB as displayed; L* is 0 to 100."""
     shown, white = _displayed(viewing), rgb_to_xyz(BT709).sum(axis=1)
     return lambda rgb: xyz_to_lab(shown(rgb), white)
 
 
-def _to_cam16ucs(viewing: Viewing, white: float = 1.0) -> Formula:
-    shown = _displayed(viewing, white)
-    adapted = 100.0 * rgb_to_xyz(BT709).sum(axis=1)
-    convert = xyz_to_cam16ucs(
-        adapted, 0.2 * viewing.ambient_illuminance / np.pi, viewing.background
-    )
-    return lambda rgb: convert(100.0 * shown(rgb))
-
-
-def _to_itp(viewing: Viewing) -> Formula:
+@Space
+def itp(viewing: Viewing) -> Formula:
+    """720 · (I, T, P) of linear RGB, whose Euclidean distance is ΔE_ITP."""
     matrix = np.linalg.inv(rgb_to_xyz(BT2020)) @ rgb_to_xyz(BT709)
     level = opaque(viewing.exposure * viewing.white_luminance)
     scale = Array3f64(720.0, 360.0, 720.0)
 
     def convert(rgb: Array3f64) -> Array3f64:
         absolute = dr.clip(times(matrix, rgb) * level, 0.0, PQ_PEAK)
-        return scale * rgb_to_ictcp(absolute, PQ_PEAK)
+        power = dr.power(times(_LMS, absolute) / PQ_PEAK, _PQ_M1)
+        encoded = dr.power((_PQ_C1 + _PQ_C2 * power) / (1.0 + _PQ_C3 * power), _PQ_M2)
+        return scale * times(_ICTCP, encoded)
 
     return convert
 
 
-lab = Space(_to_lab)
-"""CIE L*a*b* (D65, 2°) of linear RGB as displayed; L* is 0 to 100."""
-
 cam16ucs = Space(_to_cam16ucs)
 """CAM16-UCS J'a'b' of linear RGB as displayed; J' is 0 to 100."""
 
-cam16ucs_unclipped = Space(partial(_to_cam16ucs, white=inf))
+cam16ucs_unclipped = Space(partial(_to_cam16ucs, largest=inf))
 """CAM16-UCS of a display without a largest value; above white, J' exceeds 100."""
-
-itp = Space(_to_itp)
-"""720 · (I, T, P) of linear RGB, whose Euclidean distance is ΔE_ITP."""
 
 linear = Space(lambda viewing: lambda rgb: rgb)
 """Linear RGB itself."""

@@ -156,12 +156,6 @@ def find_objects(
     ), found
 
 
-def means(values: NDArray, rows: NDArray, count: int) -> NDArray[np.float64]:
-    """Return the means (..., count) of values (..., N) by object; ``rows`` (N,) names it."""
-    sums = [np.bincount(rows, each, count) for each in values.reshape(-1, len(rows))]
-    return np.reshape(sums, (*values.shape[:-1], count)) / np.bincount(rows, minlength=count)
-
-
 def _object_share(
     name: str, error: NDArray, mask: NDArray, total: float, materials: ObjectIds | None
 ) -> ObjectShare:

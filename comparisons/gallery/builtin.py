@@ -63,6 +63,13 @@ def _scene(function: str, *arguments: Any, **more: Any) -> dict[str, Any]:
     return getattr(scenes, function)(*arguments, **more)
 
 
+def _spectral(function: str) -> dict[str, Any]:
+    """Make a scene by a function of :mod:`comparisons.gallery.spectra`, which few scenes load."""
+    from comparisons.gallery import spectra
+
+    return getattr(spectra, function)()
+
+
 def _figure(name: str, title: str, lights: Any, viewer: Any, **coefficients: float) -> BuiltIn:
     return BuiltIn(name, title, partial(_scene, "figure", lights, viewer, **coefficients))
 
@@ -112,17 +119,17 @@ def _chapter_six() -> Iterator[BuiltIn]:
 
 
 def _physical() -> Iterator[BuiltIn]:
-    rgb: dict[str, Any] = {}
-    mixed: dict[str, Any] = {"variant": "llvm_ad_spectral", "heuristic_variant": "llvm_ad_rgb"}
-    for name, title, variants in (
-        ("lambert-sphere", "A diffuse sphere under a point light: an exact pair", rgb),
-        ("plastic-spheres", "Rough plastic from sharp to dull under a lamp", rgb),
-        ("narrow-band-lamp", "Coloured spheres under a sodium lamp: RGB against spectra", mixed),
+    for name, title, is_spectral in (
+        ("lambert-sphere", "A diffuse sphere under a point light: an exact pair", False),
+        ("plastic-spheres", "Rough plastic from sharp to dull under a lamp", False),
+        ("narrow-band-lamp", "Coloured spheres under a sodium lamp: RGB against spectra", True),
         ("metameric-pair", "Two surfaces of one colour in daylight, under lamplight: RGB against"
-         " spectra", mixed),
-        ("cornell-box", "The Cornell box: a lamp, shadows and colour bleeding", rgb),
+         " spectra", True),
+        ("cornell-box", "The Cornell box: a lamp, shadows and colour bleeding", False),
     ):  # fmt: skip
-        yield BuiltIn(name, title, partial(_scene, name.replace("-", "_")), **variants)
+        make = partial(_spectral if is_spectral else _scene, name.replace("-", "_"))
+        variants = ("llvm_ad_spectral", "llvm_ad_rgb") if is_spectral else ("llvm_ad_rgb",)
+        yield BuiltIn(name, title, make, *variants)
 
 
 SCENES = {scene.name: scene for scene in (*_figures(), *_chapter_six(), *_physical())}

@@ -39,7 +39,7 @@ from comparisons.departure.blocks import ratio
 from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import contrasts, without_noise
-from comparisons.departure.regions import Region, find_objects, means
+from comparisons.departure.regions import Region, find_objects
 from comparisons.hybrids.hybrids import (
     HybridImages,
     HybridScenes,
@@ -295,6 +295,12 @@ def by_object(
     )
 
 
+def means(values: NDArray, rows: NDArray, count: int) -> NDArray[np.float64]:
+    """Return the means (..., count) of values (..., N) by object; ``rows`` (N,) names it."""
+    sums = [np.bincount(rows, each, count) for each in values.reshape(-1, len(rows))]
+    return np.reshape(sums, (*values.shape[:-1], count)) / np.bincount(rows, minlength=count)
+
+
 def shares(
     players: Iterable[Player],
     value: Callable[[frozenset[Player]], Any],
@@ -353,6 +359,11 @@ def named(comparison: Comparison, effects: Mapping[str, NDArray]) -> ComparisonR
     record, images = comparison.record, comparison.images
     maps = {name: _enlarged(values, images.counted.shape) for name, values in effects.items()}
 
+    def in_region(region: Region) -> dict[str, float]:
+        rows = slice(region.y, region.y + region.height)
+        columns = slice(region.x, region.x + region.width)
+        return {name: float(values[rows, columns].mean()) for name, values in maps.items()}
+
     def each(objects, places):
         """Name the effects by the maps' cell in which each pixel of an object lies."""
         seen = places >= 0
@@ -367,18 +378,11 @@ def named(comparison: Comparison, effects: Mapping[str, NDArray]) -> ComparisonR
     return structs.replace(
         record,
         regions=tuple(
-            structs.replace(one, effect=in_words(in_region(one, maps))) for one in record.regions
+            structs.replace(one, effect=in_words(in_region(one))) for one in record.regions
         ),
         objects=each(record.objects, images.objects),
         materials=each(record.materials, images.materials),
     )
-
-
-def in_region(region: Region, effects: Mapping[str, NDArray]) -> dict[str, float]:
-    """Return the mean of each effect's map (H, W) over a region."""
-    rows = slice(region.y, region.y + region.height)
-    columns = slice(region.x, region.x + region.width)
-    return {name: float(values[rows, columns].mean()) for name, values in effects.items()}
 
 
 def in_words(found: Mapping[str, float]) -> str | None:

@@ -6,11 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-SIGNALS = {
-    number
-    for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None))
-    if number is not None
-}
+SIGNALS = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
 """Ctrl-C, the end of a job, and the end of a terminal."""
 
 PAUSE_S = 0.02
