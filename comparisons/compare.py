@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import structs
@@ -48,12 +48,6 @@ if TYPE_CHECKING:
 PERCENTILE = 95
 """A noise target is for this percentile of the noise over the counted pixels."""
 
-Terms: TypeAlias = "tuple[TermGrid | None, str]"
-"""The terms of a comparison, or why there are none."""
-
-Sums: TypeAlias = tuple[Accumulator, Accumulator, DifferenceSums]
-"""Sums of the heuristic half, of the reference, and of their difference."""
-
 
 @dataclass(frozen=True)
 class Estimates:
@@ -86,17 +80,18 @@ def compare(
     pixel sees a surface, or both halves are black; `NonFiniteError` for a NaN or an infinity in a
     rendering.
     """
+    options = options or Options()
     printed: list[str] = []
     with collect_messages(printed):
-        comparison, ready = _compare(source, options or Options(), progress, command, why)
+        comparison, ready = _compare(source, options, progress, command, why)
     lines = count_messages([*source.messages, *printed])
     made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *lines))
     comparison = replace(comparison, record=made)
-    if not why or (options and options.image):  # no effect can be added to a picture
+    if not why or options.image:  # no effect can be added to a picture
         return comparison
     from comparisons.hybrids import attribution  # loaded late: --no-why needs none of it
 
-    return attribution.explained(comparison, ready, source, options or Options(), progress)
+    return attribution.explained(comparison, ready, source, options, progress)
 
 
 def _compare(
@@ -130,7 +125,7 @@ def _compare(
 
         picture = pictures.picture_record(heuristic, ready.scene, options, images)
     done("metrics")
-    traced: Terms = None, "Terms are traced with --why."
+    traced: tuple[TermGrid | None, str] = None, "Terms are traced with --why."
     if why:
         from comparisons import pixel_terms  # loaded late: --no-why traces none
 
@@ -214,7 +209,9 @@ def is_checked(done: int, passes: int) -> bool:
     return done >= passes or (done >= 4 and done in (power, power + power // 2))
 
 
-def noise_percentile(sums: Sums, counted: np.ndarray, viewing: Viewing) -> float:
+def noise_percentile(
+    sums: tuple[Accumulator, Accumulator, DifferenceSums], counted: np.ndarray, viewing: Viewing
+) -> float:
     """Predict the noise: 95th percentile of ΔE2000 between the reference and itself with noise.
 
     The noise is that of the difference of the halves, in which shared noise cancels.

@@ -55,17 +55,16 @@ def versions() -> dict[str, str]:
 
 def machine() -> Machine:
     """Return what times depend on."""
-    system = f"{platform.system()} {platform.machine()}"
-    return Machine(processor=_processor(), cores=cores(), system=system)
-
-
-def _processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return names[0] if names else platform.processor() or platform.machine()
+    return Machine(
+        processor=names[0] if names else platform.processor() or platform.machine(),
+        cores=cores(),
+        system=f"{platform.system()} {platform.machine()}",
+    )
 
 
 class Significant(Record):
@@ -121,10 +120,6 @@ class NoiseTarget(Record):
     reached: Amount
     stopped_by: Literal["target", "samples"]
     limit_spp: Annotated[int, Meta(ge=2, description="Samples per pixel that end a run.")]
-
-
-Effects = tuple[str, ...]
-"""Labels of effects, in their order."""
 
 
 class MeanError(Record):
@@ -185,7 +180,7 @@ class ObjectContribution(Record):
 class Hybrid(Record):
     """An image in which some effects are simulated, and its mean ΔE2000 without noise."""
 
-    effects: Effects
+    effects: tuple[str, ...]
     error: float
 
 

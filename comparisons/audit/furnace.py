@@ -60,7 +60,7 @@ def hemisphere(azimuths: int, heights: int) -> tuple[NDArray, NDArray]:
     return directions, 2 * t * 3 * np.pi * u**2 * 2 / len(t)
 
 
-def seen(response: Response, degrees: float, grid: tuple[int, int] = GRID) -> float:
+def seen(response: Response, degrees: float, grid: tuple[int, int]) -> float:
     """Return what a viewer at an angle sees in the furnace: the channel that is farthest from 1."""
     above, solid_angle = hemisphere(*grid)
     view = direction(np.deg2rad(degrees), 0.0)
@@ -72,7 +72,7 @@ def seen(response: Response, degrees: float, grid: tuple[int, int] = GRID) -> fl
     return float(values[np.abs(values - 1).argmax()])
 
 
-def returned(response: Response, degrees: float, grid: tuple[int, int] = GRID) -> float:
+def returned(response: Response, degrees: float, grid: tuple[int, int]) -> float:
     """Return the share of the light from an angle that is returned, of the brightest channel."""
     view, solid_angle = hemisphere(*grid)
     light = direction(np.deg2rad(degrees), 0.0)
@@ -80,7 +80,7 @@ def returned(response: Response, degrees: float, grid: tuple[int, int] = GRID) -
     return float((values * view[2] * solid_angle).sum(axis=1).max() / np.pi)
 
 
-def random_pairs(count: int = 20_000) -> list[NDArray]:
+def random_pairs(count: int) -> list[NDArray]:
     """Return two sets of random directions (3, N), within 80 degrees of the normal."""
     rng = np.random.default_rng(0)
     return [

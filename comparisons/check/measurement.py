@@ -267,9 +267,7 @@ class Baseline(Record, kw_only=True, omit_defaults=True):
         return laid_out(records.plain(self)) + "\n"
 
 
-def baseline_of(
-    scene: str, options: Mapping[str, Any], measured: Measurement, images: str | None = None
-) -> Baseline:
+def baseline_of(scene: str, options: Mapping[str, Any], measured: Measurement) -> Baseline:
     """Return the baseline of a scene just measured, with the current versions."""
     return msgspec.convert(
         {
@@ -277,7 +275,6 @@ def baseline_of(
             "scene": scene,
             "options": dict(sorted(options.items())),
             "versions": versions(),
-            "images": images,
             **_rounded(records.plain(measured)),
         },
         Baseline,

@@ -212,13 +212,12 @@ def choose(
     source: Source,
     within: float,
     options: Options | None = None,
-    effort: Effort | None = None,
     progress: Progress | None = None,
 ) -> Choice:
     """Measure the ladder of a scene, in the current variant, and choose from it."""
     checked_threshold(within)
     options = options or Options()
-    found = measure_ladder(source, options, effort or Effort(), progress or (lambda *_: None))
+    found = measure_ladder(source, options, Effort(), progress or (lambda *_: None))
     size = options.resolution or film_size(source.parse(), options.sensor)
     points = at_size(found.points, found.methods, size)
     full = next(one.name for one in found.methods if FULL_PLAN.name in one.names)

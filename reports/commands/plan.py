@@ -112,4 +112,4 @@ def chosen(name: str, request: Options, within: float, progress: Any) -> Choice:
     from comparisons.cost.cost import choose
 
     case = open_case(name, request)
-    return choose(case.source, within, case.options, None, progress)
+    return choose(case.source, within, case.options, progress)
