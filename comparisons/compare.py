@@ -145,9 +145,7 @@ def _compare(
         regions=regions.find(images.maps[LEADING.name], images.counted),
         pairing=ready.pair.pairing,
         time=TimeSpent(
-            heuristic=heuristic.pass_times(),
-            reference=reference.pass_times(),
-            stages=stages,
+            heuristic=heuristic.pass_times(), reference=reference.pass_times(), stages=stages
         ),
         unrepresentable=ready.pair.unrepresentable,
         integrator_given=ready.pair.integrator,

@@ -11,6 +11,7 @@ values gives the fraction of a pixel.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import permutations
 from math import pi
 from pathlib import Path
@@ -307,15 +308,19 @@ def _vertex(values: np.ndarray, place: int) -> float:
 CHANNELS = ("red", "green", "blue")
 
 
+def _ordered(order: tuple[int, ...], image: np.ndarray) -> np.ndarray:
+    return image[..., list(order)]
+
+
 MISREADINGS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "values look sRGB-encoded": from_srgb,
     "values look decoded twice": to_srgb,
     **{
-        f"channels look like {', '.join(CHANNELS[place] for place in order)}": (
-            lambda image, order=order: image[..., order]
+        f"channels look like {', '.join(CHANNELS[place] for place in order)}": partial(
+            _ordered, order
         )
-        for order in map(list, permutations(range(3)))
-        if order != [0, 1, 2]
+        for order in permutations(range(3))
+        if order != (0, 1, 2)
     },
 }
 """Mistakes in encoding colours: their symptoms, and their inverses."""

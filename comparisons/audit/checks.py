@@ -10,13 +10,7 @@ import numpy as np
 from msgspec import Meta
 
 from comparisons.audit import diagnosis, furnace
-from comparisons.audit.subjects import (
-    INCIDENT,
-    LEVEL,
-    ScatteringSubject,
-    ShadingSubject,
-    Subject,
-)
+from comparisons.audit.subjects import INCIDENT, LEVEL, ScatteringSubject, ShadingSubject, Subject
 from comparisons.comparison import versions
 from heuristic import heuristics
 from reference.records import VERSION, Amount, Record, Versions

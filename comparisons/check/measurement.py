@@ -243,8 +243,7 @@ class Baseline(Record, kw_only=True, omit_defaults=True):
 
     record_version: int
     scene: Annotated[
-        str,
-        Meta(description="A built-in name, or a file's path from the baseline's folder."),
+        str, Meta(description="A built-in name, or a file's path from the baseline's folder.")
     ]
     options: Annotated[
         dict[str, Any], Meta(description="As on the command line; defaults are left out.")

@@ -209,10 +209,7 @@ class Choice(Record, kw_only=True):
 
 
 def choose(
-    source: Source,
-    within: float,
-    options: Options | None = None,
-    progress: Progress | None = None,
+    source: Source, within: float, options: Options | None = None, progress: Progress | None = None
 ) -> Choice:
     """Measure the ladder of a scene, in the current variant, and choose from it."""
     checked_threshold(within)

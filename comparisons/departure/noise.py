@@ -236,11 +236,7 @@ class _Extrapolated:
 
     @classmethod
     def of(
-        cls,
-        metric: Metric,
-        distances: Distances,
-        grouped: Grouped,
-        chosen: Sequence[int],
+        cls, metric: Metric, distances: Distances, grouped: Grouped, chosen: Sequence[int]
     ) -> _Extrapolated:
         means, sizes = grouped.means[chosen], grouped.sizes[chosen]
         mean = np.average(means, axis=0, weights=sizes)

@@ -32,14 +32,7 @@ from comparisons.fit.fit_record import (
     physical_materials,
 )
 from comparisons.fit.model import OwnModel, PhongModel
-from comparisons.fit.search import (
-    LOSSES,
-    Loss,
-    Objective,
-    bounded_minimum,
-    identify,
-    search,
-)
+from comparisons.fit.search import LOSSES, Loss, Objective, bounded_minimum, identify, search
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
 from heuristic.errors import InputError, unknown

@@ -70,8 +70,7 @@ class FormFit(Record, kw_only=True):
     parameter_error: Annotated[float, Meta(description="What better parameters remove of it.")]
     departure: Annotated[dict[str, FitDeparture], Meta(description="By metric.")]
     materials: Annotated[
-        tuple[FittedMaterial, ...],
-        Meta(description="Or the heuristic, with its own parameters."),
+        tuple[FittedMaterial, ...], Meta(description="Or the heuristic, with its own parameters.")
     ]
     converged: Annotated[bool, Meta(description="Whether the search that found them did.")]
 

@@ -40,12 +40,7 @@ from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import contrasts, without_noise
 from comparisons.departure.regions import Region, find_objects
-from comparisons.hybrids.hybrids import (
-    HybridImages,
-    HybridScenes,
-    Pairs,
-    labels,
-)
+from comparisons.hybrids.hybrids import HybridImages, HybridScenes, Pairs, labels
 from comparisons.options import Options
 from comparisons.prepared import Prepared
 from heuristic.errors import FotismosError
@@ -192,12 +187,7 @@ class ErrorMeter:
         return [LEADING.coordinates(pixels, self.viewing) for pixels in shown]
 
 
-def attribute(
-    images: HybridImages,
-    meter: ErrorMeter,
-    shapes: ObjectIds,
-    seed: int,
-) -> Causes:
+def attribute(images: HybridImages, meter: ErrorMeter, shapes: ObjectIds, seed: int) -> Causes:
     """Attribute the departure to the effects, as a whole, on each shape, and in each pixel.
 
     ``shapes`` are what each pixel sees; ``seed`` draws the orders.

@@ -26,13 +26,7 @@ from heuristic.convention import Scene
 from heuristic.heuristics import Interpolation
 from reference.pairing import lights
 from reference.pairing.halves import Pair
-from reference.planning.effects import (
-    EFFECTS,
-    ENVIRONMENT,
-    POLYGONS,
-    SPECTRAL,
-    Effect,
-)
+from reference.planning.effects import EFFECTS, ENVIRONMENT, POLYGONS, SPECTRAL, Effect
 from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
 from reference.planning.plan import Plan, physical_integrator
 from reference.rendering import direct

@@ -18,11 +18,7 @@ from comparisons.atomic import require_regular
 from comparisons.comparison import versions
 from comparisons.departure import statistics
 from comparisons.departure.colour import DEFAULT_VIEWING
-from comparisons.departure.metrics import (
-    LEADING,
-    METRICS,
-    RATIO,
-)
+from comparisons.departure.metrics import LEADING, METRICS, RATIO
 from comparisons.study.design import OWN, StudyFile
 from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
 from heuristic.errors import InputError, unknown
