@@ -23,7 +23,7 @@ from comparisons.options import Options
 from comparisons.processes.pool import Pool, cores
 from heuristic import llvm, program
 from heuristic.errors import InputError
-from reports.terminal.words import echo, level
+from reports.terminal.words import echo, level, quiet_option, verbose_option
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Decorator: TypeAlias = Callable[[Any], Any]
@@ -60,10 +60,9 @@ def complete_scene(
 
 # --- Help ------------------------------------------------------------------------------------
 
-RESULTS = "Results"
 GROUPS = {
     "What is rendered": set(Options.__struct_fields__),
-    RESULTS: {"output", "as_json", "figures", "fresh", "is_opened", "quiet", "verbose"},
+    "Results": {"output", "as_json", "figures", "fresh", "is_opened", "quiet", "verbose"},
     "Bounds and CI": {"max_visible", "within", "junit", "summary"},
     "Processes": {"timeout", "workers", "scheduler"},
 }
@@ -88,12 +87,8 @@ class Helped(click.Command):
 
     def get_help(self, context: click.Context) -> str:
         """Return the help, with commands as the user types them."""
-        return as_typed(super().get_help(context))
-
-
-def as_typed(text: str) -> str:
-    """Return a help text whose examples begin with the words that start the program."""
-    return re.sub(r"(?m)(^ +|[`(])fotismos (?=\w)", rf"\1{program.command()} ", text)
+        text = super().get_help(context)
+        return re.sub(r"(?m)(^ +|[`(])fotismos (?=\w)", rf"\1{program.command()} ", text)
 
 
 command = partial(click.command, cls=Helped)
@@ -213,8 +208,7 @@ rendering_options = with_options(
         ),
     )
 )  # fmt: skip
-scene_options = with_options(option("define"), option("sensor"))
-
+scene_options = with_options(rendering_options, option("define"), option("sensor"))
 
 timeout_option = click.option(
     "--timeout",
@@ -224,8 +218,6 @@ timeout_option = click.option(
     metavar="SECONDS",
     help="End a scene that makes no progress for this long.",
 )
-
-
 workers_option = click.option(
     "--workers",
     show_default="one per core",
@@ -234,6 +226,13 @@ workers_option = click.option(
     help="Processes that render at the same time, each with its share of the cores, and at most one"
     " per scene.",
 )
+scheduler_option = click.option(
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Use the Dask cluster with this scheduler, such as tcp://host:8786.",
+)
+process_options = with_options(timeout_option, workers_option, scheduler_option)
+verbosity_options = with_options(quiet_option, verbose_option)
 
 IN_PROCESSES = True
 """Whether scenes are read and rendered in separate processes; tests use their own process."""
@@ -283,13 +282,6 @@ def open_page(page: Path) -> None:
 
     if not webbrowser.open(page.resolve().as_uri()):
         click.echo(f"fotismos: no browser was found to open {page}. Open it yourself.", err=True)
-
-
-scheduler_option = click.option(
-    "--scheduler",
-    metavar="ADDRESS",
-    help="Use the Dask cluster with this scheduler, such as tcp://host:8786.",
-)
 
 
 def pool(

@@ -130,7 +130,7 @@ def _remedy(record: ComparisonRecord, cost: Cost, threshold: float) -> str:
         time = seconds(best.seconds.value)
         if kernels:
             time += f", kernel {seconds(min(point.seconds.value for point in kernels))}"
-        return f"{_capital(best.method)} passes: {time} at {size}."
+        return f"{best.method[:1].upper()}{best.method[1:]} passes: {time} at {size}."
     nearest = min(points, key=lambda point: point.tolerance.mean)
     more = f"To try more samples: `{search(record, threshold, 4 * nearest.spp)}`."
     if nearest in kernels:
@@ -182,10 +182,6 @@ def _noun(effect: str) -> str:
     return next((one.noun for one in EFFECTS if one.label == effect), "") or effect
 
 
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
 # --- A run -----------------------------------------------------------------------------------
 
 Studied = tuple[ComparisonRecord, "Cost | None"]
@@ -230,9 +226,5 @@ def advice(scenes: Sequence[Studied], threshold: float = TOLERANCE) -> Iterator[
     """Yield a line for each scene that does not pass: what is missing, and what to do."""
     for record, cost in scenes:
         if decision(record, threshold) != "pass" and not record.caution:
-            yield " ".join(
-                filter(
-                    None,
-                    (f"{record.scene}:", cause(record), sentence(record, cost, threshold)),
-                )
-            )
+            parts = (f"{record.scene}:", cause(record), sentence(record, cost, threshold))
+            yield " ".join(filter(None, parts))

@@ -30,7 +30,7 @@ def shown(study, record=None):
     """The page of one scene with its study."""
     view = SceneView(
         record=record or records.record(),
-        charts=tuple(cost_files.figures(study.record)),
+        chart=cost_files.figure(study.record),
         cost=cost_files.view(study),
     )
     return page.render([view])

@@ -60,7 +60,7 @@ def test_two_charts_on_a_page_share_no_id(monkeypatch):
 
 def test_text_in_a_chart_stays_text():
     figure = vega.figure(HOSTILE, bars(HOSTILE, title=HOSTILE), HOSTILE)
-    html = page.render([records.view(records.data(), charts=(figure,))])
+    html = page.render([records.view(records.data(), chart=figure)])
     shown = Page(html)
     assert not [attrs for tag, attrs in shown.tags if tag == "img"]
     assert HOSTILE not in html

@@ -93,7 +93,6 @@ def _rows(record: Cost) -> list[dict[str, Any]]:
             "method": point.method,
             "family": methods[point.method].family,
             "sampled": methods[point.method].monte_carlo,
-            "spp": point.spp,
             "time": 1e3 * point.seconds.value,
             "fastest": 1e3 * max(point.seconds.low, point.seconds.value / 10),
             "slowest": 1e3 * point.seconds.high,
@@ -117,10 +116,6 @@ def _domain(values: Sequence[float]) -> Ends:
     return low / room, high * room
 
 
-def _time(field: str, times: Ends) -> Any:
-    return _logarithmic(alt.X(f"{field}:Q"), times, "time for one image (ms, logarithmic)")
-
-
 def _error(field: str, errors: Ends) -> Any:
     return _logarithmic(alt.Y(f"{field}:Q"), errors, "mean ΔE2000 to the reference (logarithmic)")
 
@@ -133,7 +128,8 @@ def _logarithmic(channel: Any, domain: Ends, title: str) -> Any:
 def _charted(rows: Sequence[Mapping[str, Any]], times: Ends, errors: Ends) -> alt.Chart:
     """Return a chart of rows over the two axes, without marks; an error of 0 is at the border."""
     data = alt.Data(values=[{**row, "shown": max(row["error"], errors[0])} for row in rows])
-    return alt.Chart(data).encode(x=_time("time", times), y=_error("shown", errors))
+    x = _logarithmic(alt.X("time:Q"), times, "time for one image (ms, logarithmic)")
+    return alt.Chart(data).encode(x=x, y=_error("shown", errors))
 
 
 def _slope(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
@@ -149,9 +145,8 @@ def _slope(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
 def _guide(ends: Sequence[float], times: Ends, errors: Ends, dash: list[int]) -> alt.Chart:
     """Return a faint line between errors at both ends of the time axis."""
     rows = [{"time": time, "error": end} for time, end in zip(times, ends, strict=True)]
-    style: Spec = {"color": FAINT, "strokeWidth": 1.2, "strokeDash": dash, "clip": True}
-    style["aria"] = False
-    return _charted(rows, times, errors).mark_line(**style)
+    chart = _charted(rows, times, errors)
+    return chart.mark_line(color=FAINT, strokeWidth=1.2, strokeDash=dash, clip=True, aria=False)
 
 
 def _names_beside(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:

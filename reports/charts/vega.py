@@ -69,13 +69,11 @@ def specification(chart: altair.TopLevelMixin) -> Spec:
 
 @lru_cache(maxsize=1024)
 def _drawn(spec: str) -> str:
-    """The picture for the page, which is written many times while it grows."""
-    return _inline(_svg(spec))
+    """The picture for the page, which is written many times while it grows.
 
-
-def _inline(svg: str) -> str:
-    """The SVG with unique ids, since several share one page; its figure describes it."""
-    svg = re.sub(r"<[^>]*>", lambda tag: IDLE.sub("", tag[0]), svg)
+    It has unique ids, since several share one page; its figure describes it.
+    """
+    svg = re.sub(r"<[^>]*>", lambda tag: IDLE.sub("", tag[0]), _svg(spec))
     prefix = "v" + hashlib.sha256(svg.encode()).hexdigest()[:8]
     owned = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", svg)
     return owned.replace("<svg ", '<svg aria-hidden="true" ', 1)

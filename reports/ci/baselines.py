@@ -40,9 +40,8 @@ class BaselineFile:
 
     def pictures(self) -> Kept | None:
         """Return the small pictures, or None if the baseline has none."""
-        if not self.baseline.images:
-            return None
-        return _read_pictures(self.path.parent / Path(self.baseline.images).name)
+        name = self.baseline.images
+        return _read_pictures(self.path.parent / Path(name).name) if name else None
 
 
 def find(path: Path) -> list[Path]:

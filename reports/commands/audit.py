@@ -9,7 +9,7 @@ import click
 
 from comparisons.processes.pool import Task
 from reports import jobs
-from reports.terminal.words import quiet_option, tell, tell_where, verbose_option
+from reports.terminal.words import tell, tell_where
 
 if TYPE_CHECKING:
     from comparisons.audit.checks import Audit, Kind
@@ -34,8 +34,7 @@ def _parameter(text: str) -> tuple[str, float | bool | str]:
               help="A parameter of the heuristic or the BSDF; may be repeated.")  # fmt: skip
 @jobs.output_option("out", "audit/NAME")
 @jobs.timeout_option
-@quiet_option
-@verbose_option
+@jobs.verbosity_options
 @jobs.json_option
 def audit(
     heuristic: str | None,

@@ -1,6 +1,5 @@
 """``fotismos check``: whether a change moved anything that was measured before."""
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,7 @@ from click.core import ParameterSource
 
 from heuristic.errors import InputError
 from reports import jobs
-from reports.terminal.words import echo, is_quiet, quiet_option, tell, verbose_option
+from reports.terminal.words import echo, is_quiet, tell
 
 
 @jobs.command()
@@ -38,13 +37,9 @@ from reports.terminal.words import echo, is_quiet, quiet_option, tell, verbose_o
 @jobs.json_option
 @jobs.ci_options
 @jobs.output_option("out", "check")
-@jobs.timeout_option
-@jobs.workers_option
-@jobs.scheduler_option
-@jobs.rendering_options
+@jobs.process_options
 @jobs.scene_options
-@quiet_option
-@verbose_option
+@jobs.verbosity_options
 @click.pass_context
 def check(
     context: click.Context,
@@ -82,7 +77,13 @@ def check(
         for name, value in rendering.items()
         if context.get_parameter_source(name) is not ParameterSource.DEFAULT
     }
-    _require_consistent(update, scenes, images, given)
+    wanting = [f"--{name.replace('_', '-')}" for name in given if name != "seed"]
+    wanting += ["--scene"] * bool(scenes) + ["--images"] * images
+    if wanting and not update:
+        raise InputError(
+            f"{', '.join(wanting)}: a check renders its baseline's scene and options. Add --update"
+            " to write another baseline."
+        )
     inputs = list(baseline.glob("*")) if baseline.is_dir() else [baseline]
     from reports.ci import summary as summaries  # loaded late: --help needs no metrics
 
@@ -126,16 +127,3 @@ def check(
     elif code:
         click.echo(summaries.outcome(found, significance))
     context.exit(code)
-
-
-def _require_consistent(
-    update: bool, scenes: tuple[str, ...], images: bool, given: Mapping[str, Any]
-) -> None:
-    """Reject options that need --update: a check renders what the baseline says."""
-    wanting = [f"--{name.replace('_', '-')}" for name in given if name != "seed"]
-    wanting += ["--scene"] * bool(scenes) + ["--images"] * images
-    if wanting and not update:
-        raise InputError(
-            f"{', '.join(wanting)}: a check renders its baseline's scene and options. Add --update"
-            " to write another baseline."
-        )

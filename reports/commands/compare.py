@@ -10,7 +10,7 @@ import click
 
 from reports import jobs
 from reports.run import batch
-from reports.terminal.words import quiet_option, tell, verbose_option
+from reports.terminal.words import tell
 
 if TYPE_CHECKING:
     from reports.page.scene_view import SceneView
@@ -21,16 +21,12 @@ if TYPE_CHECKING:
 @jobs.output_option("out")
 @jobs.figures_option
 @jobs.fresh_option
-@jobs.timeout_option
-@jobs.workers_option
-@jobs.scheduler_option
-@jobs.rendering_options
+@jobs.process_options
+@jobs.scene_options
 @jobs.option("image")
 @jobs.option("transfer")
-@quiet_option
-@verbose_option
+@jobs.verbosity_options
 @jobs.option("noise")
-@jobs.scene_options
 @click.option(
     "--why/--no-why",
     "with_causes",
@@ -102,7 +98,7 @@ def compare(
         from reports.ci import summary as ci  # loaded late: most comparisons need no CI
 
         nonlocal code
-        studied = [(view.record, view.cost.record if view.cost else None) for view in views]
+        studied = [view.studied for view in views]
         gates = ci.gates([record for record, _ in studied], max_visible, within)
         if gates:
             tell(ci.gate_lines(gates))

@@ -10,7 +10,7 @@ import click
 from comparisons.processes.pool import Task
 from heuristic.errors import InputError
 from reports import jobs
-from reports.terminal.words import quiet_option, tell, tell_where, verbose_option
+from reports.terminal.words import tell, tell_where
 
 if TYPE_CHECKING:
     from comparisons.cost.cost_record import Cost
@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 @jobs.scene_argument
 @jobs.output_option("out", "cost/SCENE")
 @jobs.timeout_option
-@jobs.rendering_options
 @jobs.scene_options
-@quiet_option
-@verbose_option
+@jobs.verbosity_options
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
 @click.option(
     "--at", type=jobs.resolution, metavar="WxH", help="Predict time and error at this size."

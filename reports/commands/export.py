@@ -6,17 +6,15 @@ from typing import Any
 from comparisons.options import Options
 from comparisons.processes.pool import Task
 from reports import jobs
-from reports.terminal.words import quiet_option, tell_where, verbose_option
+from reports.terminal.words import tell_where
 
 
 @jobs.command()
 @jobs.scene_argument
 @jobs.output_option("out", "export/SCENE")
 @jobs.timeout_option
-@jobs.rendering_options
 @jobs.scene_options
-@quiet_option
-@verbose_option
+@jobs.verbosity_options
 def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
     """Write a scene for another program to render, for `compare --image`.
 

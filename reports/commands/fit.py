@@ -10,7 +10,7 @@ import click
 
 from comparisons.processes.pool import Task
 from reports import jobs
-from reports.terminal.words import quiet_option, tell, tell_where, verbose_option
+from reports.terminal.words import tell, tell_where
 
 if TYPE_CHECKING:
     from comparisons.fit.fit_record import FitRecord
@@ -37,10 +37,8 @@ if TYPE_CHECKING:
 )
 @jobs.json_option
 @jobs.timeout_option
-@jobs.rendering_options
 @jobs.scene_options
-@quiet_option
-@verbose_option
+@jobs.verbosity_options
 def fit(
     scenes: tuple[str, ...],
     output: Path,

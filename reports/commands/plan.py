@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     " pixels exceed this ΔE2000.",
 )
 @jobs.timeout_option
-@jobs.rendering_options
 @jobs.scene_options
 @verbose_option
 def plan(
@@ -67,8 +66,7 @@ def plan(
             lines, code = cost_tables.choice_lines(found), int(found.chosen is None)
         elif verify:
             with progress.shown() as bar:
-                task = Task(scene, verified, (scene, request, None), bar.of(scene))
-                found = pool.do(task)
+                found = pool.do(Task(scene, verified, (scene, request, None), bar.of(scene)))
             lines = plan_lines.verification_lines([found])
         else:
             found = pool.do(Task(scene, planned, (scene, request)))
@@ -102,8 +100,7 @@ def verified(
     from comparisons.verification import LEVEL, verify
 
     case = open_case(name, request)
-    usual = LEVEL if level is None else level
-    return verify(case.source, case.options, progress, usual)
+    return verify(case.source, case.options, progress, LEVEL if level is None else level)
 
 
 def chosen(name: str, request: Options, within: float, progress: Any) -> Choice:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -14,7 +13,6 @@ from comparisons.processes.pool import Task, Turn
 from reports import jobs
 from reports.commands.plan import verified
 from reports.run import batch
-from reports.terminal.words import quiet_option, verbose_option
 
 if TYPE_CHECKING:
     from comparisons.hard_cases import HardCases
@@ -41,12 +39,9 @@ VERIFIED_QUICKLY = slice(3, None, 4)
 @jobs.output_option("out/report")
 @jobs.figures_option
 @jobs.fresh_option
-@jobs.timeout_option
-@jobs.workers_option
-@jobs.scheduler_option
+@jobs.process_options
 @jobs.rendering_options
-@quiet_option
-@verbose_option
+@jobs.verbosity_options
 @click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
 @jobs.open_option
 @jobs.within_option
@@ -98,13 +93,12 @@ def _verified(folder: Path, names: Sequence[str], request: Options, quick: bool)
         Task(name, timed, (folder, verified, name, small, level)) for name in reversed(names)
     ]
     cases = Task(HARD, timed, (folder, hard_cases))
-    shown = partial(_shown, names)
-    return batch.Further("verification and hard cases", [cases, *tasks], shown)
 
+    def content(found: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the page's content of the results of tasks."""
+        return {"verifications": [found[name] for name in names], "hard_cases": found[HARD]}
 
-def _shown(names: Sequence[str], found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the page's content of the results of tasks."""
-    return {"verifications": [found[name] for name in names], "hard_cases": found[HARD]}
+    return batch.Further("verification and hard cases", [cases, *tasks], content)
 
 
 def timed(folder: Path, function: Callable[..., Any], *arguments: Any) -> tuple[Any, float]:

@@ -6,17 +6,14 @@ from pathlib import Path
 import click
 
 from reports import jobs
-from reports.terminal.words import quiet_option, tell, verbose_option
+from reports.terminal.words import tell
 
 
 @jobs.command()
 @click.argument("file", type=click.Path(path_type=Path), metavar="FILE.toml")
 @jobs.output_option("out", "study/NAME")
-@jobs.workers_option
-@jobs.scheduler_option
-@jobs.timeout_option
-@quiet_option
-@verbose_option
+@jobs.process_options
+@jobs.verbosity_options
 def study(
     file: Path, output: Path, workers: int | None, scheduler: str | None, timeout: float
 ) -> None:

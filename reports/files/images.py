@@ -49,17 +49,17 @@ def tonemap(rgb: ArrayLike, exposure: float = 1.0) -> Image.Image:
     return Image.fromarray(np.round(255.0 * to_srgb(linear)).astype(np.uint8))
 
 
-def error_map(values: ArrayLike, vmax: float, colormap: str = ERROR_COLOURS) -> Image.Image:
+def error_map(values: ArrayLike, vmax: float) -> Image.Image:
     """A map (H, W) of values ≥ 0: 0 to `vmax` over the colour map, beyond it the last colour."""
-    return _coloured(np.asarray(values, np.float64) / vmax, colormap)
+    return _coloured(np.asarray(values, np.float64) / vmax, ERROR_COLOURS)
 
 
-def signed_map(values: ArrayLike, limit: float, colormap: str = SIGNED_COLOURS) -> Image.Image:
+def signed_map(values: ArrayLike, limit: float) -> Image.Image:
     """A signed map (H, W): −`limit` (blue) over 0 (near white) to `limit` (red)."""
-    return _coloured(0.5 + 0.5 * np.asarray(values, np.float64) / limit, colormap)
+    return _coloured(0.5 + 0.5 * np.asarray(values, np.float64) / limit, SIGNED_COLOURS)
 
 
-def mask_map(marked: ArrayLike, counted: ArrayLike | None = None) -> Image.Image:
+def mask_map(marked: ArrayLike, counted: ArrayLike) -> Image.Image:
     """A map (H, W) of marks, 1, 0.5 or 0: orange if marked, pale if undetermined, else grey.
 
     Pixels that are not counted are a darker grey.
@@ -67,8 +67,7 @@ def mask_map(marked: ArrayLike, counted: ArrayLike | None = None) -> Image.Image
     marked = np.asarray(marked, np.float64)
     index = np.where(marked == marks.MARKED, np.uint8(0), np.uint8(1))
     index[marked == marks.UNDETERMINED] = 3
-    if counted is not None:
-        index[~np.asarray(counted, bool)] = 2
+    index[~np.asarray(counted, bool)] = 2
     colours = [MARKED, UNMARKED, UNCOUNTED, UNDETERMINED]
     return _with_palette(index, np.array(colours, np.uint8))
 
@@ -185,7 +184,7 @@ BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
 HALF_MAX = 65_504.0
 
 
-def write_exr(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping[str, str]) -> None:
+def write_exr(path: Path, layers: Mapping[str, ArrayLike], header: Mapping[str, object]) -> None:
     """Write images by name to a file atomically, as one scanline part, ZIP-compressed.
 
     See :func:`channels`. The header is metadata, e.g. seed, samples and versions; BT.709's
@@ -193,7 +192,6 @@ def write_exr(path: str | Path, layers: Mapping[str, ArrayLike], header: Mapping
     """
     import OpenEXR
 
-    path = Path(path)
     attributes = {
         **{name: str(value) for name, value in header.items()},
         "type": OpenEXR.scanlineimage,

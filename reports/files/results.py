@@ -227,7 +227,7 @@ def assigned(folder: Path, subjects: Iterable[tuple[str, Path | None]]) -> list[
         path = file and os.path.relpath(file.resolve(), folder.resolve())
         subject = f"of: {path or f'built-in {name}'}"
         places = [place for place, of in known.items() if of == subject]
-        free = (place for place in _candidates(name) if _is_free(folder / place))
+        free = (place for place in _candidates(name) if not _subject_of(folder / place))
         place = next(one for one in chain(places, free) if one not in found)
         own(folder / place)
         if known.get(place) != subject:
@@ -248,10 +248,7 @@ def _candidates(name: str) -> Iterator[str]:
         yield f"{plain}-{number}"
 
 
-def _is_free(place: Path) -> bool:
-    """Return whether no subject is known to own a place; one of 0.2 has none in its mark."""
-    return not is_own(place) or not _subject_of(place).startswith("of: ")
-
-
 def _subject_of(place: Path) -> str:
-    return os.fsdecode((place / MARK).read_bytes()[: 2**16])
+    """Return the subject that a mark names; empty for none, as in a mark of 0.2."""
+    text = os.fsdecode((place / MARK).read_bytes()[: 2**16]) if is_own(place) else ""
+    return text if text.startswith("of: ") else ""

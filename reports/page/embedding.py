@@ -12,18 +12,15 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure import marks
 from comparisons.departure.metrics import LEADING, METRICS, drawn
 from reference.records import Record, plain
+from reports.files.images import HALF_MAX
 
 STEP = 4
 """Half floats are rounded to multiples of this code, by up to 0.2 %, which packs better."""
-
-LARGEST = 65504.0
-"""The largest half float; greater values are clipped in the page."""
 
 LEAST = 0.01
 """ΔE2000: smaller differences are printed as "< 0.01", and stored as half of it."""
@@ -48,7 +45,7 @@ class Embedded(Record):
 
     def manifest(self) -> dict[str, Any]:
         """Return the description needed to read `data`, as plain data."""
-        shown = plain(structs.replace(self, data=""))
+        shown = plain(self)
         del shown["data"]
         return shown
 
@@ -89,7 +86,7 @@ def packed(planes: Mapping[str, Codes], block: int = 1) -> Embedded:
 
 def encode(values: ArrayLike, step: int = STEP) -> Codes:
     """Return half floats as integers, rounded to multiples of ``step``; no zero is negative."""
-    codes = np.clip(values, -LARGEST, LARGEST).astype(np.float16).view(np.uint16)
+    codes = np.clip(values, -HALF_MAX, HALF_MAX).astype(np.float16).view(np.uint16)
     rounded = np.minimum((codes & 0x7FFF) + step // 2, 0x7BFF) & ~np.uint16(step - 1)
     return np.where(rounded > 0, rounded | (codes & 0x8000), 0).astype(np.uint16)
 

@@ -38,7 +38,6 @@ from reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
     from comparisons.comparison import Attribution
-    from comparisons.cost.cost_record import Cost
     from comparisons.hard_cases import HardCases
     from comparisons.verification import Verification
 
@@ -108,7 +107,7 @@ def render(
         scenes=scenes,
         failures=failed,
         usual=usual,
-        charted=[scene for scene in scenes if scene.charts][:CHARTED],
+        charted=[scene for scene in scenes if scene.chart][:CHARTED],
         limit=LIMIT,
         usual_title=TITLE,
         metrics=METRICS,
@@ -139,13 +138,6 @@ def details(
         verifications=verifications,
         hard_cases=hard_cases,
         run=run,
-        sections={
-            "verification": verifications,
-            "hard-cases": hard_cases,
-            "equations": True,
-            "stages": run,
-            "glossary": True,
-        },
     )
 
 
@@ -155,12 +147,8 @@ def _runs(text: Callable[[float], str]) -> Runs:
     return [(i, each) for i, each in enumerate(texts) if i == 0 or each != texts[i - 1]]
 
 
-def _cost(view: SceneView) -> Cost | None:
-    return view.cost.record if view.cost else None
-
-
 def _scene(view: SceneView, taken: set[str]) -> PageScene:
-    record, cost = view.record, _cost(view)
+    record, cost = view.studied
     visible = record.metrics[LEADING.name].visible
     return PageScene(
         **structs.asdict(view),

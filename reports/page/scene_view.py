@@ -94,8 +94,13 @@ class SceneView(Record):
     thumbnails: dict[str, bytes] = field(default_factory=dict)
     embedded: Embedded | None = None
     files: dict[str, str] = field(default_factory=dict)
-    charts: tuple[Figure, ...] = ()
+    chart: Figure | None = None
     cost: CostView | None = None
     terms: TermsView | None = None
     before: Before | None = None
     why: WhyView | None = None
+
+    @property
+    def studied(self) -> tuple[ComparisonRecord, Any]:
+        """The record, and that of its study of cost if there is one."""
+        return self.record, self.cost.record if self.cost else None

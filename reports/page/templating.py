@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -38,12 +38,7 @@ EARLY = """const framed = location.protocol === "about:" ? " framed" : "";
 document.documentElement.className = `js${framed}`;"""
 
 
-def style(parts: Iterable[str]) -> Markup:
-    """Return the stylesheet of some parts, in order."""
-    return Markup("".join(_source(f"styles/{part}.css") for part in parts))
-
-
-def scripts(parts: Iterable[str]) -> list[dict[str, Markup]]:
+def scripts(parts: Sequence[str]) -> list[dict[str, Markup]]:
     """Return a page's scripts: one that runs early, and its own of some parts.
 
     Each has its ``code``, and the ``source`` by which the page's policy allows it.
@@ -108,5 +103,6 @@ def ink(colour: str) -> str:
 
 def rendered(template: str, parts: Sequence[str] = (), **content: Any) -> str:
     """Return a page of a template, with the style of all and a script of some parts."""
-    content |= {"style": style(STYLES), "scripts": scripts(parts) if parts else []}
+    style = Markup("".join(_source(f"styles/{part}.css") for part in STYLES))
+    content |= {"style": style, "scripts": scripts(parts) if parts else []}
     return environment().get_template(template).render(**content)

@@ -26,7 +26,6 @@ LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789"))
 STEP, UNCOUNTED = 0.1, 255
 """ΔE2000 of a level of the maps, and the level of pixels that do not count; as in switches.js."""
 
-
 LARGEST_CODE = 65535
 """The largest code of the terms' planes."""
 

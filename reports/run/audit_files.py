@@ -13,7 +13,6 @@ from reference import records
 from reports.charts import vega
 from reports.charts.theme import FAINT, Spec
 from reports.files import results
-from reports.files.results import PAGE
 from reports.page.templating import rendered
 from reports.terminal import tables
 from reports.terminal.words import number
@@ -70,7 +69,7 @@ def write(place: Path, record: Audit) -> None:
     """Write ``audit.svg``, ``index.html`` and ``audit.json`` to a folder; the record comes last."""
     results.own(place)
     results.write(place / "audit.svg", vega.paper(lobes(record)))
-    results.write(place / PAGE, render(record))
+    results.write(place / results.PAGE, render(record))
     results.write(place / "audit.json", records.to_json(record))
 
 

@@ -168,9 +168,9 @@ def run(
             except KeyboardInterrupt:
                 pool.end()
                 if batch.done:
-                    _write(batch, job, is_interrupted=True)
+                    _write(batch, is_interrupted=True)
                 raise
-            _write(batch, job, content)
+            _write(batch, content)
             if finish is not None:
                 finish(folder, batch.ordered)
     if batch.errors:
@@ -193,15 +193,13 @@ def _compare(
     from reports.terminal import tables
 
     others: dict[str, Any] = {}
-    names = {task.name for task in further.tasks} if further else set()
     tasks = [
         Task(place, scene.compare, call, bar.of(name_of(call[0]), stages))
         for place, call in calls.items()
     ]
     bar.begin("scenes", len(tasks), SCENE)
     for task, outcome in pool.each([*tasks, *(further.tasks if further else ())]):
-        if task.name in names and task.progress is None:
-            assert further is not None
+        if further and task.progress is None:
             others[task.name], seconds = outcome.result()
             batch.stages[further.stage] += seconds
             bar.over(None, FURTHER)
@@ -223,15 +221,12 @@ def _compare(
             bar.over(task.progress)
         batch.grow_page()
         if further and batch.done == len(calls):
-            bar.begin(further.stage, len(names), FURTHER)
+            bar.begin(further.stage, len(further.tasks), FURTHER)
     return further.content(others) if further and batch.views else {}
 
 
 def _write(
-    batch: Batch,
-    job: Job,
-    content: Mapping[str, Any] | None = None,
-    is_interrupted: bool = False,
+    batch: Batch, content: Mapping[str, Any] | None = None, is_interrupted: bool = False
 ) -> None:
     """Write the page, record and tables of all scenes as far as possible, and print the results."""
     from reference.records import to_json
@@ -255,7 +250,7 @@ def _write(
     if errors:
         raise errors[0]
     if views:
-        tell(_summary(views, job.within))
+        tell(_summary(views, batch.within))
     tell_where(folder / results.PAGE)
 
 
@@ -266,7 +261,6 @@ def _summary(views: Sequence[SceneView], threshold: float) -> Iterable[str]:
 
     records = [view.record for view in views]
     yield from tables.summary(records, threshold)
-    studied = [(view.record, view.cost.record if view.cost else None) for view in views]
     yield from ("", verdict.headline(records, threshold))
     yield from filter(None, [verdict.most_missing(records, threshold)])
-    yield from verdict.advice(studied, threshold)
+    yield from verdict.advice([view.studied for view in views], threshold)

@@ -10,7 +10,6 @@ from reference import records
 from reports import glossary
 from reports.charts import theme, vega
 from reports.files import images, results
-from reports.files.results import PAGE
 from reports.page.scene_view import CostView
 from reports.page.templating import HELP, rendered
 from reports.terminal.cost_tables import busy, closure, together
@@ -52,19 +51,19 @@ def write(place: Path, study: Study) -> None:
         data={"terms": glossary.meanings()},
         cost=view(study),
         r=study.record,
-        charts=figures(study.record),
+        figure=figure(study.record),
     )
-    results.write(place / PAGE, page)
+    results.write(place / results.PAGE, page)
     for name, content in made.items():
         results.write(place / name, content)
 
 
-def figures(record: Cost) -> list[vega.Figure]:
+def figure(record: Cost) -> vega.Figure:
     """Return the chart of a study: error against time."""
     from reports.charts import cost_charts  # Altair takes half a second to import
 
     note = "; ".join([FAMILIES, *cost_charts.reading(record)]) + "."
-    return [vega.figure("Error against time", cost_charts.error_over_time(record), note)]
+    return vega.figure("Error against time", cost_charts.error_over_time(record), note)
 
 
 def _plain(name: str) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 
 from comparisons.departure.metrics import LEADING, drawn
 from comparisons.fit.fit import Fit
-from comparisons.fit.fit_record import FitRecord, FittedParameter, FormFit
+from comparisons.fit.fit_record import FitRecord, FormFit
 from reference.records import to_json
 from reports.files import images, results
 from reports.page.templating import rendered
@@ -78,8 +78,9 @@ def _references(fit: FormFit) -> Iterator[str]:
 
 def _departures(record: FitRecord) -> Iterator[Cells]:
     def row(name: str, form: FormFit, field: str, loss: float | str = "") -> Cells:
-        means = (three_decimals(getattr(form.departure[metric], field)) for metric in drawn())
-        return name, *means, loss if isinstance(loss, str) else f"{loss:.4g}"
+        means = [f"{getattr(form.departure[metric], field):.3f}" for metric in drawn()]
+        unsigned = (mean.replace("-0.000", "0.000") for mean in means)
+        return name, *unsigned, loss if isinstance(loss, str) else f"{loss:.4g}"
 
     yield "mean of", *(metric.label for metric in drawn().values()), "loss"
     nearest, first = record.nearest, record.fits[0]
@@ -104,15 +105,10 @@ def _parameters(fit: FormFit) -> Iterator[Cells]:
             owner,
             f"{parameter.name} {parameter.channel}".strip() + " (factor)" * parameter.is_factor,
             f"{parameter.paired:.4g}",
-            value_of(parameter),
+            "–" if parameter.fitted is None else f"{parameter.fitted:.4g}",
             f"{interval[0]:.4g} to {interval[1]:.4g}" if interval else "",
             note,
         )
-
-
-def value_of(parameter: FittedParameter) -> str:
-    """Return the fitted value, a dash if the image does not determine it."""
-    return "–" if parameter.fitted is None else f"{parameter.fitted:.4g}"
 
 
 def described(reference: Mapping[str, Any]) -> str:
@@ -126,8 +122,3 @@ def described(reference: Mapping[str, Any]) -> str:
     names = ("alpha", "int_ior", "diffuse_reflectance", "reflectance")
     words = [f"{name} {number(reference[name])}" for name in names if name in reference]
     return f"{reference['plugin']} {', '.join(words)}".strip()
-
-
-def three_decimals(value: float) -> str:
-    """Three decimals, without a sign if all are 0."""
-    return f"{value:.3f}".replace("-0.000", "0.000")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -58,37 +57,27 @@ def compare(
         spent = {"finished scenes": perf_counter() - begin}
         if view is not None:
             return view, spent
-        return _compared(case, folder, place, job, key, turn, progress)
+        import comparisons.compare  # loaded late: a finished scene needs none
 
+        begin, source, options = perf_counter(), case.source, case.options
+        comparison = comparisons.compare.compare(
+            source, options, progress, case.command(), job.with_causes
+        )
+        spent = _stages(comparison.record, perf_counter() - begin)
+        study, causes = None, comparison.causes
+        if case.word in job.ladders and causes:
+            from comparisons.cost.cost import quick  # loaded late: for a handful of scenes
 
-def _compared(
-    case: Case,
-    folder: Path,
-    place: str,
-    job: Job,
-    key: str | None,
-    turn: Turn,
-    progress: Progress,
-) -> tuple[SceneView, Seconds]:
-    from comparisons.compare import compare
+            begin, command = perf_counter(), case.command("cost")
+            study = quick(source, options, causes, progress, command, turn.alone())
+            spent["methods"] = perf_counter() - begin
+        begin = perf_counter()
+        if job.figures:  # first, since the record marks the scene as finished
+            from reports.charts import figures
 
-    begin = perf_counter()
-    comparison = compare(case.source, case.options, progress, case.command(), job.with_causes)
-    spent = _stages(comparison.record, perf_counter() - begin)
-    study = None
-    if case.word in job.ladders and comparison.causes:
-        from comparisons.cost.cost import quick  # loaded late: for a handful of scenes
-
-        begin, command = perf_counter(), case.command("cost")
-        study = quick(case.source, case.options, comparison.causes, progress, command, turn.alone())
-        spent["methods"] = perf_counter() - begin
-    begin = perf_counter()
-    if job.figures:  # first, since the record marks the scene as finished
-        from reports.charts import figures
-
-        figures.write_scene(folder / results.FIGURES, place, comparison)
-    view = write(folder, place, comparison, study, key)
-    return view, spent | {"files": perf_counter() - begin}
+            figures.write_scene(folder / results.FIGURES, place, comparison)
+        view = write(folder, place, comparison, study, key)
+        return view, spent | {"files": perf_counter() - begin}
 
 
 def _stages(record: ComparisonRecord, seconds: float) -> Seconds:
@@ -189,8 +178,7 @@ def write(
     results.own(place)
     earlier = _files(place)
     results.clear(place, (RECORD, VIEW))
-    layers = _layers(comparison.images)
-    view = view_of(comparison, layers)
+    view = view_of(comparison)
     made = {
         f"{each}.png": png
         for each, png in images.pictures(comparison.images, record.viewing.exposure).items()
@@ -199,15 +187,14 @@ def write(
     if study:
         from reports.run import cost_files
 
-        priced = cost_files.documents(study)
-        made |= priced
+        made |= cost_files.documents(study)
         linked = (*linked, "cost.json")
-        charts = tuple(cost_files.figures(study.record))
-        view = structs.replace(view, charts=charts, cost=cost_files.view(study))
+        chart = cost_files.figure(study.record)
+        view = structs.replace(view, chart=chart, cost=cost_files.view(study))
     view = structs.replace(view, files={file: f"{name}/{file}" for file in linked})
     for file, content in made.items():
         results.write(place / file, content)
-    images.write_exr(place / PICTURE, layers, _header(record))
+    images.write_exr(place / PICTURE, _layers(comparison.images), _header(record))
     made[RECORD] = atomic.encoded(to_json(record))
     digests = {file: _digest(content) for file, content in made.items()}
     digests[PICTURE] = _digest_of(place / PICTURE)
@@ -223,13 +210,13 @@ def remove(place: Path) -> None:
     results.clear(place, (RECORD, VIEW, *_files(place)))
 
 
-def view_of(comparison: Comparison, layers: Mapping[str, Any] | None = None) -> SceneView:
-    """Return a comparison's part of the page without links; ``layers`` are its images."""
+def view_of(comparison: Comparison) -> SceneView:
+    """Return a comparison's part of the page without links."""
     record, shown = comparison.record, comparison.images
     return SceneView(
         record=record,
         thumbnails=images.thumbnails(shown, record.viewing.exposure),
-        embedded=embedding.embed(images.channels(layers or _layers(shown)), shown.counted),
+        embedded=embedding.embed(images.channels(_layers(shown)), shown.counted),
         terms=_terms(comparison),
         why=_why(comparison),
     )
@@ -276,14 +263,13 @@ def _layers(shown: Images) -> dict[str, Any]:
     }
 
 
-def _header(record: ComparisonRecord) -> dict[str, str]:
-    header: dict[str, object] = {
+def _header(record: ComparisonRecord) -> dict[str, object]:
+    return {
         "scene": record.scene,
         "variant": record.variant,
         "seed": record.seed,
         "spp": record.plan.spp,
         "passes": record.plan.passes,
         "pairing": record.pairing.convention,
+        **{f"version {name}": version for name, version in record.versions.items()},
     }
-    header |= {f"version {name}": version for name, version in record.versions.items()}
-    return {key: str(value) for key, value in header.items()}

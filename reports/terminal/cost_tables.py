@@ -11,7 +11,6 @@ from reports.terminal.tables import printed
 from reports.terminal.words import number, parameter, seconds
 
 if TYPE_CHECKING:
-    from comparisons.comparison import MeanError
     from comparisons.cost.cost import Choice
     from comparisons.cost.cost_record import Cost, Point
     from reference.records import Estimated
@@ -155,15 +154,10 @@ def _points(points: Sequence[Point]) -> Rows:
             point.method,
             f"{point.spp}",
             *timed(point.seconds),
-            f"{point.error.mean:.3f} ± {half(point.error):.3f}",
-            f"{point.tolerance.mean:.2f} ± {half(point.tolerance):.2f}",
+            f"{point.error.mean:.3f} ± {point.error.high - point.error.mean:.3f}",
+            f"{point.tolerance.mean:.2f} ± {point.tolerance.high - point.tolerance.mean:.2f}",
             close if point.front else "",
         )
-
-
-def half(error: MeanError) -> float:
-    """Return half an interval."""
-    return error.high - error.mean
 
 
 def _off(record: Cost) -> Rows:
@@ -189,20 +183,16 @@ def _attribution(record: Cost) -> Rows:
     adds = f"adds at {sized(whole.resolution)}, {whole.spp} samples"
     yield "effect", "removed", "95 % interval", "alone", "last", adds, "95 % interval"
     for one in whole.effects:
+        time, interval = timed(one.adds_s)
         yield (
             one.effect,
             f"{one.removes.value:.3f}",
             f"{one.removes.low:.3f} to {one.removes.high:.3f}",
             f"{one.alone:.3f}",
             f"{one.last:.3f}",
-            added(one.adds_s),
-            timed(one.adds_s)[1],
+            "no measurable time" if one.adds_s.low <= 0 <= one.adds_s.high else time,
+            interval,
         )
-
-
-def added(time: Estimated) -> str:
-    """Return the time that an effect adds, in words."""
-    return "no measurable time" if time.low <= 0 <= time.high else timed(time)[0]
 
 
 def timed(time: Estimated) -> tuple[str, str]:

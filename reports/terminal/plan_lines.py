@@ -68,10 +68,25 @@ def _planned(decision: Decision) -> PlannedEffect:
 
 def plan_lines(plan: PlanReport) -> Iterator[str]:
     """Yield the lines of a plan: the table of effects, then the simulation."""
-    yield from printed(_effects(plan))
+    effects = [
+        (
+            effect.name,
+            "yes" if effect.called_for else "no",
+            effect.rule,
+            effect.evidence,
+            effect.cost,
+        )
+        for effect in plan.effects
+    ]
+    yield from printed([("effect", "called for", "rule", "evidence", "cost"), *effects])
     yield ""
     if plan.rules:
-        yield from printed(_rules(plan))
+        headings = "pruning rule", "applies", "premise not shown", "evidence"
+        rules = [
+            (rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence)
+            for rule in plan.rules
+        ]
+        yield from printed([headings, *rules])
         yield ""
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
     rays = "" if plan.shadows else ", no shadow rays"
@@ -88,29 +103,9 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
 
 def verification_lines(results: Sequence[Verification]) -> Iterator[str]:
     """Yield a table of verifications: differences, noise, and time at equal noise."""
-    yield from printed(_verifications(results))
-    yield "significant: pixels that differ by more than both sides' noise"
-    yield "kernel: largest difference from omitting terms from the kernel"
-    yield "faster: how many times sooner the plan reaches the same noise"
-
-
-def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
-    yield "effect", "called for", "rule", "evidence", "cost"
-    for effect in plan.effects:
-        called = "yes" if effect.called_for else "no"
-        yield effect.name, called, effect.rule, effect.evidence, effect.cost
-
-
-def _rules(plan: PlanReport) -> Iterator[Sequence[str]]:
-    yield "pruning rule", "applies", "premise not shown", "evidence"
-    for rule in plan.rules:
-        yield rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence
-
-
-def _verifications(results: Sequence[Verification]) -> Iterator[Sequence[str]]:
-    yield "scene", "planned", "significant", "of pixels", "kernel", "faster"
-    for result in results:
-        yield (
+    headings = "scene", "planned", "significant", "of pixels", "kernel", "faster"
+    rows = [
+        (
             result.scene,
             result.planned,
             f"{result.significant}",
@@ -118,3 +113,9 @@ def _verifications(results: Sequence[Verification]) -> Iterator[Sequence[str]]:
             f"{result.heuristic_largest:.1e}",
             f"{result.gain:.3g} x",
         )
+        for result in results
+    ]
+    yield from printed([headings, *rows])
+    yield "significant: pixels that differ by more than both sides' noise"
+    yield "kernel: largest difference from omitting terms from the kernel"
+    yield "faster: how many times sooner the plan reaches the same noise"

@@ -128,12 +128,7 @@ class Painter {
     return this.picture(half, String(ev), (place) => rgba([levels[r[place]], levels[g[place]], levels[b[place]]]));
   }
 
-  /** @param {MapOf} map @param {number} t */
-  map(map, t) {
-    return this.picture("map", `${map.name} ${t}`, this.colours(map, t));
-  }
-
-  /** @param {MapOf} map @param {number} t @returns {(place: number) => number} */
+  /** The pixel at each place of a map. @param {MapOf} map @param {number} t @returns {(place: number) => number} */
   colours({ name, kind, top }, t) {
     const flags = this.images.codes.flags;
     const [marked, unmarked, uncounted, undetermined] = page.mask.map(rgba);

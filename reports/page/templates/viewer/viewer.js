@@ -68,22 +68,15 @@ class Viewer {
   show(view) {
     const without = !this.scene.effects && view.map === "effects";
     this.view = without ? { ...view, map: DEFAULT_VIEW.map } : view;
-    this.element.dataset.mode = view.mode;
     for (const button of /** @type {NodeListOf<HTMLElement>} */ (this.element.querySelectorAll("button[data-mode]"))) {
       button.setAttribute("aria-pressed", String(button.dataset.mode === view.mode));
     }
     this.part("[data-action=select]").setAttribute("aria-pressed", String(this.selecting));
-    this.element.classList.toggle("selecting", this.selecting);
     const option = /** @type {HTMLOptionElement} */ (this.part("option[value=effects]"));
     option.hidden = option.disabled = !this.scene.effects;
     for (const field of this.fields()) field.value = String(this.view[/** @type {"map" | "ev"} */ (field.dataset.control)]);
     this.part("[data-control=ev] + output").textContent = `${view.ev > 0 ? "+" : ""}${view.ev}`.replace("-", "−");
     this.redraw();
-  }
-
-  /** The hybrid that is switched on. */
-  hybrid() {
-    return this.view.on ? this.switches?.find(this.view.on) : undefined;
   }
 
   /** @returns {MapOf} */
@@ -118,14 +111,15 @@ class Viewer {
   paint() {
     const { painter, scene, view } = this;
     if (!painter || !this.canvas.clientWidth) return;
-    const [hybrid, map, box] = [this.hybrid(), this.map(), this.box()];
+    const hybrid = view.on ? this.switches?.find(view.on) : undefined;
+    const map = this.map(), box = this.box();
     const textbook = { picture: painter.rendering("heuristic", view.ev), title: scene.judged.name };
     const second = hybrid
       ? { picture: hybrid.picture, title: `+ ${hybrid.name}`, smooth: true }
       : { picture: painter.rendering("reference", view.ev), title: "physical" };
     const third = hybrid
       ? { picture: hybrid.map(view.t, painter.top), title: "error left" }
-      : { picture: painter.map(map, view.t), title: map.kind === "difference" ? "error" : map.title };
+      : { picture: painter.picture("map", `${map.name} ${view.t}`, painter.colours(map, view.t)), title: map.kind === "difference" ? "error" : map.title };
     const contents = { side: [textbook, second, third], split: [textbook, second] }[view.mode] ?? [third];
     /** @type {[number[], string][]} */
     const outlines = scene.regions.slice(0, 1).map(({ x, y, width, height }) => [[x, y, width, height], OVERLAY.worst]);
