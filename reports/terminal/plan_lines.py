@@ -68,17 +68,7 @@ def _planned(decision: Decision) -> PlannedEffect:
 
 def plan_lines(plan: PlanReport) -> Iterator[str]:
     """Yield the lines of a plan: the table of effects, then the simulation."""
-    effects = [
-        (
-            effect.name,
-            "yes" if effect.called_for else "no",
-            effect.rule,
-            effect.evidence,
-            effect.cost,
-        )
-        for effect in plan.effects
-    ]
-    yield from printed([("effect", "called for", "rule", "evidence", "cost"), *effects])
+    yield from printed(_effects(plan))
     yield ""
     if plan.rules:
         headings = "pruning rule", "applies", "premise not shown", "evidence"
@@ -99,6 +89,13 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
     yield f"depth         {depth}"
     yield f"samples       {plan.spp} per pixel in {plan.passes} passes, {plan.sampler}"
     yield f"planning      {plan.planning_s * 1e3:.0f} ms"
+
+
+def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
+    yield "effect", "called for", "rule", "evidence", "cost"
+    for effect in plan.effects:
+        called = "yes" if effect.called_for else "no"
+        yield effect.name, called, effect.rule, effect.evidence, effect.cost
 
 
 def verification_lines(results: Sequence[Verification]) -> Iterator[str]:
