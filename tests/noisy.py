@@ -20,7 +20,7 @@ from reference.rendering.gbuffer import gbuffer
 from reference.rendering.renderer import pass_seed
 from reference.rendering.sums import Accumulator, DifferenceSums
 from reference.scene.source import Source
-from tests.parts import look_at
+from tests.parts import camera, look_at, moved, rgb_of
 
 SIZE = 40
 
@@ -142,20 +142,15 @@ def _on_a_floor(floor, ball, lamp_at, side, radiance):
     scene = {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 8},
-        "sensor": {
-            "type": "perspective",
-            "fov": 35.0,
-            "to_world": look_at((0, -7, 4)),
-            "film": {"type": "hdrfilm", "rfilter": {"type": "box"}},
-        },
+        "sensor": camera((0, -7, 4), fov=35.0),
         "floor": {
             "type": "rectangle",
-            "to_world": mi.ScalarTransform4f().translate((0, 0, -1)).scale(12),
+            "to_world": moved((0, 0, -1), 12),
             "bsdf": floor,
         },
         "lamp": {
             "type": "rectangle",
-            "to_world": look_at(lamp_at) @ mi.ScalarTransform4f().scale(side),
+            "to_world": look_at(lamp_at).scale(side),
             "emitter": {"type": "area", "radiance": radiance},
         },
         "ball": {"type": "sphere", "center": (0.3, 0, 0), "bsdf": ball},
@@ -172,7 +167,7 @@ def _caustic():
 def _glossy():
     """A glossy floor under a small lamp."""
     floor = {"type": "roughconductor", "alpha": 0.15, "material": "Al"}
-    ball = {"type": "diffuse", "reflectance": {"type": "rgb", "value": (0.6, 0.3, 0.2)}}
+    ball = {"type": "diffuse", "reflectance": rgb_of(0.6, 0.3, 0.2)}
     return _on_a_floor(floor, ball, (-3, 3, 5), 0.2, 400.0)
 
 

@@ -162,13 +162,6 @@ def test_a_file_with_tabulated_spectra_is_compared_spectrally(run, tmp_path):
         assert read(tmp_path / "out/scene/comparison.json")["variant"] == variant
 
 
-def test_a_whole_process_renders_and_is_silent_in_a_pipe(scene_file, tmp_path):
-    words = ("compare", scene_file, "-o", "out", "--spp", 2, "--no-why")
-    done = python("-m", "reports", *words, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert (tmp_path / "out/index.html").is_file()
-
-
 def in_shell(script, folder):
     """Run a bash script in which ``fotismos`` is the program; return what came of it."""
     program = f'fotismos() {{ exec {shlex.quote(sys.executable)} -P -m reports "$@"; }}\n'

@@ -84,26 +84,6 @@ def test_a_surface_seen_from_behind_agrees_with_mitsubas_direct(rgb, twosided):
         assert not checks.render(checks.with_film(scene, 32, 4), 4, 0).any()
 
 
-def several(form, normalised):
-    """Three materials on three shapes that stand in each other's light."""
-    scene = everything()
-    floor = mi.ScalarTransform4f().translate((0, 0, -1)).scale(6)
-    grey = {"type": "phong", "k_d": 0.5, "k_s": 0.2, "n": 2}
-    shiny = {"type": "phong", "k_s": 0.6, "n": 30, "form": form, "normalised": normalised}
-    scene["floor"] = {"type": "rectangle", "to_world": floor, "bsdf": grey}
-    scene["ball"] = {"type": "sphere", "center": (-1, -1, -0.6), "radius": 0.4, "bsdf": shiny}
-    scene["sphere"]["bsdf"] |= {"form": form, "normalised": normalised}
-    scene["integrator"] |= {"occlusion": True}
-    return scene
-
-
-@pytest.mark.parametrize("normalised", [False, True])
-@pytest.mark.parametrize("form", ["phong", "blinn"])
-def test_several_materials_agree_with_mitsubas_direct(rgb, form, normalised):
-    """With shadow rays in both: Mitsuba's integrators know no light without them."""
-    checks.check_against_direct(several(form, normalised))
-
-
 def test_the_figures_show_what_the_chapter_says(rgb):
     """Unit sphere, white lights of intensity 1 without attenuation, the viewer at its place."""
     scene = SCENES["fig-8-11-n9"].make()

@@ -96,11 +96,6 @@ def test_tonemap_is_the_srgb_curve():
     np.testing.assert_array_equal(pixels_of(images.tonemap(linear / 8, exposure=8)), expected)
 
 
-def test_png_keeps_every_pixel():
-    pixels = np.random.default_rng(0).integers(0, 256, (6, 8, 3), dtype=np.uint8)
-    np.testing.assert_array_equal(decode(images.png(Image.fromarray(pixels))), pixels)
-
-
 def test_error_map_spans_magma_and_stays_in_it():
     row = pixels_of(images.error_map([[0.0, 10.0, 20.0, 500.0, -1.0]], 20.0))[0]
     ends = "000004", "fcfdbf"

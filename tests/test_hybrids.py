@@ -23,6 +23,7 @@ from reference.scene.source import Source
 from tests.misplanned import BLACK, DIFFUSE
 from tests.misplanned import scene as described
 from tests.noisy import require_equal, whole
+from tests.parts import moved
 from tests.test_objects import shadowed
 
 MADE_OF = {
@@ -182,8 +183,7 @@ def test_light_without_shadows_passes_through_what_is_in_its_way(rgb):
     """A lamp behind a board: black with shadows, and without them what the lamp gives alone."""
 
     def board(factor, height=0, bsdf=BLACK, **more):
-        place = mi.ScalarTransform4f().translate((0, 0, height))
-        return {"type": "rectangle", "to_world": place.scale(factor), "bsdf": bsdf, **more}
+        return {"type": "rectangle", "to_world": moved((0, 0, height), factor), "bsdf": bsdf} | more
 
     # The camera stands under the board, which it does not see.
     lamp = board((0.5, 0.5, -0.5), 3, emitter={"type": "area", "radiance": 20.0})

@@ -13,6 +13,7 @@ from reference import Source
 from reference.pairing.halves import pair
 from reference.scene.source import collect_messages
 from tests import oracle
+from tests.parts import camera, mesh_of
 from tests.test_normals import rows
 
 FLAT, GOURAUD, PHONG = Interpolation.FLAT, Interpolation.GOURAUD, Interpolation.PHONG
@@ -22,22 +23,6 @@ INNER = np.random.default_rng(5).dirichlet((1, 1, 1), 20)
 
 
 # --- In Mitsuba -----------------------------------------------------------------------------------
-
-
-def triangle_mesh(points, normals=None, faces=((0, 1, 2),), **properties):
-    """A mesh of a few triangles, as a user would build it."""
-    props = mi.Properties()
-    for name, value in properties.items():
-        props[name] = value
-    mesh = mi.Mesh("few", len(points), len(faces), props, has_vertex_normals=normals is not None)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = mi.Float(np.ravel(points).astype(np.float32))
-    parameters["faces"] = mi.UInt32(np.ravel(faces).astype(np.uint32))
-    if normals is not None:
-        parameters["vertex_normals"] = mi.Float(np.ravel(normals).astype(np.float32))
-    parameters.update()
-    mesh.set_id("few")
-    return mesh
 
 
 def looking_down(xy, height=5.0):
@@ -68,7 +53,7 @@ def by_oracle(position, normal, viewer):
 
 
 def test_gouraud_is_stored_at_vertices_and_interpolated(rgb):
-    mesh = triangle_mesh(CORNERS, TILTED)
+    mesh = mesh_of(CORNERS, TILTED)
     shade_mesh(mesh, GOURAUD, (1, 1, 9), COLOURED, LIGHTS, 1.0)
     at_vertices = by_oracle(CORNERS, TILTED, (1, 1, 9))
     stored = np.array(mesh.attribute_buffer("vertex_heuristic")).reshape(-1, 3)
@@ -82,7 +67,7 @@ def test_a_highlight_inside_a_triangle_is_lost_by_gouraud_and_kept_by_phong(rgb)
     """Figure 6.14: light and viewer stand over the middle, and no vertex sees the highlight."""
     angles = 2 * np.pi * np.arange(3) / 3
     corners = np.stack([2 * np.cos(angles), 2 * np.sin(angles), 0 * angles], 1)
-    mesh = triangle_mesh(corners, [(0, 0, 1)] * 3)
+    mesh = mesh_of(corners, [(0, 0, 1)] * 3)
     above = (0, 0, 2.0)
     material, lights = Material(k_s=0.9, n=50), [PointLight(above, 1.0)]
     si = hits(mesh, looking_down(np.zeros((1, 2))))
@@ -186,7 +171,7 @@ ROOF_FACES = [(0, 2, 1), (0, 1, 3)]
 
 
 def test_a_mesh_without_vertex_normals_gets_those_of_6_34(rgb):
-    mesh = triangle_mesh(ROOF, faces=ROOF_FACES)
+    mesh = mesh_of(ROOF, faces=ROOF_FACES)
     expected = np.array([(0, 0, 1)] * 2 + [(1, 0, 2) / np.sqrt(5), (-1, 0, 2) / np.sqrt(5)])
     np.testing.assert_allclose(rows(shading_points(mesh, GOURAUD).n), expected, atol=1e-6)
     for weighting in WEIGHTINGS:
@@ -197,7 +182,7 @@ def test_a_mesh_without_vertex_normals_gets_those_of_6_34(rgb):
 
 
 def test_face_normals_need_faces_of_their_own_vertices(rgb):
-    mesh = triangle_mesh(ROOF, faces=ROOF_FACES, face_normals=True)
+    mesh = mesh_of(ROOF, faces=ROOF_FACES, face_normals=True)
     with pytest.raises(InputError, match="split_faces"):
         shading_points(mesh, GOURAUD)
     split = tessellation.split_faces(mesh)
@@ -208,7 +193,7 @@ def test_face_normals_need_faces_of_their_own_vertices(rgb):
 
 
 def test_opposing_faces_are_refused(rgb):
-    mesh = triangle_mesh(CORNERS, faces=[(0, 1, 2), (2, 1, 0)])
+    mesh = mesh_of(CORNERS, faces=[(0, 1, 2), (2, 1, 0)])
     with pytest.raises(InputError, match="'few': 3 vertices have no normal"):
         shading_points(mesh, GOURAUD)
     assert rows(shading_points(mesh, FLAT).n)[:, 2] == pytest.approx([0.9701425, -0.9701425])
@@ -216,7 +201,7 @@ def test_opposing_faces_are_refused(rgb):
 
 def test_degenerate_faces_and_lone_vertices_stay_black_and_finite(rgb):
     points = [*CORNERS, (8, 0, 0), (9, 9, 9)]
-    mesh = triangle_mesh(points, faces=[(0, 1, 2), (0, 1, 3), (1, 1, 1)])
+    mesh = mesh_of(points, faces=[(0, 1, 2), (0, 1, 3), (1, 1, 1)])
     for interpolation, name in {FLAT: "face_heuristic", GOURAUD: "vertex_heuristic"}.items():
         shade_mesh(mesh, interpolation, (1, 1, 9), COLOURED, LIGHTS)
         stored = np.array(mesh.attribute_buffer(name)).reshape(-1, 3)
@@ -236,12 +221,10 @@ def two_balls(twosided):
                            | {"flip_normals": x > 0})
         for name, x in {"outward": -1, "inward": 1}.items()
     }  # fmt: skip
-    film = {"type": "hdrfilm", "width": 16, "height": 16}
-    to_world = mi.ScalarTransform4f().look_at((1, -6, 2), (0, 0, 0), (0, 0, 1))
     return {
         "type": "scene",
         "integrator": {"type": "heuristic", "interpolation": "flat"},
-        "sensor": {"type": "perspective", "to_world": to_world, "film": film},
+        "sensor": camera((1, -6, 2), size=16),
         "lamp": {"type": "heuristic_point", "position": (3, -5, 4), "k0": 0.0, "k2": 0.1}
         | {"intensity": {"type": "uniform", "value": 3.0}},
         **balls,
@@ -295,10 +278,8 @@ SIDES = ((0, 1, 3), (0, 2, 1), (0, 3, 2), (1, 2, 3))
 
 def seen(**shapes):
     """A scene of diffuse shapes under a parallel light."""
-    film = {"type": "hdrfilm", "width": 16, "height": 16, "rfilter": {"type": "box"}}
-    to_world = mi.ScalarTransform4f().look_at((1, -6, 2), (0, 0, 0), (0, 0, 1))
     sun = {"type": "directional", "direction": (-1, 2, -1)}
-    sensor = {"type": "perspective", "to_world": to_world, "film": film}
+    sensor = camera((1, -6, 2), size=16)
     return Source("a test", {"type": "scene", "sensor": sensor, "sun": sun, **shapes})
 
 
@@ -309,7 +290,7 @@ def half(source, interpolation=PHONG, **others):
 def test_meshes_with_the_normals_of_faces_keep_them(rgb, tmp_path):
     """Under parallel light a diffuse face is even, however it is shaded."""
     path = tmp_path / "four.ply"
-    triangle_mesh(TETRAHEDRON, faces=SIDES).write_ply(str(path))
+    mesh_of(TETRAHEDRON, faces=SIDES).write_ply(str(path))
     shape = {"type": "ply", "filename": str(path), "face_normals": True}
     pictures = {
         name: np.array(mi.render(half(seen(it=shape), **how), spp=4))

@@ -43,14 +43,6 @@ def test_a_plane_has_its_coefficients_as_normal(vector_type):
     )
 
 
-@EVERY_TYPE
-def test_a_triangle_faces_those_who_see_it_anticlockwise(vector_type):
-    p0, p1, p2 = vector_type(1, 1, 5), vector_type(3, 1, 5), vector_type(1, 2, 5)
-    require_units(normals.triangle_normal(p0, p1, p2), (0, 0, 1), 0)
-    require_units(normals.triangle_normal(p1, p2, p0), (0, 0, 1), 0)
-    require_units(normals.triangle_normal(p0, p2, p1), (0, 0, -1), 0)
-
-
 whole = st.integers(-1000, 1000)
 vectors = st.tuples(whole, whole, whole)
 
@@ -183,7 +175,7 @@ def test_faces_without_area_count_nothing(weighting):
 def test_opposing_faces_leave_no_normal(vector_type, weighting, thickness):
     """Both sides of a sheet, the back beginning with another vertex, down to a thin sliver."""
     rng = np.random.default_rng(3)
-    corners = rng.normal(size=(3, 3)) @ np.diag([1, 1, 1])
+    corners = rng.normal(size=(3, 3))
     corners[2] = corners[0] + 0.4 * (corners[1] - corners[0]) + thickness * corners[2]
     found = vertex_normals(vector_type(corners.T), Array3u([0, 1], [1, 0], [2, 2]), weighting)
     require_units(found, np.zeros((3, 3)), 0)

@@ -159,15 +159,3 @@ def test_the_spot_of_an_area_light_is_right_in_the_far_field(rgb):
     errors = np.array(errors)
     assert errors[0] > 0.01, "near by, the two should differ visibly"
     np.testing.assert_allclose(errors[:-1] / errors[1:], 4, rtol=0.25)
-
-
-def test_white_diffuse_light_of_unit_intensity_has_the_value_1(rgb):
-    """The bridge between the units: irradiance pi on a white surface is radiance 1."""
-    description = scene(
-        plane() | {"bsdf": {"type": "diffuse", "reflectance": 1.0}},
-        {"type": "directional", "direction": (0, 0, -1), "irradiance": float(np.pi)},
-        viewer=(0, -0.5, 1),
-        fov=20.0,
-    )
-    for colour, _, _ in both_halves(description):
-        np.testing.assert_allclose(colour, 1, rtol=1e-5)

@@ -1,4 +1,4 @@
-"""Rendering in passes: sums, common camera rays, direct light, honest standard errors."""
+"""Rendering in passes: sums, common camera rays, and light."""
 
 import drjit as dr
 import mitsuba as mi
@@ -7,8 +7,6 @@ import pytest
 from scipy import stats
 
 from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from comparisons.prepared import prepare
 from heuristic.errors import NonFiniteError
 from reference.pairing import halves
 from reference.rendering import renderer, sums
@@ -86,27 +84,6 @@ def test_no_two_runs_have_a_pass_in_common():
     assert len(set(seeds)) == len(seeds) == 50 * 64 * len(streams)
 
 
-def test_means_vary_as_those_of_independent_passes_must(rgb):
-    """Over 120 neighbouring seeds of a run, with 4 samples per pass.
-
-    The variance of the means of 4 passes is that of passes within a run, over 4, to 2 % or so.
-    Seeds that are added up, so that neighbouring runs share passes, give 0.89 times that.
-    """
-    options = Options(resolution=(16, 16), spp=64)
-    renderer = prepare(SCENES["cornell-box"].source(), options).reference
-    renderer.spp = 4
-    images = np.array(
-        [[renderer.render(pass_seed(seed, number)) for number in range(4)] for seed in range(120)],
-        float,
-    )
-    # A few bright pixels would outweigh all others.
-    images = images.reshape(120, 4, -1) / images.mean(axis=(0, 1)).ravel().clip(1e-3)
-    of_means = images.mean(axis=1).var(axis=0, ddof=1)
-    within = images.var(axis=1, ddof=1).mean(axis=0) / 4
-    assert np.median(of_means / within) == pytest.approx(1.0, abs=0.06)
-    assert of_means.mean() / within.mean() == pytest.approx(1.0, abs=0.1)
-
-
 def check_same_means(made, ours, theirs, passes):
     """Compare two integrators: in no pixel do the means differ by more than the noise.
 
@@ -146,28 +123,6 @@ def test_indirect_light_is_that_of_mitsubas_path(rgb, max_depth):
     made = mi.load_dict(scene(12, one=POINT, two=SECOND, lamp=lamp(), sky=CONSTANT))
     integrators = ({"type": kind, "max_depth": max_depth} for kind in ("direct_all", "path"))
     check_same_means(made, *integrators, passes=32)
-
-
-def coverage(repetitions, passes=8):
-    """Return the share of pixels in which a 95 % interval of Student's t holds the truth."""
-    made = mi.load_dict(scene(lamp=lamp(), sky=CONSTANT))
-    integrator = mi.load_dict({"type": "direct_all"})
-    truth = estimate(made, integrator, 256, 64, 10_000)
-    shares = []
-    t = stats.t.ppf(0.975, passes - 1)
-    for repetition in range(repetitions):
-        found = estimate(made, integrator, 4, passes, 100 * repetition)
-        noisy = found.standard_error > 1e-6
-        off = np.abs(found.mean - truth.mean)
-        # The truth is an estimate too, of 512 times the samples.
-        shares.append(np.mean((off <= t * found.standard_error)[noisy]))
-    return np.mean(shares)
-
-
-@pytest.mark.thorough
-def test_standard_errors_are_honest(rgb):
-    """95 % intervals hold the truth in 90 to 98 % of pixels, over 30 seeds."""
-    assert 0.90 < coverage(30) < 0.98
 
 
 def broken_integrator(value, row, column):

@@ -15,6 +15,7 @@ from reference.pairing import albedo, factors
 from reference.pairing.albedo import RoughPlastic
 from reports.charts import study_charts
 from tests.programs import ROOT
+from tests.witnesses.fresnel import dielectric
 
 # --- Designs --------------------------------------------------------------------------------------
 
@@ -106,14 +107,6 @@ def rows(*words):
     return found
 
 
-def fresnel(cosine, ior):
-    """Unpolarised reflectance of a dielectric, from Snell's law."""
-    refracted = np.sqrt(1 - (1 - cosine**2) / ior**2)
-    s = (cosine - ior * refracted) / (cosine + ior * refracted)
-    p = (refracted - ior * cosine) / (refracted + ior * cosine)
-    return (s**2 + p**2) / 2
-
-
 def torrance_sparrow(light, view, alpha, ior):
     """Specular radiance in the plane of incidence, display-linear: pi f cos(light).
 
@@ -128,7 +121,7 @@ def torrance_sparrow(light, view, alpha, ior):
     light, view = np.deg2rad(light), np.deg2rad(view)
     half = (light - view) / 2
     slopes = np.exp(-((np.tan(half) / alpha) ** 2)) / (np.pi * alpha**2 * np.cos(half) ** 4)
-    reflectance = fresnel(np.cos((light + view) / 2), ior)
+    reflectance = dielectric(np.cos((light + view) / 2), ior)
     return np.pi * reflectance * slopes * shadowing(light) * shadowing(view) / (4 * np.cos(view))
 
 
@@ -165,7 +158,7 @@ def test_the_reference_rises_towards_grazing_and_peaks_off_the_mirror_direction(
         expected = torrance_sparrow(angle, angle, 0.1, 1.5)
         assert row["specular_reference"] == pytest.approx(expected, rel=0.01)
     first, _, last = (row["specular_reference"] for row in found)
-    assert last / first > fresnel(np.cos(np.deg2rad(80)), 1.5) / fresnel(1.0, 1.5) > 9
+    assert last / first > dielectric(np.cos(np.deg2rad(80)), 1.5) / dielectric(1.0, 1.5) > 9
     views = np.arange(0, 89.9, 0.02)
     for row in rows("alpha = [0.2, 0.4]\nlight_angle = [40, 50]"):
         angle = row["light_angle"]

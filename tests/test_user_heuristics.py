@@ -16,7 +16,7 @@ from heuristic.heuristics import HEURISTICS, Heuristic, Parameter, known_as, nam
 from reference.pairing import halves
 from reference.scene.source import Source
 from tests import checks, oracle
-from tests.parts import camera, rgb_of, shown_by
+from tests.parts import camera, moved, rgb_of, shown_by
 
 SHADERS = Path(__file__).parents[1] / "docs/shaders"
 SMALL = {"resolution": (24, 24), "spp": 8}
@@ -250,12 +250,11 @@ def test_a_mistake_is_named_with_file_and_line(rgb, written):
 
 
 def test_values_that_only_a_scene_shows_name_pixel_and_file(rgb, written):
-    up = mi.ScalarTransform4f()
     scene = {
         "type": "scene",
-        "floor": {"type": "rectangle", "to_world": up.scale(40), "bsdf": {"type": "diffuse"}},
+        "floor": {"type": "rectangle", "to_world": moved(0, 40), "bsdf": {"type": "diffuse"}},
         "light": {"type": "constant"},
-        "sensor": {"type": "perspective", "to_world": up.look_at([0, 0, 30], [0, 0, 0], [0, 1, 0])},
+        "sensor": camera((0, 0, 30), up=(0, 1, 0)),
     }
     for value, kind in (("-1", "negative"), ("dr.nan", "NaN or infinite")):
         name = written(

@@ -45,7 +45,7 @@ def run(rounds):
     for _ in range(rounds):
         for name, contender in found.items():
             contender()
-            seconds[name] += [contender()[0] for _ in range(TIMED_A_TURN)]
+            seconds[name] += [_timed(contender) for _ in range(TIMED_A_TURN)]
     times = {name: 1e3 * median(values) for name, values in seconds.items()}
     copy = min(times[name] for name in times if name.startswith("memory copy"))
     ratios = {name: times[name] / times["Dr.Jit"] for name in times} | {
@@ -70,7 +70,7 @@ def g_buffer():
 
 
 def contenders(points):
-    """Return the contenders by name; each returns its time and its result."""
+    """Return the contenders by name; each returns its result."""
     lights, colours = np.array(POSITIONS, np.float32), np.array(COLOURS, np.float32)
     out = np.empty_like(points[0])
     # Half of the twelve floats a point read and half of them written.
@@ -85,23 +85,23 @@ def contenders(points):
             loop(*points, lights, colours, out)
             return out
 
-        return _timed(call)
+        return call
 
     return {
         "Dr.Jit": lambda: _evaluated(shade(*arrays, material, lamps, 1.0)),
-        "NumPy": _timed(lambda: in_numpy(*points)),
+        "NumPy": lambda: in_numpy(*points),
         "Numba": by(in_numba),
         "Numba, three lights": by(in_numba_unrolled),
         "memory copy, Dr.Jit": lambda: _evaluated(sum(arrays)),
-        "memory copy, NumPy": _timed(lambda: np.copyto(target, source)),
+        "memory copy, NumPy": lambda: np.copyto(target, source),
     }
 
 
 def require_agreement(found):
     """Compile everything, and ensure that all compute the same."""
-    expected = found["Numba"]()[1].copy()
+    expected = found["Numba"]().copy()
     for name, contender in found.items():
-        result = contender()[1]
+        result = contender()
         if "copy" not in name:
             worst = float(np.abs(np.array(result) - expected).max())
             assert worst < AGREEMENT, f"{name} differs from Numba by up to {worst:.2g}"
@@ -119,9 +119,7 @@ def many_lights(points, rounds):
 
     def seconds(count, n=N):
         material = Material(k_a=K_A, k_d=(0.5, 0.4, 0.3), k_s=K_S, n=n)
-        begin = perf_counter()
-        _evaluated(shade(*arrays, material, all_lights[:count], 1.0))
-        return perf_counter() - begin
+        return _timed(lambda: _evaluated(shade(*arrays, material, all_lights[:count], 1.0)))
 
     rows = []
     for count in COUNTS:
@@ -140,19 +138,15 @@ def many_lights(points, rounds):
 
 
 def _evaluated(value):
-    begin = perf_counter()
     dr.eval(value)
     dr.sync_thread()
-    return perf_counter() - begin, value
+    return value
 
 
 def _timed(function):
-    def contender():
-        begin = perf_counter()
-        result = function()
-        return perf_counter() - begin, result
-
-    return contender
+    begin = perf_counter()
+    function()
+    return perf_counter() - begin
 
 
 def _print(title, rows):
