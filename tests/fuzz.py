@@ -120,10 +120,7 @@ def check_attenuation(rows, seed, clamped=False):
     """``I_0 f_att``, within ten rounding steps, for every distance, intensity and coefficient."""
     draw = Source(rows, seed)
     distance, intensity = abs(draw.anything()), abs(draw.anything())
-    k = []
-    for _ in range(3):
-        kind = draw.bits() & 3
-        k.append(dr.select(kind == 0, 0, draw.magnitude(1e-6, 1e6)))
+    k = [dr.select((draw.bits() & 3) == 0, 0, draw.magnitude(1e-6, 1e6)) for _ in range(3)]
     dr.eval(distance, intensity, k)
     law = terms.clamped_attenuation if clamped else terms.attenuation
     found = law(distance, *k, intensity)
@@ -178,16 +175,11 @@ def check_shade(rows, seed):
     view = dr.select(dr.all(dr.isfinite(view)), view, 0)
     intensity = dr.select((draw.bits() & 1) == 0, draw.magnitude(1e-30, 1e30), draw.uniform())
     n = dr.select((draw.bits() & 7) == 0, 0, draw.magnitude(1e-3, 1e6))
-    attenuation = tuple(
-        dr.select((draw.bits() & 1) == 0, 0, draw.magnitude(1e-3, 1e3)) for _ in range(3)
-    )
-    attenuation = (
-        dr.select(attenuation[0] + attenuation[1] + attenuation[2] > 0, attenuation[0], 1),
-        *attenuation[1:],
-    )
+    k0, k1, k2 = (dr.select((draw.bits() & 1) == 0, 0, draw.magnitude(1e-3, 1e3)) for _ in range(3))
+    k0 = dr.select(k0 + k1 + k2 > 0, k0, 1)
     inputs = {
         "position": position, "normal": normal, "view": view, "light": light, "n": n,
-        "I": intensity, "k0": attenuation[0], "k1": attenuation[1], "k2": attenuation[2],
+        "I": intensity, "k0": k0, "k1": k1, "k2": k2,
     }  # fmt: skip
     dr.eval(inputs)
     found = _shaded(Array3f, Float, inputs)

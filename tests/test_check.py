@@ -13,6 +13,7 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from heuristic.errors import InputError
 from reference.scene.source import Source
+from tests.parts import look_at
 
 SMALL = Options(resolution=(64, 64))
 
@@ -24,8 +25,7 @@ def spheres(alpha=1, distance=1):
         bsdf = scene[name]["bsdf"]
         scene[name]["bsdf"] = bsdf | {"alpha": alpha * bsdf["alpha"]}
     place = [distance * x for x in (-3, -4, 7)]
-    look = mi.ScalarTransform4f().look_at(place, (0, 0, 0), (0, 0, 1))
-    scene["lamp"]["to_world"] = look.scale(0.5)
+    scene["lamp"]["to_world"] = look_at(place).scale(0.5)
     return scene
 
 

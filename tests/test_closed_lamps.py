@@ -11,15 +11,15 @@ from tests.parts import camera, moved
 
 WHITE = {"type": "diffuse", "reflectance": 0.6}
 LAMPS = {
-    "ball": lambda to_world: {"type": "sphere", "to_world": to_world},
-    "box": lambda to_world: {"type": "cube", "to_world": to_world},
-    "tube": lambda to_world: {"type": "cylinder", "p0": (0, 0, -1), "to_world": to_world},
+    "ball": {"type": "sphere"},
+    "box": {"type": "cube"},
+    "tube": {"type": "cylinder", "p0": (0, 0, -1)},
 }
 
 
 def room(kind):
     """A floor, a small ball on it, and a lamp above that is closed or nearly."""
-    lamp = LAMPS[kind](moved((1.5, 0, 3), 0.4))
+    lamp = LAMPS[kind] | {"to_world": moved((1.5, 0, 3), 0.4)}
     return {
         "type": "scene",
         "sensor": camera((0, -6, 4), size=(48, 36)),

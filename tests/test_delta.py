@@ -12,6 +12,7 @@ from scipy import stats
 from reference.rendering.renderer import Renderer, Stream, pass_seed
 from reference.rendering.sums import Accumulator
 from tests.misplanned import scene as described
+from tests.parts import moved
 
 SIDE, SPP, PASSES = 24, 256, 8
 
@@ -39,8 +40,7 @@ CASES = [
 
 def _scene(ball, light):
     """A ball in a room: closed about a lamp or a point, and a floor alone under the sky."""
-    at = mi.ScalarTransform4f()
-    down = at.translate((0, 0, 1.9)).rotate((1, 0, 0), 180).scale(0.5)
+    down = moved((0, 0, 1.9)).rotate((1, 0, 0), 180).scale(0.5)
     lights = {
         "area": {
             "type": "rectangle", "to_world": down, "emitter": {"type": "area", "radiance": 8.0},
@@ -48,8 +48,8 @@ def _scene(ball, light):
         "constant": {"type": "constant", "radiance": 1.0},
         "point": {"type": "point", "position": (0.3, -0.4, 1.5), "intensity": 6.0},
     }  # fmt: skip
-    room = {"type": "cube", "flip_normals": True, "to_world": at.scale(2)}
-    floor = {"type": "rectangle", "to_world": at.translate((0, 0, -2)).scale(2)}
+    room = {"type": "cube", "flip_normals": True, "to_world": moved(0, 2)}
+    floor = {"type": "rectangle", "to_world": moved((0, 0, -2), 2)}
     return described(
         (1.5, -1.7, 0.6),
         lens={"fov": 70.0, "sampler": {"type": "independent"}},

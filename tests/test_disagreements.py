@@ -12,6 +12,7 @@ from reference.planning.rules import LIGHT_BY_LIGHT
 from reference.rendering.renderer import pass_seed
 from reference.scene.source import Source
 from tests.misplanned import BLACK, DIFFUSE, lamp, octahedron, scene
+from tests.parts import look_at, moved
 
 PASSES = 8
 
@@ -33,9 +34,10 @@ def stock(description, spp=256):
     return estimate(lambda seed: mi.render(made, spp=spp, seed=seed))
 
 
-def planned(description, spp=256):
+def planned(description, spp=256, everything=False):
     """The plan of a scene, and the mean of its reference."""
-    made = prepare(Source("a test", description), Options(spp=spp * PASSES))
+    options = Options(spp=spp * PASSES, everything=everything)
+    made = prepare(Source("a test", description), options)
     made.reference.spp = spp
     return made, estimate(made.reference.render)
 
@@ -50,14 +52,13 @@ def agree(one, other):
 
 def lit_by_meshes(folder, face_normals):
     """Two octahedra that shine on a floor."""
-    turned = mi.ScalarTransform4f()
-    found = {"floor": {"type": "rectangle", "bsdf": DIFFUSE, "to_world": turned.scale(4)}}
+    found = {"floor": {"type": "rectangle", "bsdf": DIFFUSE, "to_world": moved(0, 4)}}
     for number, x in enumerate((-1.2, 1.2)):
         found[f"lamp{number}"] = {
             "type": "ply",
             "filename": str(octahedron(folder / "lamp.ply")),
             "face_normals": face_normals,
-            "to_world": turned.translate((x, 0, 0.7)).rotate((1, 1, 0), 25).scale((0.3, 0.7, 0.2)),
+            "to_world": moved((x, 0, 0.7)).rotate((1, 1, 0), 25).scale((0.3, 0.7, 0.2)),
             "emitter": {"type": "area", "radiance": 4.0},
             "bsdf": BLACK,
         }
@@ -87,19 +88,18 @@ def test_the_light_of_a_mesh_with_smooth_normals_is_stock_mitsubas(rgb, tmp_path
 
 def behind_a_lamp(shape, integrator, near_clip=None):
     """A shape behind a large lamp, which is hidden, or behind the near clip plane."""
-    towards_it = mi.ScalarTransform4f().look_at((0, -2, 0), (0, 0, 0), (0, 0, 1))
     return scene(
         integrator={"type": integrator, "hide_emitters": near_clip is None},
         camera={"near_clip": near_clip} if near_clip else {},
         body={"bsdf": DIFFUSE, **shape},
-        lamp=shining(towards_it.scale(1.5)),
+        lamp=shining(look_at((0, -2, 0)).scale(1.5)),
     )
 
 
 @pytest.mark.guarantee("plans", "What the camera sees through a hidden lamp is lit right.")
 @pytest.mark.parametrize("plugin", ["disk", "sphere", "cylinder", "rectangle"])
 def test_a_shape_seen_through_a_hidden_lamp_is_as_bright_as_without_looking_through(rgb, plugin):
-    to_world = mi.ScalarTransform4f().look_at((0, 0, 0), (0, -4, 0), (0, 0, 1))
+    to_world = look_at((0, 0, 0), (0, -4, 0))
     shape = {"type": plugin, "to_world": to_world} if plugin in ("disk", "rectangle") else {}
     shape = shape or {"type": plugin}
     truth = stock(behind_a_lamp(shape, "path", near_clip=2.5))
@@ -108,14 +108,8 @@ def test_a_shape_seen_through_a_hidden_lamp_is_as_bright_as_without_looking_thro
         made, found = planned(described)
         if integrator != "direct" or plugin != "cylinder":  # its inside is lit by itself
             assert agree(found, truth), (integrator, made.plan.integrator, found, truth)
-        whole = planned_whole(described)
+        _, whole = planned(described, everything=True)
         assert agree(whole, found), (integrator, whole, found)
-
-
-def planned_whole(description, spp=256):
-    made = prepare(Source("a test", description), Options(spp=spp * PASSES, everything=True))
-    made.reference.spp = spp
-    return estimate(made.reference.render)
 
 
 # --- Settings of the scene's own integrator --------------------------------------------------
@@ -123,9 +117,8 @@ def planned_whole(description, spp=256):
 
 def mirrored(integrator, sampling_weight=1.0):
     """A mirror that shows a lamp, on a floor."""
-    at = mi.ScalarTransform4f()
-    mirror, below = at.look_at((0, 1, 0), (0, -4, 0), (0, 0, 1)), at.translate((0, 0, -1)).scale(4)
-    above = at.look_at((0, -2, 1.5), (0, 1, 0), (0, 1, 0)).scale(0.7)
+    mirror, below = look_at((0, 1, 0), (0, -4, 0)), moved((0, 0, -1), 4)
+    above = look_at((0, -2, 1.5), (0, 1, 0), (0, 1, 0)).scale(0.7)
     return scene(
         integrator=integrator,
         mirror={"type": "rectangle", "to_world": mirror, "bsdf": {"type": "conductor"}},

@@ -3,6 +3,7 @@
 import mitsuba as mi
 
 from reference.rendering.gbuffer import gbuffer
+from tests.parts import look_at
 
 HALVES = """
 <scene version="3.0.0">
@@ -34,7 +35,7 @@ def test_equal_names_are_told_apart(rgb):
     shapes = {name: {"type": "sphere", "radius": 0.4, "bsdf": bsdf | {"reflectance": grey},
                      "center": (x, 0, 0)}
               for name, x, grey in (("one", -0.5, 0.2), ("two", 0.5, 0.3))}  # fmt: skip
-    to_world = mi.ScalarTransform4f().look_at((0, 0, 4), (0, 0, 0), (0, 1, 0))
+    to_world = look_at((0, 0, 4), up=(0, 1, 0))
     scene = mi.load_dict(
         {"type": "scene", "sensor": {"type": "orthographic", "to_world": to_world}, **shapes},
         optimize=False,

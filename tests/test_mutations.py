@@ -94,9 +94,3 @@ def test_a_figure_of_the_chapter_finds_a_wrong_kernel(rgb, monkeypatch, wrong):
     """With viewer and light on one side and ``f_att = 1``, the figures cannot show the others."""
     monkeypatch.setattr(kernel, "shade", wrong)
     require_found_out(checks.check_figure, SCENES["fig-8-11-n9"].make())
-
-
-def test_the_checks_pass_on_the_kernel_as_it_is(rgb):
-    checks.check_kernel(drjit.llvm.ad.Array3f, 1e-5)
-    checks.check_figure(everything())
-    checks.check_against_direct(everything())

@@ -68,21 +68,6 @@ def test_the_cone_holds_its_edge_and_nothing_beyond(float_type):
     np.testing.assert_array_equal(inside, [1, 1, 1, 0, 0, 0])
 
 
-@FLOATS
-@pytest.mark.parametrize("n", [1e3, 1e5, 1e6, 1e7])
-def test_the_complement_carries_what_the_cosine_rounds_away(float_type, n):
-    """Angles of a highlight, whose cosines all round to 1 in the end."""
-    angle = np.linspace(0, np.sqrt(2 * np.log(1e3) / n), 200)
-    complement = 2 * np.sin(angle / 2) ** 2
-    cosine = numerics.Cosine(float_type(1 - complement), float_type(complement))
-    found = np.array(terms.power(cosine, dr.opaque(float_type, n)), float)
-    expected = np.exp(n * np.log1p(-complement))
-    np.testing.assert_allclose(found, expected, rtol=5e-6 if float_type is Single else 1e-12)
-    rounded = np.float32(1 - complement).astype(float) ** n
-    if n >= 1e5:
-        assert np.abs(rounded / expected - 1).max() > 1e-3, "without it the highlight is wrong"
-
-
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.floats(-(2.0**90), 2.0**90, width=32), min_size=1, max_size=60))
 def test_sums_lose_next_to_nothing(values):

@@ -84,7 +84,7 @@ def test_a_diffuse_sphere_in_a_constant_environment(rgb):
     """``rho L``: exactly for the heuristic, within its noise for the reference."""
     radiance = 1.5
     description = scene(sphere(), {"type": "constant", "radiance": radiance})
-    heuristic, reference = both_halves(description, spp=64)
+    heuristic, _ = both_halves(description, spp=64)
     normal = heuristic[2]
     inside = np.linalg.norm(normal, axis=1) > 0.999  # of 64 samples none missed the sphere
     np.testing.assert_allclose(
@@ -99,7 +99,6 @@ def test_a_diffuse_sphere_in_a_constant_environment(rgb):
     error = mean.std(axis=0, ddof=1) / np.sqrt(8)
     np.testing.assert_array_less(np.abs(mean.mean(axis=0) - radiance * ALBEDO), 4.5 * error + 1e-5)
     assert np.all(error < 0.01 * radiance * ALBEDO)
-    assert np.abs(reference[0][inside].mean(axis=0) / (radiance * ALBEDO) - 1).max() < 0.02
 
 
 EXACT = {

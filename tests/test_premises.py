@@ -1,6 +1,5 @@
 """The rules of pruning: each is refused where a premise does not hold, and the images show why."""
 
-import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -21,34 +20,20 @@ from reference.planning.rules import (
     TABULATED_ENVIRONMENT,
     loses_light,
 )
-from reference.rendering.renderer import pass_seed
 from reference.scene.source import Source
 from tests.misplanned import DIFFUSE, SCENES, TWO_SIDED, lamp, prune_blindly, scene, sphere, tube
 from tests.parts import moved
+from tests.test_disagreements import planned, stock
 
-SPP, PASSES = 256, 4
-
-
-def means(description):
-    """The mean of the plan's reference and of the scene's own integrator, and their doubt."""
-    ready = prepare(Source("misplanned", description), Options(spp=SPP * PASSES))
-    ready.reference.spp = SPP
-    stock = mi.load_dict(description, optimize=False)
-    found = []
-    for side in (
-        lambda seed: ready.reference.render(pass_seed(seed, 0)),
-        lambda seed: mi.render(stock, spp=SPP, seed=seed),
-    ):
-        passes = [float(np.mean(np.array(side(number)))) for number in range(PASSES)]
-        found.append((np.mean(passes), np.std(passes, ddof=1) / PASSES**0.5))
-    return found
+SPP = 256
 
 
 @pytest.mark.guarantee("plans", "A rule is rejected if a premise is not known to hold.")
 @pytest.mark.parametrize("name", SCENES)
 def test_the_plan_of_a_scene_that_was_planned_wrongly_is_right(rgb, name):
-    (planned, error), (stock, other) = means(SCENES[name]())
-    assert abs(planned - stock) < 0.002 * stock + 5 * np.hypot(error, other) + 1e-6
+    _, (found, error) = planned(SCENES[name](), SPP)
+    expected, noise = stock(SCENES[name](), SPP)
+    assert abs(found - expected) < 0.002 * expected + 5 * np.hypot(error, noise) + 1e-6
 
 
 PRINCIPLED = {"type": "principled", "base_color": 0.5}
@@ -70,8 +55,9 @@ def test_principled_only_reflects_unless_it_says_otherwise(rgb):
 def test_with_every_premise_taken_for_true_it_is_wrong(rgb, monkeypatch):
     """The anisotropic one by a percent; the others by so much that the guard finds them."""
     prune_blindly(monkeypatch)
-    (planned, error), (stock, other) = means(SCENES["an anisotropic sphere"]())
-    assert abs(planned - stock) > 0.005 * stock + 5 * np.hypot(error, other)
+    described = SCENES["an anisotropic sphere"]()
+    (_, (found, error)), (expected, noise) = planned(described, SPP), stock(described, SPP)
+    assert abs(found - expected) > 0.005 * expected + 5 * np.hypot(error, noise)
 
 
 def facts_of(description):
@@ -171,14 +157,10 @@ def test_a_cylinder_that_shines_is_sampled_where_rays_hit_it_if_the_plan_says_so
     scale, is_right = TUBES[name]
     lit = tube(scale)
     assert LIGHT_BY_LIGHT.check(facts_of(lit)).applies is is_right
-    found = []
-    for ways in ({"bsdf_samples": 0}, {"emitter_samples": 0}):
-        stock = mi.load_dict(
-            lit | {"integrator": {"type": "direct", "hide_emitters": True, **ways}}
-        )
-        passes = [float(np.mean(np.array(mi.render(stock, spp=512, seed=i)))) for i in range(4)]
-        found.append((np.mean(passes), np.std(passes, ddof=1) / 2))
-    (one, error), (other, noise) = found
+    (one, error), (other, noise) = (
+        stock(lit | {"integrator": {"type": "direct", "hide_emitters": True, way: 0}}, SPP)
+        for way in ("bsdf_samples", "emitter_samples")
+    )
     assert (abs(one - other) < 0.02 * one + 5 * np.hypot(error, noise)) is np.bool_(is_right)
 
 

@@ -7,7 +7,6 @@ import pytest
 from scipy import stats
 
 from comparisons.gallery.builtin import SCENES
-from heuristic.errors import NonFiniteError
 from reference.pairing import halves
 from reference.rendering import renderer, sums
 from reference.rendering.renderer import pass_seed
@@ -123,30 +122,6 @@ def test_indirect_light_is_that_of_mitsubas_path(rgb, max_depth):
     made = mi.load_dict(scene(12, one=POINT, two=SECOND, lamp=lamp(), sky=CONSTANT))
     integrators = ({"type": kind, "max_depth": max_depth} for kind in ("direct_all", "path"))
     check_same_means(made, *integrators, passes=32)
-
-
-def broken_integrator(value, row, column):
-    """Make an integrator that is white but for one pixel of a film of 24 by 24."""
-
-    class Broken(mi.SamplingIntegrator):
-        def sample(self, scene, sampler, ray, medium=None, active=True):
-            sensor = scene.sensors()[0]
-            target, _ = sensor.sample_ray(
-                0.0, 0.5, mi.Point2f((column + 0.5) / 24, (row + 0.5) / 24), mi.Point2f(0.5)
-            )
-            near = dr.dot(target.d, ray.d) > np.cos(np.deg2rad(40 / 24 / 10))
-            return dr.select(near, mi.Spectrum(value), mi.Spectrum(1)), active, []
-
-    return Broken(mi.Properties())
-
-
-@pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_a_pixel_that_is_no_number_is_an_error_that_names_it(rgb, value):
-    made = mi.load_dict(scene(point=POINT))
-    half = renderer.Renderer(made, broken_integrator(value, 5, 17), 256, "reference image")
-    said = r"reference image, pass with seed 4: 1 of \d+ pixels .*\(x, y\) = \(17, 5\)"
-    with pytest.raises(NonFiniteError, match=said):
-        half.render(4)
 
 
 def test_all_passes_share_one_kernel_whatever_their_seed(rgb, monkeypatch):

@@ -33,9 +33,6 @@ def image(scene, name, **more):
     return np.array(prepare(case.source, case.options).heuristic.render(3))
 
 
-GREY = "def shade(point):\n    return point.ambient * 0 + 0.25\n"
-
-
 @pytest.mark.guarantee("kernel", "Phong's model in a Python file gives the kernel's image to 1e-5.")
 def test_phong_in_a_file_is_phong():
     for scene, more in (
@@ -288,19 +285,6 @@ def test_a_process_apart_reads_the_file_and_a_changed_one_again(run, apart, writ
         stamps.append(path.stat().st_mtime_ns)
     assert means[0] == means[1] != means[2]
     assert stamps[0] == stamps[1] != stamps[2]
-
-
-def test_what_a_file_does_to_its_process_is_undone(rgb, written, tmp_path):
-    import os
-    import sys
-
-    before = os.getcwd(), list(sys.path), dict(os.environ), set(sys.modules)
-    written("X = 1\n", "beside_it.py")
-    named(written(
-        "import os, sys, beside_it\nos.chdir('/')\nsys.path.clear()\nos.environ['X'] = 'x'\n" + GREY
-    ))  # fmt: skip
-    assert (os.getcwd(), list(sys.path), dict(os.environ)) == before[:3]
-    assert "beside_it" not in sys.modules
 
 
 def test_an_object_in_a_file_keeps_its_declaration(rgb, written):
