@@ -80,12 +80,8 @@ def _volumes(folder):
 
 
 def _vol(path, values):
-    """Write a grid in Mitsuba's volume format, version 3: float32, x fastest."""
-    values = np.asarray(values, "<f4")
-    values = values[..., None] if values.ndim == 3 else values
-    z, y, x, channels = values.shape
-    head = b"VOL" + struct.pack("<B5i6f", 3, 1, x, y, z, channels, 0, 0, 0, 1, 1, 1)
-    path.write_bytes(head + values.tobytes())
+    values = np.asarray(values, np.float32)
+    mi.VolumeGrid(values[..., None] if values.ndim == 3 else values).write(str(path))
 
 
 def _measured(path):

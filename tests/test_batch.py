@@ -94,7 +94,6 @@ HOSTILE = {
     "broken reference": (SCENE.replace('<bsdf type="diffuse"/>', '<ref id="nix"/>'), "nix"),
     "unclosed comments": ("<!--" * 300_000, "x.xml"),  # these two take hours if read badly
     "unclosed elements": ("<a" * 300_000, "x.xml"),
-    "NUL": (SCENE[:200] + "\0" + SCENE[200:], "parsing"),
     "film": (
         SCENE.replace('value="24"', 'value="1000000"').replace('value="16"', 'value="1000000"'),
         "1000000x1000000 pixels is too large",

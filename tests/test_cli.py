@@ -204,6 +204,7 @@ def test_a_comparison_of_a_built_in_scene_imports_what_it_needs(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
     modules = done.stdout.split()
     assert "comparisons.compare" in modules
+    assert "altair" not in modules, "the charts of a study of cost alone need it"
     elsewhere = ("hard", "fit", "study", "check")
     unneeded = tuple(f"comparisons.{name}" for name in elsewhere)
     assert [name for name in modules if name.startswith(unneeded)] == []

@@ -15,10 +15,11 @@ from comparisons.options import Options
 from comparisons.plain_scene import plain_scene
 from heuristic import meshes
 from heuristic.errors import InputError
-from reference.rendering.gbuffer import gbuffer, pixel_rays
+from reference.rendering.gbuffer import gbuffer
 from reference.scene.source import Source
 from reports.files.export_files import gltf
 from tests import oracle
+from tests.test_pixel_terms import centres
 
 SIZE = (48, 32)
 
@@ -51,21 +52,11 @@ def test_the_files_hold_all_that_the_textbooks_picture_is_made_of(rgb):
     for scene in ("fig-6-5-m40", "plastic-spheres", "cornell-box"):
         case, found = exported_of(scene)
         half = case.options.pair(case.source).heuristic.instantiate()
-        image, expected = shaded(found), centres(half)
+        pixels = map(np.arange, SIZE)
+        image, expected = shaded(found), centres(half, half.integrator(), SIZE, *pixels)
         edge = np.abs(image - expected).max(axis=-1) > 2e-4 * max(1, expected.max())
         assert expected.max() > 0.1
         assert edge.mean() < 0.005
-
-
-def centres(scene):
-    """Shade the rays through the pixel centres with the integrator of a heuristic half."""
-    width, height = SIZE
-    ray = pixel_rays(scene, SIZE, *np.meshgrid(np.arange(width), np.arange(height)))
-    sampler = mi.load_dict({"type": "independent"})
-    sampler.seed(0, width * height)
-    colour, hit, _ = scene.integrator().sample(scene, sampler, ray)
-    image = np.where(np.array(hit), np.array(mi.Color3f(colour)), 0)
-    return image.T.reshape(height, width, 3)
 
 
 def array_of(file, number):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reference.planning.facts import Form, geometry
-from tests.parts import mesh_of
+from tests.parts import mesh_of, moved
 
 pytestmark = pytest.mark.usefixtures("rgb")
 
@@ -14,10 +14,9 @@ pytestmark = pytest.mark.usefixtures("rgb")
 def random_transform(rng, shear=False):
     """A turn, a mirror or none, an even or an uneven scale, and a turn before that."""
     scale = rng.uniform(0.3, 3, 3) if shear else np.full(3, rng.uniform(0.3, 3))
-    made = mi.ScalarTransform4f().translate(vector(rng.normal(size=3)))
-    made = made @ mi.ScalarTransform4f().rotate(axis(rng), 77.0)
-    made = made @ mi.ScalarTransform4f().scale(vector(scale * rng.choice([-1, 1], 3)))
-    return made @ mi.ScalarTransform4f().rotate(axis(rng), float(rng.uniform(0, 90)))
+    made = moved(vector(rng.normal(size=3))).rotate(axis(rng), 77.0)
+    made = made.scale(vector(scale * rng.choice([-1, 1], 3)))
+    return made.rotate(axis(rng), float(rng.uniform(0, 90)))
 
 
 def vector(values):

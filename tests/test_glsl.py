@@ -161,7 +161,6 @@ MISTAKES = {
         r"mine\.glsl, line 4: .*normle",
     ),
     "no shade": ("vec3 colour(Point point) { return vec3(1); }", "no function `vec3 shade"),
-    "empty": ("", "no function `vec3 shade"),
     "open brace": ("vec3 shade(Point point) { return vec3(1);", r"mine\.glsl, at its end: "),
     "recursion": (
         "vec3 f(vec3 a) { return f(a); }\nvec3 shade(Point point) { return f(point.normal); }",

@@ -13,7 +13,7 @@ from reference import Source
 from reference.pairing.halves import pair
 from reference.scene.source import collect_messages
 from tests import oracle
-from tests.parts import camera, mesh_of
+from tests.parts import camera, mesh_of, moved
 from tests.test_normals import rows
 
 FLAT, GOURAUD, PHONG = Interpolation.FLAT, Interpolation.GOURAUD, Interpolation.PHONG
@@ -97,7 +97,7 @@ def test_large_meshes_are_stored_whole(rgb, interpolation):
 @pytest.mark.parametrize("plugin", ["sphere", "disk", "cylinder", "rectangle"])
 @pytest.mark.parametrize("flipped", [False, True])
 def test_shapes_become_meshes_that_look_like_them(rgb, plugin, flipped):
-    placed = mi.ScalarTransform4f().translate((1, 2, 3)).rotate((0.6, 0, 0.8), 40).scale(2)
+    placed = moved((1, 2, 3)).rotate((0.6, 0, 0.8), 40).scale(2)
     shape = mi.load_dict(
         {
             "type": plugin,

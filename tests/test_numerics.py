@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import heuristic
-from heuristic import numerics, terms, vectors
+from heuristic import numerics, terms
 
 Single, Double = drjit.llvm.ad.Float, drjit.llvm.ad.Float64
 Array3f, Array3f64 = drjit.llvm.ad.Array3f, drjit.llvm.ad.Array3f64
@@ -42,14 +42,6 @@ def test_specular_is_the_power_and_nothing_where_the_lobe_ends(float_type, opaqu
         assert np.all(np.abs(found - expected)[big] <= (tolerance * expected)[big])
         assert np.all(found[~big] <= 2 * smallest)
         assert not found[base <= 0].any()
-
-
-def test_directions_that_do_not_exist_are_zero():
-    here = Array3f(1, 2, 3)
-    toward, distance = vectors.light_vector(here, here)
-    for vector in (toward, vectors.view_vector(here, here), vectors.normalise(here * 0)):
-        np.testing.assert_array_equal(np.array(vector), np.zeros((3, 1)))
-    assert dr.all(distance == 0)
 
 
 @FLOATS

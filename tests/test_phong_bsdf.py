@@ -18,9 +18,7 @@ from tests.parts import rgb_of
 MATERIALS = {
     "diffuse": {"k_d": 0.7},
     "specular n=1": {"k_s": 0.9, "n": 1},
-    "specular n=9": {"k_s": 0.9, "n": 9},
     "specular n=100": {"k_s": 0.9, "n": 100},
-    "mixed n=1": {"k_d": 0.5, "k_s": 0.7, "n": 1},
     "mixed n=9": {"k_d": 0.5, "k_s": 0.7, "n": 9},
     "mixed n=100": {"k_d": 0.05, "k_s": 0.7, "n": 100},
     "even lobe": {"k_d": 0.2, "k_s": 0.7, "n": 0},

@@ -10,7 +10,7 @@ from comparisons.options import Options
 from reference import Source
 from reference.pairing import halves
 from reference.rendering import renderer
-from tests.parts import camera, look_at
+from tests.parts import camera, look_at, moved
 
 ALBEDO = np.array([0.7, 0.45, 0.2])
 DIFFUSE = {"type": "diffuse", "reflectance": {"type": "rgb", "value": tuple(ALBEDO)}}
@@ -23,7 +23,7 @@ def scene(shape, light, viewer=(-3, 0, 1), fov=40.0, size=48):
 
 
 def plane():
-    return {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(3), "bsdf": DIFFUSE}
+    return {"type": "rectangle", "to_world": moved(0, 3), "bsdf": DIFFUSE}
 
 
 def sphere():
@@ -146,8 +146,7 @@ def test_the_spot_of_an_area_light_is_right_in_the_far_field(rgb):
     for distance in (2.0, 4.0, 8.0):
         lamp = {
             "type": "rectangle",
-            "to_world": look_at((0.3 * distance, 0, distance), (0, 0, 0), (0, 1, 0))
-            @ mi.ScalarTransform4f().scale(side / 2),
+            "to_world": look_at((0.3 * distance, 0, distance), up=(0, 1, 0)).scale(side / 2),
             "emitter": {"type": "area", "radiance": 10.0},
         }
         description = scene(plane(), lamp, viewer=(0, -0.5, 1), fov=5.0, size=8)

@@ -13,6 +13,7 @@ from reference.rendering.gbuffer import pixel_rays
 from reference.rendering.renderer import variant
 from reports.page.why_view import terms_view
 from tests.misplanned import scene as described
+from tests.oracle import unit
 from tests.test_embedding import codes
 
 KERNEL = 1e-5
@@ -34,15 +35,22 @@ def traced(scene, **options):
     return grid, ready
 
 
+def centres(scene, integrator, size, columns, rows):
+    """Return what an integrator has through the centres of pixels, (H, W, 3)."""
+    ray = pixel_rays(scene, size, *np.meshgrid(columns, rows))
+    sampler = mi.load_dict({"type": "independent"})
+    sampler.seed(0, len(columns) * len(rows))
+    colour, valid, _ = integrator.sample(scene, sampler, ray)
+    image = np.array(mi.Color3f(colour) & valid, np.float64)
+    return image.T.reshape(len(rows), len(columns), 3)
+
+
 def kernel(ready, grid):
     """Return what the heuristic half's integrator has at the grid's points, (H, W, 3)."""
     half = ready.heuristic
     with variant(half.variant):
-        ray = pixel_rays(half.scene, grid.resolution, *np.meshgrid(grid.columns, grid.rows))
-        sampler = mi.load_dict({"type": "independent"})
-        sampler.seed(0, grid.material.size)
-        colour, valid, _ = half.integrator.sample(half.scene, sampler, ray)
-        image = np.array(mi.Color3f(colour) & valid, np.float64).T.reshape(*grid.material.shape, 3)
+        size = grid.resolution
+        image = centres(half.scene, half.integrator, size, grid.columns, grid.rows)
     return np.where(grid.material[..., None] < 0, 0, image)
 
 
@@ -88,10 +96,6 @@ def unpacked(embedded, tops):
         is_signed = name not in tops
         found[name] = 2 * code / 65535 - 1 if is_signed else tops[name] * (code / 65535) ** 2
     return found | {"material": material}
-
-
-def unit(vector):
-    return vector / np.linalg.norm(vector)
 
 
 def seen_on_the_unit_sphere(x, y, side, viewer):

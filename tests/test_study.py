@@ -15,6 +15,7 @@ from reference.pairing import albedo, factors
 from reference.pairing.albedo import RoughPlastic
 from reports.charts import study_charts
 from tests.programs import ROOT
+from tests.test_engine_lobes import dot, integral
 from tests.witnesses.fresnel import dielectric
 
 # --- Designs --------------------------------------------------------------------------------------
@@ -59,14 +60,11 @@ MISTAKES = (
     ("parts = []", "'parts' is not known .did you mean part"),
     ("a = " + 100_000 * "[" + 100_000 * "]", "not TOML"),
     (part("alpha = " + 10_000 * "1"), "not TOML"),
-    ("part = 5", "array"),
     ("title = 5\n" + part("alpha = 1"), "`str"),
     (part("alfa = 1"), "'alfa' is not known.*alpha"),
     (part("alpha = 0"), "alpha = 0: give a number from 0.02 to 1[.]"),
-    (part("alpha = [0.1, 'rough']"), "alpha = 'rough'"),
     (part("alpha = nan"), "alpha = nan"),
     (part("alpha = []"), "at least one value"),
-    (part("light_angle = 95"), "light_angle = 95: give a number from 0 to 89 deg"),
     (part("alpha = {from = 0.1, to = 1}"), "from, steps, to"),
     (part("alpha = {from = 0.5, to = 0.1, steps = 3}"), "from 0.5 to 0.1"),
     (part("alpha = {from = 0.1, to = 1, steps = 3, scale = 'cubic'}"), "'cubic'"),
@@ -126,14 +124,13 @@ def torrance_sparrow(light, view, alpha, ior):
 
 
 def phong_albedo(k_d, k_s, n, degrees):
-    """Exitance over irradiance of (8.10), by midpoints; light at ``degrees``."""
-    theta, phi = (np.arange(300) + 0.5) * np.pi / 600, (np.arange(300) + 0.5) * np.pi / 300
-    theta, phi = np.meshgrid(theta, phi)
-    a = np.deg2rad(degrees)
-    cosine = np.sin(a) * np.sin(theta) * np.cos(phi) + np.cos(a) * np.cos(theta)
-    radiance = k_d * np.cos(a) + k_s * np.maximum(cosine, 0) ** n
-    weight = np.cos(theta) * np.sin(theta) * (np.pi / 600) * (np.pi / 300)
-    return 2 * np.sum(radiance * weight) / (np.pi * np.cos(a))
+    """Exitance over irradiance of (8.10); light at ``degrees``."""
+
+    def reflected(light, view, half):
+        mirrored = np.stack([-light[0], -light[1], light[2]])
+        return (k_d + k_s * np.maximum(dot(mirrored, view), 0) ** n / light[2]) / np.pi
+
+    return integral(reflected, degrees)
 
 
 def test_phong_reflects_more_than_it_receives_for_a_large_k_s():

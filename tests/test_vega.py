@@ -8,7 +8,6 @@ from heuristic.errors import OutputError
 from reports.charts import theme, vega
 from reports.page import page
 from tests import records
-from tests.programs import python
 from tests.test_page import HOSTILE, Page
 
 
@@ -40,11 +39,6 @@ def test_paper_is_white_with_black_text_and_otherwise_as_the_page():
         inked = {**theme.PAPER[part]}
         differing = {key for key, value in theme.PAGE[part].items() if inked[key] != value}
         assert all("olor" in key for key in differing), differing
-
-
-def test_a_comparison_without_a_study_of_cost_does_not_wait_for_altair():
-    told = "import sys, reports.page.page, reports.run.scene; print('altair' in sys.modules)"
-    assert python("-c", told).stdout.strip() == "False"
 
 
 def test_two_charts_on_a_page_share_no_id(monkeypatch):

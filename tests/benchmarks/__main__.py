@@ -1,6 +1,5 @@
 """Run the named benchmarks, or all of them."""
 
-import json
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -20,15 +19,10 @@ BENCHMARKS = [
 @click.option(
     "--rounds", default=30, show_default=True, type=click.IntRange(2), help="Repetitions."
 )
-@click.option("--json", "file", type=click.Path(dir_okay=False, path_type=Path), help="Write here.")
-def main(names, rounds, file):
-    """Measure, print tables, and write the numbers as JSON where asked to."""
-    results = {
-        name: import_module(f"tests.benchmarks.{name}").run(rounds)
-        for name in names or sorted(BENCHMARKS)
-    }
-    if file:
-        file.write_text(json.dumps(results, indent=2) + "\n", encoding="utf-8")
+def main(names, rounds):
+    """Measure, and print tables."""
+    for name in names or sorted(BENCHMARKS):
+        import_module(f"tests.benchmarks.{name}").run(rounds)
 
 
 if __name__ == "__main__":

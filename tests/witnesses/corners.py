@@ -6,10 +6,10 @@ stands on one of its sides: all that the wall shows came from the floor.
 
 from functools import cache
 
-import mitsuba as mi
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
+from tests.parts import moved
 from tests.witnesses import configuration, stage
 from tests.witnesses.witness import Witness
 
@@ -25,7 +25,7 @@ CELLS = 24
 
 
 def _corner(max_depth):
-    to_world = mi.ScalarTransform4f().translate((0.5, 0, 0)).scale(0.5)
+    to_world = moved((0.5, 0, 0), 0.5)
     camera = stage.camera((2, 0, HALF), (0, 0, HALF), (0, 0, 1), HALF)
     wall = stage.plate((0, 0, 0.5), (1, 0, 0.5), (0, 0, 1), 0.5, 0.5)
     sun = {"type": "directional", "direction": (0, 0, -1), "irradiance": IRRADIANCE}

@@ -4,9 +4,9 @@ The floor is diffuse, of reflectance ``rho``: its radiance is ``rho E / pi``, an
 a lamp of radiance ``L`` sends it the irradiance ``E = pi L F``.
 """
 
-import mitsuba as mi
 import numpy as np
 
+from tests.parts import look_at
 from tests.witnesses import configuration, stage
 from tests.witnesses.stage import GREY
 from tests.witnesses.witness import Witness
@@ -42,7 +42,7 @@ def _beside_a_rectangle():
 
 
 def _below_a_disc():
-    to_world = mi.ScalarTransform4f().look_at((0.2, 0, HEIGHT), (0.2, 0, 0), (0, 1, 0)).scale(0.4)
+    to_world = look_at((0.2, 0, HEIGHT), (0.2, 0, 0), (0, 1, 0)).scale(0.4)
     lamp = {"type": "disk", "to_world": to_world, "bsdf": stage.BLACK, "emitter": stage.shining()}
     return stage.scene(stage.above(), floor=stage.floor(), lamp=lamp)
 
@@ -73,9 +73,8 @@ INTENSITY = 3.0
 
 
 def _spot(place, target):
-    to_world = mi.ScalarTransform4f().look_at(place, target, (0, 1, 0))
     return {
-        "type": "spot", "to_world": to_world, "intensity": INTENSITY,
+        "type": "spot", "to_world": look_at(place, target, (0, 1, 0)), "intensity": INTENSITY,
         "cutoff_angle": CUTOFF, "beam_width": BEAM,
     }  # fmt: skip
 

@@ -1,6 +1,6 @@
 """What the scenes of the witnesses are made of: a camera without perspective, plates and lamps."""
 
-import mitsuba as mi
+from tests import parts
 
 GREY = 0.5
 """Reflectance of what is looked at, unless a case says otherwise."""
@@ -22,9 +22,8 @@ def above(half=1.0, height=0.5, centre=(0.0, 0.0)):
 
 def camera(origin, target, up, half):
     """Return an orthographic camera, whose film is as wide as twice ``half``."""
-    to_world = mi.ScalarTransform4f().look_at(origin, target, up).scale((half, half, 1))
-    film = {"type": "hdrfilm", "width": 32, "height": 32, "rfilter": {"type": "box"}}
-    return {"type": "orthographic", "to_world": to_world, "film": film}
+    to_world = parts.look_at(origin, target, up).scale((half, half, 1))
+    return parts.camera(origin, target, up, type="orthographic", to_world=to_world)
 
 
 def diffuse(reflectance=GREY):
@@ -34,14 +33,12 @@ def diffuse(reflectance=GREY):
 
 def floor(half=2.0, reflectance=GREY):
     """Return a square about the origin in the plane z = 0, facing up."""
-    to_world = mi.ScalarTransform4f().scale(half)
-    return {"type": "rectangle", "to_world": to_world, "bsdf": diffuse(reflectance)}
+    return {"type": "rectangle", "to_world": parts.moved(0, half), "bsdf": diffuse(reflectance)}
 
 
 def plate(centre, toward, up, half_width, half_height, **rest):
     """Return a rectangle that faces a point; its height is along ``up``, black unless told."""
-    to_world = mi.ScalarTransform4f().look_at(centre, toward, up)
-    to_world = to_world.scale((half_width, half_height, 1))
+    to_world = parts.look_at(centre, toward, up).scale((half_width, half_height, 1))
     return {"type": "rectangle", "to_world": to_world, "bsdf": BLACK, **rest}
 
 
