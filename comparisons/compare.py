@@ -131,6 +131,11 @@ def _compare(
 
         traced = pixel_terms.trace(ready.heuristic, options)
         done("terms")
+    mistakes: tuple[str, ...] = ()
+    if not options.image and not heuristics.named(options.heuristic).is_own:
+        from comparisons.audit import diagnosis  # loaded late: only users' shaders have any
+
+        mistakes = diagnosis.describe(options.heuristic)
     made = ComparisonRecord(
         scene=source.name,
         variant=reference.variant,
@@ -156,7 +161,7 @@ def _compare(
         caution=caution,
         noise_target=estimates.stop,
         picture=picture,
-        mistakes=_mistakes(options),
+        mistakes=mistakes,
         **numbers,
     )
     return Comparison(made, images, *traced), ready
@@ -222,15 +227,6 @@ def noise_percentile(
         truth = reference[rows][counted[rows]].astype(np.float64)
         distances.append(distance(truth + noise[rows][counted[rows]], truth))
     return float(np.percentile(np.concatenate(distances), PERCENTILE))
-
-
-def _mistakes(options: Options) -> tuple[str, ...]:
-    """Return the mistakes that a user's heuristic seems to have."""
-    if options.image or heuristics.named(options.heuristic).is_own:
-        return ()
-    from comparisons.audit import diagnosis
-
-    return diagnosis.describe(options.heuristic)
 
 
 def _measure(

@@ -155,13 +155,6 @@ class TermGrid:
         specular = k_s[self.material] * light.lobe[..., None]
         return np.multiply(light.intensity, light.attenuation[..., None]) * (diffuse + specular)
 
-    def total(self) -> NDArray[np.float64]:
-        """Return the sum of all terms, (H, W, 3), which equals the kernel's image."""
-        even = [np.add(m.k_i, np.multiply(m.ambient, m.k_a)) for m in self.materials]
-        image = np.array([*even, np.zeros(3)])[self.material]
-        image = image + sum(map(self.light_image, self.lights))
-        return image if self.others is None else image + self.others
-
     def _light(self, light: GridLight, material: TermMaterial, place: tuple) -> LightTerms:
         arrays = ("attenuation", "cos_incidence", "cos_view", "lobe")
         here = vars(light) | {name: float(getattr(light, name)[place]) for name in arrays}

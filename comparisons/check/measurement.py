@@ -220,16 +220,12 @@ def block_means(images: Array) -> Array:
     Blocks may differ by a pixel in size; a smaller image has fewer blocks.
     """
     for axis in (-3, -2):
-        edges = block_edges(images.shape[axis])
+        side = images.shape[axis]
+        count = min(GRID, side)
+        edges = np.arange(count + 1) * side // count  # the first pixel of each, and the side
         sums = np.add.reduceat(images, edges[:-1], axis=axis)
         images = sums / np.diff(edges).reshape((-1, *(1,) * (-1 - axis)))
     return images
-
-
-def block_edges(side: int) -> NDArray[np.int_]:
-    """Return the first pixel of each block along a side, and the side itself."""
-    count = min(GRID, side)
-    return np.arange(count + 1) * side // count
 
 
 # --- Baselines ----------------------------------------------------------------------------------

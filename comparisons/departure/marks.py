@@ -82,7 +82,10 @@ def find(
     marks = np.zeros(counted.shape, np.float32)
     beyond = counted.copy()
     for rows in bands(len(counted)):
-        beyond[rows] &= _beyond_rounding(difference.mean[rows], test[rows])
+        mean, shown = difference.mean[rows], test[rows]
+        size = np.maximum(np.abs(shown), np.abs(shown - mean))
+        rounding = np.maximum(ABSOLUTE_ROUNDING, RELATIVE_ROUNDING * size)
+        beyond[rows] &= np.any(np.abs(mean) > rounding, axis=-1)
     if exact:
         marks[beyond] = MARKED
         return marks
@@ -103,12 +106,6 @@ def find(
         pixels = _Pixels.of(difference, around, rows, rest)
         marks[rows][rest[rows]] = UNDETERMINED * pixels.are_open(test[rows][rest[rows]], distance)
     return marks
-
-
-def _beyond_rounding(difference: Array, test: Array) -> NDArray[np.bool_]:
-    size = np.maximum(np.abs(test), np.abs(test - difference))
-    rounding = np.maximum(ABSOLUTE_ROUNDING, RELATIVE_ROUNDING * size)
-    return np.any(np.abs(difference) > rounding, axis=-1)
 
 
 def _discoveries(chances: Array, rate: float) -> float:

@@ -88,9 +88,13 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
             break
         worth[rows, columns] = -total  # no box that touches these is worth anything
         down, across = (slice(part.start * cell, part.stop * cell) for part in (rows, columns))
-        region = _region(error, counted, down, across, total)
-        if region.share >= LEAST_SHARE:
-            found.append(region)
+        inside = np.zeros_like(counted)
+        inside[down, across] = counted[down, across]
+        held = error[down, across].sum(dtype=np.float64)
+        share = float(held / total)
+        if share >= LEAST_SHARE:
+            mean = float(held / inside.sum())
+            found.append(Region(share=share, mean_dE2000=mean, **bounds(inside)))
         elif value < LEAST_SHARE * total / MOST:  # only specks are left
             break
     return tuple(found)
@@ -111,16 +115,6 @@ def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
         best = max(best, (float(running[pair]), pair, int(start[pair]), column), key=itemgetter(0))
     value, pair, first, last = best
     return slice(int(top[pair]), int(bottom[pair])), slice(first, last + 1), value
-
-
-def _region(error: NDArray, counted: NDArray, rows: slice, columns: slice, total: float) -> Region:
-    """Return the region of a box, shrunk to its counted pixels."""
-    inside = np.zeros_like(counted)
-    inside[rows, columns] = counted[rows, columns]
-    held = error[rows, columns].sum(dtype=np.float64)
-    return Region(
-        share=float(held / total), mean_dE2000=float(held / inside.sum()), **bounds(inside)
-    )
 
 
 def bounds(mask: NDArray) -> dict[str, Any]:

@@ -83,7 +83,22 @@ def summarise(
     mask = np.asarray(mask, bool)
     factor = best_exposure(metric, test, reference, mask, viewing)
     grain = np.asarray(noise) if noise is not None and np.any(noise) else None
-    maps = _maps(metric, test, reference, mask, viewing, factor, grain)
+    # Of the test image, after exposure, and of noise alone, the last two of the mask only. Single
+    # precision keeps seven digits of a distance, in half the memory.
+    maps: NDArray[np.float32] = np.zeros((3, *mask.shape), np.float32)
+    is_pixelwise = isinstance(metric, Pixelwise)
+    wide = np.float64 if is_pixelwise else test.dtype
+    for rows in _blocks(metric, test):
+        images = {0: test[rows]}
+        if factor != 1.0:
+            images[1] = np.multiply(test[rows], factor, dtype=wide)
+        if grain is not None:
+            images[2] = np.add(reference[rows], grain[rows], dtype=wide)
+        # Equal pixels are 0 apart: the surroundings of a figure's objects cost nothing.
+        measured = mask[rows] | (not is_pixelwise or (test[rows] != reference[rows]).any(axis=-1))
+        distances = metric.against(reference[rows], measured, viewing)
+        for place, image in images.items():
+            maps[place][rows][measured] = distances(image)
     values, exposed, noise_alone = (found[mask] for found in maps)
     numbers: dict[str, Any] = _numbers(metric, values)
     after = numbers
@@ -104,37 +119,6 @@ def summarise(
         **clean,
     )
     return summary, maps[0]
-
-
-def _maps(
-    metric: Metric,
-    test: Array,
-    reference: Array,
-    mask: NDArray[np.bool_],
-    viewing: Viewing,
-    factor: float,
-    grain: Array | None,
-) -> NDArray[np.float32]:
-    """Return maps (3, H, W) of the test image, after exposure, and of noise alone.
-
-    The last two are of the mask only, and 0 without a factor or without noise.
-    """
-    # Single precision keeps seven digits of a distance, in half the memory.
-    maps: NDArray[np.float32] = np.zeros((3, *mask.shape), np.float32)
-    is_pixelwise = isinstance(metric, Pixelwise)
-    wide = np.float64 if is_pixelwise else test.dtype
-    for rows in _blocks(metric, test):
-        images = {0: test[rows]}
-        if factor != 1.0:
-            images[1] = np.multiply(test[rows], factor, dtype=wide)
-        if grain is not None:
-            images[2] = np.add(reference[rows], grain[rows], dtype=wide)
-        # Equal pixels are 0 apart: the surroundings of a figure's objects cost nothing.
-        measured = mask[rows] | (not is_pixelwise or (test[rows] != reference[rows]).any(axis=-1))
-        distances = metric.against(reference[rows], measured, viewing)
-        for place, image in images.items():
-            maps[place][rows][measured] = distances(image)
-    return maps
 
 
 def summarise_log2_luminance(

@@ -4,7 +4,6 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
 from comparisons.gallery.scenes import looking_from
 
@@ -35,26 +34,18 @@ def narrow_band_lamp() -> dict[str, Any]:
 def metameric_pair() -> dict[str, Any]:
     """Two spheres of the same colour in daylight, under an incandescent lamp (CIE A).
 
-    Their reflectances differ by a metameric black of D65: a spectrum that gives X = Y = Z = 0 under
-    that light. RGB, whose numbers are for daylight, cannot tell them apart.
+    Their reflectances differ by the largest admissible multiple of a metameric black of D65: a
+    spectrum that gives X = Y = Z = 0 under that light. RGB, whose numbers are for daylight, cannot
+    tell them apart.
     """
-    plain, other = metamers()
-    surfaces = {"plain": _spectrum(plain), "metamer": _spectrum(other)}
-    return _row(surfaces, _spectrum(_at_luminance(_incandescent(), 70.0)))
-
-
-def metamers() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return two reflectances at :data:`WAVELENGTHS` that have the same colour under D65.
-
-    The second is the first plus the largest admissible multiple of the metameric black: a cosine
-    less its projection on the three weights (D65 times the colour-matching functions).
-    """
+    # A cosine less its projection on the three weights, D65 times the colour-matching functions.
     weights = (np.array(mi.cie_d65(mi.Float(WAVELENGTHS))) * _colour_matching()).T
     plain = 0.45 - 0.12 * np.cos(2 * np.pi * (WAVELENGTHS - 380) / 340)
     wave = np.cos(2 * np.pi * (WAVELENGTHS - 560) / 150)
     black = wave - weights @ np.linalg.lstsq(weights, wave, rcond=None)[0]
     room = np.where(black > 0, (0.95 - plain), (plain - 0.05)) / np.maximum(np.abs(black), 1e-9)
-    return plain, plain + room.min() * black
+    surfaces = {"plain": _spectrum(plain), "metamer": _spectrum(plain + room.min() * black)}
+    return _row(surfaces, _spectrum(_at_luminance(_incandescent(), 70.0)))
 
 
 def _colour_matching():

@@ -103,7 +103,13 @@ def find(
     size = min(WIDTH, width), max(1, round(height * min(1, WIDTH / width)))
     surface = gbuffer(ready.scene, *size)
     require_surface(surface.hit, source.name)
-    groups = converged(ready, size, options.seed, progress)
+    reference = Renderer(ready.scene, ready.reference.integrator, SPP, "reference image", size)
+    # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
+    loop = passes(
+        [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
+        progress=progress, stage="reference",
+    )  # fmt: skip
+    groups = np.stack([np.array(one.images[0]) for one in loop])
     meter = ErrorMeter(groups, surface.hit, options.viewing)
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
@@ -115,19 +121,6 @@ def find(
     if progress:
         progress(CAUSES, 1, 1)
     return found
-
-
-def converged(
-    ready: Prepared, size: tuple[int, int], seed: int, progress: Progress | None
-) -> NDArray:
-    """Render the reference, with seeds that no hybrid has.
-
-    Returns as many passes (R, H, W, 3) as a hybrid has replicates.
-    """
-    renderer = Renderer(ready.scene, ready.reference.integrator, SPP, "reference image", size)
-    stream = Stream.OTHER_SIDE
-    loop = passes([renderer], seed, REPLICATES, stream=stream, progress=progress, stage="reference")
-    return np.stack([np.array(one.images[0]) for one in loop])
 
 
 class ErrorMeter:

@@ -109,7 +109,13 @@ class Pool:
         if self._count == 0:
             self._prepare()
             for task in tasks:
-                yield task, _done_here(task)
+                outcome: Future[Any] = Future()
+                try:
+                    progress = filter(None, [task.progress])
+                    outcome.set_result(task.function(*task.arguments, *progress))
+                except Exception as error:
+                    outcome.set_exception(error)
+                yield task, outcome
             return
         waiting = iter(tasks)
         self._fill(waiting)
@@ -153,15 +159,6 @@ class Pool:
                     self._idle.append(worker)
         self._busy = [worker for worker in self._busy if worker not in over]
         return [(worker.task, worker.outcome) for worker in over]
-
-
-def _done_here(task: Task) -> Future[Any]:
-    outcome: Future[Any] = Future()
-    try:
-        outcome.set_result(task.function(*task.arguments, *filter(None, [task.progress])))
-    except Exception as error:
-        outcome.set_exception(error)
-    return outcome
 
 
 class Worker:
