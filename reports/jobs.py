@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, TypeAlias, TypeVar, cast
+from typing import Any, TypeAlias, cast
 
 import click
 from click.shell_completion import CompletionItem
@@ -25,7 +25,6 @@ from heuristic import llvm, program
 from heuristic.errors import InputError
 from reports.terminal.words import echo, level, quiet_option, verbose_option
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 Decorator: TypeAlias = Callable[[Any], Any]
 
 
@@ -143,7 +142,7 @@ class Within(click.FloatRange):
 def with_options(*options: Decorator) -> Decorator:
     """Return a decorator that adds options to a command."""
 
-    def add(command: Command) -> Command:
+    def add(command: Any) -> Any:
         for option in reversed(options):
             command = option(command)
         return command

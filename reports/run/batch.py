@@ -8,7 +8,7 @@ them may kill. The page is written again after each scene.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
@@ -230,6 +230,7 @@ def _write(
 ) -> None:
     """Write the page, record and tables of all scenes as far as possible, and print the results."""
     from reference.records import to_json
+    from reports import verdict
     from reports.files import results
     from reports.terminal import tables
 
@@ -250,17 +251,8 @@ def _write(
     if errors:
         raise errors[0]
     if views:
-        tell(_summary(views, batch.within))
+        tell(tables.summary(records, batch.within))
+        tell(["", verdict.headline(records, batch.within)])
+        tell(filter(None, [verdict.most_missing(records, batch.within)]))
+        tell(verdict.advice([view.studied for view in views], batch.within))
     tell_where(folder / results.PAGE)
-
-
-def _summary(views: Sequence[SceneView], threshold: float) -> Iterable[str]:
-    """Yield the table of scenes, the verdict and its advice."""
-    from reports import verdict
-    from reports.terminal import tables
-
-    records = [view.record for view in views]
-    yield from tables.summary(records, threshold)
-    yield from ("", verdict.headline(records, threshold))
-    yield from filter(None, [verdict.most_missing(records, threshold)])
-    yield from verdict.advice([view.studied for view in views], threshold)
