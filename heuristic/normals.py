@@ -24,18 +24,11 @@ PARALLEL_STEPS = 4
 """Edges and tangents are off by half a rounding step per component, products by as much again."""
 
 
-def plane_coefficients(normal: Vector, point: Position) -> tuple[Number, Number, Number, Number]:
-    """Equation 6.17: ``n.(p - p0) = 0``, the plane through ``p0`` with the normal ``n``.
-
-    Returns ``(a, b, c, d) = (n_x, n_y, n_z, -n.p0)``, the coefficients of 6.16.
-    """
-    return normal.x, normal.y, normal.z, -dr.dot(normal, point)
-
-
 def plane_normal(a: Number, b: Number, c: Number) -> Direction:
-    """Equations 6.16, 6.18: ``n = (a, b, c) / |(a, b, c)|`` of the plane ``ax + by + cz + d = 0``.
+    """Equations 6.16-6.18: ``n = (a, b, c) / |(a, b, c)|`` of the plane ``ax + by + cz + d = 0``.
 
-    It points to the side where ``ax + by + cz + d > 0``.
+    It points to the side where ``ax + by + cz + d > 0``; with a point ``p0`` of the plane,
+    ``d = -n.p0``.
     """
     return unit(_vector_type(a)(a, b, c))
 

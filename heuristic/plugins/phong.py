@@ -194,18 +194,7 @@ def define() -> dict[str, Any]:
                 require_positive(f"phong: {name}", getattr(self, name))
             self.present = {name for name in COEFFICIENTS if may_be_nonzero(getattr(self, name))}
             self.is_clear = may_be_nonzero(self.transmittance)
-            self._set_components()
-            self.n_is_moderate = False
-            dr.make_opaque([each for each in self.partner.values() if isinstance(each, mi.Float)])
-            if not isinstance(self.n, mi.Texture):
-                dr.make_opaque(self.n)
-                exponents = np.ravel(self.n).tolist()
-                for n in exponents:
-                    _require_exponent(n)
-                self.n_is_moderate = all(map(numerics.is_moderate, exponents))
-
-        def _set_components(self):
-            """Declare the lobe, the diffuse part and the null component, in this order."""
+            # The lobe, the diffuse part and the null component, in this order.
             front, back = mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide
             sides = front | (back if self.twosided else 0)
             self.m_components = [
@@ -215,6 +204,14 @@ def define() -> dict[str, Any]:
             if self.is_clear:
                 self.m_components.append(mi.BSDFFlags.Null | front | back)
             self.m_flags = reduce(or_, self.m_components)
+            self.n_is_moderate = False
+            dr.make_opaque([each for each in self.partner.values() if isinstance(each, mi.Float)])
+            if not isinstance(self.n, mi.Texture):
+                dr.make_opaque(self.n)
+                exponents = np.ravel(self.n).tolist()
+                for n in exponents:
+                    _require_exponent(n)
+                self.n_is_moderate = all(map(numerics.is_moderate, exponents))
 
         def to_string(self):
             parts = ", ".join(f"{name} = {getattr(self, name)}" for name in (*COEFFICIENTS, "n"))

@@ -104,7 +104,12 @@ def pair(
 def _paired(
     graph, settings, convention, interpolation, tessellation, prune, heuristic, with_partners
 ):
-    geometry = cache(_bare(graph).instantiate)
+    bare = graph.copy()
+    for shape in bare.nodes(SHAPE):
+        for kind in (BSDF, MEDIUM):
+            for key, _ in bare.children(shape, kind):
+                bare.detach(shape, key)
+    geometry = cache(bare.instantiate)
 
     model, half, replaced = named(heuristic), graph.copy(), Replacements()
     context = bsdfs.Context(half, convention, for_users=with_partners or not model.is_own)
@@ -118,7 +123,18 @@ def _paired(
             half.props(index)["form"] = model.form
     radiance = emitters.to_heuristic(half, geometry, settings.hide_emitters, replaced)
     ambient = settings.ambient if settings.ambient is not None else radiance
-    _set_integrator(half, ambient, settings, interpolation, prune, model)
+    props = properties(
+        "heuristic",
+        hide_emitters=settings.hide_emitters,
+        occlusion=settings.occlusion or "visible" in model.needs,
+        interpolation=interpolation.value,
+        prune=prune,
+        model=model.name,
+    )
+    if ambient is not None:
+        props["ambient"] = mi.ScalarColor3f(ambient) if isinstance(ambient, tuple) else ambient
+    props.set_id("integrator")  # identifies its parameters
+    half.attach(0, "integrator", half.add(INTEGRATOR, props))
     if interpolation is not Interpolation.PHONG or tessellation is not None:
         from reference.pairing import polygons  # loaded late: few scenes are made into triangles
 
@@ -154,30 +170,6 @@ def _paired(
         overridden=tuple(settings.overridden),
         shading=model.name,
     )
-
-
-def _bare(graph):
-    copy = graph.copy()
-    for shape in copy.nodes(SHAPE):
-        for kind in (BSDF, MEDIUM):
-            for key, _ in copy.children(shape, kind):
-                copy.detach(shape, key)
-    return copy
-
-
-def _set_integrator(graph, ambient, settings, interpolation, prune, model):
-    props = properties(
-        "heuristic",
-        hide_emitters=settings.hide_emitters,
-        occlusion=settings.occlusion or "visible" in model.needs,
-        interpolation=interpolation.value,
-        prune=prune,
-        model=model.name,
-    )
-    if ambient is not None:
-        props["ambient"] = mi.ScalarColor3f(ambient) if isinstance(ambient, tuple) else ambient
-    props.set_id("integrator")  # identifies its parameters
-    graph.attach(0, "integrator", graph.add(INTEGRATOR, props))
 
 
 def _energy_warnings(graph):

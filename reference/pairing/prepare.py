@@ -59,7 +59,11 @@ def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -
     One of several sensors is kept, by its number in the Mitsuba scene. The integrator is removed:
     each half gets its own.
     """
-    _open_merged(graph)
+    for index in graph.nodes(SHAPE):  # merging shapes is an optimisation, and hides their ids
+        if graph.plugin(index) == "merge":
+            for _, child in graph.children(index, SHAPE):
+                graph.attach(0, f"shape_{child}", child)
+            graph.remove(index)
     bsdfs.give_default(graph)
     for index in graph.nodes(mi.ObjectType.BSDF):
         values.check_colours(graph, index, bsdfs.COLOURS.get(graph.plugin(index), ()))
@@ -81,15 +85,6 @@ def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -
     _give_weights(graph, settings)
     _take_integrator(graph, settings)
     return settings
-
-
-def _open_merged(graph):
-    """Replace ``merge`` by the shapes inside it: merging is an optimisation, and hides ids."""
-    for index in graph.nodes(SHAPE):
-        if graph.plugin(index) == "merge":
-            for _, child in graph.children(index, SHAPE):
-                graph.attach(0, f"shape_{child}", child)
-            graph.remove(index)
 
 
 def film_size(graph: Graph, sensor: int = 0) -> tuple[int, int]:

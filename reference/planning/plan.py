@@ -36,13 +36,7 @@ from heuristic.materials import COEFFICIENTS
 from reference.pairing import lights
 from reference.pairing.halves import Pair
 from reference.pairing.prepare import PATHS
-from reference.planning.effects import (
-    EFFECTS,
-    INTERREFLECTION,
-    OCCLUSION,
-    Decision,
-    Effect,
-)
+from reference.planning.effects import EFFECTS, INTERREFLECTION, OCCLUSION, Decision, Effect
 from reference.planning.facts import BSDF, Facts
 from reference.planning.rules import LIGHT_BY_LIGHT, RULES, TABULATED_ENVIRONMENT, RuleResult
 from reference.records import Amount, Count, Record, Size

@@ -162,17 +162,15 @@ class DifferenceSums(Accumulator):
         third, n = self._array("cubes"), self.count
         # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, and of the mean 1/n² of it.
         third *= 1.0 / (n * (n - 1) * (n - 2)) if n >= 4 else 0.0
-        plain = super().estimate(dtype)
-        return DifferenceEstimate(**vars(plain), third=third, grouped=self._grouped())
-
-    def _grouped(self) -> Grouped:
         sizes = np.bincount(np.arange(self.count) % GROUPS, minlength=GROUPS)
         sizes = sizes[sizes > 0]
         means = self._groups[: len(sizes)] / sizes[:, None]
         places, blocks, total = self._sample
         shape = (len(sizes), len(places), 3)
         sampled = int(blocks.max()) + 1 if len(blocks) else 0
-        return Grouped(means.reshape(shape), sizes, places, blocks, sampled, total)
+        grouped = Grouped(means.reshape(shape), sizes, places, blocks, sampled, total)
+        plain = super().estimate(dtype)
+        return DifferenceEstimate(**vars(plain), third=third, grouped=grouped)
 
 
 def block_numbers(counted: np.ndarray) -> np.ndarray:

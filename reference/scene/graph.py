@@ -148,18 +148,16 @@ class Graph:
             return kind
         plugin = self.plugin(index)
         if plugin not in self.kinds:
-            is_own = plugin in PLUGINS
-            kind = KINDS[PLUGINS[plugin][0]] if is_own else self._kind_of_object(index)
+            if plugin in PLUGINS:
+                kind = KINDS[PLUGINS[plugin][0]]
+            else:  # a user's plugin has the kind of the object that it makes
+                made = self.instantiate(index)
+                for name in ("BSDF", "Emitter", "Integrator", "Texture", "Shape", "Sensor", "Film"):
+                    if isinstance(made, getattr(mi, name)):
+                        kind = getattr(mi.ObjectType, name)
+                        break
             self.kinds[plugin] = kind
         return self.kinds[plugin]
-
-    def _kind_of_object(self, index):
-        """Return the kind of a user's plugin: the kind of the object that it makes."""
-        made = self.instantiate(index)
-        for kind in ("BSDF", "Emitter", "Integrator", "Texture", "Shape", "Sensor", "Film"):
-            if isinstance(made, getattr(mi, kind)):
-                return getattr(mi.ObjectType, kind)
-        return mi.ObjectType.Unknown
 
     def plugin(self, index: int) -> str:
         """Return the name of a node's plugin."""
@@ -229,13 +227,6 @@ class Graph:
                 if isinstance(value, Reference):
                     queue.append(value.index())
         return sorted(seen)
-
-
-def files_from(folder: Path) -> Any:
-    """Return a resolver that searches a scene's own folder first, like Mitsuba's command."""
-    widened = mi.FileResolver(mi.file_resolver())
-    widened.prepend(str(folder))
-    return widened
 
 
 def find_file(resolver: mi.FileResolver | None, name: str) -> Path | None:

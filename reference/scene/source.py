@@ -24,7 +24,6 @@ from reference.scene.graph import (
     SCRIPT,
     Graph,
     Reference,
-    files_from,
     find_file,
     plain_message,
     resolving,
@@ -136,7 +135,8 @@ class Source:
             else:
                 path = Path(content)
                 text_of(path)  # Mitsuba takes any bytes, which later are no names
-                resolver = files_from(path.resolve().parent)
+                resolver = mi.FileResolver(mi.file_resolver())
+                resolver.prepend(str(path.resolve().parent))  # first, as for Mitsuba's command
                 with resolving(resolver):
                     state = Parser.parse_file(config, str(path), **self.parameters)
             Parser.transform_upgrade(config, state)
