@@ -113,6 +113,14 @@ def test_noise_is_taken_out_at_any_departure(draw):
         assert left < share * floor, value
 
 
+def test_the_jackknife_tells_the_spread():
+    rng = np.random.default_rng(5)
+    repeats = [without_noise(rng, DRAWN["normal"], 0.33)[0] for _ in range(40)]
+    found = np.array([values[0] for values in repeats])
+    stated = [np.sqrt((REPLICATES - 1) * values[1:].var()) for values in repeats]
+    assert 0.8 * found.std() < np.sqrt(np.mean(np.square(stated))) < 2.5 * found.std()
+
+
 def test_without_noise_errors_are_the_metrics():
     found, floor = without_noise(np.random.default_rng(1), lambda rng, shape: np.zeros(shape), 0.36)
     np.testing.assert_allclose(found, true(0.36), rtol=1e-6)

@@ -301,6 +301,20 @@ def test_summary_is_of_the_mask(metric, images):
     assert empty.after_exposure.exposure == 1.0
 
 
+@POINTWISE
+def test_noise_floor_is_what_noise_alone_gives(metric):
+    """Twice the noise gives twice the floor, another draw the same, none gives none."""
+    rng = np.random.default_rng(3)
+    reference = np.full((80, 80, 3), 0.4)
+    mask = np.ones((80, 80), bool)
+    first, second = rng.normal(0, 0.002, (2, 80, 80, 3))
+    floor = noise_floor(metric, reference, first, mask)
+    assert floor > 0.0
+    assert noise_floor(metric, reference, second, mask) == pytest.approx(floor, rel=0.05)
+    assert noise_floor(metric, reference, 2 * first, mask) == pytest.approx(2 * floor, rel=0.02)
+    assert noise_floor(metric, reference, 0 * first, mask) == 0.0
+
+
 # --- Metrics from outside, and the doctor ---------------------------------------------------------
 
 
