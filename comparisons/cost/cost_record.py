@@ -234,10 +234,6 @@ class Cost(Record, kw_only=True):
         """Return a method by any of its names, also one that was merged with another."""
         return next(one for one in self.methods if name in (one.name, *one.names))
 
-    def points_of(self, name: str) -> tuple[Point, ...]:
-        """Return the points of a method."""
-        return tuple(point for point in self.points if point.method == name)
-
 
 LEAST_SHARE = 0.85
 """Share of the threads' processor time: less tells of a busy machine."""

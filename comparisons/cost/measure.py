@@ -147,9 +147,8 @@ def measure_ladder(
     """Measure every method of a scene's ladder, in the current variant.
 
     If ``options.resolution`` is omitted, that of ``at``, or of the film, is reduced to
-    :data:`WIDTH`.
-    ``options.spp`` is the largest sample count of a Monte Carlo method. Times are measured within
-    the context ``alone``.
+    :data:`WIDTH`. ``options.spp`` is the largest sample count of a Monte Carlo method. Times are
+    measured within the context ``alone``.
     """
     options.require_model("a study of cost")
     if options.resolution is None:

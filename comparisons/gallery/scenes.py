@@ -30,14 +30,14 @@ def _sphere(**bsdf):
     return {"type": "sphere", "bsdf": {"id": "sphere material", **bsdf}}
 
 
+def _textbook(viewer, field_of_view=40.0, /, **content):
+    sensor, integrator = _camera(viewer, field_of_view), {"type": "heuristic"}
+    return {"type": "scene", "integrator": integrator, "sensor": sensor, **content}
+
+
 def figure(lights: Any, viewer: Any, **coefficients: float) -> dict[str, Any]:
     """A unit sphere at the origin; lights with ``I_p0 = 1`` and ``f_att = 1``; ``I_a = 1``."""
-    scene: dict[str, Any] = {
-        "type": "scene",
-        "integrator": {"type": "heuristic"},
-        "sensor": _camera(viewer),
-        "sphere": _sphere(type="phong", **coefficients),
-    }
+    scene = _textbook(viewer, sphere=_sphere(type="phong", **coefficients))
     if "k_a" in coefficients:
         scene["integrator"]["ambient"] = 1.0
     for number, (position, colour) in enumerate(lights, 1):
@@ -51,34 +51,33 @@ def figure(lights: Any, viewer: Any, **coefficients: float) -> dict[str, Any]:
 
 def spot(exponent: float) -> dict[str, Any]:
     """Figure 6.5: a spot on a white floor; a small ``m`` gives a beam without a clear border."""
-    return {
-        "type": "scene",
-        "integrator": {"type": "heuristic"},
-        "sensor": _camera((0, -6, 5), 45.0),
-        "floor": {
+    return _textbook(
+        (0, -6, 5),
+        45.0,
+        floor={
             "type": "rectangle",
             "to_world": mi.ScalarTransform4f().scale(4),
             "bsdf": {"type": "phong", "id": "floor material", "k_d": 0.9},
         },
-        "spot": {
+        spot={
             "type": "heuristic_spot",
             "position": (0, 0, 3),
             "direction": (0, 0, -1),
             "cutoff": 60.0,
             "exponent": exponent,
         },
-    }
+    )
 
 
 def coarse_sphere() -> dict[str, Any]:
     """Figure 6.10: a sphere of few polygons, whose edges show under flat shading."""
-    return {
-        "type": "scene",
-        "integrator": {"type": "heuristic", "ambient": 1.0},
-        "sensor": _camera((0, -4, 1), 36.0),
-        "sphere": _sphere(type="phong", k_a=0.1, k_d=0.6, k_s=0.4, n=20),
-        "light": {"type": "heuristic_point", "position": (-2.5, -3.5, 3)},
-    }
+    return _textbook(
+        (0, -4, 1),
+        36.0,
+        integrator={"type": "heuristic", "ambient": 1.0},
+        sphere=_sphere(type="phong", k_a=0.1, k_d=0.6, k_s=0.4, n=20),
+        light={"type": "heuristic_point", "position": (-2.5, -3.5, 3)},
+    )
 
 
 def highlight_in_a_triangle() -> dict[str, Any]:
@@ -86,16 +85,14 @@ def highlight_in_a_triangle() -> dict[str, Any]:
     viewer = (0.0, -2.6, 3.0)
     # The mirror image of the viewer about the plane's normal through the highlight.
     light = tuple(2 * h - v for h, v in zip(HIGHLIGHT[:2], viewer[:2], strict=True)) + viewer[2:]
-    return {
-        "type": "scene",
-        "integrator": {"type": "heuristic"},
-        "sensor": _camera(viewer, 40.0),
-        "square": {
+    return _textbook(
+        viewer,
+        square={
             "type": "rectangle",
             "bsdf": {"type": "phong", "id": "square material", "k_d": 0.3, "k_s": 0.6, "n": 60},
         },
-        "light": {"type": "heuristic_point", "position": light},
-    }
+        light={"type": "heuristic_point", "position": light},
+    )
 
 
 def cornell_box() -> dict[str, Any]:
