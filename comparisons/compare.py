@@ -30,7 +30,7 @@ from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded, require_light
 from heuristic import heuristics
 from reference.records import Pixels
-from reference.rendering.gbuffer import GBuffer, image_size
+from reference.rendering.gbuffer import GBuffer
 from reference.rendering.renderer import Progress, passes
 from reference.rendering.sums import (
     DEVIATION,
@@ -112,7 +112,6 @@ def _compare(
     assert guard is not None
     done("scene and pairing", ready.planning_seconds + guard.seconds)
     stages |= {"planning": ready.planning_seconds, "guard": guard.seconds}
-    width, height = image_size(ready.scene)
     estimates = render(ready, options, ready.counted, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
     exact = ready.plan.exact and not options.image
@@ -143,10 +142,10 @@ def _compare(
         heuristic=f"picture {', '.join(options.image)}" if options.image else options.heuristic,
         interpolation=options.polygon_shading.value,
         seed=options.seed,
-        resolution=(width, height),
+        resolution=images.counted.shape[::-1],
         plan=ready.plan_record(estimates.passes),
         viewing=options.viewing,
-        pixels=Pixels(counted=int(images.counted.sum()), total=width * height),
+        pixels=Pixels(counted=int(images.counted.sum()), total=images.counted.size),
         regions=regions.find(images.maps[LEADING.name], images.counted),
         pairing=ready.pair.pairing,
         time=TimeSpent(

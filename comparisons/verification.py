@@ -13,7 +13,6 @@ from comparisons.options import Options
 from comparisons.prepared import Prepared, prepare
 from reference.planning.plan import Plan
 from reference.records import VERSION, Record
-from reference.rendering.gbuffer import gbuffer, image_size
 from reference.rendering.renderer import Progress, Renderer, Stream, pass_seed, passes
 from reference.rendering.sampler import with_sampler
 from reference.rendering.sums import DEVIATION, Accumulator, DifferenceSums, add_difference
@@ -69,8 +68,7 @@ def verify(
     ]
     count = max(side.passes for side in sides)
     count = max(count, 2) * (1 if planned.plan.max_depth == 2 else PASSES_WITH_PATHS)
-    width, height = image_size(planned.scene)
-    counted = gbuffer(planned.scene, width, height).hit
+    counted = planned.counted
     # The sides have different seeds: equal ones would hide shared noise.
     streams = (
         passes([everything.reference], options.seed, count, stream=Stream.OTHER_SIDE),
@@ -90,7 +88,7 @@ def verify(
     return Verification(
         scene=source.name,
         planned=_words(planned.plan),
-        resolution=(width, height),
+        resolution=counted.shape[::-1],
         significant=int((marked == marks.MARKED).sum()),
         pixels=int(counted.sum()),
         heuristic_largest=_kernel_difference(planned, everything, options.seed),

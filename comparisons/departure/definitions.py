@@ -73,9 +73,9 @@ DEFINED: dict[str, tuple[Callable[..., Array], Callable[..., Any]]] = {
 """Space and difference of each metric that colour-science defines."""
 
 
-def farthest(count: int = 4096) -> float:
+def farthest() -> float:
     """Return the largest deviation of the compiled differences, over random colours."""
-    test, reference = np.random.default_rng(0).random((2, count, 3))
+    test, reference = np.random.default_rng(0).random((2, 4096, 3))
     viewing, apart = DEFAULT_VIEWING, 0.0
     with np.errstate(all="ignore"), colour.utilities.suppress_warnings(python_warnings=True):
         for name, (space, difference) in DEFINED.items():

@@ -131,7 +131,6 @@ class Pool:
             worker.end()
 
     def _fill(self, waiting: Iterator[Task]) -> None:
-        """Give tasks to idle and new processes."""
         for task in islice(waiting, self._count - len(self._busy)):
             self._idle = [worker for worker in self._idle if worker.process.is_alive()]
             worker = self._idle.pop() if self._idle else Worker(self._prepare)
