@@ -249,9 +249,5 @@ def _weighted(positions, faces, weights):
     return dr.select(dr.norm(total) > limit, unit(total), 0)
 
 
-WEIGHTINGS = {
-    "mean": mean_normals,
-    "area": area_weighted_normals,
-    "angle": angle_weighted_normals,
-}
+WEIGHTINGS = {"mean": mean_normals, "area": area_weighted_normals, "angle": angle_weighted_normals}
 """How much each face around a vertex counts (6.32-6.34)."""

@@ -123,10 +123,7 @@ def cost(
 
 
 def fit(
-    scene: Scene,
-    name: str | None = None,
-    loss: str = "perceptual",
-    **options: Any,
+    scene: Scene, name: str | None = None, loss: str = "perceptual", **options: Any
 ) -> FitRecord:
     """Return the best heuristic parameters, and the error that remains; see :func:`compare`."""
     case = open_case(scene, Options.of(options), name)

@@ -20,14 +20,7 @@ import numpy as np
 
 from heuristic.errors import InputError
 from heuristic.user_code import contained
-from reference.scene.graph import (
-    SCRIPT,
-    Graph,
-    Reference,
-    find_file,
-    plain_message,
-    resolving,
-)
+from reference.scene.graph import SCRIPT, Graph, Reference, find_file, plain_message, resolving
 
 Parser = mi.parser
 Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]

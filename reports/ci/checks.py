@@ -123,9 +123,7 @@ def examine(
     if found.passed:
         return made, None
     made = structs.replace(
-        made,
-        causes=tuple(found.causes()),
-        pictures=folder.as_posix() if folder else None,
+        made, causes=tuple(found.causes()), pictures=folder.as_posix() if folder else None
     )
     if folder is None:
         return made, None

@@ -42,8 +42,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Make the mark known."""
     config.addinivalue_line(
-        "markers",
-        f"{MARK}(*names): render in these Mitsuba variants, one test for each",
+        "markers", f"{MARK}(*names): render in these Mitsuba variants, one test for each"
     )
 
 

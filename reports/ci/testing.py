@@ -98,11 +98,7 @@ class Fotismos:
         )
 
     def unchanged(
-        self,
-        scene: Scene,
-        name: str | None = None,
-        significance: float = LEVEL,
-        **options: Any,
+        self, scene: Scene, name: str | None = None, significance: float = LEVEL, **options: Any
     ) -> bool:
         """Return True; fail the test if a scene moved from its baseline, or has none.
 

@@ -33,12 +33,7 @@ if TYPE_CHECKING:
 @jobs.scene_options
 @verbose_option
 def plan(
-    scene: str,
-    as_json: bool,
-    verify: bool,
-    within: float | None,
-    timeout: float,
-    **rendering: Any,
+    scene: str, as_json: bool, verify: bool, within: float | None, timeout: float, **rendering: Any
 ) -> None:
     """List the effects that a scene calls for, by which rule, and what will be simulated.
 

@@ -19,14 +19,7 @@ from msgspec import structs
 
 from comparisons.departure.colour import BT709, rgb_to_xyz
 from comparisons.departure.criterion import LIMIT, TOLERANCE, decide
-from comparisons.departure.metrics import (
-    LEADING,
-    LOG2_EPSILON,
-    METRICS,
-    RATIO,
-    THRESHOLDS,
-    drawn,
-)
+from comparisons.departure.metrics import LEADING, LOG2_EPSILON, METRICS, RATIO, THRESHOLDS, drawn
 from reference.records import plain
 from reports import glossary, verdict
 from reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT

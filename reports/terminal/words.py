@@ -33,9 +33,7 @@ def _option(letter: str, name: str, help: str) -> Callable[[Any], Any]:
 
 quiet_option = _option("-q", "--quiet", "Print only where the results are, no progress or tables.")
 verbose_option = _option(
-    "-v",
-    "--verbose",
-    "Also print the simulation, the pairing of lights, warnings, and times.",
+    "-v", "--verbose", "Also print the simulation, the pairing of lights, warnings, and times."
 )
 
 
