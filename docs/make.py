@@ -16,6 +16,7 @@ from nbclient import NotebookClient
 
 from comparisons import atomic
 from comparisons.compare import compare
+from comparisons.departure.metrics import METRICS
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
 from heuristic import plugins
@@ -28,6 +29,7 @@ from reports.charts.cost_charts import titled
 from reports.files import images
 from reports.run import audit_files
 from reports.terminal import tables
+from reports.terminal.words import number, percent
 from tests.witnesses import page
 
 DOCS = Path(__file__).parent
@@ -207,7 +209,23 @@ def _example():
         options = Options(spp=samples, resolution=(256, 256))
         results.append(compare(builtin("cornell-box").source(), options))
     atomic.write(DOCS / "reading.png", figures.drawn(figures.strip(results[-1]), "png", 150))
-    replace("reading.md", "example", tables.metrics_markdown(r.record for r in results))
+    replace("reading.md", "example", _departures([result.record for result in results]))
+
+
+def _departures(records):
+    """Yield a table of the means of each metric, and what its brackets hold."""
+    rows = [("", *(f"{record.plan.spp} samples per pixel" for record in records))]
+    for name, metric in METRICS.items():
+        means = (
+            f"{number(one.mean)} ({number(one.after_exposure.mean)}; {number(one.noise_floor)})"
+            for one in (record.metrics[name] for record in records)
+        )
+        rows.append((metric.label, *means))
+    rows.append(("significant", *(percent(one.significant.fraction) for one in records)))
+    yield from tables.markdown(rows)
+    yield ""
+    yield "Means over the pixels that see a surface; in brackets the mean after the one exposure"
+    yield "that makes it smallest, and the mean that the reference's noise alone would give."
 
 
 def _witnesses():

@@ -197,13 +197,12 @@ def define() -> dict[str, Any]:
             # The lobe, the diffuse part and the null component, in this order.
             front, back = mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide
             sides = front | (back if self.twosided else 0)
-            self.m_components = [
-                mi.BSDFFlags.GlossyReflection | sides,
-                mi.BSDFFlags.DiffuseReflection | sides,
-            ]
+            flags = mi.BSDFFlags
+            components = [flags.GlossyReflection | sides, flags.DiffuseReflection | sides]
             if self.is_clear:
-                self.m_components.append(mi.BSDFFlags.Null | front | back)
-            self.m_flags = reduce(or_, self.m_components)
+                components.append(flags.Null | front | back)
+            self.m_components = components  # Mitsuba copies the list
+            self.m_flags = reduce(or_, components)
             self.n_is_moderate = False
             dr.make_opaque([each for each in self.partner.values() if isinstance(each, mi.Float)])
             if not isinstance(self.n, mi.Texture):
