@@ -108,7 +108,9 @@ def sentence(
                 f" differ, and {percent(LIMIT)} may. More samples (--spp, --noise) decide."
             )
     if lead.after_exposure.p95 + NOISE * lead.noise_floor <= threshold:
-        return f"Only the level is off: ×{number(lead.after_exposure.exposure)} makes it pass."
+        factor = lead.after_exposure.exposure
+        change = "Brightening" if factor > 1 else "Darkening"
+        return f"{change} the picture is enough: ×{number(factor)} makes it pass."
     if record.picture:
         return "The map shows where the picture is wrong."
     if cost is None:

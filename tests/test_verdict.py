@@ -72,7 +72,9 @@ RULES = {
         "Too close to call: 3.00 % to 8.00 % of the pixels differ, and 5.00 % may. More samples"
         " (--spp, --noise) decide.",
     ),
-    "level": (scene(exposed=1.5), None, 2.0, "Only the level is off: ×1.11 makes it pass."),
+    "level": (
+        scene(exposed=1.5), None, 2.0, "Brightening the picture is enough: ×1.11 makes it pass.",
+    ),
     "level, if noise does not hide more": (
         scene(exposed=1.9), None, 2.0,
         "To find the cheapest method that passes: `fotismos plan a --within 2`.",

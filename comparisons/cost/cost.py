@@ -211,11 +211,16 @@ class Choice(Record, kw_only=True):
 def choose(
     source: Source, within: float, options: Options | None = None, progress: Progress | None = None
 ) -> Choice:
-    """Measure the ladder of a scene, in the current variant, and choose from it."""
+    """Measure the ladder of a scene, in the current variant, and choose from it.
+
+    Errors are measured at a small size, times follow from the time per sample.
+    """
     checked_threshold(within)
     options = options or Options()
-    found = measure_ladder(source, options, Effort(), progress or (lambda *_: None))
     size = options.resolution or film_size(source.parse(), options.sensor)
+    small = options.changed(resolution=None)
+    progress = progress or (lambda *_: None)
+    found = measure_ladder(source, small, Effort(), progress, at=options.resolution)
     points = at_size(found.points, found.methods, size)
     full = next(one.name for one in found.methods if FULL_PLAN.name in one.names)
     of_full = [point for point in points if point.method == full]

@@ -63,7 +63,7 @@ def fit(
         pool.start()
         from heuristic.materials import FORMS
         from reference.records import plain
-        from reports.files.results import hold, own, places
+        from reports.files.results import PAGE, hold, own, places
         from reports.run import fit_files
         from reports.terminal import progress
 
@@ -83,7 +83,7 @@ def fit(
         return
     for record in records:
         tell(fit_files.lines(record))
-    tell_where(folder)
+    tell_where(folder / next(iter(folders)) / PAGE if len(folders) == 1 else folder)
 
 
 def fitted(
