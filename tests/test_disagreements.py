@@ -90,7 +90,7 @@ def behind_a_lamp(shape, integrator, near_clip=None):
     """A shape behind a large lamp, which is hidden, or behind the near clip plane."""
     return scene(
         integrator={"type": integrator, "hide_emitters": near_clip is None},
-        camera={"near_clip": near_clip} if near_clip else {},
+        lens={"near_clip": near_clip} if near_clip else {},
         body={"bsdf": DIFFUSE, **shape},
         lamp=shining(look_at((0, -2, 0)).scale(1.5)),
     )

@@ -63,7 +63,7 @@ def spheres(form="phong", red=RED, grey=GREY, floor=FLOOR, lights=LIGHTS, **inte
     return described(
         (0, -8, 3),
         integrator={"type": "heuristic", "ambient": 1.0, **integrator},
-        camera={"type": "perspective", "sampler": sampler},
+        lens={"sampler": sampler},
         size=SIZE,
         **shapes,
     )
