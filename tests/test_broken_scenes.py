@@ -61,6 +61,7 @@ def test_what_cannot_be_meant_is_refused_by_name(rgb, tmp_path):
     assert not wrong
 
 
+@pytest.mark.thorough
 def test_what_mitsuba_renders_is_not_refused(rgb, tmp_path):
     for before, after in TABLE["legal"]:
         images = compared(tmp_path, changed(before, after)).images
@@ -273,6 +274,7 @@ def outcome(seed, folder):
     return "rendered" if is_sound and made.record.pixels.counted else f"{seed}: not a picture"
 
 
+@pytest.mark.thorough
 def test_a_scene_broken_at_random_is_rendered_or_refused(rgb, corpus):
     assert {outcome(seed, corpus) for seed in range(8)} == {"rendered", "refused"}
 

@@ -174,6 +174,7 @@ def test_the_surest_of_the_widest_comes_first():
 # --- Measurement -----------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 def test_jackknife_errors_are_those_of_metrics_drawn_again():
     """The spread of a metric over independent measurements is the error that each reports."""
     rng = np.random.default_rng(6)

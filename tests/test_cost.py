@@ -52,7 +52,11 @@ def short():
 
 @pytest.mark.parametrize(
     "name",
-    ["cornell-box", "fig-6-10", pytest.param("narrow-band-lamp", marks=pytest.mark.thorough)],
+    [
+        pytest.param("cornell-box", marks=pytest.mark.thorough),
+        pytest.param("fig-6-10", marks=pytest.mark.thorough),
+        "narrow-band-lamp",
+    ],
 )
 def test_a_study_has_its_effects_files_and_tables(name):
     case = open_case(name, Options(resolution=(24, 24)))
@@ -90,7 +94,13 @@ def ladder(source, **options):
     return Ladder(source, chosen, prepare(source, chosen))
 
 
-@pytest.mark.parametrize("name", ["fig-8-9", "cornell-box", "open floor"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        *(pytest.param(n, marks=pytest.mark.thorough) for n in ("fig-8-9", "cornell-box")),
+        "open floor",
+    ],
+)
 def test_merged_methods_are_equal_images(rgb, name):
     """Every name that a method swallowed, rendered as if the scene could tell it apart."""
     if name == "open floor":
@@ -255,7 +265,7 @@ def test_plan_within_names_the_fastest_that_suffices_and_exits_with_1_if_none_do
 ):
     source, few = SCENES["fig-8-9"].source(), Options(resolution=(12, 12))
     found = measure_ladder(source, few, TINY, lambda *_: None)
-    monkeypatch.setattr(studies, "measure_ladder", lambda *_: found)
+    monkeypatch.setattr(studies, "measure_ladder", lambda *_, **__: found)
     words = "plan", "fig-8-9", "--resolution", "12x12"
     code, said, _ = run(*words, "--within", 10, "--json")
     assert code == 0

@@ -113,6 +113,7 @@ def check(name, samples, passes, runs, size=noisy.SIZE):
     return pool
 
 
+@pytest.mark.thorough
 @pytest.mark.guarantee(
     "marks", "On the Cornell box 16 passes mark nine tenths of the pixels above ΔE2000 3."
 )
