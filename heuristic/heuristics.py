@@ -40,6 +40,9 @@ RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "
 LOADERS = {".py": "heuristic.user_shaders:from_file", ".glsl": "heuristic.glsl:from_file"}
 """Functions that read a user's file by its suffix, imported when a name has it."""
 
+OF_FUNCTION, SHADED = "heuristic.user_shaders:of_function", "heuristic.user_shaders:shaded"
+"""Make a heuristic of a function, and call and check a user's; imported as late."""
+
 _FILE = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)
 
 
@@ -298,9 +301,7 @@ class Heuristic:
         point = Point(self.needs, arguments, uv, tuned, prepared, wavelengths)
         if self.is_own:
             return self.shade(point)
-        from heuristic.user_shaders import shaded  # loaded late: the package's own need no checks
-
-        return shaded(self.name, self.shade, point)
+        return pkgutil.resolve_name(SHADED)(self.name, self.shade, point)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -351,7 +352,7 @@ def known_as(heuristic: "str | Heuristic | Callable[[Point], Array]") -> str:
         return heuristic
     if not isinstance(heuristic, Heuristic):
         name = getattr(heuristic, "__name__", "shade").lower().replace("_", "-").strip("-")
-        heuristic = pkgutil.resolve_name("heuristic.user_shaders:of_function")(heuristic, name)
+        heuristic = pkgutil.resolve_name(OF_FUNCTION)(heuristic, name)
     return declare(heuristic).name
 
 
