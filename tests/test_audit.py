@@ -267,6 +267,7 @@ def test_the_headline_and_the_page_name_every_failure(grey):
     assert "default-src 'none'" in html
 
 
+@pytest.mark.thorough
 def test_only_values_that_no_light_has_fail_the_command(run, tmp_path):
     file = tmp_path / "mine.py"
     file.write_text(

@@ -18,6 +18,7 @@ def test_shading_in_rgb_against_spectra_is_as_it_was(fotismos, name):
     assert fotismos.unchanged(name)
 
 
+@pytest.mark.thorough
 @pytest.mark.fotismos_variant("llvm_ad_spectral")
 def test_a_scene_in_spectra_is_as_it_was(fotismos):
     assert fotismos.unchanged("cornell-box")

@@ -276,7 +276,7 @@ def test_plan_within_names_the_fastest_that_suffices_and_exits_with_1_if_none_do
     assert {"shadow map", "constant ambient"} <= made["left_out"].keys()
     none = MeanError(mean=20.0, low=19.0, high=21.0)
     points = tuple(structs.replace(point, tolerance=none) for point in found.points)
-    monkeypatch.setattr(studies, "measure_ladder", lambda *_: replace(found, points=points))
+    monkeypatch.setattr(studies, "measure_ladder", lambda *_, **__: replace(found, points=points))
     code, said, _ = run(*words, "--within", 10)
     assert code == 1
     assert said.startswith("At 12x12 no measured method suffices at ΔE2000 10")

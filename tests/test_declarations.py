@@ -159,6 +159,7 @@ TONE = Heuristic("flat-tone", lambda point: point.material.k_d, "Flat <tone>")
 NO_SHADOWS = Method(name="no <shadows>", family="physical", without=("occlusion",), max_depth=2)
 
 
+@pytest.mark.thorough
 def test_a_method_and_a_heuristic_are_in_json_tables_page_and_chart(
     run, scene_file, tmp_path, monkeypatch
 ):

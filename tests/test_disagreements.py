@@ -97,7 +97,13 @@ def behind_a_lamp(shape, integrator, near_clip=None):
 
 
 @pytest.mark.guarantee("plans", "What the camera sees through a hidden lamp is lit right.")
-@pytest.mark.parametrize("plugin", ["disk", "sphere", "cylinder", "rectangle"])
+@pytest.mark.parametrize(
+    "plugin",
+    [
+        "disk",
+        *(pytest.param(n, marks=pytest.mark.thorough) for n in ("sphere", "cylinder", "rectangle")),
+    ],
+)
 def test_a_shape_seen_through_a_hidden_lamp_is_as_bright_as_without_looking_through(rgb, plugin):
     to_world = look_at((0, 0, 0), (0, -4, 0))
     shape = {"type": plugin, "to_world": to_world} if plugin in ("disk", "rectangle") else {}

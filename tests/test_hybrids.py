@@ -91,6 +91,7 @@ def removes(options, name="cornell-box"):
     return attribution.find(guarded(source, options), source, options).record
 
 
+@pytest.mark.thorough
 @pytest.mark.guarantee("attribution", "With all effects simulated, no departure remains.")
 def test_with_all_effects_nothing_is_left(rgb, monkeypatch):
     monkeypatch.setattr(attribution, "REPLICATES", 8)
@@ -156,6 +157,7 @@ def test_without_effects_the_plugins_give_the_kernels_image(rgb):
         np.testing.assert_allclose(found, expected, atol=2e-5)
 
 
+@pytest.mark.thorough
 def test_images_of_one_rendering_are_those_of_a_rendering_each(rgb):
     """Only light between surfaces without shadows draws other random numbers alone."""
     _, scenes = hybrid_scenes(SCENES["cornell-box"].source())

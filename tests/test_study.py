@@ -133,6 +133,7 @@ def phong_albedo(k_d, k_s, n, degrees):
     return integral(reflected, degrees)
 
 
+@pytest.mark.thorough
 def test_phong_reflects_more_than_it_receives_for_a_large_k_s():
     parameters = "n = [1, 9, 100]\nk_d = 0.3\nk_s = [0.5, 2]\nlight_angle = [0, 75]"
     found = rows(parameters, "lobe", "pairing = 'literal'")
