@@ -143,11 +143,7 @@ def _on_a_floor(floor, ball, lamp_at, side, radiance):
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 8},
         "sensor": camera((0, -7, 4), fov=35.0),
-        "floor": {
-            "type": "rectangle",
-            "to_world": moved((0, 0, -1), 12),
-            "bsdf": floor,
-        },
+        "floor": {"type": "rectangle", "to_world": moved((0, 0, -1), 12), "bsdf": floor},
         "lamp": {
             "type": "rectangle",
             "to_world": look_at(lamp_at).scale(side),

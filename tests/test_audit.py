@@ -11,12 +11,7 @@ import pytest
 from msgspec import structs
 
 from comparisons.audit import checks
-from comparisons.audit.subjects import (
-    DISTANCES,
-    EXTREMES,
-    ScatteringSubject,
-    ShadingSubject,
-)
+from comparisons.audit.subjects import DISTANCES, EXTREMES, ScatteringSubject, ShadingSubject
 from heuristic import Range, heuristics
 from heuristic.errors import InputError
 from heuristic.heuristics import HEURISTICS
@@ -274,7 +269,7 @@ def test_only_values_that_no_light_has_fail_the_command(run, tmp_path):
         "import drjit as dr\n"
         "def even(point):\n"
         "    facing = dr.dot(point.normal, point.view)\n"
-        "    return dr.select(facing < 1e-5, dr.log(facing - 1), 1) * point.material.k_s\n",
+        "    return dr.select(facing < 1e-5, dr.log(facing - 1), 1) * point.material.k_s\n"
     )
     assert run("audit", "--bsdf", "diffuse", "-p", "reflectance=0.5", "-o", tmp_path)[0] == 0
     code, said, _ = run("audit", "--heuristic", f"{file}:even", "-o", tmp_path)

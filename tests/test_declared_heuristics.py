@@ -11,14 +11,7 @@ from comparisons.gallery.builtin import SCENES
 from heuristic import kernel, tessellation
 from heuristic.declared import Declared
 from heuristic.errors import InputError
-from heuristic.heuristics import (
-    HEURISTICS,
-    PHONG,
-    Heuristic,
-    Parameter,
-    declare,
-    named,
-)
+from heuristic.heuristics import HEURISTICS, PHONG, Heuristic, Parameter, declare, named
 from reference.pairing import halves
 from reference.rendering.renderer import Renderer
 from tests import checks

@@ -63,7 +63,7 @@ def test_nothing_is_told_of_models_of_another_kind(rgb, tmp_path):
             "        cosine = dr.maximum(dr.dot(point.normal, each.toward), 0)\n"
             "        half = dr.normalize(each.toward + point.view)\n"
             f"        value += each.intensity * ({light})\n"
-            "    return value\n",
+            "    return value\n"
         )
         assert mistakes_of(path) == (), name
 

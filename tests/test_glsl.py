@@ -96,7 +96,7 @@ def test_shadows_are_those_of_a_heuristic_in_python(rgb, written):
     written(
         "import drjit as dr\n"
         "def shade(point):\n"
-        "    return sum(dr.select(l.visible(), l.intensity, 0) for l in point.lights)\n",
+        "    return sum(dr.select(l.visible(), l.intensity, 0) for l in point.lights)\n"
     )
     text = """vec3 shade(Point point) {
         vec3 sum = vec3(0.0);

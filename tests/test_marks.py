@@ -124,10 +124,7 @@ def test_the_cornell_box_has_few_false_marks_and_most_true_ones(rgb):
 
 @pytest.mark.guarantee("marks", "At most 5 % of marks are wrong, on skewed noise too.")
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "samples", "passes"),
-    noisy.RUNS,
-)
+@pytest.mark.parametrize(("name", "samples", "passes"), noisy.RUNS)
 def test_false_marks_are_as_rare_as_stated(rgb, name, samples, passes):
     pool = check(name, samples, passes, 200)
     if name == "cornell" and samples * passes >= 256:

@@ -19,11 +19,7 @@ from reference.pairing.probe import mean_radiance
 from tests.parts import camera, moved, rgb_of
 
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
-CHECKS = {
-    "type": "checkerboard",
-    "color0": rgb_of(0.9, 0.6, 0.3),
-    "color1": rgb_of(0.1, 0.2, 0.4),
-}
+CHECKS = {"type": "checkerboard", "color0": rgb_of(0.9, 0.6, 0.3), "color1": rgb_of(0.1, 0.2, 0.4)}
 GREY_CHECKS = {"type": "checkerboard", "color0": 0.2, "color1": 0.8}
 SUN = {"type": "directional", "direction": [0.4, 0.2, -1.0], "irradiance": 2.0}
 

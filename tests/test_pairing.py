@@ -192,8 +192,7 @@ def test_the_literal_convention_goes_by_name(rgb):
     assert not misses
     assert plastic == RoughPlastic((0.5,) * 3, pytest.approx(sqrt(2 / 5)), 1.5)
     back = albedo.to_phong(
-        RoughPlastic((0.1, 0.2, 0.3), 0.2, 1.9, specular_reflectance=(0.5, 0.6, 0.7)),
-        LITERAL,
+        RoughPlastic((0.1, 0.2, 0.3), 0.2, 1.9, specular_reflectance=(0.5, 0.6, 0.7)), LITERAL
     )
     assert back == Phong((0.1, 0.2, 0.3), (0.5, 0.6, 0.7), pytest.approx(48))
     plastic, misses = albedo.to_roughplastic(Phong((1.5, 0.5, 0.5), (0.1,) * 3, 9.0), LITERAL)

@@ -38,9 +38,7 @@ def pick(visitor, x, y, how):
 
 
 @pytest.mark.parametrize(
-    ("visitor", "how"),
-    [({}, "click"), ({}, "keys"), (PHONE, "touch")],
-    indirect=["visitor"],
+    ("visitor", "how"), [({}, "click"), ({}, "keys"), (PHONE, "touch")], indirect=["visitor"]
 )
 def test_the_terms_are_those_of_the_pixel(visitor, how):
     page = visitor.open(SCENE)
