@@ -250,7 +250,7 @@ def test_causes_name_the_half_the_place_and_the_colour():
 # --- Files of others -------------------------------------------------------------------------
 
 
-@pytest.mark.guarantee("runs", "`--junit`, `--summary` and `--images` replace no file of yours.")
+@pytest.mark.guarantee("runs", "`--junit`, `--summary` and `--images` do not replace your files.")
 def test_a_file_of_others_is_not_replaced_by_compare(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     files = {"a.xml": SCENE, "mine.txt": "mine", "b.md": SCENE}

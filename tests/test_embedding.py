@@ -15,7 +15,7 @@ ROUNDING, ERROR_ROUNDING = 0.0025, 2**-4
 
 
 def codes(embedded):
-    """All planes of 16 bits by name, from their differences."""
+    """The planes of 16 bits and their names, from their differences."""
     raw = zlib.decompress(base64.b64decode(embedded.data))
     found = np.cumsum(np.frombuffer(raw, "<u2"), dtype=np.uint16)
     found = found.reshape(len(embedded.names), embedded.height, embedded.width)

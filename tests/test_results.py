@@ -133,7 +133,7 @@ def test_files_of_others_stay_and_ours_are_replaced(tmp_path):
     assert (out / "index.html").read_text() == "new"
 
 
-@pytest.mark.guarantee("runs", "Nothing of yours in an output folder is overwritten or deleted.")
+@pytest.mark.guarantee("runs", "Your own files in an output folder are not overwritten or deleted.")
 @pytest.mark.parametrize(
     ("name", "make"),
     [

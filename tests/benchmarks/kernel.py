@@ -70,7 +70,7 @@ def g_buffer():
 
 
 def contenders(points):
-    """Return the contenders by name; each returns its result."""
+    """Return the contenders and their names; each returns its result."""
     lights, colours = np.array(POSITIONS, np.float32), np.array(COLOURS, np.float32)
     out = np.empty_like(points[0])
     # Half of the twelve floats a point read and half of them written.

@@ -17,6 +17,11 @@ COUNTING = """() => {
   };
 }"""
 
+TURNING = """(canvas, turn) => {  // at once: a slow machine would pause between turns
+  const options = { bubbles: true, cancelable: true, ...turn };
+  for (let i = 0; i < 6; i++) canvas.dispatchEvent(new WheelEvent("wheel", options));
+}"""
+
 
 def displayed(linear, exposure):
     """8-bit sRGB of linear light (IEC 61966-2-1), after the exposure."""
@@ -163,12 +168,11 @@ def test_zoom_by_wheel_keeps_the_pixel_and_shows_squares(visitor, report):
     place = visitor.place_of(8, 28)
     visitor.canvas().hover(position=dict(zip("xy", place, strict=True)))
     page.evaluate(COUNTING)
-    page.keyboard.down("Control")
-    for _ in range(6):
-        page.mouse.wheel(0, -120)
-    page.keyboard.up("Control")
+    box = visitor.canvas().bounding_box()
+    client = {"clientX": box["x"] + place[0], "clientY": box["y"] + place[1]}
+    visitor.canvas().evaluate(TURNING, {"deltaY": -120, "ctrlKey": True, **client})
     page.wait_for_timeout(600)  # the gesture's end
-    assert 1 <= page.evaluate("window.replaced") <= 2  # a slow machine may pause between turns
+    assert page.evaluate("window.replaced") == 1  # once for the whole gesture
     zoom, *centre = (float(visitor.state()[key]) for key in ("zoom", "x", "y"))
     assert zoom > 3 * visitor.canvas().bounding_box()["width"] / WIDTH
     assert visitor.inspected()["position"] == "Pixel 8, 28"
