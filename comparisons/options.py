@@ -73,7 +73,7 @@ class Options(
     resolution: Annotated[tuple[Side, Side] | None, _help("Width and height.", "the film's")] = None
     heuristic: Annotated[
         str,
-        _help("The heuristic: phong, blinn, one that engines use (such as mean-ambient), one that"
+        _help("The heuristic: phong, blinn, one that engines use (such as shadow-map), one that"
               " a package declares, or a function shade(point) in a file."),
     ] = "phong"  # fmt: skip
     interpolation: Annotated[

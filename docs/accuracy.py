@@ -13,7 +13,7 @@ import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is impo
 from comparisons.case import open_case
 from comparisons.cost.cost import cost
 from comparisons.cost.cost_record import Cost, Point
-from comparisons.cost.front import at_size, sufficient
+from comparisons.cost.front import at_size, fronted, sufficient
 from comparisons.cost.methods import FULL_PLAN, STAND_INS
 from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
@@ -43,6 +43,11 @@ def measured(names: Sequence[str] = (*SCENES, *map(str, LARGER))) -> list[Cost]:
     return found
 
 
+def at_full_size(record: Cost) -> tuple[Point, ...]:
+    """Return the points of a study with their times and front at :data:`SIZE`."""
+    return fronted(at_size(record.points, record.methods, SIZE))
+
+
 def setting(records: Sequence[Cost]) -> Iterator[str]:
     """Yield the conditions of the measurement."""
     first = records[0]
@@ -56,13 +61,10 @@ def setting(records: Sequence[Cost]) -> Iterator[str]:
 
 def fronts(records: Sequence[Cost]) -> Iterator[str]:
     """Yield the front of some studies at full size, in steps that lower the error by a tenth."""
-    yield f"Times at {SIZE[0]} by {SIZE[1]} pixels."
-    yield ""
     rows = []
     for record in (each for each in records if each.scene in AT_FULL_SIZE):
         error = float("inf")
-        points = at_size(record.points, record.methods, SIZE)
-        for point in sorted(points, key=lambda point: point.seconds.value):
+        for point in sorted(at_full_size(record), key=lambda point: point.seconds.value):
             if point.front and point.error.mean <= 0.9 * error:
                 error = point.error.mean
                 where = record.scene, f"{point.method}, {point.spp}"
@@ -94,14 +96,15 @@ def methods(records: Sequence[Cost]) -> Iterator[str]:
     """Yield the fastest method that suffices, with one row for scenes that have the same ones."""
     yield (
         "The fastest method of which at most 5 % of the pixels exceed a ΔE2000, with its samples"
-        " per pixel; in brackets its time over that of the textbook kernel with the fewest"
-        " (*kernel*), in the median of the scenes. *Full plan*: the same of the full plan with the"
-        " most samples."
+        f" per pixel, at {SIZE[0]} by {SIZE[1]} pixels; in brackets its time over that of the textbook"
+        " kernel with the fewest (*kernel*), in the median of the scenes. *Full plan*: the same of"
+        " the full plan with the most samples."
     )
     yield ""
     alike: dict[tuple[str, ...], list[tuple[Cost, list[Point | None]]]] = {}
     for record in records:
-        chosen = [sufficient(record.points, limit) for limit in TOLERANCES]
+        points = at_full_size(record)
+        chosen = [sufficient(points, limit) for limit in TOLERANCES]
         names = tuple(_named(one, record.methods[0].name) for one in chosen)
         alike.setdefault(names, []).append((record, chosen))
     rows = []
@@ -132,7 +135,7 @@ def attribution(records: Sequence[Cost]) -> Iterator[str]:
             effect,
             f"{len(found)}",
             number(median(removed for removed, _ in found)),
-            f"{median(times for _, times in found):+.2g}",
+            f"{median(times for _, times in found):+.2f}",
         )
         for effect, found in sorted(worth.items(), key=lambda row: -len(row[1]))
         if len(found) >= FEW
@@ -157,7 +160,7 @@ def _within(records, limit):
     """Return how many scenes need only a kernel at a tolerance, and how much faster it is."""
     enough, saved = 0, []
     for record in records:
-        chosen = sufficient(record.points, limit)
+        chosen = sufficient(at_full_size(record), limit)
         if chosen and record.method(chosen.method).is_kernel:
             enough += 1
             full = record.method(FULL_PLAN.name).per_sample_s.value
@@ -189,13 +192,14 @@ def _stand_ins(records):
     on_front = Counter(
         name
         for record in records
-        for name in {point.method for point in record.points if point.front}.intersection(names)
+        for name in {one.method for one in at_full_size(record) if one.front}.intersection(names)
     )
     never = [name for name in names if not on_front[name]]
     said = "; ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
     left = f" Never: {'; '.join(never)}." if never else ""
     left += (
-        " Gone since version 0.2: filtered shadow map (1), spherical harmonics, ambient occlusion."
+        " Measured, never on one and gone: constant ambient, and in version 0.2 spherical harmonics"
+        " and ambient occlusion; the filtered shadow map was on one."
     )
     return f"Stand-ins on the front, by the number of scenes: {said}.{left}"
 
@@ -208,12 +212,12 @@ def _named(point: Point | None, kernel: str) -> str:
 
 def _longest(record: Cost) -> Point:
     """Return the full plan with the most samples."""
-    own = (point for point in record.points if point.method == FULL_PLAN.name)
+    own = (point for point in at_full_size(record) if point.method == FULL_PLAN.name)
     return max(own, key=lambda point: point.spp)
 
 
 def _ratio(record: Cost, point: Point | None) -> float:
     """Return a point's time over that of the textbook kernel with the fewest samples."""
     kernel = record.methods[0].name
-    fewest = min(one.seconds.value for one in record.points if one.method == kernel)
+    fewest = min(one.seconds.value for one in at_full_size(record) if one.method == kernel)
     return point.seconds.value / fewest if point else 0.0

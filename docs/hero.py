@@ -22,6 +22,7 @@ from reports import verdict
 from reports.charts import figures
 from reports.charts.theme import EFFECT_COLOURS
 from reports.files.images import webp
+from reports.files.results import TABLES
 from reports.jobs import Job
 from reports.run import scene
 from reports.terminal.words import number, percent
@@ -58,6 +59,7 @@ def made(request: Options | None = None) -> Hero:
     """Compare the scene as the command does."""
     job = Job(request or Options(), with_causes=True)
     with TemporaryDirectory() as folder:
+        Path(folder, TABLES).mkdir()  # where processes of a command wait for their turn
         view, _ = scene.compare(SCENE, Path(folder), SCENE, job, lambda *_: None)
         files = {name: Path(folder, SCENE, f"{name}.png") for name in PANELS}
         pictures = {name: Image.open(file).convert("RGB") for name, file in files.items()}

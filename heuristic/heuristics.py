@@ -320,7 +320,6 @@ HEURISTICS: Declared[Heuristic] = Declared(
     phong="heuristic.heuristics:PHONG",
     blinn="heuristic.heuristics:BLINN",
     shadow_map="heuristic.shadow_maps:MAP",
-    mean_ambient="heuristic.indirect_light:MEAN",
     hemisphere_ambient="heuristic.indirect_light:HEMISPHERE",
 )
 """All heuristics."""

@@ -10,12 +10,10 @@ sees::
 where the directions ``w`` follow the cosine and ``w'`` the environment's light. ``L`` is the light
 reflected towards the point. The seed is fixed, so runs repeat.
 
-In ``mean-ambient`` ``A`` is the mean over these points, each weighted by its ``k_d``: artists of
-the 1990s set ``I_a`` by hand to imitate it, and the mean is the best single number for the image's
-level. In ``hemisphere-ambient`` it comes from a sky of radiance ``S`` above the horizon and a
-ground of ``G`` below. A surface with ``c = n.up`` receives ``E / pi = S (1 + c) / 2 + G (1 - c) /
-2``: the integral of both halves over its hemisphere. ``S`` and ``G`` are fitted by least squares to
-the same points, which keeps the image's mean.
+``A`` comes from a sky of radiance ``S`` above the horizon and a ground of ``G`` below. A surface
+with ``c = n.up`` receives ``E / pi = S (1 + c) / 2 + G (1 - c) / 2``: the integral of both halves
+over its hemisphere. ``S`` and ``G`` are fitted by least squares to these points, each weighted by
+its ``k_d``, which keeps the image's mean.
 
 ``I_a`` stands for the environment if the scene has one, and is then replaced. If the scene has its
 own ``I_a``, it stays, and the light reflected by surfaces is added.
@@ -154,14 +152,9 @@ def fit(
     return np.maximum(level + slope, 0), np.maximum(level - slope, 0)
 
 
-def prepare_mean(scene: Any) -> tuple[Array, Array, list[float], bool]:
-    """Return sky and ground that are the same, since no direction is up."""
-    return prepare(scene, np.zeros(3))
-
-
-def prepare(scene: Any, up: np.ndarray | None = None) -> tuple[Array, Array, list[float], bool]:
+def prepare(scene: Any) -> tuple[Array, Array, list[float], bool]:
     """Return sky, ground, the upward direction, and whether they replace ``I_a``."""
-    up = upward(scene) if up is None else up
+    up = upward(scene)
     sky, ground = (mi.Spectrum(end.tolist()) for end in fit(*gather(scene), up))
     dr.make_opaque(sky, ground)  # as literals they would compile a kernel for every scene
     return sky, ground, up.tolist(), scene.environment() is not None
@@ -183,14 +176,11 @@ def shade(point: Point) -> Array:
     return colour + point.material.k_d * arriving
 
 
-MEAN, HEMISPHERE = (
-    Heuristic(
-        f"{name}-ambient",
-        shade,
-        f"{name} ambient light",
-        frozenset(INPUTS) - {"uv", "visible"},
-        prepare=ready,
-        refuse=refuse,
-    )
-    for name, ready in (("mean", prepare_mean), ("hemisphere", prepare))
+HEMISPHERE = Heuristic(
+    "hemisphere-ambient",
+    shade,
+    "hemisphere ambient light",
+    frozenset(INPUTS) - {"uv", "visible"},
+    prepare=prepare,
+    refuse=refuse,
 )

@@ -127,9 +127,8 @@ METHODS: Terms = {
     ("Phong kernel",): "The textbook’s model at each point, with interpolated normals.",
     ("kernel with shadows",): "The textbook’s model with a shadow ray to each light.",
     ("shadow map",): "Shadows from a depth image as each light sees it.",
-    ("constant ambient", "hemisphere ambient"): (
-        "Ambient light in place of light between surfaces: one colour, or two colours for up"
-        " and down."
+    ("hemisphere ambient",): (
+        "Ambient light in place of light between surfaces: two colours, for up and down."
     ),
     ("phong BSDF, full transport",): "Textbook materials under all light transport.",
     ("direct",): "Physical materials under the light that comes straight from lights.",

@@ -76,7 +76,7 @@ def test_a_study_has_its_effects_files_and_tables(name):
     assert record.methods[0].ratio.value == 1.0
     if name == "cornell-box":
         prepared = {method.name: method.prepare_s for method in record.methods}
-        assert prepared["constant ambient"] > 0
+        assert prepared["hemisphere ambient"] > 0
         assert prepared["Phong kernel"] == prepared["direct"] == 0
 
 
@@ -129,7 +129,7 @@ def test_merged_methods_are_equal_images(rgb, name):
 
 TOY = Method(name="no shadows", family="physical", without=("occlusion",), max_depth=2)
 HALF = Method(
-    name="half light", family="kernel", heuristic="mean-ambient", stands_in_for=("interreflection",)
+    name="half light", family="kernel", heuristic="hemisphere-ambient", stands_in_for=("interreflection",)
 )
 
 
@@ -140,7 +140,7 @@ def test_methods_stand_in_order_with_declared_ones_before_the_full_plan(rgb, dec
     paths = ("direct", "path 3", "path 4", "path 5", TOY.name)
     assert [method.names for method in everything.methods] == [(name,) for name in (
         "Phong kernel", "kernel with shadows", "shadow map",
-        "constant ambient", "hemisphere ambient", "phong BSDF, full transport", *paths, HALF.name,
+        "hemisphere ambient", "phong BSDF, full transport", *paths, HALF.name,
         "full plan",
     )]  # fmt: skip
     # Nothing shadows the one ball of the figure.
@@ -270,7 +270,7 @@ def test_plan_within_names_the_fastest_that_suffices_and_exits_with_1_if_none_do
     best, full, chosen = (made[name]["tolerance"]["mean"] for name in ("best", "full", "chosen"))
     assert 0 < best <= full < 10 > chosen
     assert made["chosen"]["seconds"]["low"] <= made["full"]["seconds"]["high"]
-    assert {"shadow map", "constant ambient"} <= made["left_out"].keys()
+    assert {"shadow map", "hemisphere ambient"} <= made["left_out"].keys()
     none = MeanError(mean=20.0, low=19.0, high=21.0)
     points = tuple(structs.replace(point, tolerance=none) for point in found.points)
     monkeypatch.setattr(studies, "measure_ladder", lambda *_, **__: replace(found, points=points))

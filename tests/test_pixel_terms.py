@@ -173,7 +173,7 @@ def test_lights_beyond_four_are_one_term_and_textures_materials_of_each_colour(r
 def test_other_shading_has_no_terms_and_says_why():
     for scene, options, reason in (
         ("fig-6-10", {}, "Flat shading"),
-        ("fig-8-9", {"heuristic": "mean-ambient"}, "mean-ambient"),
+        ("fig-8-9", {"heuristic": "hemisphere-ambient"}, "hemisphere-ambient"),
         ("fig-8-9", {"variant": "llvm_ad_spectral"}, "by wavelength"),
     ):
         ready, given = prepared(scene, resolution=(8, 8), **options)

@@ -51,8 +51,6 @@ KERNELS = (
     Method(name="kernel with shadows", family="kernel", shadows=True),
 )
 
-_INDIRECT = (INTERREFLECTION.label, ENVIRONMENT.label)
-
 STAND_INS = tuple(
     Method(
         name=name,
@@ -63,8 +61,7 @@ STAND_INS = tuple(
     )
     for name, heuristic, effects in (
         ("shadow map", "shadow-map", (OCCLUSION.label,)),
-        ("constant ambient", "mean-ambient", _INDIRECT),
-        ("hemisphere ambient", "hemisphere-ambient", _INDIRECT),
+        ("hemisphere ambient", "hemisphere-ambient", (INTERREFLECTION.label, ENVIRONMENT.label)),
     )
 )
 """What engines use instead of transport, each with shadows and a textbook's lights."""
