@@ -50,8 +50,9 @@ from reference.rendering.renderer import Progress, Renderer, Stream, passes
 from reference.rendering.sums import block_numbers, jackknifed
 from reference.scene.source import Source
 
-WIDTH = 48
-"""Width of the images that causes are found in, at most."""
+WIDTH, NARROW, MANY = 48, 32, 64
+"""Width of the images that causes are found in, at most, and that for more than MANY lights or
+shapes: each sample takes longer there."""
 
 REPLICATES, SPP = 4, 64
 """Replicates of each image, and samples per pixel of each: with 16 instead of 64, skewed noise left
@@ -100,7 +101,9 @@ def find(
 ) -> "Causes":
     """Attribute the departure of a prepared scene, on a film of at most :data:`WIDTH` pixels."""
     width, height = image_size(ready.scene)
-    size = min(WIDTH, width), max(1, round(height * min(1, WIDTH / width)))
+    is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
+    most = NARROW if is_large else WIDTH
+    size = min(most, width), max(1, round(height * min(1, most / width)))
     surface = gbuffer(ready.scene, *size)
     require_surface(surface.hit, source.name)
     reference = Renderer(ready.scene, ready.reference.integrator, SPP, "reference image", size)
