@@ -165,7 +165,10 @@ def _within(records, limit):
             enough += 1
             full = record.method(FULL_PLAN.name).per_sample_s.value
             saved.append(full / record.method(chosen.method).per_sample_s.value)
-    said = f"At ΔE2000 {parameter(limit)} a kernel suffices in {enough} of {len(records)} scenes"
+    said = (
+        f"At ΔE2000 {parameter(limit)} a kernel is the fastest method that suffices in {enough} of"
+        f" {len(records)} scenes"
+    )
     return (
         f"{said}: a sample takes 1 / {median(saved):.2g} of the full plan's."
         if saved

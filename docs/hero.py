@@ -63,9 +63,9 @@ def made(request: Options | None = None) -> Hero:
         view, _ = scene.compare(SCENE, Path(folder), SCENE, job, lambda *_: None)
         files = {name: Path(folder, SCENE, f"{name}.png") for name in PANELS}
         pictures = {name: Image.open(file).convert("RGB") for name, file in files.items()}
-    record, study = view.record, view.cost.record if view.cost else None
+    record = view.record
     mean, share = record.metrics[LEADING.name].mean, verdict.share(record).value
-    parts = {name: mean * part for name, part in verdict.missing(record, study).items()}
+    parts = {name: mean * part for name, part in verdict.missing(record).items()}
     return Hero(pictures, mean, share, parts, f"./run compare {SCENE}")
 
 
