@@ -96,9 +96,9 @@ def methods(records: Sequence[Cost]) -> Iterator[str]:
     """Yield the fastest method that suffices, with one row for scenes that have the same ones."""
     yield (
         "The fastest method of which at most 5 % of the pixels exceed a ΔE2000, with its samples"
-        f" per pixel, at {SIZE[0]} by {SIZE[1]} pixels; in brackets its time over that of the textbook"
-        " kernel with the fewest (*kernel*), in the median of the scenes. *Full plan*: the same of"
-        " the full plan with the most samples."
+        f" per pixel, at {SIZE[0]} by {SIZE[1]} pixels; in brackets its time over that of the"
+        " textbook kernel with the fewest (*kernel*), in the median of the scenes. *Full plan*: the"
+        " same of the full plan with the most samples."
     )
     yield ""
     alike: dict[tuple[str, ...], list[tuple[Cost, list[Point | None]]]] = {}

@@ -129,7 +129,10 @@ def test_merged_methods_are_equal_images(rgb, name):
 
 TOY = Method(name="no shadows", family="physical", without=("occlusion",), max_depth=2)
 HALF = Method(
-    name="half light", family="kernel", heuristic="hemisphere-ambient", stands_in_for=("interreflection",)
+    name="half light",
+    family="kernel",
+    heuristic="hemisphere-ambient",
+    stands_in_for=("interreflection",),
 )
 
 
