@@ -59,14 +59,16 @@ class TermMaterial:
 class GridLight:
     """A light at all points, arrays (H, W).
 
-    ``intensity`` is ``I_p0``, RGB, display-linear; ``attenuation`` is ``f_att``, the cone of a spot
-    light included; ``cos_incidence`` is ``N·L``, below 0 if the light is behind the surface;
-    ``cos_view`` is ``L·V``, which gives ``R·V = 2 (N·L) (N·V) − L·V``; ``lobe`` is the kernel's
-    ``(R·V)^n`` or ``(N·H)^n``, 0 below the horizon.
+    ``intensity`` and ``specular_intensity`` are ``L_d`` and ``L_s``, mostly both ``I_p0``; RGB,
+    display-linear. ``attenuation`` is ``f_att``, the cone of a spot light included;
+    ``cos_incidence`` is ``N·L``, below 0 if the light is behind the surface; ``cos_view`` is
+    ``L·V``, which gives ``R·V = 2 (N·L) (N·V) − L·V``; ``lobe`` is the kernel's ``(R·V)^n`` or
+    ``(N·H)^n``, 0 below the horizon.
     """
 
     name: str
     intensity: Colour
+    specular_intensity: Colour
     attenuation: Any
     cos_incidence: Any
     cos_view: Any
@@ -153,17 +155,20 @@ class TermGrid:
         )
         diffuse = k_d[self.material] * np.maximum(light.cos_incidence, 0)[..., None]
         specular = k_s[self.material] * light.lobe[..., None]
-        return np.multiply(light.intensity, light.attenuation[..., None]) * (diffuse + specular)
+        reflected = light.intensity * diffuse + light.specular_intensity * specular
+        return light.attenuation[..., None] * reflected
 
     def _light(self, light: GridLight, material: TermMaterial, place: tuple) -> LightTerms:
         arrays = ("attenuation", "cos_incidence", "cos_view", "lobe")
         here = vars(light) | {name: float(getattr(light, name)[place]) for name in arrays}
-        n_l, arriving = here["cos_incidence"], np.multiply(light.intensity, here["attenuation"])
+        n_l, fading = here["cos_incidence"], here["attenuation"]
         return LightTerms(
             **here,
             cos_reflection=2 * n_l * float(self.cos_view[place]) - here["cos_view"],
-            diffuse=_colour(arriving * material.k_d * max(n_l, 0)),
-            specular=_colour(arriving * material.k_s * here["lobe"]),
+            diffuse=_colour(np.multiply(light.intensity, material.k_d) * fading * max(n_l, 0)),
+            specular=_colour(
+                np.multiply(light.specular_intensity, material.k_s) * fading * here["lobe"]
+            ),
         )
 
 
@@ -291,7 +296,7 @@ class _Points:
     def light(self, emitter: Any, shape: tuple[int, int]) -> GridLight:
         """Return a light at all points."""
         light = emitter.light(self.si, self.si.is_valid())
-        toward, arriving, _ = light.illuminate(self.position)
+        toward, *arriving, _ = light.illuminate(self.position)
         cos_incidence = dr.dot(self.normal, toward)
 
         def lobe(material: Material) -> NDArray:
@@ -299,9 +304,12 @@ class _Points:
             cosine = cosine(light, self.position, toward, cos_incidence)
             return self.floats(terms.specular(1, 1, cosine, material.n))[:, None]
 
-        intensity, arriving = self.colours(light.intensity)[0], self.colours(arriving)
+        # Both intensities in a row; the largest number tells what they have in common.
+        intensity = np.hstack([self.colours(light.intensities[place])[0] for place in (0, -1)])
         brightest = int(np.argmax(intensity))
-        scale = arriving[:, brightest] / (intensity[brightest] or 1.0)
+        scale = np.hstack(list(map(self.colours, arriving)))[:, brightest]
+        scale /= intensity[brightest] or 1.0
         each = (scale, self.floats(cos_incidence), self.floats(dr.dot(toward, self.view)))
         arrays = (*each, self.select(lobe))
-        return GridLight(emitter.id(), _colour(intensity), *(a.reshape(shape) for a in arrays))
+        colours = map(_colour, np.split(intensity, 2))
+        return GridLight(emitter.id(), *colours, *(a.reshape(shape) for a in arrays))

@@ -15,7 +15,7 @@ from comparisons.options import Options
 from heuristic import meshes
 from heuristic.convention import Scene
 from heuristic.errors import InputError
-from heuristic.lights import PLUGINS
+from heuristic.lights import INTENSITIES, PLUGINS
 from heuristic.materials import COEFFICIENTS, PHYSICAL
 from heuristic.tessellation import RESOLUTION, to_mesh
 from reference.pairing.halves import pair
@@ -182,7 +182,10 @@ def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict:
 
 
 def light_of(emitter: mi.Emitter, point: mi.SurfaceInteraction3f) -> dict:
-    """Return a light as paired; ``intensity`` is I_p, and ``attenuation`` k0, k1, k2 of 6.1."""
+    """Return a light as paired; ``intensity`` is I_p, and ``attenuation`` k0, k1, k2 of 6.1.
+
+    A light of two intensities has them too.
+    """
     light = emitter.light(point, True)
     numbered: dict[str, Any] = {"name": emitter.id(), "type": KINDS[type(light)]}
     for field in fields(light):
@@ -191,8 +194,8 @@ def light_of(emitter: mi.Emitter, point: mi.SurfaceInteraction3f) -> dict:
             numbered[field.name] = [numbers(each)[0] for each in value]
         elif field.name == "clamped":
             numbered[field.name] = bool(value)
-        else:
-            several = numbers(mi.Color3f(value) if field.name == "intensity" else value)
+        elif value is not None:
+            several = numbers(mi.Color3f(value) if field.name in INTENSITIES else value)
             numbered[field.name] = several if len(several) > 1 else several[0]
     return numbered
 

@@ -48,7 +48,10 @@ MATERIAL = {
     "k_i": 3, "k_a": 3, "k_d": 3, "k_s": 3, "n": 1, "base_color": 3,
     "alpha": 1, "ior": 1, "metallic": 1,
 }  # fmt: skip
-LIGHT = {"toward": 3, "distance": 1, "intensity": 3, "visible": 1}
+LIGHT = {
+    "toward": 3, "distance": 1, "intensity": 3, "diffuse_intensity": 3, "specular_intensity": 3,
+    "visible": 1,
+}  # fmt: skip
 """Fields of the structures, and how many floats each is."""
 
 _kept = threading.local()

@@ -21,8 +21,6 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-import drjit as dr
-
 from heuristic import kernel, vectors
 from heuristic.convention import Array
 from heuristic.declared import Declared
@@ -73,14 +71,22 @@ class LightAtPoint:
     ``toward`` is the unit vector from the point towards the light, in world space; zero on the
     light itself. ``distance`` is in units of the scene; infinite for parallel light. ``intensity``
     is ``I_p``, display-linear, with attenuation and cone: a white diffuse surface that faces the
-    light has this value. If the integrator has ``occlusion``, and the heuristic does not need
-    ``visible``, it is 0 at points that the light does not reach.
+    light has this value. ``specular_intensity`` is ``L_s`` of a light that has its own, otherwise
+    the same; ``diffuse_intensity`` is another name of ``intensity``. If the integrator has
+    ``occlusion``, and the heuristic does not need ``visible``, all are 0 at points that the light
+    does not reach.
     """
 
     toward: Array
     distance: Array
     intensity: Array
+    specular_intensity: Array
     _point: "Point"
+
+    @property
+    def diffuse_intensity(self) -> Array:
+        """``L_d``, which is ``intensity``."""
+        return self.intensity
 
     def visible(self) -> Array:
         """Return the mask of points that the light reaches, by a shadow ray (a need)."""
@@ -162,10 +168,9 @@ class Point:
         return kernel.shade(*self.arguments._replace(**instead))
 
     def _light(self, light: Any) -> LightAtPoint:
-        toward, intensity, distance = light.illuminate(self.arguments.position)
-        if self.arguments.visible is not None and "visible" not in self.needs:
-            intensity = dr.select(self.arguments.visible(toward, distance), intensity, 0)
-        return LightAtPoint(toward, distance, intensity, self)
+        visible = None if "visible" in self.needs else self.arguments.visible
+        toward, diffuse, specular, distance = light.illuminate(self.arguments.position, visible)
+        return LightAtPoint(toward, distance, diffuse, specular, self)
 
     def require(self, name: str) -> None:
         """Raise InputError for an input that is not among the heuristic's needs."""

@@ -11,7 +11,7 @@ import numpy as np
 from heuristic import materials, numerics, terms, vectors
 from heuristic.convention import Array, Colour, Mask, Position, Vector
 from heuristic.errors import InputError, type_of
-from heuristic.lights import Light
+from heuristic.lights import INTENSITIES, Light
 from heuristic.materials import COEFFICIENTS, Material
 
 HOW = "give a Dr.Jit array of three components, such as drjit.auto.Array3f(x, y, z)"
@@ -29,9 +29,10 @@ def shade(
     """Equations 8.10-8.12, 6.11-6.15: the sum of all terms over all lights.
 
     ``I = k_i + I_a k_a + sum_k I_p0^k f_att^k [k_d (N.L^k) + k_s (R^k.V)^n]``, evaluated for each
-    wavelength (8.11) or for RGB (8.12, 6.13-6.15). Lights at or below the horizon (``N.L <= 0``)
-    give neither diffuse nor specular light. Only terms that can be non-zero are traced: a
-    coefficient of 0, or an empty list of lights, adds no instruction.
+    wavelength (8.11) or for RGB (8.12, 6.13-6.15). A light of two intensities has ``L_d`` in the
+    first product and ``L_s`` in the second, in place of ``I_p0`` (6.6-6.12). Lights at or below the
+    horizon (``N.L <= 0``) give neither diffuse nor specular light. Only terms that can be non-zero
+    are traced: a coefficient of 0, or an empty list of lights, adds no instruction.
 
     ``P``, ``N`` and ``V`` are Dr.Jit arrays of three components, of any float type, in one space.
     Normals and views of any length are normalised; a zero vector receives no light. Three plain
@@ -62,7 +63,12 @@ def shade(
     ambient = materials.checked_colour("ambient", ambient)
     _check_sizes((position, normal, view), material, lights, ambient)
     values = {name: getattr(material, name) for name in COEFFICIENTS} | {"ambient": ambient}
-    own = {f"lights[{i}].intensity": light.intensity for i, light in enumerate(lights)}
+    own = {
+        f"lights[{i}].{name}": value
+        for i, light in enumerate(lights)
+        for name, value in light.given().items()
+        if name in INTENSITIES
+    }
     materials.require_common_wavelengths(values | own)
     vector_type = type(position)
     k_i, k_a, k_d, k_s, ambient = (
@@ -121,16 +127,14 @@ def sum_lights(
             dr.eval(sums)  # the last block's sums stay open, for the caller's kernel
         parts: dict[str, Array] = {}
         for light in block:
-            toward, intensity, distance = light.illuminate(position)
-            cos_incidence = dr.dot(normal, toward)
-            if visible is not None:
-                intensity = dr.select(visible(toward, distance), intensity, 0)
+            arrival = light.illuminate(position, visible)
+            cos_incidence = dr.dot(normal, arrival.toward)
             if has_diffuse:
-                term = terms.diffuse(intensity, 1, cos_incidence)
+                term = terms.diffuse(arrival.diffuse, 1, cos_incidence)
                 parts["diffuse"] = parts["diffuse"] + term if "diffuse" in parts else term
             if lobe:
-                cosine = lobe(light, position, toward, cos_incidence)
-                term = terms.specular(intensity, 1, cosine, material.n)
+                cosine = lobe(light, position, arrival.toward, cos_incidence)
+                term = terms.specular(arrival.specular, 1, cosine, material.n)
                 parts["specular"] = parts["specular"] + term if "specular" in parts else term
         for name, part in parts.items():
             # A sum of thousands would lose terms below its last digit (Neumaier).
@@ -192,7 +196,7 @@ def _check_sizes(point: tuple, material: Material, lights: Sequence[Light], ambi
     values = dict(zip(("position", "normal", "view"), point, strict=True)) | {"ambient": ambient}
     values |= {name: getattr(material, name) for name in (*COEFFICIENTS, "n")}
     for number, light in enumerate(lights):
-        values |= {f"lights[{number}].{name}": value for name, value in vars(light).items()}
+        values |= {f"lights[{number}].{name}": value for name, value in light.given().items()}
     widths = {name: dr.width(value) for name, value in values.items() if dr.is_jit_v(value)}
     several = {name: width for name, width in widths.items() if width != 1}
     if len(set(several.values())) > 1 or 0 in several.values():

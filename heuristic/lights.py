@@ -16,12 +16,15 @@ from typing import Any, ClassVar, NamedTuple, Self
 import drjit as dr
 
 from heuristic import materials, numerics, terms, vectors
-from heuristic.convention import Colour, Direction, Number, Position, Vector
+from heuristic.convention import Colour, Direction, Mask, Number, Position, Vector
 from heuristic.errors import InputError
 from heuristic.numerics import is_number
 
 UNATTENUATED = (1, 0, 0)
 INVERSE_SQUARE = (0, 0, 1)
+
+INTENSITIES = ("intensity", "diffuse_intensity", "specular_intensity")
+"""The fields that hold a colour: ``I_p``, and ``L_d`` and ``L_s`` if they differ from it."""
 
 FAR = 1e8
 """Where shadow rays of parallel light end: outside any scene. A Python plugin does not learn the
@@ -29,13 +32,15 @@ size of the scene from Mitsuba, and rays of this length still keep their directi
 
 
 class Arrival(NamedTuple):
-    """How light arrives at a point: ``L``, ``I_p0 f_att`` and ``d``, infinite for parallel rays.
+    """How light arrives at a point: ``L``, ``L_d f_att``, ``L_s f_att`` and ``d``.
 
-    ``d`` ends at the shell of a lamp that has one: shadow rays go no further.
+    ``d`` is infinite for parallel rays, and ends at the shell of a lamp that has one: shadow rays
+    go no further.
     """
 
     toward: Direction
-    intensity: Colour
+    diffuse: Colour
+    specular: Colour
     distance: Number
 
 
@@ -43,11 +48,15 @@ class Light:
     """A kind of light, as the kernel sees it; each subclass is a frozen dataclass.
 
     ``plugin`` is its emitter in a Mitsuba scene. Fields of the same name mean the same in all
-    kinds; :data:`CHECKS` checks them.
+    kinds; :data:`CHECKS` checks them. ``diffuse_intensity`` is ``L_d``, the light that takes part
+    in diffuse reflection (6.6), ``specular_intensity`` ``L_s`` (6.8); each is ``intensity`` if
+    omitted.
     """
 
     plugin: ClassVar[str]
     intensity: Colour
+    diffuse_intensity: Colour | None
+    specular_intensity: Colour | None
     position: Position
     attenuation: tuple[Number, Number, Number]
     clamped: bool
@@ -58,19 +67,36 @@ class Light:
             if hasattr(self, name):
                 object.__setattr__(self, name, check(getattr(self, name)))
 
-    def illuminate(self, position: Position) -> Arrival:
-        """Return ``L`` (6.26) and ``I_0 f_att`` (6.1, 8.6), within the cone of a spot (6.3)."""
+    @property
+    def intensities(self) -> tuple[Colour, ...]:
+        """``L_d`` and ``L_s``; one colour alone if the light has none of its own for a term."""
+        own = self.diffuse_intensity, self.specular_intensity
+        if all(each is None for each in own):
+            return (self.intensity,)
+        return tuple(self.intensity if each is None else each for each in own)
+
+    def illuminate(self, position: Position, visible: Callable[..., Mask] | None = None) -> Arrival:
+        """Return how light arrives; black where ``visible(toward, distance)`` is false."""
+        toward, distance, colours = self.rays(position)
+        if visible is not None:
+            is_seen = visible(toward, distance)
+            colours = [dr.select(is_seen, colour, 0) for colour in colours]
+        return Arrival(toward, colours[0], colours[-1], distance)
+
+    def rays(self, position: Position) -> tuple[Direction, Number, list[Colour]]:
+        """Return ``L`` (6.26), ``d``, and intensities times ``f_att`` (6.1, 8.6) and cone (6.3)."""
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
-        intensity = materials.as_array(self.intensity, vector_type) * self.cone(toward)
+        cone = self.cone(toward)
+        colours = [materials.as_array(each, vector_type) * cone for each in self.intensities]
         if not is_unattenuated(self.attenuation):
             law: Callable[..., Colour]
             law = terms.clamped_attenuation if self.clamped else terms.attenuation
             inverse = vectors.inverse_distance(vector_type(self.position), position)
-            intensity = law(distance, *self.attenuation, intensity, inverse)
+            colours = [law(distance, *self.attenuation, each, inverse) for each in colours]
         if not is_number(self.shell, 0):
             distance = dr.maximum(distance - self.shell, 0)
-        return Arrival(toward, intensity, distance)
+        return toward, distance, colours
 
     def cone(self, toward: Direction) -> Number:
         """Return the factor on the intensity towards a light; 1 unless it is a spot."""
@@ -80,6 +106,10 @@ class Light:
         """Return ``L`` in double precision, as a vector and its inverse length."""
         return vectors.wide_light_vector(type(position)(self.position), position)
 
+    def given(self) -> dict[str, Any]:
+        """Return the fields that are not omitted, with their values."""
+        return {name: value for name, value in vars(self).items() if value is not None}
+
     def compiled(self) -> dict[str, Any]:
         """Return the fields that are part of the kernel's code, with their values."""
         even = {"attenuation": UNATTENUATED} if is_unattenuated(self.attenuation) else {}
@@ -88,7 +118,8 @@ class Light:
 
     def structure(self) -> tuple:
         """Return what determines the light's instructions, apart from its numbers; hashable."""
-        return type(self), materials.wavelength_count(self.intensity), *self.compiled().items()
+        counts = map(materials.wavelength_count, self.intensities)
+        return type(self), tuple(counts), *self.compiled().items()
 
     def opaque(self, vector_type: type) -> Self:
         """Return the light with its numbers out of the kernel's code, as opaque Dr.Jit values."""
@@ -100,10 +131,11 @@ class Light:
 
         float_type = dr.value_t(vector_type)
         compiled = self.compiled()
-        values = {name: moved(own) for name, own in vars(self).items() if name not in compiled}
+        values = {name: moved(own) for name, own in self.given().items() if name not in compiled}
         for name in {"position", "direction"} & values.keys():
             values[name] = vector_type(values[name])
-        values["intensity"] = materials.as_array(values["intensity"], vector_type)
+        for name in values.keys() & INTENSITIES:
+            values[name] = materials.as_array(values[name], vector_type)
         light: Any = self
         return replace(light, **values)
 
@@ -120,12 +152,15 @@ class DirectionalLight(Light):
 
     direction: Direction
     intensity: Colour
+    diffuse_intensity: Colour | None = None
+    specular_intensity: Colour | None = None
 
-    def illuminate(self, position: Position) -> Arrival:
-        """Return ``L = -direction / |direction|`` and ``I_p``."""
+    def rays(self, position: Position) -> tuple[Direction, Number, list[Colour]]:
+        """Return ``L = -direction / |direction|``, an infinite distance and the intensities."""
         vector_type = type(position)
         toward = -vectors.normalise(vector_type(self.direction))
-        return Arrival(toward, materials.as_array(self.intensity, vector_type), inf)
+        colours = [materials.as_array(each, vector_type) for each in self.intensities]
+        return toward, inf, colours
 
     def wide_toward(self, position: Position) -> tuple[Vector, Number]:
         return -numerics.wide_unit(type(position)(self.direction)), 1
@@ -152,6 +187,8 @@ class PointLight(Light):
     attenuation: tuple[Number, Number, Number] = UNATTENUATED
     clamped: bool = False
     shell: Number = 0
+    diffuse_intensity: Colour | None = None
+    specular_intensity: Colour | None = None
 
 
 @dataclass(frozen=True)
@@ -173,6 +210,8 @@ class SpotLight(Light):
     attenuation: tuple[Number, Number, Number] = UNATTENUATED
     clamped: bool = False
     shell: Number = 0
+    diffuse_intensity: Colour | None = None
+    specular_intensity: Colour | None = None
 
     def cone(self, toward: Direction) -> Number:
         """Equation 6.3: 1 within the cone, else 0; times the fall-off of 6.4 where ``m > 0``."""
@@ -242,10 +281,15 @@ def _number(name: str, is_allowed: Callable[[Any], bool], allowed: str, value: A
     return number
 
 
+def _intensity(name: str, value: Any) -> Any:
+    is_omitted = value is None and name != "intensity"
+    return None if is_omitted else materials.checked_colour(name, value)
+
+
 CHECKS: dict[str, Callable[[Any], Any]] = {
     "position": partial(_triple, "position"),
     "direction": _direction,
-    "intensity": partial(materials.checked_colour, "intensity"),
+    **{name: partial(_intensity, name) for name in INTENSITIES},
     "cutoff": partial(
         _number,
         "cutoff",

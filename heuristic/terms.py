@@ -29,7 +29,7 @@ def diffuse(intensity: Colour, k_d: Colour, cos_incidence: Number) -> Colour:
     """Equations 8.5, 8.6, 6.6, 6.7: ``I = I_p k_d (N.L)`` for ``N.L > 0``, otherwise 0.
 
     8.6 and 6.7 are the same for an ``intensity`` that is already attenuated, ``I_p0 f_att``.
-    Lambert's law (8.3, 8.4) is why no view angle appears.
+    Chapter 6 writes ``L_d`` for ``I_p``. Lambert's law (8.3, 8.4) is why no view angle appears.
 
     >>> diffuse(intensity=1.0, k_d=0.5, cos_incidence=0.5)
     0.25
@@ -42,10 +42,11 @@ def diffuse(intensity: Colour, k_d: Colour, cos_incidence: Number) -> Colour:
 def specular(intensity: Colour, k_s: Colour, cos_reflection: Cosines, n: Number) -> Colour:
     """Equations 8.8, 8.9, 6.8-6.10: ``I = I_p k_s (R.V)^n``.
 
-    6.10 is the same for an ``intensity`` that is already attenuated. The limit of large ``n`` is
-    the perfect mirror of 8.7. ``cos_reflection`` is a float or, for large ``n``, a
-    :class:`heuristic.numerics.Cosine`. The caller handles the horizon (``N.L > 0``); the lobe
-    itself ends where ``R.V <= 0``, for every ``n``, so ``n = 0`` is the limit of small ``n``.
+    6.10 is the same for an ``intensity`` that is already attenuated. Chapter 6 writes ``L_s`` for
+    ``I_p``. The limit of large ``n`` is the perfect mirror of 8.7. ``cos_reflection`` is a float
+    or, for large ``n``, a :class:`heuristic.numerics.Cosine`. The caller handles the horizon
+    (``N.L > 0``); the lobe itself ends where ``R.V <= 0``, for every ``n``, so ``n = 0`` is the
+    limit of small ``n``.
 
     >>> specular(intensity=1.0, k_s=0.5, cos_reflection=0.5, n=2)
     0.125

@@ -4,7 +4,7 @@ Each raises AssertionError where the two differ. They stand apart from the tests
 of wrong kernels (`test_mutations`) run the very same ones.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -16,16 +16,18 @@ from tests import oracle
 
 POINTS = 20_000
 
+OWN = ("diffuse_intensity", "specular_intensity")
+
 LIGHTS = (
     oracle.Light("point", 0.6, position=(2.0, -1.5, 4.0)),
-    oracle.Light("point", 3.0, position=(-3.0, 2.0, 2.5), attenuation=(0.25, 0.5, 0.125)),
+    oracle.Light("point", 3.0, (-3.0, 2.0, 2.5), attenuation=(0.25, 0.5, 0.125),
+                 diffuse_intensity=2.0),
     oracle.Light("point", 0.5, (-2.5, -2.5, -3.0), attenuation=(0.25, 0.0, 0.0625), clamped=True),
-    oracle.Light("directional", 0.4, direction=(1.0, 2.0, -2.0)),
+    oracle.Light("directional", 0.4, direction=(1.0, 2.0, -2.0), specular_intensity=0.9),
     oracle.Light("spot", 0.5, (4.0, 0.0, 3.0), (-1.0, 0.25, -0.75), cutoff=20.0),
-    oracle.Light(
-        "spot", 9.0, (0.0, 4.0, 0.0), (0.0, -1.0, 0.0), 75.0, exponent=2.5, attenuation=(0, 0, 1)
-    ),
-)
+    oracle.Light("spot", 9.0, (0.0, 4.0, 0.0), (0.0, -1.0, 0.0), 75.0, 2.5, (0, 0, 1),
+                 diffuse_intensity=6.0, specular_intensity=12.0),
+)  # fmt: skip
 COEFFICIENTS = {
     "one": dict(k_i=0.05, k_a=0.3, k_d=0.5, k_s=0.7),
     "rgb": dict(k_i=(0.0, 0.1, 0.0), k_a=(0.3, 0.2, 0.1), k_d=(0.5, 0.4, 0.1), k_s=0.7),
@@ -55,10 +57,14 @@ def random_points(count=POINTS, seed=7):
 
 def tinted(lights, tint):
     """Give lights a colour, each another where it has components."""
-    return [
-        oracle.Light(**{**vars(light), "intensity": _times(light.intensity, np.roll(tint, place))})
-        for place, light in enumerate(lights)
-    ]
+
+    def colours(light, place):
+        for turn, name in enumerate(("intensity", *OWN), place):
+            value = getattr(light, name)
+            if value is not None:
+                yield name, _times(value, np.roll(tint, turn))
+
+    return [replace(light, **dict(colours(light, place))) for place, light in enumerate(lights)]
 
 
 def _times(intensity, tint):
@@ -68,18 +74,19 @@ def _times(intensity, tint):
 
 def kernel_light(light):
     """Turn an oracle's light into the kernel's."""
+    own = {name: getattr(light, name) for name in OWN}
     if light.kind == "directional":
-        return heuristic.DirectionalLight(light.direction, light.intensity)
-    attenuation = {"attenuation": light.attenuation, "clamped": light.clamped}
+        return heuristic.DirectionalLight(light.direction, light.intensity, **own)
+    own |= {"attenuation": light.attenuation, "clamped": light.clamped}
     if light.kind == "point":
-        return heuristic.PointLight(light.position, light.intensity, **attenuation)
+        return heuristic.PointLight(light.position, light.intensity, **own)
     return heuristic.SpotLight(
         light.position,
         light.direction,
         light.intensity,
         light.cutoff,
         light.exponent,
-        **attenuation,
+        **own,
     )
 
 
@@ -168,6 +175,7 @@ def described(scene):
             exponent=value.get("exponent", 0.0),
             attenuation=tuple(value.get(k, d) for k, d in (("k0", 1), ("k1", 0), ("k2", 0))),
             clamped=value.get("clamped", False),
+            **{name: _plain(value[name]) for name in OWN if name in value},
         )
         for value in scene.values()
         if isinstance(value, dict) and value.get("type", "").startswith("heuristic_")
@@ -181,7 +189,8 @@ def check_against_direct(scene, resolution=96, spp=16, seed=3):
     """Compare the integrator ``heuristic`` with the ``phong`` plugin under Mitsuba's ``direct``.
 
     ``direct`` draws one emitter for each sample, so every light is rendered alone, and the sum
-    taken. Emission and ambient light join one of these renderings as a ``heuristic_glow``.
+    taken; a light of two intensities twice, each time with one of the terms. Emission and ambient
+    light join one of these renderings as a ``heuristic_glow``.
     """
     scene = with_film(scene, resolution, spp)
     kernel = render(scene, spp, seed)
@@ -194,13 +203,26 @@ def check_against_direct(scene, resolution=96, spp=16, seed=3):
     if names:
         glow["sampling_weight"] = 0.0
     total = 0.0
-    for number, name in enumerate(names or [None]):
-        lit = dict(dark) if name is None else {**dark, name: scene[name]}
+    passes = [(name, *each) for name in names for each in _passes(scene[name])]
+    for number, (name, light, without) in enumerate(passes or [(None, None, {})]):
+        lit = dict(dark) if name is None else {**dark, name: light}
+        lit["sphere"] = {**dark["sphere"], "bsdf": bsdf | without}
         if number == 0:
-            lit["sphere"] = {**dark["sphere"], "glow": glow}
+            lit["sphere"]["glow"] = glow
         total = total + render(lit, spp, seed, integrator)
     assert kernel.max() > 0.1, "the picture should not be black"
     oracle.require_close(kernel, total, relative=1e-5, absolute=2.0**-23)
+
+
+def _passes(light):
+    """Return a light as each of its renderings has it, with the coefficients that are 0 there.
+
+    A sample of Mitsuba's has one colour, which is ``L_d``.
+    """
+    if not light.keys() & set(OWN):
+        return [(light, {})]
+    specular = light.get("specular_intensity", light.get("intensity", 1.0))
+    return [(light, {"k_s": 0.0}), (light | {"diffuse_intensity": specular}, {"k_d": 0.0})]
 
 
 def _plain(value):

@@ -12,7 +12,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Light:
-    """A light as plain numbers; ``kind`` is point, directional or spot."""
+    """A light as plain numbers; ``kind`` is point, directional or spot.
+
+    Its numbers may also be arrays with a row for each point.
+    """
 
     kind: str
     intensity: object
@@ -22,6 +25,16 @@ class Light:
     exponent: float = 0.0
     attenuation: tuple = (1.0, 0.0, 0.0)
     clamped: bool = False
+    diffuse_intensity: object = None
+    specular_intensity: object = None
+
+    def intensities(self):
+        """Return ``L_d`` of 6.6 and ``L_s`` of 6.8, both ``I_p`` unless given; (C,) or (N, C)."""
+        own = self.diffuse_intensity, self.specular_intensity
+        return [
+            np.atleast_1d(np.asarray(self.intensity if each is None else each, float))
+            for each in own
+        ]
 
     def arriving(self, position):
         """Return ``L``, the factor on the intensity, and how near each point is to the cone's edge.
@@ -30,7 +43,8 @@ class Light:
         """
         count = len(position)
         if self.kind == "directional":
-            toward = np.tile(-unit(np.array(self.direction, float)), (count, 1))
+            toward = -unit(np.array(self.direction, float))
+            toward = np.broadcast_to(toward, (count, 3))
             return toward, np.ones(count), np.full(count, np.inf)
         offset = np.array(self.position, float) - position
         distance = np.sqrt(np.sum(offset**2, axis=1))
@@ -41,7 +55,7 @@ class Light:
             factor = np.minimum(factor, 1)
         margin = np.full(count, np.inf)
         if self.kind == "spot":
-            cos_axis = -(toward @ unit(np.array(self.direction, float)))
+            cos_axis = -np.sum(toward * unit(np.array(self.direction, float)), axis=1)
             margin = cos_axis - np.cos(np.deg2rad(self.cutoff))
             fading = np.where(cos_axis > 0, cos_axis, 0) ** self.exponent
             factor = np.where(margin >= 0, factor * fading, 0)
@@ -65,7 +79,7 @@ def unit(vector):
 
 
 def shade(position, normal, view, material, lights, ambient=0.0):
-    """Equation 8.10 for each wavelength; an array (N, C)."""
+    """Equations 8.10 and 6.12 for each wavelength; an array (N, C)."""
     position = np.asarray(position, float)
     normal, view = unit(np.asarray(normal, float)), unit(np.asarray(view, float))
     k_i, k_a, k_d, k_s, ambient = (
@@ -80,10 +94,11 @@ def shade(position, normal, view, material, lights, ambient=0.0):
         cos_reflection = np.sum(mirrored * view, axis=1)
         lobe = np.zeros(len(position))
         seen = (cos_incidence > 0) & (cos_reflection > 0)
-        lobe[seen] = cos_reflection[seen] ** material.n
+        lobe[seen] = cos_reflection[seen] ** np.broadcast_to(material.n, len(position))[seen]
         cosine = np.maximum(cos_incidence, 0)
-        reflected = k_d * cosine[:, None] + k_s * lobe[:, None]
-        colour = colour + np.atleast_1d(light.intensity) * factor[:, None] * reflected
+        diffuse, specular = light.intensities()
+        reflected = diffuse * k_d * cosine[:, None] + specular * k_s * lobe[:, None]
+        colour = colour + factor[:, None] * reflected
     return colour
 
 

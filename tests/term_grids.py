@@ -39,4 +39,5 @@ def _light(name, intensity, angle, view, azimuth, n):
     cosine, sine = np.cos(angle), np.sin(angle)
     cos_view = cosine * view - sine * np.sqrt(1 - view**2) * np.cos(azimuth)
     lobe = np.where(cosine > 0, np.maximum(2 * cosine * view - cos_view, 0) ** n, 0)
-    return GridLight(name, intensity, 0.5 + 0.2 * azimuth, cosine, cos_view, lobe)
+    specular = intensity if name == "key" else intensity[::-1]
+    return GridLight(name, intensity, specular, 0.5 + 0.2 * azimuth, cosine, cos_view, lobe)

@@ -49,7 +49,7 @@ def shaded(found):
 
 def test_the_files_hold_all_that_the_textbooks_picture_is_made_of(rgb):
     """The picture that the export makes in NumPy is the kernel's, but for edges."""
-    for scene in ("fig-6-5-m40", "plastic-spheres", "cornell-box"):
+    for scene in ("fig-6-5-m40", "two-intensities", "plastic-spheres", "cornell-box"):
         case, found = exported_of(scene)
         half = case.options.pair(case.source).heuristic.instantiate()
         pixels = map(np.arange, SIZE)
@@ -113,6 +113,12 @@ def test_the_gltf_says_the_same(rgb):
     light = file["extensions"]["KHR_lights_punctual"]["lights"][0]
     intensity = np.array(light["color"]) * light["intensity"]
     np.testing.assert_allclose(intensity, pi * np.array(found.lights[0]["intensity"]))
+    assert light["extras"].keys().isdisjoint({"diffuse_intensity", "specular_intensity"})
+    _, two = exported_of("two-intensities")
+    light = gltf(two)["extensions"]["KHR_lights_punctual"]["lights"][0]
+    intensity = np.array(light["color"]) * light["intensity"]
+    np.testing.assert_allclose(intensity, pi * np.array((0.9, 0.4, 0.1)), 1e-6)
+    assert light["extras"]["specular_intensity"] == [1, 1, 1]
     camera = next(node for node in file["nodes"] if "camera" in node)
     inverse = matrix_of(camera) @ np.array(found.camera["view"])
     np.testing.assert_allclose(inverse, np.eye(4), atol=1e-6)

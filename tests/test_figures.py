@@ -15,7 +15,10 @@ FIGURES = [name for name in SCENES if name.startswith("fig-8")]
 
 
 def everything():
-    """What the figures lack: spots, parallel light, attenuation, colours, emission, back light."""
+    """What the figures lack: spots, parallel light, attenuation, colours, emission, back light.
+
+    Two of the lights have an intensity of their own for a term.
+    """
     scene = SCENES["fig-8-11-n9"].make()
     scene["sphere"]["bsdf"] |= {
         "k_i": rgb_of(0.02, 0.0, 0.05),
@@ -32,11 +35,13 @@ def everything():
         "cutoff": 12.0,
         "exponent": 20.0,
         "intensity": rgb_of(0.9, 0.9, 0.4),
+        "specular_intensity": rgb_of(0.3, 0.6, 0.9),
     }
     scene["light 5"] = {
         "type": "heuristic_directional",
         "direction": (-1, 0.5, -0.5),  # from behind: a highlight at the rim, cut by the horizon
         "intensity": rgb_of(0.2, 0.4, 0.8),
+        "diffuse_intensity": rgb_of(0.5, 0.1, 0.2),
     }
     return scene
 
@@ -50,7 +55,7 @@ def test_all_fifteen_figures_are_there():
 @pytest.mark.guarantee(
     "kernel", "The kernel is within 1e-5 of the equations in float64, on every figure."
 )
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", [*FIGURES, "two-intensities"])
 def test_the_kernel_agrees_with_the_oracle_everywhere(rgb, name):
     checks.check_figure(SCENES[name].make())
 
@@ -58,7 +63,7 @@ def test_the_kernel_agrees_with_the_oracle_everywhere(rgb, name):
 @pytest.mark.guarantee(
     "kernel", "Kernel and `phong` plugin agree to 1e-5, on every pixel of every figure."
 )
-@pytest.mark.parametrize("name", FIGURES)
+@pytest.mark.parametrize("name", [*FIGURES, "two-intensities"])
 def test_the_kernel_agrees_with_mitsubas_direct_on_every_pixel(rgb, name):
     checks.check_against_direct(SCENES[name].make())
 

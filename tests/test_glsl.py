@@ -53,6 +53,7 @@ def test_phong_in_glsl_is_phong():
     spectral = {"variant": "llvm_ad_spectral", "heuristic_variant": "llvm_ad_rgb"}
     for scene, more in (
         ("fig-8-11-n3", {}),
+        ("two-intensities", {}),
         ("cornell-box", {}),
         ("plastic-spheres", {}),
         ("fig-8-9", {"interpolation": "gouraud"}),
@@ -124,7 +125,7 @@ FIELDS = (
     + [
         (f"lights[{number}].{name}", f"lights[{number}].{name}")
         for number in (0, 1)
-        for name in ("toward", "intensity")
+        for name in ("toward", "intensity", "diffuse_intensity", "specular_intensity")
     ]
     + [("lights[0].distance", "lights[0].distance"), ("uv, 0.25", "uv")]
 )

@@ -1,11 +1,13 @@
 """Lights in scenes with occluders, by the thousands, and against closed forms."""
 
+from dataclasses import replace
+
 import drjit as dr
 import numpy as np
 import pytest
 
 import heuristic
-from heuristic import kernel
+from heuristic import kernel, terms
 from tests import checks, oracle
 from tests.parts import camera, moved, rgb_of
 
@@ -66,14 +68,17 @@ def many(count, seed=1):
         intensity = tuple(10.0 ** rng.uniform(-3, 0, 3))
         attenuation = [(1, 0, 0), (0.5, 0.1, 0.2)][number % 2]
         kind = number % 3
+        own = {"specular_intensity": intensity[::-1]} if number % 5 == 1 else {}
         if kind == 0:
-            light = oracle.Light("point", intensity, tuple(4 * position), attenuation=attenuation)
+            light = oracle.Light(
+                "point", intensity, tuple(4 * position), attenuation=attenuation, **own
+            )
         elif kind == 1:
-            light = oracle.Light("directional", intensity, direction=tuple(direction))
+            light = oracle.Light("directional", intensity, direction=tuple(direction), **own)
         else:
             light = oracle.Light(
                 "spot", intensity, tuple(4 * position), tuple(direction), 60.0, float(number % 4),
-                attenuation,
+                attenuation, **own,
             )  # fmt: skip
         made.append(light)
     return made
@@ -127,3 +132,55 @@ def test_many_lights_pass_gradients():
     value = heuristic.shade(position, up, up, heuristic.Material(k_d=k_d), lights)
     dr.backward(dr.sum(value))
     assert dr.grad(k_d)[0] == pytest.approx(dr.sum(value)[0] / 0.5, rel=1e-5)
+
+
+# -- Lights of two intensities (6.6, 6.8) ----------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["point", "directional", "spot"])
+@pytest.mark.parametrize("omitted", [None, *checks.OWN])
+def test_two_intensities_are_those_of_the_equations_in_random_sets(kind, omitted):
+    """Each point has a light, a material and a view of its own."""
+    rng, count = np.random.default_rng(66), 4000
+    points = checks.random_points(count, seed=6)
+    names = [name for name in ("intensity", *checks.OWN) if name != omitted]
+    numbers = {name: rng.uniform(0, 2, (count, 3)) for name in (*names, "k_d", "k_s")}
+    place, travel = rng.normal(size=(2, count, 3)).astype(np.float32)
+    numbers |= {"position": 4 * place} if kind != "directional" else {}
+    numbers |= {"direction": travel} if kind != "point" else {}
+    numbers |= {"n": rng.uniform(1, 40, count)}
+    more = {"cutoff": 70.0, "exponent": 2.0} if kind == "spot" else {}
+    more |= {"attenuation": (0.5, 0.1, 0.2)} if kind != "directional" else {}
+
+    def split(values):
+        own = {name: values.pop(name) for name in ("k_d", "k_s", "n")}
+        return own, values | more
+
+    material, light = split(dict(numbers))
+    light = oracle.Light(kind, **light)
+    arrays = points.position, points.normal, points.view
+    expected = oracle.shade(*arrays, oracle.Material(**material), [light])
+    float64 = dr.llvm.Array3f64
+    given = {n: float64(v.T) if v.ndim > 1 else dr.llvm.Float64(v) for n, v in numbers.items()}
+    material, lamp = split(given)
+    classes = heuristic.PointLight, heuristic.DirectionalLight, heuristic.SpotLight
+    made = dict(zip(("point", "directional", "spot"), classes, strict=True))[kind](**lamp)
+    found = heuristic.shade(*(float64(a.T) for a in arrays), heuristic.Material(**material), [made])
+    away = ~oracle.near_an_edge(points.position, points.normal, [light], 1e-9)
+    assert (expected > 0.01).any(axis=1).sum() > 500
+    oracle.require_close(checks.as_rows(found), expected, absolute=1e-12, where=away)
+
+
+def test_a_light_of_one_intensity_is_worked_out_once(monkeypatch):
+    """Two equal ones give the same values to the bit."""
+    calls, right = [], terms.attenuation
+    monkeypatch.setattr(terms, "attenuation", lambda *given: calls.append(1) or right(*given))
+    points = checks.random_points(4000)
+    arrays = [dr.llvm.Array3f(v.T) for v in (points.position, points.normal, points.view)]
+    material = heuristic.Material(k_d=0.5, k_s=0.3, n=5)
+    one = heuristic.PointLight((1, 2, 3), (0.9, 0.4, 0.1), (0, 0, 1))
+    two = replace(one, diffuse_intensity=one.intensity, specular_intensity=one.intensity)
+    found = [np.array(heuristic.shade(*arrays, material, [light])) for light in (one, two)]
+    assert len(calls) == 1 + 2
+    assert found[0].max() > 0.01
+    np.testing.assert_array_equal(*found)

@@ -54,8 +54,33 @@ def with_half_vector(position, normal, view, material, lights, ambient=0, visibl
     return colour
 
 
+def with_intensities(choose):
+    """Return a kernel in which ``choose(L_d, L_s)`` are the two intensities of each light."""
+
+    def shade(position, normal, view, material, lights, ambient=0, visible=None):
+        pairs = (choose(light.intensities[0], light.intensities[-1]) for light in lights)
+        lights = [
+            replace(light, diffuse_intensity=diffuse, specular_intensity=specular)
+            for light, (diffuse, specular) in zip(lights, pairs, strict=True)
+        ]
+        return right(position, normal, view, material, lights, ambient, visible)
+
+    return shade
+
+
+with_swapped_intensities = with_intensities(lambda diffuse, specular: (specular, diffuse))
+with_diffuse_alone = with_intensities(lambda diffuse, specular: (diffuse, diffuse))
+with_specular_alone = with_intensities(lambda diffuse, specular: (specular, specular))
+INTENSITIES = [with_swapped_intensities, with_diffuse_alone, with_specular_alone]
+
 # Wrong in the kernel alone, so that the plugins, which share its terms, tell too.
-KERNELS = [without_horizon, with_swapped_lights, with_one_light, with_half_vector]
+KERNELS = [
+    without_horizon,
+    with_swapped_lights,
+    with_one_light,
+    with_half_vector,
+    *INTENSITIES,
+]
 
 
 def no_attenuation(distance, k0, k1, k2, intensity=1, inverse=None):
@@ -87,6 +112,16 @@ def test_the_oracle_finds_a_wrong_kernel(rgb, monkeypatch, wrong):
         monkeypatch.setattr(terms, wrong, WRONG_TERMS[wrong])
     require_found_out(checks.check_kernel, drjit.llvm.ad.Array3f, 1e-5)
     require_found_out(checks.check_figure, everything())
+
+
+@pytest.mark.parametrize("wrong", INTENSITIES)
+def test_a_light_of_two_intensities_finds_a_kernel_that_mixes_them_up(rgb, monkeypatch, wrong):
+    """Only the lights that have two can show it."""
+    scene = SCENES["two-intensities"].make()
+    monkeypatch.setattr(kernel, "shade", wrong)
+    require_found_out(checks.check_figure, scene)
+    require_found_out(checks.check_against_direct, scene)
+    checks.check_figure(SCENES["fig-8-9"].make())
 
 
 @pytest.mark.parametrize("wrong", [with_swapped_lights, with_half_vector])

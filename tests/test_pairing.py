@@ -238,6 +238,36 @@ def test_the_factor_from_heuristic_to_physical_lights_is_pi(rgb):
     assert tuple(only(pair.physical, EMITTER)["irradiance"]) == pytest.approx((pi,) * 3)
 
 
+TWO_INTENSITIES = """<scene version="3.0.0"><sensor type="perspective"/>
+<shape type="sphere"><bsdf type="phong"><float name="k_d" value="0.5"/>
+<float name="k_s" value="0.4"/></bsdf></shape>
+<emitter type="heuristic_{}" id="lamp"><float name="k2" value="1"/><float name="k0" value="0"/>
+<rgb name="diffuse_intensity" value="0.9, 0.6, 0.3"/><float name="scale" value="2"/>
+<rgb name="specular_intensity" value="{}"/></emitter></scene>"""
+
+
+def test_a_light_of_two_intensities_is_paired_by_the_diffuse_one(rgb, tmp_path):
+    path = tmp_path / "two.xml"
+    for kind, parameter in (
+        ("point", "intensity"), ("spot", "intensity"), ("directional", "irradiance"),
+    ):  # fmt: skip
+        for specular, is_lost in (("0.9, 0.6, 0.4", True), ("0.9, 0.6, 0.3", False)):
+            text = TWO_INTENSITIES.format(kind, specular)
+            if kind == "directional":
+                text = text.replace('<float name="k2" value="1"/><float name="k0" value="0"/>', "")
+            path.write_text(text)
+            pair = halves.pair(Source("two", path))
+            (record,) = pair.pairing.emitters
+            given = np.array(only(pair.physical, EMITTER)[parameter])
+            np.testing.assert_allclose(given, 2 * record.factor * np.array((0.9, 0.6, 0.3)), 1e-6)
+            lost = [(loss.name, loss.plugin, loss.lost) for loss in pair.unrepresentable]
+            expected = ("lamp", f"heuristic_{kind}", "specular intensity L_s")
+            assert lost == [expected] * is_lost
+    path.write_text(text.replace("0.9, 0.6, 0.3", "0.9, -0.6, 0.3"))
+    with pytest.raises(InputError, match=r"lamp: diffuse_intensity = .* is not allowed"):
+        halves.pair(Source("two", path))
+
+
 def test_light_without_attenuation_gets_the_same_mean_irradiance_over_what_is_seen(rgb):
     """On a diffuse sphere that is the mean of the picture; only the fall-off's shape differs."""
     pair = halves.pair(SCENES["fig-8-6b"].source(), resolution=(192, 192))

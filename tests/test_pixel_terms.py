@@ -89,8 +89,9 @@ def total_of(view):
         for place, light in enumerate(view.lights):
             of = {name: planes[f"{place}.{name}"][..., None] for name in
                   ("attenuation", "cos_incidence", "lobe")}  # fmt: skip
-            reflected = k_d * np.maximum(of["cos_incidence"], 0) + k_s * of["lobe"]
-            value = value + np.array(light["intensity"]) * of["attenuation"] * reflected
+            diffuse = light["intensity"] * k_d * np.maximum(of["cos_incidence"], 0)
+            specular = light["specular_intensity"] * k_s * of["lobe"]
+            value = value + of["attenuation"] * (diffuse + specular)
         image = np.where(here, value, image)
     if "others.R" in planes:
         image += np.stack([planes[f"others.{colour}"] for colour in "RGB"], axis=-1)

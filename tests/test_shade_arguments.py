@@ -70,6 +70,8 @@ REFUSED_REST = [
     ({"lights": [PointLight((0, 0, 3), Float([1, 2]))]}, r"position has 3, lights\[0\].intensity"),
     ({"lights": [PointLight(UP, (1,) * 5)], "material": Material(k_d=(0.5, 0.4, 0.3))},
      r"k_d has 3, lights\[0\]\.intensity has 5"),
+    ({"lights": [PointLight(UP, (1,) * 3, specular_intensity=(1,) * 5)]},
+     r"lights\[0\]\.intensity has 3, lights\[0\]\.specular_intensity has 5"),
     ({"material": Material(k_d=Float([1, 2]))}, "position has 3, k_d has 2"),
     ({"ambient": Float([1, 2, 3, 4])}, "ambient has 4"),
     ({"ambient": -1}, "^ambient = -1"),
@@ -102,6 +104,10 @@ MADE = {
     "k_a = .*finite values of 0 or more": (lambda odd: Material(k_a=odd), BAD),
     "k_s = .*finite values of 0 or more": (lambda odd: Material(k_s=odd), BAD),
     "intensity = ": (lambda odd: PointLight(UP, odd), [*ODD[:-1], *BAD]),
+    "diffuse_intensity = ": (
+        lambda odd: DirectionalLight(UP, 1, diffuse_intensity=odd), [*ODD[1:-1], *BAD],
+    ),
+    "specular_intensity = ": (lambda odd: SpotLight(UP, UP, 1, 30, specular_intensity=odd), BAD),
     "position": (lambda odd: PointLight(odd, 1), ODD),
     "attenuation = .*k0, k1, k2": (
         lambda odd: PointLight(UP, 1, odd),

@@ -39,6 +39,7 @@ def test_phong_in_a_file_is_phong():
         ("fig-8-9", {"pairing": "literal"}),
         ("fig-8-11-n3", {"interpolation": "gouraud"}),
         ("fig-6-5-m40", {"interpolation": "flat"}),
+        ("two-intensities", {}),
         ("cornell-box", {"everything": True}),
         ("narrow-band-lamp", {}),
     ):

@@ -99,6 +99,11 @@ def _figures() -> Iterator[BuiltIn]:
 
 
 def _chapter_six() -> Iterator[BuiltIn]:
+    yield BuiltIn(
+        "two-intensities",
+        "Equations 6.6 and 6.8: an orange diffuse and a white specular intensity of one light",
+        partial(_scene, "two_intensities"),
+    )
     for m in (1.0, 40.0):
         title = f"Figure 6.5: a spot of {'small' if m < 10 else 'large'} exponent, m = {m:g}"
         yield BuiltIn(f"fig-6-5-m{m:g}", title, partial(_scene, "spot", m))

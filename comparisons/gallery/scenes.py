@@ -49,6 +49,21 @@ def figure(lights: Any, viewer: Any, **coefficients: float) -> dict[str, Any]:
     return scene
 
 
+def two_intensities() -> dict[str, Any]:
+    """Equations 6.6 and 6.8: a light whose highlight is white and whose diffuse light is orange."""
+    return _textbook(
+        (0, -4, 1),
+        36.0,
+        sphere=_sphere(type="phong", k_d=0.8, k_s=0.6, n=20),
+        light={
+            "type": "heuristic_directional",
+            "direction": (2.5, 3.5, -3),
+            "diffuse_intensity": {"type": "rgb", "value": (0.9, 0.4, 0.1)},
+            "specular_intensity": 1.0,
+        },
+    )
+
+
 def spot(exponent: float) -> dict[str, Any]:
     """Figure 6.5: a spot on a white floor; a small ``m`` gives a beam without a clear border."""
     return _textbook(

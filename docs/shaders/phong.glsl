@@ -9,7 +9,8 @@ vec3 shade(Point point) {
         if (cosine > 0.0) {
             vec3 mirrored = 2.0 * cosine * point.normal - light.toward;
             float lobe = pow(max(dot(mirrored, point.view), 0.0), material.n);
-            value += light.intensity * (material.k_d * cosine + material.k_s * lobe);
+            value += light.diffuse_intensity * material.k_d * cosine;
+            value += light.specular_intensity * material.k_s * lobe;
         }
     }
     return value;

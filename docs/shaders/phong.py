@@ -14,6 +14,7 @@ def shade(point):
         mirrored = 2 * cosine * point.normal - light.toward
         along = dr.dot(mirrored, point.view)
         lobe = dr.select(along > 0, dr.maximum(along, 1e-6) ** material.n, 0)  # 0 ** 0 is NaN
-        reflected = material.k_d * cosine + material.k_s * lobe
-        value += dr.select(cosine > 0, light.intensity * reflected, 0)
+        diffuse = light.diffuse_intensity * material.k_d * cosine
+        specular = light.specular_intensity * material.k_s * lobe
+        value += dr.select(cosine > 0, diffuse + specular, 0)
     return value

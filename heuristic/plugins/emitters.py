@@ -6,7 +6,9 @@ Parameter                 Type (default)      Meaning
 ``position``              point (0, 0, 0)     point and spot
 ``direction``             vector (0, 0, 1)    spot and directional: direction of travel
 ``intensity``             spectrum (1)        ``I_p``, display-linear
-``scale``                 float (1)           factor on the intensity
+``diffuse_intensity``     spectrum            ``L_d`` of 6.6; ``intensity`` if omitted
+``specular_intensity``    spectrum            ``L_s`` of 6.8; ``intensity`` if omitted
+``scale``                 float (1)           factor on the intensities
 ``k0``, ``k1``, ``k2``    float (1, 0, 0)     point and spot: attenuation of 6.1
 ``clamped``               boolean (false)     the other form of 8.6, ``min(..., 1)``
 ``cutoff``                float (30)          spot: half angle of the cone, degrees
@@ -14,12 +16,16 @@ Parameter                 Type (default)      Meaning
 ``shell``                 float (0)           point and spot: radius in which nothing casts a shadow
 ========================  ==================  =====================================================
 
-Position, direction, intensity and the coefficients are exposed to ``mitsuba.traverse``. Python::
+Position, direction, the given intensities and the coefficients are exposed to
+``mitsuba.traverse``. Python::
 
     {'type': 'heuristic_point', 'position': [-4.24, 0, 0], 'intensity': 1.0}
 
 Under Mitsuba's integrators a light of intensity ``I_p`` arrives as irradiance ``pi I_p f_att``
-(:mod:`heuristic.convention`). ``light`` hands the same parameters to the kernel.
+(:mod:`heuristic.convention`). ``light`` hands the same parameters to the kernel. A sample of
+Mitsuba's has one colour, which is ``L_d``. So the sum of the chapters is there that of two
+renderings: with ``k_s = 0``, and with ``k_d = 0`` and ``L_s`` in place of ``L_d``; emission and
+ambient light belong in one of them.
 
 ``heuristic_glow`` is emission and ambient light of a shape (8.1, 8.2):
 
@@ -45,7 +51,7 @@ import mitsuba as mi
 
 from heuristic import terms
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.lights import FAR, PLUGINS, UNATTENUATED, DirectionalLight
+from heuristic.lights import FAR, INTENSITIES, PLUGINS, UNATTENUATED, DirectionalLight
 from heuristic.plugins.coefficients import coefficient, emitted
 
 
@@ -66,7 +72,8 @@ def define() -> dict[str, Any]:
         def __init__(self, props):
             super().__init__(props)
             self.model = PLUGINS[props.plugin_name()]
-            self.intensity = emitted(props, "intensity", 1.0)
+            given = [name for name in INTENSITIES if name == "intensity" or name in props]
+            self.intensities = {name: emitted(props, name, 1.0) for name in given}
             self.numbers = []  # names of the parameters that are opaque numbers
             names = {field.name for field in fields(self.model)}
             for name, (kind, default) in parameters.items():
@@ -91,16 +98,20 @@ def define() -> dict[str, Any]:
                 self.unattenuated = False
 
         def traverse(self, callback):
-            for name in ("intensity", *self.numbers):
-                callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+            numbers = {name: getattr(self, name) for name in self.numbers}
+            for name, value in (self.intensities | numbers).items():
+                callback.put(name, value, mi.ParamFlags.Differentiable)
 
         def light(self, it, active=True):
             """Return the kernel's form of this light, at the wavelengths of an interaction."""
             si = dr.zeros(mi.SurfaceInteraction3f)
             si.wavelengths = it.wavelengths
-            own = {field.name for field in fields(self.model)} - {"intensity"}
+            own = {field.name for field in fields(self.model)}.difference(INTENSITIES)
             return self.model(
-                intensity=self.scale * self.intensity.eval(si, active),
+                **{
+                    name: self.scale * intensity.eval(si, active)
+                    for name, intensity in self.intensities.items()
+                },
                 **{name: getattr(self, name) for name in own},
             )
 
@@ -110,15 +121,16 @@ def define() -> dict[str, Any]:
             return UNATTENUATED if self.unattenuated else (self.k0, self.k1, self.k2)
 
         def sample_direction(self, it, sample, active=True):
-            toward, intensity, distance = self.light(it, active).illuminate(mi.Vector3f(it.p))
+            arrival = self.light(it, active).illuminate(mi.Vector3f(it.p))
+            distance = arrival.distance
             ds = dr.zeros(mi.DirectionSample3f)
-            ds.d, ds.dist = toward, FAR if isinstance(distance, float) else distance
-            ds.p, ds.n = it.p + toward * ds.dist, -toward
+            ds.d, ds.dist = arrival.toward, FAR if isinstance(distance, float) else distance
+            ds.p, ds.n = it.p + ds.d * ds.dist, -ds.d
             ds.time = it.time
             ds.pdf = 1.0
             ds.delta = True
             ds.emitter = mi.EmitterPtr(self)
-            return ds, IRRADIANCE_PER_INTENSITY * mi.Spectrum(intensity) & active
+            return ds, IRRADIANCE_PER_INTENSITY * mi.Spectrum(arrival.diffuse) & active
 
         def eval(self, si, active=True):
             return mi.Spectrum(0)
@@ -135,7 +147,8 @@ def define() -> dict[str, Any]:
             return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(*(c[0] for c in self.position)))
 
         def to_string(self):
-            return f"{self.model.__name__}[intensity = {self.intensity}]"
+            shown = ", ".join(f"{name} = {value}" for name, value in self.intensities.items())
+            return f"{self.model.__name__}[{shown}]"
 
         def _keep(self, props, name, kind, default):
             """Read a parameter as an opaque number."""

@@ -12,6 +12,9 @@ the scene nor on the view. A heuristic point or spot with another ``f_att`` has 
 depends on the distance, which only the scene determines.
 
 Parallel light is an exact pair; so is a point with the fall-off of Mitsuba's.
+
+Physical light has one intensity. A heuristic light of two (6.6, 6.8) is paired by its diffuse one,
+which determines the irradiance; its ``L_s`` is recorded as lost.
 """
 
 from collections.abc import Callable, Iterator
@@ -62,6 +65,7 @@ def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements
     """Replace heuristic lights by physical ones; ``surface()`` returns the visible `GBuffer`."""
     for index in [i for i in graph.nodes(EMITTER) if is_heuristic(graph.plugin(i))]:
         light = LightNode(graph, index, surface=surface, replaced=replaced)
+        light.lose_second_intensity()
         if light.plugin == "heuristic_point":
             factor, note = level(light, lambda travel: 1.0, lambda travel: 1.0, 1.0)
             place, intensity = mi.ScalarPoint3d(*light.position()), light.scaled_intensity(factor)

@@ -19,7 +19,8 @@ closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L
 emission of radiance ``L``                     ``k_i = L``
 =============================================  =====================================================
 
-The rule for the level of lights without an exact pair is in :mod:`reference.pairing.emitters`.
+The rules for the level of lights without an exact pair, and for lights of two intensities, are in
+:mod:`reference.pairing.emitters`.
 
 A flat light of area ``A`` sends the intensity ``L A cos`` in its far field, a convex closed one the
 mean projected area ``A / 4`` times ``L`` (Cauchy). The ambient pair is exact for an unoccluded

@@ -6,6 +6,7 @@ from typing import Any
 import mitsuba as mi
 
 from heuristic.errors import InputError
+from heuristic.lights import INTENSITIES
 from reference.pairing import bsdfs, lights
 from reference.records import Record
 from reference.scene import checks, values
@@ -69,8 +70,8 @@ def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -
         values.check_colours(graph, index, bsdfs.COLOURS.get(graph.plugin(index), ()))
     for index in graph.nodes(mi.ObjectType.Emitter):
         plugin = graph.plugin(index)
-        colour = "intensity" if lights.is_heuristic(plugin) else lights.of(plugin).colour
-        values.check_colours(graph, index, (colour,))
+        own = INTENSITIES if lights.is_heuristic(plugin) else (lights.of(plugin).colour,)
+        values.check_colours(graph, index, own)
     checks.check(graph)
     for shape in graph.nodes(SHAPE):
         if not graph.props(shape).id():

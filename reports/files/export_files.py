@@ -27,7 +27,8 @@ README = """# {name}, for another program
   (x + 0.5, y + 0.5).
 - Light is display-linear: a white diffuse surface that faces a light of intensity 1 has the value
   1. With a light's intensity I and attenuation (k0, k1, k2), the distance d makes it
-  I / (k0 + k1 d + k2 d^2). In glTF a light's intensity is pi times I, as irradiance is.
+  I / (k0 + k1 d + k2 d^2). In glTF a light's intensity is pi times I, as irradiance is. A
+  `diffuse_intensity` takes the place of I for k_d, and in glTF; a `specular_intensity` for k_s.
 - `ambient` in lights.json is added times k_a; in physical terms it is an environment of that
   radiance.
 - Angles are in degrees in JSON, in radians in glTF; `direction` is that in which light travels.
@@ -69,9 +70,9 @@ def _json(content: object) -> str:
 def gltf(scene: PlainScene) -> dict[str, Any]:
     """Return a scene as glTF 2.0, buffer included.
 
-    A light's intensity is pi times the I_p of the pair, as irradiance is. Attenuation other than by
-    the inverse square, which glTF lacks, is in ``extras``, as Phong's coefficients are. By hand,
-    since libraries keep neither lights nor the index of refraction.
+    A light's intensity is pi times the I_p of the pair, or L_d, as irradiance is. Attenuation other
+    than by the inverse square, which glTF lacks, is in ``extras``, as L_s and Phong's coefficients
+    are. By hand, since libraries keep neither lights nor the index of refraction.
     """
     arrays: list[np.ndarray] = []
     meshes = [_mesh(shape, arrays) for shape in scene.shapes]
@@ -165,13 +166,14 @@ def _material(material: dict[str, Any]) -> dict[str, Any]:
 
 
 def _light(light: dict[str, Any]) -> dict[str, Any]:
-    largest = max(*light["intensity"], 1e-30)
+    intensity = light.get("diffuse_intensity", light["intensity"])
+    largest = max(*intensity, 1e-30)
     outer = min(radians(light.get("cutoff", 0.0)), pi / 2)
     spot = {"spot": {"innerConeAngle": 0.0, "outerConeAngle": outer}}
     return {
         "name": light["name"],
         "type": light["type"],
-        "color": [value / largest for value in light["intensity"]],
+        "color": [value / largest for value in intensity],
         "intensity": pi * largest,
         "extras": {key: value for key, value in light.items() if key not in ("name", "type")},
         **(spot if light["type"] == "spot" else {}),

@@ -39,7 +39,7 @@ class TermsView(Record):
     """The page's data of the terms of a scene.
 
     ``grid`` has planes over the grid of pixels, and ``tops`` those of its values ≥ 0; lights have a
-    name and their ``I_p0``. ``missing`` says why there are no terms.
+    name, ``L_d`` and ``L_s``. ``missing`` says why there are no terms.
     """
 
     grid: Embedded | None = None

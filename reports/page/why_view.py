@@ -20,7 +20,7 @@ from reports.page.scene_view import EffectMap, TermsView, WhyView
 if TYPE_CHECKING:
     from comparisons.pixel_terms import TermGrid
 
-LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789"))
+LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789a"))
 """Codes of the map: no effect, a pixel that does not count, and the effects' places."""
 
 STEP, UNCOUNTED = 0.1, 255
@@ -28,6 +28,9 @@ STEP, UNCOUNTED = 0.1, 255
 
 LARGEST_CODE = 65535
 """The largest code of the terms' planes."""
+
+LIGHT = ("name", "intensity", "specular_intensity")
+"""Fields of a light that all pixels share."""
 
 
 def why_view(
@@ -98,5 +101,5 @@ def terms_view(grid: TermGrid) -> TermsView:
         grid=packed(planes),
         tops=tops,
         materials=tuple(vars(material) for material in grid.materials),
-        lights=tuple({"name": each.name, "intensity": each.intensity} for each in grid.lights),
+        lights=tuple({name: getattr(each, name) for name in LIGHT} for each in grid.lights),
     )

@@ -8,7 +8,7 @@
  * @typedef {{on: number[], mean: string}} Hybrid
  * @typedef {{width: number, height: number, columns: number, hybrids: Hybrid[]}} Board
  * @typedef {{name: string, k_i: number[], k_a: number[], k_d: number[], k_s: number[], n: number, form: string, ambient: number[]}} Material
- * @typedef {{name: string, intensity: number[]}} Lamp
+ * @typedef {{name: string, intensity: number[], specular_intensity: number[]}} Lamp
  * @typedef {{grid: Manifest | null, tops: Record<string, number>, materials: Material[], lights: Lamp[], missing: string}} Terms
  */
 

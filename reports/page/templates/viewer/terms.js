@@ -73,11 +73,10 @@ function termRows({ terms, planes }, material, place) {
 /** @param {Lamp} light @param {Material} material @param {number} normalView @param {(name: string) => number} at */
 function lightTerms(light, material, normalView, at) {
   const [attenuation, cosIncidence, cosView, lobe] = ["attenuation", "cos_incidence", "cos_view", "lobe"].map(at);
-  const arriving = light.intensity.map((value) => value * attenuation);
   return {
     ...light, attenuation, cosIncidence, lobe, cosReflection: 2 * cosIncidence * normalView - cosView,
-    diffuse: product(arriving, material.k_d).map((value) => value * Math.max(cosIncidence, 0)),
-    specular: product(arriving, material.k_s).map((value) => value * lobe),
+    diffuse: product(light.intensity, material.k_d).map((value) => value * attenuation * Math.max(cosIncidence, 0)),
+    specular: product(light.specular_intensity, material.k_s).map((value) => value * attenuation * lobe),
   };
 }
 
@@ -86,8 +85,10 @@ function lightRows(light, material) {
   const isLit = light.cosIncidence > 0, isBlinn = material.form === "blinn";
   const cosine = Math.max(isBlinn ? light.lobe ** (1 / material.n) : light.cosReflection, 0);
   const behind = `N·L = ${factor(light.cosIncidence)}: the light is behind the surface`;
+  const [diffuse, specular] = [light.intensity, light.specular_intensity].map(colourText);
+  const [symbol, second] = diffuse === specular ? ["I_{p0}", ""] : ["L_{d}", `; L_{s} = ${specular}`];
   return [
-    termRow(light.name, `I_{p0} f_{att} = ${colourText(light.intensity)} × ${factor(light.attenuation)}`, ["", "", ""], "light"),
+    termRow(light.name, `${symbol} f_{att} = ${diffuse} × ${factor(light.attenuation)}${second}`, ["", "", ""], "light"),
     termRow("diffuse", isLit ? `× k_{d} (N·L) = × ${colourText(material.k_d)} × ${factor(light.cosIncidence)}` : behind, light.diffuse.map(amount)),
     termRow("specular", isLit ? `× k_{s} (${isBlinn ? "N·H" : "R·V"})^{n} = × ${colourText(material.k_s)} × ${factor(cosine, 4)}^{${factor(material.n)}}` : "", light.specular.map(amount)),
   ];
