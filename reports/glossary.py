@@ -118,6 +118,9 @@ EFFECTS: Terms = {
     ("polygon interpolation",): "Flat and Gouraud shading, which interpolate over polygons.",
     ("transmission",): "Light that passes through surfaces, which the textbook’s cannot.",
     ("distance attenuation",): "How light weakens with distance: physically by its square.",
+    ("one intensity",): (
+        "Physical light has one intensity. The textbook’s may have one for each kind of reflection."
+    ),
     ("spot cone",): "How a spot light weakens towards the edge of its cone.",
 }
 

@@ -178,7 +178,7 @@ def test_kernels_that_are_compared_have_the_same_mesh(rgb):
 
 
 def test_steps_lead_from_the_kernel_to_the_full_plan_an_effect_at_a_time(rgb):
-    for name in ("plastic-spheres", "cornell-box", "fig-6-10"):
+    for name in ("plastic-spheres", "cornell-box", "fig-6-10", "two-intensities"):
         scene = SCENES[name]
         options = {"interpolation": scene.interpolation, "tessellation": scene.tessellation}
         found = ladder(scene.source(), **options)

@@ -31,6 +31,7 @@ MADE_OF = {
     "fig-6-10": {
         "distance attenuation", "polygon interpolation", "microfacets and Fresnel", "environment",
     },
+    "two-intensities": {"one intensity", "microfacets and Fresnel"},
     "narrow-band-lamp": {"occlusion", "spectral"},
 }  # fmt: skip
 """Effects of scenes that between them have all that the built-in ones have."""
@@ -44,6 +45,7 @@ MADE_OF = {
     params=[
         "cornell-box",
         "fig-6-10",
+        "two-intensities",
         pytest.param("narrow-band-lamp", marks=pytest.mark.thorough),
     ],
 )

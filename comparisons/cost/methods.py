@@ -32,6 +32,7 @@ from reference.planning.effects import (
     INTERREFLECTION,
     MICROFACETS,
     OCCLUSION,
+    ONE_INTENSITY,
     POLYGONS,
     SPECTRAL,
     TRANSMISSION,
@@ -262,6 +263,7 @@ class Ladder:
             POLYGONS.label: {"interpolation": Interpolation.PHONG},
             OCCLUSION.label: {"shadows": True},
             SPECTRAL.label: {"variant": self.ready.reference.variant},
+            ONE_INTENSITY.label: {},  # which the kernel has at no cost
         }
         for label, change in changes.items():
             if label in effects:

@@ -13,7 +13,6 @@ samples, and the mean over a block of them is the pixel that the coarser film wo
 """
 
 from collections.abc import Iterable, Sequence, Set
-from functools import cached_property
 from typing import Any
 
 import mitsuba as mi
@@ -26,7 +25,14 @@ from heuristic.convention import Scene
 from heuristic.heuristics import Interpolation
 from reference.pairing import lights
 from reference.pairing.halves import Pair
-from reference.planning.effects import EFFECTS, ENVIRONMENT, POLYGONS, SPECTRAL, Effect
+from reference.planning.effects import (
+    EFFECTS,
+    ENVIRONMENT,
+    ONE_INTENSITY,
+    POLYGONS,
+    SPECTRAL,
+    Effect,
+)
 from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
 from reference.planning.plan import Plan, physical_integrator
 from reference.rendering import direct
@@ -43,6 +49,9 @@ IN_SCENE: frozenset[Effect] = frozenset(REPLACED)
 
 IN_EMISSION = tuple(effect for effect in REPLACED if effect.emission)
 """Effects that change the emission pass."""
+
+OF_KERNEL = frozenset({POLYGONS, ONE_INTENSITY})
+"""Effects that only the kernel can do without: flat and Gouraud shading, lights of two colours."""
 
 UNWEIGHTED = "perspective", "orthographic", "thinlens"
 """Cameras that leave light as it is."""
@@ -202,6 +211,7 @@ class HybridImages:
         self._scenes = {self._variant: scenes}
         self._known: dict[frozenset[Effect], NDArray] = {}
         self._emission: dict[tuple[str, frozenset[Effect]], NDArray | None] = {}
+        self._kernels: dict[frozenset[Effect], NDArray] = {}
         self.effects = pairs.effects(scenes.differences)
         rfilter = scenes.scene.sensors()[0].film().rfilter()
         self.finer = FINER if "Box" in rfilter.class_name() else 1
@@ -212,7 +222,7 @@ class HybridImages:
         A scene is released before the next: each that is alive slows all others.
         """
         groups: dict[tuple[str, frozenset[Effect]], list[frozenset[Effect]]] = {}
-        for each in dict.fromkeys(frozenset(one) - {POLYGONS} for one in sets):
+        for each in dict.fromkeys(frozenset(one) - OF_KERNEL for one in sets):
             groups.setdefault(self._group(each), []).append(each)
         for (name, _), group in sorted(groups.items(), key=lambda found: found[0][0]):
             with variant(name):
@@ -224,7 +234,7 @@ class HybridImages:
         None has the kernel's terms; all are the scene of the reference, edited, which would show
         faults of the edits.
         """
-        key = frozenset(effects) - {POLYGONS}
+        key = frozenset(effects) - OF_KERNEL
         if key not in self._known:
             self.render([key])
         return self._known[key]
@@ -232,34 +242,42 @@ class HybridImages:
     def simulating(self, effects: Set[Effect]) -> NDArray:
         """Return the image in which some of ``effects`` are simulated; for none it is the kernel's.
 
-        Only the kernel has flat and Gouraud shading; where they remain, an image gets the
-        difference that they make there.
+        Where an effect is missing that only the kernel can do without, an image gets the difference
+        that this makes in the kernel.
         """
         if not effects:
             return self.kernel
-        found = self.plugin(effects)
-        if POLYGONS in self.effects and POLYGONS not in effects:
-            return found + (self.kernel - self.plain_kernel)
-        return found
+        found, own = self.plugin(effects), OF_KERNEL.intersection(self.effects)
+        if own <= set(effects):
+            return found
+        return found + (self._kernel(own.intersection(effects)) - self.plain_kernel)
 
-    @cached_property
+    @property
     def kernel(self) -> NDArray:
         """The kernel as requested."""
-        return self._of_kernel(self._ready.heuristic.scene)
+        return self._kernel(frozenset())
 
-    @cached_property
+    @property
     def plain_kernel(self) -> NDArray:
-        """The kernel with an exact normal at each point."""
-        if POLYGONS not in self.effects:
-            return self.kernel
-        with variant(self._pairs.heuristic_variant):
-            graph = with_sampler(self._pairs.plain().heuristic, self._ready.plan.sampler)
-            return self._of_kernel(graph.instantiate())
+        """The kernel with an exact normal at each point, and one intensity of each light."""
+        return self._kernel(OF_KERNEL.intersection(self.effects))
 
-    def _of_kernel(self, scene: Scene) -> NDArray:
-        with variant(self._pairs.heuristic_variant):
+    def _kernel(self, effects: frozenset[Effect]) -> NDArray:
+        """Return the image of the kernel with some of :data:`OF_KERNEL`."""
+        if effects in self._kernels:
+            return self._kernels[effects]
+        pairs, scene = self._pairs, self._ready.heuristic.scene
+        with variant(pairs.heuristic_variant):
+            if effects:
+                has_polygons = POLYGONS not in effects
+                pair = pairs.of(pairs.options.polygon_shading) if has_polygons else pairs.plain()
+                graph = with_sampler(pair.heuristic, self._ready.plan.sampler)
+                if ONE_INTENSITY in effects:
+                    lights.give_one_intensity(graph)
+                scene = graph.instantiate()
             (found,) = self._passes(Renderer(scene, None, self._finer_spp, "image of the kernel"))
-            return found
+        self._kernels[effects] = found
+        return found
 
     def _group(self, effects: frozenset[Effect]) -> tuple[str, frozenset[Effect]]:
         """Return the variant and what all images of one rendering have in common."""

@@ -169,7 +169,27 @@ SPECTRAL = Effect(
 )
 
 
-# --- Lights that differ in form: fall-off, cone, extent, surroundings ------------------------
+# --- Lights that differ in form: intensities, fall-off, cone, extent, surroundings -----------
+
+
+def _of_two_intensities(facts: Facts) -> list[str]:
+    lost = facts.pair.unrepresentable
+    return [light.name for light in lost if light.lost == lights.SECOND_INTENSITY]
+
+
+ONE_INTENSITY = Effect(
+    label="one intensity",
+    noun="one intensity for all reflection",
+    heuristic="L_d and L_s (6.6, 6.8)",
+    reference="one",
+    cost="nothing",
+    rule=lambda facts: (
+        bool(_of_two_intensities(facts)),
+        f"lights of two intensities: {', '.join(_of_two_intensities(facts)) or 'none'}",
+    ),
+    colour="#332288",
+    sites=_of_two_intensities,
+)
 
 
 def _inexact_lights(with_cone: bool) -> Callable[[Facts], list[str]]:
@@ -406,6 +426,7 @@ EFFECTS: tuple[Effect, ...] = (
     AMBIENT,
     DIFFUSE,
     SPECULAR,
+    ONE_INTENSITY,
     ATTENUATION,
     CONE,
     POLYGONS,

@@ -9,7 +9,7 @@ Spec: TypeAlias = dict[str, Any]
 
 EFFECT_COLOURS = {effect.label: effect.colour for effect in EFFECTS if effect.colour}
 """Colours of effects in attributions: Okabe and Ito's seven for those that often come together, and
-three of Tol's muted scheme. Both suit the common colour deficiencies."""
+four of Tol's muted scheme. Both suit the common colour deficiencies."""
 
 EFFECTS_TITLE = "Effects"
 """Title of the map of dominant effects."""

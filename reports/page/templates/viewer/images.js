@@ -148,7 +148,7 @@ class Painter {
       const own = pixelsOf([...(this.scene.effects?.colours ?? []), page.noEffect].join("").replaceAll("#", ""));
       return (place) => {
         const letter = this.letter(place);
-        return letter === NOT_COUNTED ? uncounted : own[letter === NO_EFFECT ? own.length - 1 : Number(letter)];
+        return letter === NOT_COUNTED ? uncounted : own[letter === NO_EFFECT ? own.length - 1 : parseInt(letter, 36)];
       };
     }
     const colour = differenceColours(t, this.top);
@@ -167,5 +167,5 @@ function letterAt(effects, x, y) {
 
 /** What is missing where a letter stands; empty if unknown. @param {Effects | null} effects @param {string} letter */
 function effectName(effects, letter) {
-  return letter === NO_EFFECT ? "none visible" : effects?.names[Number(letter)] ?? "";
+  return letter === NO_EFFECT ? "none visible" : effects?.names[parseInt(letter, 36)] ?? "";
 }
