@@ -102,7 +102,8 @@ def by_kernel(setting: Setting) -> NDArray[np.float32]:
         axis = tuple(map(float, s.direction))
         cone = float(s.cutoff), float(s.m)
         lamp = heuristic.SpotLight(light, axis, intensity, *cone, (k0, k1, k2))
-    material = heuristic.Material(k_d=float(s.k_d), k_s=float(s.k_s), n=n)
+    exponent = n if np.isfinite(s.n).all() else np.inf  # a mirror is a plain number
+    material = heuristic.Material(k_d=float(s.k_d), k_s=float(s.k_s), n=exponent)
     dr.eval(position, normal, view, n, light, intensity)
     value = heuristic.shade(position, normal, view, material, [lamp])
     return np.array(value + dr.zeros(Float, len(columns[0][0])))
@@ -125,13 +126,13 @@ def _highlight(n: float, **changes: Any) -> Setting:
     return replace(Setting(normal=NORMAL, light=LIGHT, view=view, k_s=1.0, n=n), **changes)
 
 
-def _mirror_directions() -> Setting:
+def _mirror_directions(n: float) -> Setting:
     """Return views in the mirror direction of a light, to single precision."""
     normal = np.random.default_rng(2).normal(size=(POINTS, 3)).astype(np.float32).astype(float)
     normal[:, 2] = np.abs(normal[:, 2]) + 0.1
     up = unit(normal)
     return Setting(
-        normal=normal, light=(0, 0, 1), view=2 * up[:, 2:] * up - (0, 0, 1), k_s=1.0, n=1e7
+        normal=normal, light=(0, 0, 1), view=2 * up[:, 2:] * up - (0, 0, 1), k_s=1.0, n=n
     )
 
 
@@ -177,8 +178,11 @@ CASES = tuple(replace(case, setting=case.setting.rounded()) for case in (
           "The same; even rounding N, L and V turns the highlight visibly."),
     HardCase("exponent 123456.78", "Exponents", 2e-4, _highlight(123456.78),
           "A large exponent that is not an integer."),
-    HardCase("exponent 1e7 in the mirror direction", "Exponents", 2e-4, _mirror_directions(),
+    HardCase("exponent 1e7 in the mirror direction", "Exponents", 2e-4, _mirror_directions(1e7),
           "R·V rounds to just over 1 or just under, and the power makes it 3.3 or 0.3."),
+    HardCase("exponent ∞, a mirror", "Exponents", 0.0, _mirror_directions(np.inf),
+          "A light at a point is seen from one direction alone; R·V rounds to 1, or over it.",
+          exactly=np.zeros(POINTS)),
     HardCase("a light on the surface", "Geometry", 2e-4, replace(_FLAT, light=(0.0, 0.0, 0.0)),
           "d = 0: no direction, and 0 / 0."),
     HardCase("a light at a distance of 1e-20", "Geometry", 1e-6,

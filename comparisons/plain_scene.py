@@ -165,6 +165,8 @@ def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict:
     material = bsdf.material(point, True, False, None, True)
     textures = {name: getattr(bsdf, name) for name in (*COEFFICIENTS, "n", "base_color")}
     colours = {name: textures[name].eval(point) for name in (*COEFFICIENTS, "base_color")}
+    if bsdf.is_mirror:
+        colours["k_s"] = 0
     return {
         "name": bsdf.id() or f"material {number + 1}",
         **{name: numbers(mi.Color3f(colour)) for name, colour in colours.items()},

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from math import inf
 from numbers import Real
 from typing import Any
 
@@ -108,12 +109,14 @@ def sum_lights(
 ) -> tuple[Colour | None, Colour | None]:
     """Return the diffuse and specular sums of 8.10, with ``k_d`` and ``k_s`` taken out of them.
 
-    Each is None if its coefficient is zero. More than :data:`BLOCK` lights are evaluated in blocks,
+    Each is None if its coefficient is zero; the specular one is for a mirror, too
+    (:func:`heuristic.terms.mirror`). More than :data:`BLOCK` lights are evaluated in blocks,
     so compile time, kernel size and memory do not grow with their number. They are unrolled if
     there is nothing to evaluate (scalar arrays) or it is impossible (in a symbolic loop or call).
     """
     has_diffuse = not materials.is_zero(material.k_d)
-    has_specular = not materials.is_zero(material.k_s)
+    is_mirror = numerics.is_number(material.n, inf)
+    has_specular = not (is_mirror or materials.is_zero(material.k_s))
     if not (has_diffuse or has_specular):
         return None, None
     in_blocks = (

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf
 from numbers import Real
 from typing import Any
 
@@ -115,6 +114,8 @@ class Material:
     :data:`heuristic.numerics.LARGEST_LITERAL_EXPONENT` as products; a Dr.Jit array is a run-time
     value, and ``n_is_moderate`` says whether it is known to lie within
     :data:`heuristic.numerics.MODERATE_EXPONENTS`, where the kernel may do without double precision.
+    A plain ``inf`` makes a mirror (8.7), which shows no light of the kernel
+    (:func:`heuristic.terms.mirror`); an array is finite.
 
     ``form`` is ``phong`` for the chapters' ``(R.V)^n`` (8.9), or ``blinn`` for ``(N.H)^n`` of Blinn
     (1977), which OpenGL's fixed pipeline and most engines use. ``normalised`` scales the lobe by
@@ -167,8 +168,11 @@ class PairedMaterial(Material):
 
 def _exponent(n):
     number = numerics.plain(n)
-    if number is None or (isinstance(number, Real) and not 0 <= number < inf):
-        raise InputError(f"n = {n!r} is not allowed: Phong's exponent is finite and 0 or more.")
+    if number is None or (isinstance(number, Real) and not number >= 0):
+        raise InputError(
+            f"n = {n!r} is not allowed: Phong's exponent is finite and 0 or more;"
+            " inf makes a mirror."
+        )
     return number
 
 

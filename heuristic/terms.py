@@ -6,6 +6,7 @@ numbers, Dr.Jit floats, or colours with one component per wavelength (8.11, 8.12
 functions serve the kernel (:mod:`heuristic.kernel`) and the plugins (:mod:`heuristic.plugins`).
 """
 
+from math import inf
 from numbers import Real
 
 import drjit as dr
@@ -43,7 +44,7 @@ def specular(intensity: Colour, k_s: Colour, cos_reflection: Cosines, n: Number)
     """Equations 8.8, 8.9, 6.8-6.10: ``I = I_p k_s (R.V)^n``.
 
     6.10 is the same for an ``intensity`` that is already attenuated. Chapter 6 writes ``L_s`` for
-    ``I_p``. The limit of large ``n`` is the perfect mirror of 8.7. ``cos_reflection`` is a float
+    ``I_p``. The limit of large ``n`` is :func:`mirror`. ``cos_reflection`` is a float
     or, for large ``n``, a :class:`heuristic.numerics.Cosine`. The caller handles the horizon
     (``N.L > 0``); the lobe itself ends where ``R.V <= 0``, for every ``n``, so ``n = 0`` is the
     limit of small ``n``.
@@ -52,6 +53,17 @@ def specular(intensity: Colour, k_s: Colour, cos_reflection: Cosines, n: Number)
     0.125
     """
     return intensity * k_s * power(cos_reflection, n)
+
+
+def mirror(arriving: Colour, k_s: Colour) -> Colour:
+    """Equation 8.7: ``I = I_p k_s delta(b - a)``, here without the delta function: ``I_p k_s``.
+
+    It is what a viewer sees of light that arrives from the mirror image of the view, and the limit
+    of a normalised lobe for ``n`` to infinity; the albedo is ``k_s`` for every angle and form. Only
+    what has an extent is seen in a mirror: a light at a point, or in one direction, would be seen
+    from one direction alone. So the kernel, which traces no rays, gives a mirror no specular light.
+    """
+    return arriving * k_s
 
 
 def normalisation(form: str, n: Number) -> Number:
@@ -66,9 +78,11 @@ def normalisation(form: str, n: Number) -> Number:
     >>> normalisation("phong", 10)
     6.0
     """
+    if numerics.is_number(n, inf):
+        return 1.0
     if form == "blinn":
         halves = 2 ** (-float(n) / 2) if isinstance(n, Real) else dr.exp2(-n / 2)
-        return (n + 2) * (n + 4) / (8 * (n + halves))
+        return (n + 2) * ((n + 4) / (8 * (n + halves)))
     return (n + 2) / 2
 
 

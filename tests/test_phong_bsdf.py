@@ -253,7 +253,7 @@ def test_what_is_edited_is_as_if_made_so(rgb, kernel_history, kind):
 
 
 def test_values_that_mean_nothing_are_refused(rgb):
-    wrong = [{"n": n} for n in (-1.0, float("nan"), float("inf"))]
+    wrong = [{"n": n} for n in (-1.0, float("nan"), -float("inf"))]
     for name in ("k_i", "k_a", "k_d", "k_s"):
         colour = rgb_of(0.5, -1.0, 0.5)
         wrong += [{name: value} for value in (-0.1, float("nan"), colour)]

@@ -96,7 +96,7 @@ NAN, INFINITY = float("nan"), float("inf")
 ODD = [None, "x", object(), [1, [2]], ["a"], 1j, {1: 2}, 10**400, NAN, -1, (), Array2f(1)]
 BAD = [-0.1, NAN, INFINITY, (0.5, -1.0, 0.5), (0.5, NAN, 0.5)]
 MADE = {
-    "n = .*finite and 0 or more": (lambda odd: Material(n=odd), [*ODD, INFINITY]),
+    "n = .*finite and 0 or more": (lambda odd: Material(n=odd), [*ODD, -INFINITY]),
     "form = ": (lambda odd: Material(form=odd), ODD),
     "normalised = ": (lambda odd: Material(normalised=odd), ODD),
     "k_d = ": (lambda odd: Material(k_d=odd), [*ODD[:-1], *BAD, "red"]),

@@ -155,13 +155,15 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
 
 
 def _require_fittable(names, bsdfs):
-    """Reject transparent materials, since a sample has one surface, and varying exponents."""
+    """Reject transparent materials (a sample has one surface), mirrors, and varying exponents."""
     for name, bsdf in zip(names, bsdfs, strict=True):
         if bsdf.is_clear:
             raise InputError(
                 f"{name}: a fit needs opaque materials; glass, masks and `null` let light pass."
                 " Replace it."
             )
+        if bsdf.is_mirror:
+            raise InputError(f"{name}: n is infinite: a mirror has no lobe to fit. Give a number.")
         if isinstance(bsdf.n, mi.Texture):
             raise InputError(
                 f"{name}: n varies over the surface, and a fit has one n per material. Give its"

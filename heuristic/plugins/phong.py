@@ -7,8 +7,8 @@ Parameter           Type (default)    Meaning
                                       ``heuristic`` only, since they are not reflection
 ``k_d``, ``k_s``    spectrum or       diffuse and specular coefficient
                     texture (0)
-``n``               float or          Phong's exponent
-                    texture (1)
+``n``               float or          Phong's exponent; ``inf`` makes a mirror (8.7) that reflects
+                    texture (1)       ``k_s``: a delta component
 ``form``            string (phong)    ``phong`` for ``(R.V)^n``, ``blinn`` for ``(N.H)^n``
 ``normalised``      boolean (false)   scale the lobe so that ``k_s`` is its albedo at normal
                                       incidence
@@ -29,6 +29,7 @@ has no cosine factor; as in the chapters, it neither conserves energy nor is rec
 """
 
 from functools import reduce
+from math import inf
 from numbers import Real
 from operator import or_
 from typing import Any
@@ -74,13 +75,13 @@ def define() -> dict[str, Any]:
         def material(self, si, active=True, prune=True, form=None, physical=False):
             """Return the material at a surface interaction; absent terms are plain zeros.
 
-            ``k_s`` is that of a lobe without normalisation. With ``physical`` it is a
-            :class:`heuristic.materials.PairedMaterial`.
+            ``k_s`` is that of a lobe without normalisation, 0 for a mirror. With ``physical`` the
+            material is a :class:`heuristic.materials.PairedMaterial`.
             """
             form, n = form or self.form, self.exponent(si, active)
             coefficients = {
                 name: getattr(self, name).eval(si, active)
-                for name in (self.present if prune else COEFFICIENTS)
+                for name in (self.present if prune else self.kernel_terms)
             }
             if self.normalised and "k_s" in coefficients:
                 coefficients["k_s"] = coefficients["k_s"] * terms.normalisation(form, n)
@@ -94,7 +95,9 @@ def define() -> dict[str, Any]:
             return kind(**coefficients, n=n, form=form, n_is_moderate=self.n_is_moderate)
 
         def exponent(self, si, active=True):
-            """Return ``n`` at a surface interaction."""
+            """Return ``n`` at a surface interaction; 1 for a mirror, whose lobe is not used."""
+            if self.is_mirror:
+                return mi.Float(1)
             if isinstance(self.n, mi.Texture):
                 return dr.maximum(self.n.eval_1(si, active), 0)
             return self.n
@@ -117,25 +120,34 @@ def define() -> dict[str, Any]:
             wi, wo = self._facing(si.wi, wo)
             above = active & (wi.z > 0) & (wo.z > 0)
             probability = self._specular_probability(ctx, si, above)
-            reflected = 1 - self._through_probability(ctx, si, above)
+            reflected = 1 - sum(self._single_directions(ctx, si, above))
             diffuse = mi.warp.square_to_cosine_hemisphere_pdf(wo)
             specular = self._lobe_pdf(wi, wo, self.exponent(si, above))
             return dr.select(above, reflected * dr.lerp(diffuse, specular, probability), 0)
 
         def sample(self, ctx, si, sample1, sample2, active=True):
-            if not self.is_clear:
+            if not (self.is_clear or self.is_mirror):
                 return self._reflected(ctx, si, sample1, sample2, active)
-            probability = self._through_probability(ctx, si, active)
-            passes = active & (sample1 < probability)
+            clear, mirrored = self._single_directions(ctx, si, active)
+            both = clear + mirrored
+            chosen = active & (sample1 < both)
+            passes = chosen & (sample1 < clear)
             # The rest of the number is uniform again, and chooses between the other two.
-            sample1 = dr.select(passes, 0, (sample1 - probability) / (1 - probability))
-            reflected, weight = self._reflected(ctx, si, sample1, sample2, active & ~passes)
-            straight = dr.zeros(mi.BSDFSample3f)
-            straight.wo, straight.eta, straight.pdf = -si.wi, 1.0, probability
-            straight.sampled_component = mi.UInt32(2)
-            straight.sampled_type = mi.UInt32(+mi.BSDFFlags.Null)
-            passed = self.transmittance.eval(si, passes) / probability
-            return dr.select(passes, straight, reflected), dr.select(passes, passed, weight)
+            sample1 = dr.select(chosen, 0, (sample1 - both) / (1 - both))
+            reflected, weight = self._reflected(ctx, si, sample1, sample2, active & ~chosen)
+            single = dr.zeros(mi.BSDFSample3f)
+            single.wo = dr.select(passes, -si.wi, mi.reflect(si.wi))
+            single.eta, single.pdf = 1.0, dr.select(passes, clear, mirrored)
+            single.sampled_component = dr.select(passes, mi.UInt32(2), 0)
+            flags = (mi.BSDFFlags.Null, mi.BSDFFlags.DeltaReflection)
+            single.sampled_type = dr.select(passes, *(mi.UInt32(+flag) for flag in flags))
+            value = dr.select(
+                passes,
+                self.transmittance.eval(si, passes),
+                terms.mirror(1, self.k_s.eval(si, chosen & ~passes)),
+            )
+            weight = dr.select(chosen, value / dr.select(chosen, single.pdf, 1), weight)
+            return dr.select(chosen, single, reflected), weight
 
         def eval_null_transmission(self, si, active=True):
             return mi.Spectrum(self.transmittance.eval(si, active))
@@ -185,32 +197,35 @@ def define() -> dict[str, Any]:
                 callback.put(name, value, mi.ParamFlags.Differentiable)
 
         def parameters_changed(self, keys=()):
-            """Note which coefficients can be non-zero, and make the exponent opaque.
+            """Note which coefficients can be non-zero, if it is a mirror, and make ``n`` opaque.
 
             An opaque exponent can change without a new compilation, unless it crosses the bounds of
             :data:`heuristic.numerics.MODERATE_EXPONENTS`. Values below 0 raise InputError.
             """
             for name in (*COEFFICIENTS, "transmittance"):
                 require_positive(f"phong: {name}", getattr(self, name))
-            self.present = {name for name in COEFFICIENTS if may_be_nonzero(getattr(self, name))}
             self.is_clear = may_be_nonzero(self.transmittance)
-            # The lobe, the diffuse part and the null component, in this order.
-            front, back = mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide
-            sides = front | (back if self.twosided else 0)
-            flags = mi.BSDFFlags
-            components = [flags.GlossyReflection | sides, flags.DiffuseReflection | sides]
-            if self.is_clear:
-                components.append(flags.Null | front | back)
-            self.m_components = components  # Mitsuba copies the list
-            self.m_flags = reduce(or_, components)
-            self.n_is_moderate = False
+            self.n_is_moderate = self.is_mirror = False
             dr.make_opaque([each for each in self.partner.values() if isinstance(each, mi.Float)])
             if not isinstance(self.n, mi.Texture):
                 dr.make_opaque(self.n)
                 exponents = np.ravel(self.n).tolist()
                 for n in exponents:
                     _require_exponent(n)
-                self.n_is_moderate = all(map(numerics.is_moderate, exponents))
+                self.is_mirror = inf in exponents
+                self.n_is_moderate = self.is_mirror or all(map(numerics.is_moderate, exponents))
+            self.kernel_terms = [k for k in COEFFICIENTS if k != "k_s" or not self.is_mirror]
+            self.present = {k for k in self.kernel_terms if may_be_nonzero(getattr(self, k))}
+            # The lobe or mirror, the diffuse part and the null component, in this order.
+            front, back = mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide
+            sides = front | (back if self.twosided else 0)
+            flags = mi.BSDFFlags
+            specular = flags.DeltaReflection if self.is_mirror else flags.GlossyReflection
+            components = [specular | sides, flags.DiffuseReflection | sides]
+            if self.is_clear:
+                components.append(flags.Null | front | back)
+            self.m_components = components  # Mitsuba copies the list
+            self.m_flags = reduce(or_, components)
 
         def to_string(self):
             parts = ", ".join(f"{name} = {getattr(self, name)}" for name in (*COEFFICIENTS, "n"))
@@ -232,20 +247,26 @@ def define() -> dict[str, Any]:
             total = diffuse + specular
             return dr.select(total > 0, specular / total, 0.5)
 
-        def _through_probability(self, ctx, si, active):
-            """Share of samples that pass straight through."""
-            if not self.is_clear or not ctx.is_enabled(mi.BSDFFlags.Null, 2):
-                return mi.Float(0)
-            clear = dr.mean(self.transmittance.eval(si, active))
-            total = clear + sum(self._albedos(si, active))
-            return dr.select(total > 0, clear / total, 0)
+        def _single_directions(self, ctx, si, active):
+            """Return the shares of samples that pass straight through, and that are mirrored."""
+            clear, mirrored = mi.Float(0), mi.Float(0)
+            if self.is_clear or self.is_mirror:
+                passing = dr.mean(self.transmittance.eval(si, active))
+                diffuse, specular = self._albedos(si, active)
+                total = passing + diffuse + specular
+                if self.is_clear and ctx.is_enabled(mi.BSDFFlags.Null, 2):
+                    clear = dr.select(total > 0, passing / total, 0)
+                if self.is_mirror and ctx.is_enabled(mi.BSDFFlags.DeltaReflection, 0):
+                    lit = (total > 0) & (self.twosided | (si.wi.z > 0))
+                    mirrored = dr.select(lit, specular / total, 0)
+            return clear, mirrored
 
         def _albedos(self, si, active):
             """Return the albedo of the two parts at normal incidence, the mean over channels."""
-            n = self.exponent(si, active)
-            albedo = self._scale(n) / terms.normalisation(self.form, n)
             k_d, k_s = (dr.mean(k.eval(si, active)) for k in (self.k_d, self.k_s))
-            return k_d, k_s * albedo
+            if self.is_mirror or self.normalised:
+                return k_d, k_s
+            return k_d, k_s * (1 / terms.normalisation(self.form, self.exponent(si, active)))
 
         def _scale(self, n):
             return terms.normalisation(self.form, n) if self.normalised else 1
@@ -304,5 +325,5 @@ def _exponent(props):
 
 
 def _require_exponent(n):
-    if not 0 <= n < float("inf"):
-        raise InputError(f"phong: n = {n} is not allowed: give a finite value of 0 or more.")
+    if not n >= 0:
+        raise InputError(f"phong: n = {n} is not allowed: give 0 or more; inf makes a mirror.")

@@ -60,8 +60,9 @@ LEAST_SPREAD = 0.01
 LITERAL_IOR = 1.5
 SMALLEST_IOR = exp(1e-4)
 """Reflects 2.5e-9 at normal incidence; Mitsuba rejects an IOR of 1."""
-LARGEST_IOR = 10.0
-"""A larger specular albedo is recorded as missed."""
+LARGEST_IOR, LARGEST_SMOOTH_IOR = 10.0, 3.8
+"""A larger specular albedo is recorded as missed. Above the second Mitsuba's fit has a smooth coat
+return more from within than arrives."""
 
 MATCHING_TOLERANCE = 1e-5
 """Relative tolerance; a larger mismatch is recorded as a miss."""
@@ -72,7 +73,10 @@ STEP = 1.02
 
 @dataclass(frozen=True)
 class RoughPlastic:
-    """Parameters of Mitsuba's ``roughplastic``; ``alpha`` is the root-mean-square slope."""
+    """Parameters of Mitsuba's ``roughplastic``; ``alpha`` is the root-mean-square slope.
+
+    With ``alpha = 0`` they are those of ``plastic``.
+    """
 
     diffuse_reflectance: tuple[float, float, float]
     alpha: float
@@ -99,6 +103,10 @@ class Albedo(NamedTuple):
 def of_roughplastic(plastic: RoughPlastic) -> Albedo:
     """Return the :class:`Albedo` of a :class:`RoughPlastic` at normal incidence."""
     _, alpha, eta = plastic.interface
+    if not alpha:
+        interface = plastic.int_ior, plastic.ext_ior, plastic.nonlinear
+        smooth = [of_smooth_plastic(rho, *interface)[0] for rho in plastic.diffuse_reflectance]
+        return Albedo(np.array(smooth), specular_of(plastic))
     transmittance, returned = coat(*plastic.interface)
     theta, weight = nodes(max(alpha, LEAST_SPREAD))
     cosine = np.cos(theta)
@@ -112,6 +120,8 @@ def of_roughplastic(plastic: RoughPlastic) -> Albedo:
 def specular_of(plastic: RoughPlastic) -> np.ndarray:
     """Return the specular part of :func:`of_roughplastic`; it does not need a kernel."""
     distribution, alpha, eta = plastic.interface
+    if not alpha:
+        return _fresnel(np.ones(1), eta) * plastic.specular_reflectance
     theta, weight = nodes(alpha)
     slope = np.tan(theta / 2)
     if distribution == "beckmann":
@@ -140,7 +150,7 @@ def of_smooth_plastic(
     # Light that a smooth coat reflects from within, by Mitsuba's fit.
     returned = float(mi.fresnel_diffuse_reflectance(mi.Float(1 / eta))[0])
     base = level / (1 - (level if nonlinear else 1) * returned)
-    # Beyond an index of 4 the fit reflects more than all, and the plugin's base is below 0.
+    # Beyond an index of 3.84 the fit reflects more than all, and the plugin's base is below 0.
     return max(float(base * (1 - mirror) * leaving), 0.0), mirror
 
 
@@ -149,15 +159,16 @@ def ior_of_lobe(plastic: RoughPlastic, albedo: float) -> float:
 
     The search begins at the inverse of a smooth surface's ``((ior - 1) / (ior + 1))^2``.
     """
+    largest = LARGEST_IOR if plastic.alpha else LARGEST_SMOOTH_IOR
 
     def reached(log_ior):
-        int_ior = exp(min(max(log_ior, log(SMALLEST_IOR)), log(LARGEST_IOR)))
+        int_ior = exp(min(max(log_ior, log(SMALLEST_IOR)), log(largest)))
         return max(specular_of(replace(plastic, int_ior=int_ior)))
 
     if albedo <= 0:
         return LITERAL_IOR
-    if albedo >= reached(log(LARGEST_IOR)):
-        return LARGEST_IOR
+    if albedo >= reached(log(largest)):
+        return largest
     if albedo <= reached(log(SMALLEST_IOR)):
         return SMALLEST_IOR
     from scipy.optimize import root_scalar  # loaded late: a tenth of a command's start
@@ -299,13 +310,8 @@ def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic,
     ['diffuse albedo at normal incidence', 'specular albedo at normal incidence']
     """
     if convention is Convention.LITERAL:
-        red, green, blue = (min(component, 1.0) for component in phong.k_d)
-        misses = tuple(
-            Miss(what="diffuse reflectance", wanted=component, reached=1.0)
-            for component in dict.fromkeys(phong.k_d)
-            if component > 1
-        )
-        return RoughPlastic((red, green, blue), alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
+        rho, misses = up_to_1("diffuse reflectance", phong.k_d)
+        return RoughPlastic(rho, alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
 
     diffuse, specular = np.array(phong.k_d), specular_albedo(phong)
     strength = max(phong.k_s)
@@ -329,6 +335,15 @@ def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic,
                 what = f"{part} albedo at normal incidence"
                 missed[part, target] = Miss(what=what, wanted=float(target), reached=float(value))
     return plastic, tuple(missed.values())
+
+
+def up_to_1(
+    what: str, colour: tuple[float, float, float]
+) -> tuple[tuple[float, float, float], tuple[Miss, ...]]:
+    """Return a colour limited to 1, as a reflectance is, and what it misses."""
+    red, green, blue = (min(component, 1.0) for component in colour)
+    missed = (component for component in dict.fromkeys(colour) if component > 1)
+    return (red, green, blue), tuple(Miss(what=what, wanted=c, reached=1.0) for c in missed)
 
 
 @lru_cache(maxsize=KEPT)

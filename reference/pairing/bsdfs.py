@@ -7,11 +7,12 @@ Towards the heuristic half there is one rule per plugin, which returns the neare
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from math import inf
 from typing import Any
 
 import mitsuba as mi
 
-from heuristic.materials import COEFFICIENTS
+from heuristic.materials import COEFFICIENTS, SMALLEST_ALPHA
 from reference.pairing.factors import Convention, Miss, Phong, Replacements
 from reference.scene import values
 from reference.scene.graph import Graph, properties
@@ -43,6 +44,9 @@ COLOURS = {
     "phong": ("k_i", "k_a", "k_d", "k_s"),
 }
 """Colours that pairing reads; they are checked before."""
+
+UNSEEN = ("mirror image", "nothing: the kernel traces no rays")
+"""What is lost of a ``phong`` with an infinite ``n`` (8.7), and what replaces it."""
 
 PLASTICS = (1.3, 1.8)
 """Indices of refraction of real plastics: fluoropolymers have 1.3, those rich in sulphur 1.76."""
@@ -157,7 +161,8 @@ Rule = Callable[[Context, int], NearestPhong]
 def to_heuristic(context: Context, replaced: Replacements) -> None:
     """Replace the BSDFs of all shapes by the nearest ``phong``.
 
-    Those that were not ``phong`` are recorded, also nested ones, but not those around others.
+    Those that were not ``phong`` are recorded, also nested ones, but not those around others; and
+    what is lost.
     """
     graph = context.graph
     for shape in graph.nodes(mi.ObjectType.Shape):
@@ -165,29 +170,32 @@ def to_heuristic(context: Context, replaced: Replacements) -> None:
             context.nearest(index)
     for index, material in sorted(context.done.items()):
         label, plugin = graph.label(index), graph.plugin(index)
-        if plugin not in ("phong", *WRAPPERS):
+        if plugin in WRAPPERS:
+            continue
+        if plugin != "phong":
             is_diffuse = plugin == "diffuse"
             parameters = {"k_d": "reflectance"} if is_diffuse else material.parameters()
             replaced.bsdf(label, plugin, "phong", parameters)
-            for lost, rule in material.lost:
-                replaced.lose(label, plugin, lost, rule)
+        for lost, rule in material.lost:
+            replaced.lose(label, plugin, lost, rule)
     for index, material in context.done.items():
         graph.replace(index, material.properties())
 
 
 def to_physical(graph: Graph, convention: Convention, replaced: Replacements) -> None:
-    """Replace every ``phong`` of the graph by ``diffuse`` or ``roughplastic``."""
+    """Replace every ``phong`` of the graph by its :func:`physical_partner`."""
     for index in [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]:
         label, given = graph.label(index), graph.props(index)
         plugin, parameters, misses = physical_partner(graph, index, convention)
         replaced.misses += misses
+        recorded, note = parameters, ""
         if plugin == "diffuse":
-            replaced.bsdf(label, "phong", plugin, {"reflectance": _base(given)})
-        else:
+            recorded = {"reflectance": _base(given)}
+        elif "int_ior" in parameters:
             (low, high), ior = PLASTICS, parameters["int_ior"] / parameters["ext_ior"]
             note = f"no real plastic has the index {ior:.3g}: they have {low:g} to {high:g}"
             note = "" if low <= ior <= high else note
-            replaced.bsdf(label, "phong", plugin, parameters, note)
+        replaced.bsdf(label, "phong", plugin, recorded, note)
         props = properties(plugin, **parameters)
         is_twosided = given.get("twosided", False)
         graph.replace(index, mi.Properties("twosided") if is_twosided else props)
@@ -198,12 +206,25 @@ def to_physical(graph: Graph, convention: Convention, replaced: Replacements) ->
 def physical_partner(
     graph: Graph, index: int, convention: Convention
 ) -> tuple[str, dict[str, Any], tuple[Miss, ...]]:
-    """Return plugin and parameters of the physical BSDF that replaces a ``phong``, and misses."""
+    """Return plugin and parameters of the physical BSDF that replaces a ``phong``, and misses.
+
+    It is ``diffuse`` without ``k_s``, and ``roughplastic`` with it. That of a mirror is a
+    ``conductor`` that reflects ``k_s``, or a smooth ``plastic`` if there is a diffuse part, too.
+    """
     if any(values.colour(graph, index, "k_s", 0.0)):
         from reference.pairing import albedo  # loaded late: only lobes need it
 
-        plastic, misses = albedo.to_roughplastic(phong(graph, index), convention)
-        return "roughplastic", asdict(plastic), misses
+        given = phong(graph, index)
+        if given.n == inf and not any(given.k_d):
+            reflected, misses = albedo.up_to_1("specular reflectance", given.k_s)
+            metal = {"material": "none", "specular_reflectance": reflected}
+            return "conductor", metal, misses
+        plastic, misses = albedo.to_roughplastic(given, convention)
+        if plastic.alpha:
+            return "roughplastic", asdict(plastic), misses
+        smooth = asdict(plastic)
+        del smooth["alpha"], smooth["distribution"]
+        return "plastic", smooth, misses
     given = graph.props(index)
     return "diffuse", {"reflectance": given.get(_base(given), 0.0)}, ()
 
@@ -218,25 +239,33 @@ def phong(graph: Graph, index: int) -> Phong:
     return Phong(
         k_d=values.colour(graph, index, "k_d", 0.0),
         k_s=values.colour(graph, index, "k_s", 0.0),
-        n=values.number(graph, index, "n", 1.0),
+        n=inf if is_mirror(props) else values.number(graph, index, "n", 1.0),
         form=props.get("form", "phong"),
         normalised=props.get("normalised", False),
     )
 
 
+def is_mirror(props: mi.Properties) -> bool:
+    """Return whether a ``phong`` is a mirror (8.7)."""
+    return values.plain(props.get("n", 1.0)) == inf
+
+
 def itself(context: Context, index: int) -> NearestPhong:
-    """``phong``: itself; physically the ``diffuse`` or ``roughplastic`` that it is paired with."""
+    """``phong``: itself; physically its :func:`physical_partner`."""
     props, physical = context.graph.props(index), {}
     if context.for_users:
         plugin, own, _ = physical_partner(context.graph, index, context.convention)
         if plugin == "diffuse":
             physical = context.physical(own["reflectance"])
+        elif plugin == "conductor":
+            physical = context.physical(own["specular_reflectance"], SMALLEST_ALPHA, metallic=1.0)
         else:
-            ior = own["int_ior"] / own["ext_ior"]
-            physical = context.physical(own["diffuse_reflectance"], own["alpha"], ior)
+            alpha, ior = own.get("alpha", SMALLEST_ALPHA), own["int_ior"] / own["ext_ior"]
+            physical = context.physical(own["diffuse_reflectance"], alpha, ior)
     names = ("k_i", "k_a", "k_d", "k_s", "n", "form", "normalised", "twosided", "transmittance")
     given = {name: props[name] for name in (*names, "tilt") if name in props}
-    return NearestPhong(**given, physical=physical)
+    lost = (UNSEEN,) if is_mirror(props) and values.may_be_nonzero(props.get("k_s", 0.0)) else ()
+    return NearestPhong(**given, lost=lost, physical=physical)
 
 
 def diffuse(context: Context, index: int) -> NearestPhong:

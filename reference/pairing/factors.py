@@ -154,8 +154,9 @@ def alpha_of(n: float, form: str = "phong") -> float:
     At a half-vector angle ``d``, Beckmann's lobe is ``exp(-tan^2(d) / alpha^2)``. Blinn's is
     ``cos^n(d)``, near ``exp(-n d^2 / 2)``, hence the well-known ``alpha = sqrt(2 / (n + 2))``. The
     chapters' is ``cos^n(2 d)``, near ``exp(-2 n d^2)``, because the mirror direction turns by twice
-    the half vector: hence ``alpha = sqrt(1 / (2 n + 1))``. Both are 1 at ``n = 0``. The match holds
-    near the top: at half the height, widths agree within 3 % from ``n = 30`` on.
+    the half vector: hence ``alpha = sqrt(1 / (2 n + 1))``. Both are 1 at ``n = 0``, and 0 for a
+    mirror. The match holds near the top: at half the height, widths agree within 3 % from ``n =
+    30`` on.
 
     >>> alpha_of(12)
     0.2

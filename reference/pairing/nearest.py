@@ -12,7 +12,7 @@ the albedo of its diffuse part, and the index of its lobe's albedo. Index 1 mean
 """
 
 from dataclasses import asdict, replace
-from math import sqrt
+from math import inf, sqrt
 from typing import Any
 
 import drjit as dr
@@ -300,10 +300,21 @@ def null(context: Context, index: int) -> NearestPhong:
 def alike(
     graph: Graph, first: NearestPhong, second: NearestPhong
 ) -> tuple[NearestPhong, NearestPhong]:
-    """Return two materials with their lobes scaled in the same way, so ``k_s`` can be mixed."""
+    """Return two materials with lobes that can be mixed: scaled alike, and no mirror beside one."""
+    first, second = _beside(first, second), _beside(second, first)
     if first.normalised == second.normalised:
         return first, second
     return _normalised(graph, first), _normalised(graph, second)
+
+
+def _beside(material: NearestPhong, other: NearestPhong) -> NearestPhong:
+    """Return a material without its mirror if another has a lobe, since both share one ``n``."""
+    own, others = values.plain(material.n), values.plain(other.n)
+    if others == inf and values.is_zero(material.k_s):
+        return replace(material, n=inf)
+    if own == inf != others and not values.is_zero(other.k_s):
+        return replace(material, k_s=0.0, n=other.n)
+    return material
 
 
 def _normalised(graph: Graph, material: NearestPhong) -> NearestPhong:

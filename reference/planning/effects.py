@@ -12,7 +12,7 @@ import mitsuba as mi
 
 from heuristic.heuristics import Interpolation
 from reference.pairing import lights
-from reference.pairing.bsdfs import WRAPPERS
+from reference.pairing.bsdfs import WRAPPERS, is_mirror
 from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
 from reference.planning.rules import NO_SECOND_REFLECTION, NO_SHADOWS, PruningRule
 from reference.records import Record
@@ -105,6 +105,8 @@ def _coefficient(name: str) -> Callable[[Facts], tuple[bool, str]]:
     def rule(facts: Facts) -> tuple[bool, str]:
         present = name in facts.kernel_terms
         where = "not 0 in some material" if present else "0 in every material"
+        if name == "k_s" and any(map(is_mirror, facts.materials)):
+            where += ", mirrors aside: the kernel traces no rays"
         return present, f"{name} is {where}"
 
     return rule

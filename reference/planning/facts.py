@@ -19,7 +19,7 @@ from heuristic import meshes
 from heuristic.heuristics import Interpolation
 from heuristic.materials import COEFFICIENTS
 from reference.pairing import lights
-from reference.pairing.bsdfs import REFLECTANCES, TRANSMITTANCES
+from reference.pairing.bsdfs import REFLECTANCES, TRANSMITTANCES, is_mirror
 from reference.pairing.halves import Pair
 from reference.pairing.lights import LightNode
 from reference.scene import values
@@ -377,14 +377,23 @@ class Facts:
         return self.kernel.get("occlusion", False)
 
     @cached_property
-    def kernel_terms(self) -> tuple[str, ...]:
-        """The coefficients that are not 0 in every material."""
+    def materials(self) -> list[mi.Properties]:
+        """The parameters of the heuristic half's materials."""
         graph = self.pair.heuristic
-        materials = [graph.props(i) for i in graph.nodes(BSDF) if graph.plugin(i) == "phong"]
+        return [graph.props(i) for i in graph.nodes(BSDF) if graph.plugin(i) == "phong"]
+
+    @cached_property
+    def kernel_terms(self) -> tuple[str, ...]:
+        """The coefficients that are not 0 in every material; ``k_s`` of a mirror does not count."""
         return tuple(
             name
             for name in COEFFICIENTS
-            if any(name in props and values.may_be_nonzero(props[name]) for props in materials)
+            if any(
+                name in props
+                and values.may_be_nonzero(props[name])
+                and not (name == "k_s" and is_mirror(props))
+                for props in self.materials
+            )
         )
 
     @property
