@@ -124,10 +124,11 @@ def _images(name, interpolation=None):
 def _models():
     """Draw the pictures of docs/models.md."""
     import model_figures  # next to this script
+    import schemes
 
-    for name in ("vectors", "lobes"):
-        drawn = figures.drawn(getattr(model_figures, name)(), "svg")
-        atomic.write(DOCS / f"models-{name}.svg", drawn)
+    drawn = {name: schemes.sheet(panels) for name, panels in schemes.SHEETS.items()}
+    for name, figure in (drawn | {"lobes": model_figures.lobes()}).items():
+        atomic.write(DOCS / f"models-{name}.svg", figures.drawn(figure, "svg"))
     for name, scenes in SHEETS.items():
         found = model_figures.compared(scenes, [_images(scene) for scene in scenes])
         atomic.write(DOCS / f"models-{name}.png", figures.drawn(found, "png", 100))
@@ -164,8 +165,12 @@ def _site():
 
 def _measurements():
     """Measure all errors and times in the documents again, for a quarter of an hour."""
-    import measured  # next to this script
+    import density  # next to this script
+    import measured
 
+    found = density.measured()
+    atomic.write(DOCS / "models-density.svg", figures.drawn(density.chart(found), "svg"))
+    replace("models.md", "density", density.sentences(found))
     for measure in (measured.baselines, measured.findings):
         measure()
     replace("fit.md", "fits", measured.fits())

@@ -1,4 +1,4 @@
-"""The figures of docs/models.md: its vectors, its lobes as the kernel computes them, and sheets."""
+"""The figures of docs/models.md that the kernel computes: its lobes, and sheets of pictures."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from drjit.auto import Array3f
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Arc
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -23,7 +23,15 @@ EXPONENTS = {3: "#b97b00", 9: "#0067a8", 81: "#00795a"}
 """Colours of lobes by exponent; the figures of chapter 8 have 3 and 9."""
 
 COLOURS = {"N": "#1c1e21", "L": "#b97b00", "R": "#0067a8", "V": "#00795a"}
-"""Colours of vectors."""
+COLOURS |= {rf"\mathbf{{{letter.lower()}}}": colour for letter, colour in COLOURS.items()}
+"""Colours of vectors: chapter 8 has capitals, chapter 6 bold letters."""
+
+OTHER = "#6b4ea0"
+
+HALO = [withStroke(linewidth=3, foreground=GROUND)]
+"""It keeps lines from crossing letters."""
+
+Place = tuple[float, float]
 
 VIEWS = np.arange(-90, 91, 1.5)
 """Degrees from the normal at which lobes are drawn."""
@@ -36,27 +44,6 @@ STYLE = {"font.size": 11, "axes.titlesize": 11, "mathtext.fontset": "dejavuserif
 INCH = 1.92
 
 
-def vectors() -> Figure:
-    """Draw the unit vectors of the model at a point, with the angles between them."""
-    with rc_context(STYLE):
-        figure = Figure(figsize=(6, 3.5), facecolor=GROUND)
-        axes = figure.add_axes((0, 0, 1, 1), xlim=(-1.5, 1.5), ylim=(-0.35, 1.4), aspect="equal")
-        axes.axis("off")
-        _surface(axes)
-        angles = {"L": -INCIDENCE, "H": -12.5, "N": 0.0, "V": 25.0, "R": INCIDENCE}
-        for letter, angle in angles.items():
-            _arrow(axes, letter, angle)
-        for low, high, radius, words in (
-            (-INCIDENCE, 0.0, 0.5, "θ"), (0.0, INCIDENCE, 0.5, "θ"), (25.0, INCIDENCE, 0.72, "α"),
-        ):  # fmt: skip
-            axes.add_patch(Arc((0, 0), 2 * radius, 2 * radius, theta1=90 - high, theta2=90 - low,
-                               color=FAINT))  # fmt: skip
-            x, y = _at(low + 0.3 * (high - low), radius + 0.08)  # clear of V
-            axes.text(x, y, words, ha="center", va="center", style="italic", family="serif")
-        axes.text(-1.3, -0.3, "cos θ = N·L     cos α = R·V     H halves the angle of L and V")
-    return figure
-
-
 def lobes() -> Figure:
     """Draw the value seen from each direction: Lambert's, Phong's, and Blinn's lobes."""
     with rc_context(STYLE):
@@ -66,16 +53,16 @@ def lobes() -> Figure:
         _panel(diffuse, "diffuse, $k_d\\,(N·L)$")
         for incidence, colour in ((0.0, "#b0426f"), (INCIDENCE, COLOURS["R"])):
             label = f"N·L = {np.cos(np.radians(incidence)):.2f}"
-            _lobe(diffuse, seen(incidence, k_d=1.0), colour, label)
-            _arrow(diffuse, "L", -incidence)
+            lobe(diffuse, seen(incidence, k_d=1.0), colour, label)
+            arrow(diffuse, "L", -incidence)
         for axes, form, title in (
             (phong, "phong", "Phong, $k_s\\,(R·V)^n$"), (blinn, "blinn", "Blinn, $k_s\\,(N·H)^n$"),
         ):  # fmt: skip
             _panel(axes, title)
-            _arrow(axes, "L", -INCIDENCE)
-            _arrow(axes, "R", INCIDENCE)
+            arrow(axes, "L", -INCIDENCE)
+            arrow(axes, "R", INCIDENCE)
             for n, colour in EXPONENTS.items():
-                _lobe(axes, seen(INCIDENCE, k_s=1.0, n=n, form=form), colour, f"n = {n}")
+                lobe(axes, seen(INCIDENCE, k_s=1.0, n=n, form=form), colour, f"n = {n}")
         for axes in (diffuse, phong, blinn):
             axes.legend(loc="lower center", ncols=3, frameon=False, fontsize=9,
                         handlelength=1.2, columnspacing=1)  # fmt: skip
@@ -87,8 +74,8 @@ def seen(incidence: float, **material: float | str) -> NDArray[np.float64]:
 
     ``incidence`` is in degrees; the light has intensity 1.
     """
-    view = Array3f(*(np.float32(part) for part in _at(VIEWS)), 0)
-    toward = _at(-incidence)
+    view = Array3f(*(np.float32(part) for part in at(VIEWS)), 0)
+    toward = at(-incidence)
     light = heuristic.DirectionalLight(direction=(-toward[0], -toward[1], 0), intensity=1.0)
     made = heuristic.Material(**material)
     value = heuristic.shade(Array3f(0), Array3f(0, 1, 0), view, made, [light])
@@ -146,26 +133,28 @@ def _panel(axes: Axes, title: str) -> None:
     axes.plot((-1.1, 1.1), (0, 0), color=FAINT, linewidth=1)
 
 
-def _surface(axes: Axes) -> None:
-    across = np.linspace(-1.3, 1.3, 60)
-    down = -0.09 * across**2
-    axes.fill_between(across, down, -0.16, color="#f3f4f5")
-    axes.plot(across, down, color="#585f67", linewidth=1)
-
-
-def _lobe(axes: Axes, radius: NDArray[np.float64], colour: str, label: str) -> None:
-    x, y = _at(VIEWS, radius)
+def lobe(axes: Axes, radius: NDArray[np.float64], colour: str, label: str) -> None:
+    """Draw values at :data:`VIEWS` as the distances of a curve from the origin."""
+    x, y = at(VIEWS, radius)
     axes.fill(x, y, facecolor=colour + "22", edgecolor=colour, linewidth=1.4, label=label)
 
 
-def _arrow(axes: Axes, letter: str, angle: float) -> None:
-    colour = COLOURS.get(letter, "#6b4ea0")
+def arrow(axes: Axes, letter: str, angle: float) -> None:
+    """Draw a unit vector at the origin, at an angle from the normal."""
+    vector(axes, letter, at(angle))
+
+
+def vector(axes: Axes, label: str, tip: Place, tail: Place = (0.0, 0.0), size: float = 15) -> None:
+    """Draw an arrow, and its label beyond the tip."""
+    colour = COLOURS.get(label, OTHER)
     style = {"arrowstyle": "-|>", "color": colour, "linewidth": 1.8, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", _at(angle), (0, 0), arrowprops=style)
-    axes.text(*_at(angle, 1.1), letter, color=colour, ha="center", va="center", size=15,
-              style="italic", family="serif")  # fmt: skip
+    axes.annotate("", tip, tail, arrowprops=style)
+    (x, y), (u, v) = tip, tail
+    beyond = 0.12 / np.hypot(x - u, y - v)
+    axes.text(x + beyond * (x - u), y + beyond * (y - v), f"${label}$", color=colour,
+              ha="center", va="center", size=size, path_effects=HALO)  # fmt: skip
 
 
-def _at(angle: float | NDArray[np.float64], radius: float | NDArray[np.float64] = 1.0):
+def at(angle: float | NDArray[np.float64], radius: float | NDArray[np.float64] = 1.0):
     """Return x and y of an angle from the normal, in degrees to the right."""
     return radius * np.sin(np.radians(angle)), radius * np.cos(np.radians(angle))

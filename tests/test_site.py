@@ -60,3 +60,47 @@ def test_every_equation_of_the_models_can_be_drawn(docs):
     found = [a or b for a, b in re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", page)]
     assert len(found) > 20
     assert all(typeset.svg(each).count("M") >= 1 for each in found)
+
+
+def numbers(text):
+    """The numbers of equations or figures in a text, one by one: 6.8-6.10 are three."""
+    found = re.findall(r"\b([68])\.(\d+)(?:[-–]\1\.(\d+))?", text)
+    return [f"{c}.{n}" for c, low, high in found for n in range(int(low), int(high or low) + 1)]
+
+
+def index(heading):
+    """The rows of an index of the models: numbers, and what is said of them."""
+    page = (ROOT / "docs/models.md").read_text().partition(f"\n## The index of {heading}\n")[2]
+    return re.findall(r"^\| ([68]\.[^|]*) \| (.*) \|$", page.partition("\n## ")[0], re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("heading", "eighth", "sixth"), [("equations", 12, 38), ("figures", 11, 14)]
+)
+def test_an_index_has_each_number_of_both_chapters_once(heading, eighth, sixth):
+    listed = [number for row, _ in index(heading) for number in numbers(row)]
+    assert sorted(listed) == sorted(numbers(f"8.1-8.{eighth} 6.1-6.{sixth}"))
+
+
+def test_the_home_of_an_equation_names_it(docs):
+    from website import api_pages
+
+    for row, home in index("equations"):
+        ((words, path),) = re.findall(r"\[`(.*)`\]\(\.\./(.*?)\)", home)
+        assert set(numbers(row)) <= set(numbers(locate(api_pages.name(path, words)).__doc__)), row
+
+
+def test_every_figure_is_a_scene_or_drawn(docs):
+    import schemes
+
+    from comparisons.gallery.builtin import SCENES
+
+    drawn = []
+    for name, panels in schemes.SHEETS.items():
+        picture = (ROOT / f"docs/models-{name}.svg").read_text()
+        assert [title for title in panels if f"<!-- {title} -->" not in picture] == []
+        drawn += numbers(" ".join(title.partition("  ")[0] for title in panels))
+    for row, where in index("figures"):
+        scenes = re.findall(r"`(.*?)`", where)
+        assert set(scenes) <= set(SCENES)
+        assert scenes or set(numbers(row)) <= set(drawn), row

@@ -65,7 +65,10 @@ def two_intensities() -> dict[str, Any]:
 
 
 def spot(exponent: float) -> dict[str, Any]:
-    """Figure 6.5: a spot on a white floor; a small ``m`` gives a beam without a clear border."""
+    """Figure 6.5: a spot on a white floor; a small ``m`` gives a beam without a clear border.
+
+    But the cone, of 60 degrees, cuts off the floor's corners.
+    """
     return _textbook(
         (0, -6, 5),
         45.0,

@@ -151,7 +151,7 @@ POLYGONS = Effect(
     noun="normals between the vertices",
     heuristic="flat, Gouraud (6.35-6.38)",
     reference="none",
-    cost="less than Phong",
+    cost="a lookup",
     rule=lambda facts: (
         facts.interpolation is not Interpolation.PHONG,
         f"interpolation {facts.interpolation.value}",

@@ -1,0 +1,126 @@
+"""Error and time of flat, Gouraud and Phong shading against the density of the mesh.
+
+The sphere of figure 6.10 is seen so near that no outline shows: what is left is shading. All
+meshes, and the sphere itself, are rendered in turn, with the same samples.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from model_figures import COLOURS, GROUND, STYLE
+
+from comparisons.cost import measure
+from comparisons.cost.times import ratio
+from comparisons.gallery import scenes
+from comparisons.options import Options
+from comparisons.prepared import prepare
+from heuristic.heuristics import Interpolation
+from reference.records import Estimated
+from reference.rendering.renderer import Renderer
+from reference.scene.source import Source
+from reports.terminal.words import number
+
+FINENESS = (2, 4, 8, 16, 32, 64)
+"""Edges per quarter turn."""
+
+SIDE, SPP, ROUNDS = 128, 64, 7
+FIELD_OF_VIEW = 16.0
+EXACT = "sphere"
+
+MARKS = {
+    Interpolation.FLAT: (COLOURS["L"], "s", "flat"),
+    Interpolation.GOURAUD: (COLOURS["R"], "o", "Gouraud"),
+    Interpolation.PHONG: (COLOURS["V"], "^", "Phong"),
+}
+
+
+@dataclass(frozen=True)
+class Density:
+    """One shading of a mesh: mean ΔE2000 to the sphere, and time per sample over the sphere's."""
+
+    shading: Interpolation
+    faces: int
+    error: float
+    ratio: Estimated
+
+
+def near_sphere() -> dict:
+    """Return figure 6.10 through a longer lens."""
+    scene = scenes.coarse_sphere()
+    scene["sensor"]["fov"] = FIELD_OF_VIEW
+    return scene
+
+
+def measured(fineness: Sequence[int] = FINENESS, rounds: int = ROUNDS) -> list[Density]:
+    """Render all meshes and the sphere itself in turn."""
+    source, options = Source(EXACT, near_sphere), Options(resolution=(SIDE, SIDE))
+    ready = prepare(source, options)
+    kernel = replace(ready, reference=ready.heuristic, scene=ready.heuristic.scene)
+    reference = measure.converged(kernel, options.seed, None)
+    judge = measure.judge_by(reference, ready.counted, options.viewing)
+    firsts = {EXACT: ready.heuristic.sampled(SPP)}
+    meshes: dict[str, tuple[Interpolation, int]] = {}
+    for n in fineness:
+        for shading in MARKS:
+            changed = options.changed(interpolation=shading.value, tessellation=n)
+            renderer: Renderer = prepare(source, changed).heuristic
+            name = f"{shading.value} {n}"
+            firsts[name] = renderer.sampled(SPP)
+            meshes[name] = shading, renderer.scene.shapes()[0].face_count()
+    renderers = measure.tried(firsts, dict.fromkeys(firsts, (SPP,)), SIDE**2)
+    judged = {(name, SPP) for name in meshes}
+    errors, _ = measure.rendered(renderers, judge, judged, rounds, options.seed, None, "")
+    lines = measure.timed(renderers, rounds, SIDE**2)
+    return [
+        Density(*mesh, errors[name, SPP][0].mean, ratio(lines[name], lines[EXACT]))
+        for name, mesh in meshes.items()
+    ]
+
+
+def chart(found: Sequence[Density]) -> Figure:
+    """Draw the errors against the number of faces, and against time."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(6, 3.4), facecolor=GROUND, layout="constrained")
+        faces, time = figure.subplots(1, 2, sharey=True)
+        for shading, (colour, shape, label) in MARKS.items():
+            own = [one for one in found if one.shading is shading]
+            errors, ratios = [one.error for one in own], [one.ratio for one in own]
+            style = {"color": colour, "marker": shape, "label": label}
+            faces.loglog([one.faces for one in own], errors, **style)
+            ends = np.abs([(one.low - one.value, one.high - one.value) for one in ratios]).T
+            time.errorbar([one.value for one in ratios], errors, xerr=ends, **style)
+        faces.set(xlabel="faces", ylabel="mean ΔE2000 to the sphere's image")
+        time.set(xlabel="time per sample, sphere = 1")
+        faces.yaxis.set_major_formatter("{x:g}")
+        for axes in (faces, time):
+            axes.set_facecolor(GROUND)
+            axes.grid(alpha=0.25)
+            axes.spines[["top", "right"]].set_visible(False)
+        faces.legend(frameon=False)
+    return figure
+
+
+def sentences(found: Sequence[Density]) -> Iterator[str]:
+    """Yield what was measured."""
+    flat, gouraud, phong = ([one for one in found if one.shading is kind] for kind in MARKS)
+    errors = (
+        f"{row[0].faces:,} faces {', '.join(number(one.error) for one in row)}"
+        for row in [(flat[i], gouraud[i], phong[i]) for i in (0, len(flat) // 2, -1)]
+    )
+    yield f"Mean ΔE2000 of flat, Gouraud and Phong shading: with {'; with '.join(errors)}."
+    enough = [one.faces for one in gouraud if one.error <= phong[0].error]
+    if enough:
+        yield (
+            f"Gouraud shading needs {min(enough):,} faces to be as near as Phong shading with"
+            f" {phong[0].faces}."
+        )
+    times = [one.ratio.value / other.ratio.value for one, other in zip(gouraud, phong, strict=True)]
+    yield (
+        f"On the same mesh one of its samples takes {min(times):.2g} to {max(times):.2g} times as"
+        " long: a lookup saves nothing where one light has to be summed."
+    )
