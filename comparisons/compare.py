@@ -43,7 +43,7 @@ from reference.rendering.sums import (
 from reference.scene.source import Source, collect_messages, count_messages
 
 if TYPE_CHECKING:
-    from comparisons.pixel_terms import TermGrid
+    from comparisons.pixel_terms import LivePoints, TermGrid
 
 PERCENTILE = 95
 """A noise target is for this percentile of the noise over the counted pixels."""
@@ -125,10 +125,12 @@ def _compare(
         picture = pictures.picture_record(heuristic, ready.scene, options, images)
     done("metrics")
     traced: tuple[TermGrid | None, str] = None, "Terms are traced with --why."
+    live: LivePoints | str = "It needs --why."
     if why:
         from comparisons import pixel_terms  # loaded late: --no-why traces none
 
         traced = pixel_terms.trace(ready.heuristic, options)
+        live = pixel_terms.live(ready.heuristic, options)
         done("terms")
     mistakes: tuple[str, ...] = ()
     if not options.image and not heuristics.named(options.heuristic).is_own:
@@ -163,7 +165,7 @@ def _compare(
         mistakes=mistakes,
         **numbers,
     )
-    return Comparison(made, images, *traced), ready
+    return Comparison(made, images, *traced, live), ready
 
 
 def render(

@@ -39,7 +39,7 @@ from reference.records import (
 from reference.rendering.renderer import Times
 
 if TYPE_CHECKING:
-    from comparisons.pixel_terms import TermGrid
+    from comparisons.pixel_terms import LivePoints, TermGrid
 
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
@@ -339,12 +339,13 @@ class Images:
 class Comparison:
     """What a comparison returns: the content of ``comparison.json``, the images, and the terms.
 
-    ``no_terms`` gives the reason if there are no terms. ``causes`` are those of ``record.why``, by
-    pixel.
+    ``no_terms`` is the reason if there are no terms. ``live`` are the points that a page shades
+    again, or why it cannot. ``causes`` are those of ``record.why``, by pixel.
     """
 
     record: ComparisonRecord
     images: Images
     terms: TermGrid | None = None
     no_terms: str = ""
+    live: LivePoints | str = ""
     causes: Causes | None = None

@@ -3,7 +3,7 @@
 The terms are at the centres of pixels, one in the middle of each cell of a regular grid.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -35,6 +35,15 @@ MOST_LIGHTS = 64
 
 MATERIALS = 256
 """Different sets of coefficients, at most: textures have more."""
+
+LIVE_SIDE = 128
+"""Points along the longer side of the film on which a page shades again, at most."""
+
+LIVE_LIGHTS = 16
+"""Lights that a page shades with, at most."""
+
+SAME = 1e-3
+"""Largest difference of normals that are the same for the page."""
 
 
 Colour = tuple[float, float, float]
@@ -172,6 +181,25 @@ class TermGrid:
         )
 
 
+@dataclass(frozen=True)
+class LivePoints:
+    """What 8.10 reads at the pixels of a coarse film, so that a page can shade them again.
+
+    ``planes`` (H, W) are ``material``, 1 more than the index in ``materials``, 0 where no shaded
+    surface is seen; ``depth``, the logarithm of the distance from a ray's origin; ``normal.x`` and
+    so on; ``face_normal.x`` and so on, if faces of meshes have other normals; and ``k_d.x`` and so
+    on, factors on the materials', if they vary. ``lights`` have a name, and the fields of
+    :mod:`heuristic.lights` as lists of numbers. ``rays`` (2, 3, 3) are origins and directions, of
+    any length, of the rays of three pixels in the corners: left, right, and left again below.
+    """
+
+    planes: dict[str, NDArray]
+    materials: tuple[TermMaterial, ...]
+    lights: tuple[dict[str, Any], ...]
+    rays: list
+    is_flat: bool
+
+
 def _colour(values: object) -> Colour:
     red, green, blue = np.asarray(values, float).tolist()
     return red, green, blue
@@ -182,10 +210,8 @@ def _colour(values: object) -> Colour:
 
 def trace(half: Renderer, options: Options) -> tuple[TermGrid | None, str]:
     """Return the terms of a heuristic half, or why there are none."""
-    if options.image:
-        return None, "The heuristic half is a picture, which has no terms."
     with variant(half.variant):
-        if reason := _without(half, options):
+        if reason := _without(half, options, Interpolation.PHONG):
             return None, reason
         grid = _traced(half.scene, half.integrator)
     if grid is None:
@@ -193,13 +219,27 @@ def trace(half: Renderer, options: Options) -> tuple[TermGrid | None, str]:
     return grid, ""
 
 
-def _without(half: Renderer, options: Options) -> str:
+def live(half: Renderer, options: Options) -> LivePoints | str:
+    """Return what a page needs to shade a heuristic half again, or why it cannot.
+
+    Flat shading has the face's normal, at each point in place of the face's centre.
+    """
+    with variant(half.variant):
+        reason = _without(half, options, Interpolation.PHONG, Interpolation.FLAT)
+        return reason or _live(half, options)
+
+
+def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
     """Return why equation 8.10 does not describe a half's shading; empty if it does."""
+    if options.image:
+        return "The heuristic half is a picture, which has no terms."
     if options.heuristic not in ("phong", "blinn"):
         return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
-    if options.polygon_shading is not Interpolation.PHONG:
+    if options.polygon_shading not in allowed:
         shading = options.polygon_shading.value.capitalize()
         return f"{shading} shading does not evaluate 8.10 at pixels."
+    if half.integrator.occlusion:
+        return "Shadow rays hide lights, which is no part of equation 8.10."
     if mi.is_spectral:
         return "The heuristic half is rendered by wavelength, so its terms are not RGB."
     if len(half.scene.emitters()) > MOST_LIGHTS:
@@ -209,8 +249,54 @@ def _without(half: Renderer, options: Options) -> str:
     return ""
 
 
+def _live(half: Renderer, options: Options) -> LivePoints | str:
+    scene = half.scene
+    emitters, sensor = _emitters(scene), scene.sensors()[0]
+    if len(emitters) > LIVE_LIGHTS:
+        return f"There are more than {LIVE_LIGHTS} lights."
+    if not isinstance(sensor, mi.ProjectiveCamera):
+        return f"The camera, {sensor.class_name()}, has no plane film."
+    size = _size(image_size(scene), LIVE_SIDE)
+    ray = pixel_rays(scene, size, *np.meshgrid(*map(np.arange, size)))
+    ahead = sensor.world_transform() @ mi.Vector3f(0, 0, 1)
+    film, corners = (ray.o, ray.d / dr.dot(ray.d, ahead)), [0, size[0] - 1, -size[0]]
+    points = _Points(scene, half.integrator, ray)
+    if not points.hit.any():
+        return "No pixel’s centre sees a shaded surface."
+    (materials, places), vectors = points.materials(), dict[str, NDArray]()
+    if len(materials) > MATERIALS:
+        vectors["k_d"] = points.select(lambda material: points.colours(material.k_d))
+        has_ambient = points.colours(points.ambient).any()  # else k_a, too, does not matter
+        materials, places = points.materials(range(7 if has_ambient else 4, 10))
+        if len(materials) > MATERIALS:
+            return f"Its textures make more than {MATERIALS} different materials."
+    si = points.si
+    vectors["normal"] = points.colours(points.normal)
+    face = points.colours(dr.mulsign(si.n, dr.dot(si.n, points.view)))
+    if abs(face - vectors["normal"])[points.hit].max() > SAME:
+        vectors["face_normal"] = face
+    planes = {"material": places + 1, "depth": np.log(points.floats(si.t))}
+    for name, vector in vectors.items():
+        planes |= {f"{name}.{axis}": vector[:, i] for i, axis in enumerate("xyz")}
+
+    def numbers(emitter: Any) -> dict[str, Any]:
+        light = emitter.light(dr.zeros(mi.SurfaceInteraction3f), True)
+        fields = light.given()
+        for name, place in (("diffuse_intensity", 0), ("specular_intensity", -1)):
+            fields[name] = points.colours(light.intensities[place])[0]
+        return {name: np.ravel(v).tolist() for name, v in fields.items()} | {"name": emitter.id()}
+
+    return LivePoints(
+        {name: plane.reshape(size[::-1]) for name, plane in planes.items()},
+        materials,
+        tuple(map(numbers, emitters)),
+        [points.colours(each)[corners].tolist() for each in film],
+        options.polygon_shading is Interpolation.FLAT,
+    )
+
+
 def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
-    emitters = [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
+    emitters = _emitters(scene)
     resolution = image_size(scene)
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
     points = _Points(scene, integrator, pixel_rays(scene, resolution, *np.meshgrid(columns, rows)))
@@ -230,14 +316,23 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
     return replace(grid, lights=tuple(lights[number] for number in kept), others=others)
 
 
+def _emitters(scene: Scene) -> list[Any]:
+    return [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
+
+
+def _size(resolution: tuple[int, int], longest: int) -> tuple[int, int]:
+    """Return a width and height of the same shape, with a longest side at most."""
+    scale = min(1.0, longest / max(resolution))
+    width, height = (max(1, round(scale * side)) for side in resolution)
+    return width, height
+
+
 def _pixels(resolution: tuple[int, int], lights: int) -> tuple[NDArray, NDArray]:
     """Return the columns and rows of the pixels in the middles of the cells."""
     longest = min(SIDE, int((VALUES / 2 / lights) ** 0.5) if lights > 2 else SIDE)
-    scale = min(1.0, longest / max(resolution))
-    counts = (max(1, round(scale * side)) for side in resolution)
     columns, rows = (
         (2 * np.arange(count) + 1) * side // (2 * count)
-        for count, side in zip(counts, resolution, strict=True)
+        for count, side in zip(_size(resolution, longest), resolution, strict=True)
     )
     return columns, rows
 
@@ -273,10 +368,11 @@ class _Points:
             total = total + np.where(here, read(material), 0.0)
         return total
 
-    def materials(self) -> tuple[tuple[TermMaterial, ...], NDArray[np.int64]]:
-        """Return the different materials, and the index of each point's."""
+    def materials(self, ones: Sequence[int] = ()) -> tuple[tuple[TermMaterial, ...], NDArray]:
+        """Return the different materials, with 1 in some columns, and the index of each point's."""
         number = self.floats(self.known.index(self.si, self.si.is_valid()))
         rows = np.column_stack((number, self.select(self._row), self.colours(self.ambient)))
+        rows[:, list(ones)] = 1
         different, places = np.unique(rows[self.hit], axis=0, return_inverse=True)
         numbers = np.full(len(self.hit), -1)
         numbers[self.hit] = places.ravel()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.pixel_terms import GridLight, TermGrid, TermMaterial
+from comparisons.pixel_terms import GridLight, LivePoints, TermGrid, TermMaterial
 
 CELL = 4
 """Pixels along the sides of a cell."""
@@ -41,3 +41,39 @@ def _light(name, intensity, angle, view, azimuth, n):
     lobe = np.where(cosine > 0, np.maximum(2 * cosine * view - cos_view, 0) ** n, 0)
     specular = intensity if name == "key" else intensity[::-1]
     return GridLight(name, intensity, specular, 0.5 + 0.2 * azimuth, cosine, cos_view, lobe)
+
+
+def points(resolution):
+    """Return points of a floor seen from above, with steps at its right, under three lights."""
+    width, height = resolution
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    x, y, corners = 2 * u - 1, 1.4 * v - 0.7, ((0, 0), (0, -1), (-1, 0))
+    material = np.where(v > 0.5, 2, 1)
+    material[0] = 0
+    planes = {"material": material, "depth": np.log(2 * np.sqrt(x**2 + y**2 + 4))}
+    for name, slope in (("normal", 0.0), ("face_normal", np.where(u > 0.5, 0.6, 0.0))):
+        planes |= {f"{name}.x": slope + 0 * u, f"{name}.y": 0 * u}
+        planes[f"{name}.z"] = np.sqrt(1 - planes[f"{name}.x"] ** 2)
+
+    def own(colour):
+        kinds = ("intensity", "diffuse_intensity", "specular_intensity")
+        return {kind: list(colour) for kind in kinds}
+
+    even = {"attenuation": [1.0, 0.0, 0.0], "clamped": [False], "shell": [0.0]}
+    key = (
+        {
+            "name": "key",
+            "position": [1.0, 1.0, 2.0],
+        }
+        | own((2.0, 1.5, 1.0))
+        | even
+    )
+    sun = {"name": "sun", "direction": [0.0, 0.6, -0.8]} | own((0.5, 0.5, 0.9))
+    cone = {"name": "cone", "direction": [0.0, 0.0, -1.0], "cutoff": [30.0], "exponent": [2.0]}
+    return LivePoints(
+        planes,
+        (_material("matt <b>", 0.0, 1.0), _material("shiny", 0.5, 12.0)),
+        (key, sun, key | cone),
+        [[[0, 0, 4]] * 3, [[x[row, column], y[row, column], -2] for row, column in corners]],
+        is_flat=False,
+    )

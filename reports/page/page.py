@@ -41,7 +41,7 @@ DETAILS = "details.html"
 
 SCRIPTS = (
     *HELP, "address", "overview", "images", "viewport", "drawing", "switches", "panels", "viewer",
-    "pointer", "keyboard", "terms", "main",
+    "pointer", "keyboard", "terms", "shading", "live", "main",
 )  # fmt: skip
 
 CHARTED = 6
@@ -178,6 +178,7 @@ def _scene_data(scene: PageScene) -> dict[str, Any]:
         "effects": plain(why.effects) if why else None,
         "board": _board(why, record.why),
         "terms": scene.terms.manifest() if scene.terms else None,
+        "live": scene.live.manifest() if scene.live else None,
     }
 
 
@@ -200,7 +201,7 @@ def _board(why: WhyView | None, found: Attribution | None) -> dict[str, Any] | N
 
 
 def _drawing() -> dict[str, Any]:
-    """Return the maps, their colours, and luminance of linear RGB, under the script's names."""
+    """Return the maps, their colours, and XYZ of linear RGB, under the script's names."""
     declared = [metric for metric in drawn().values() if not METRICS.is_own(metric)]
     maps = (
         (LEADING.name, LEADING.label, "difference", 0),
@@ -217,7 +218,7 @@ def _drawing() -> dict[str, Any]:
             "signed": images.colour_table(images.SIGNED_COLOURS),
         },
         "mask": [images.MARKED, images.UNMARKED, images.UNCOUNTED, images.UNDETERMINED],
-        "luminance": rgb_to_xyz(BT709)[1].tolist(),
+        "xyz": rgb_to_xyz(BT709).tolist(),
         "epsilon": LOG2_EPSILON,
     }
 

@@ -53,6 +53,19 @@ class TermsView(Record):
         return plain(self) | {"grid": self.grid.manifest() if self.grid else None}
 
 
+class LiveView(TermsView):
+    """The page's data of the points that it can shade again; ``missing`` says why there are none.
+
+    ``grid`` has planes as differences to the row above, and ``tops`` their largest sizes; ``rays``
+    are those of :class:`comparisons.pixel_terms.LivePoints`. ``fit`` is the mean ΔE2000 that a fit
+    of the scene reached, with its width and height.
+    """
+
+    rays: list = field(default_factory=list)
+    is_flat: bool = False
+    fit: tuple[float, int, int] | None = None
+
+
 class CostView(Record):
     """A page's data of a study.
 
@@ -97,6 +110,7 @@ class SceneView(Record):
     chart: Figure | None = None
     cost: CostView | None = None
     terms: TermsView | None = None
+    live: LiveView | None = None
     before: Before | None = None
     why: WhyView | None = None
 

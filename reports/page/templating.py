@@ -21,7 +21,7 @@ from reports.terminal.words import difference, number, parameter, percent, secon
 
 TEMPLATES = Path(__file__).parent / "templates"
 
-STYLES = ("base", "page", "print")
+STYLES = ("base", "page", "live", "print")
 
 HELP = ("page", "help")
 """The parts of a script that explains terms; those of the whole page follow."""

@@ -15,10 +15,10 @@ from comparisons.hybrids.attribution import dominating
 from reports.charts.theme import EFFECT_COLOURS
 from reports.files import images
 from reports.page.embedding import packed
-from reports.page.scene_view import EffectMap, TermsView, WhyView
+from reports.page.scene_view import EffectMap, LiveView, TermsView, WhyView
 
 if TYPE_CHECKING:
-    from comparisons.pixel_terms import TermGrid
+    from comparisons.pixel_terms import LivePoints, TermGrid
 
 LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789a"))
 """Codes of the map: no effect, a pixel that does not count, and the effects' places."""
@@ -27,7 +27,7 @@ STEP, UNCOUNTED = 0.1, 255
 """ΔE2000 of a level of the maps, and the level of pixels that do not count; as in switches.js."""
 
 LARGEST_CODE = 65535
-"""The largest code of the terms' planes."""
+"""The largest code of the planes of terms and normals."""
 
 LIGHT = ("name", "intensity", "specular_intensity")
 """Fields of a light that all pixels share."""
@@ -102,4 +102,26 @@ def terms_view(grid: TermGrid) -> TermsView:
         tops=tops,
         materials=tuple(vars(material) for material in grid.materials),
         lights=tuple({name: getattr(each, name) for name in LIGHT} for each in grid.lights),
+    )
+
+
+def live_view(points: LivePoints) -> LiveView:
+    """Return the page's data of the points that it can shade again.
+
+    A value ``v`` has the code ``65535 (1 + v / top) / 2``, with the plane's ``top``.
+    ``templates/viewer/shading.js`` reads them.
+    """
+    tops, rows = {}, {}
+    for name, plane in points.planes.items():
+        plane = np.where(points.planes["material"], plane, 0.0)
+        tops[name] = float(abs(plane).max()) or 1.0
+        codes = np.rint(LARGEST_CODE * (1 + plane / tops[name]) / 2).astype(np.uint16)
+        rows[name] = np.diff(codes, axis=0, prepend=np.uint16(0))
+    return LiveView(
+        grid=packed(rows),
+        tops=tops,
+        materials=tuple(map(vars, points.materials)),
+        lights=points.lights,
+        rays=points.rays,
+        is_flat=points.is_flat,
     )

@@ -213,7 +213,7 @@ def _compare(
                 raise
             batch.errors[task.name] = error
         else:
-            batch.views[task.name] = view
+            batch.views[task.name] = scene.with_fit(view, batch.folder / "fit" / task.name)
             for stage, seconds in spent.items():
                 batch.stages[stage] += seconds
             remark(tables.details(view.record))

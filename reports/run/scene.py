@@ -13,19 +13,20 @@ from msgspec import structs
 
 from comparisons import atomic
 from comparisons.comparison import CAUSES, ComparisonRecord
-from comparisons.departure.metrics import METRICS, drawn
+from comparisons.departure.metrics import LEADING, METRICS, drawn
 from comparisons.processes.pool import Turn
 from heuristic import program
 from heuristic.heuristics import named
 from reference.records import VERSION, Record, plain, to_json
 from reports.files import images, results
 from reports.page import embedding
-from reports.page.scene_view import SceneView, TermsView
+from reports.page.scene_view import LiveView, SceneView, TermsView
 
 if TYPE_CHECKING:
     from comparisons.case import Case
     from comparisons.comparison import Comparison, Images
     from comparisons.cost.cost import Study
+    from comparisons.pixel_terms import LivePoints
     from reference.rendering.renderer import Progress
     from reports.jobs import Job
     from reports.page.scene_view import WhyView
@@ -218,6 +219,7 @@ def view_of(comparison: Comparison) -> SceneView:
         thumbnails=images.thumbnails(shown, record.viewing.exposure),
         embedded=embedding.embed(images.channels(_layers(shown)), shown.counted),
         terms=_terms(comparison),
+        live=_live(comparison.live),
         why=_why(comparison),
     )
 
@@ -229,6 +231,28 @@ def _terms(comparison: Comparison) -> TermsView | None:
     from reports.page.why_view import terms_view  # loaded late: --no-why traces none
 
     return terms_view(comparison.terms)
+
+
+def _live(points: LivePoints | str) -> LiveView | None:
+    """Return the points that the page shades again, or why it does not."""
+    if isinstance(points, str):
+        return LiveView(missing=points) if points else None
+    from reports.page.why_view import live_view  # loaded late: --no-why traces none
+
+    return live_view(points)
+
+
+def with_fit(view: SceneView, place: Path) -> SceneView:
+    """Return a view with what the record of a fit in a place says of its scene, if there is one."""
+    try:
+        fit = json.loads((place / "fit.json").read_bytes())
+        mean = fit["fits"][fit["best"]]["departure"][LEADING.name]["after"]
+        found, is_same = (mean, *fit["resolution"]), fit["scene"] == view.record.scene
+    except (OSError, ValueError, LookupError, TypeError):
+        return view
+    if view.live and is_same:
+        return structs.replace(view, live=structs.replace(view.live, fit=found))
+    return view
 
 
 def _why(comparison: Comparison) -> WhyView | None:

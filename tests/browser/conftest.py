@@ -87,7 +87,8 @@ def noisy():
     metrics = found.record.metrics
     metrics = metrics | {"dE2000": structs.replace(metrics["dE2000"], visible=beyond)}
     record = structs.replace(found.record, metrics=metrics)
-    return Comparison(record, found.images, term_grids.grid((WIDTH, HEIGHT)))
+    size = WIDTH, HEIGHT
+    return Comparison(record, found.images, term_grids.grid(size), live=term_grids.points(size))
 
 
 def exact():
@@ -106,9 +107,8 @@ def exact():
         warnings=(),
         unrepresentable=(),
     )
-    return Comparison(
-        record, found.images, no_terms="Flat shading does not evaluate 8.10 at pixels."
-    )
+    reason = "Flat shading does not evaluate 8.10 at pixels."
+    return Comparison(record, found.images, no_terms=reason, live="There are more than 16 lights.")
 
 
 def comparison(name, heuristic, reference, maps, significant):

@@ -49,6 +49,7 @@ def test_the_types_of_data_are_those_of_what_python_writes(written, tmp_path):
         True,
         False,
     }
+    assert {bool(scene.get("live") and scene["live"]["grid"]) for scene in scenes} == {True, False}
     assert any(scene.get("board") for scene in scenes)
     assert any(scene.get("regions") for scene in scenes)
     assert any(scene.get("failed") for scene in scenes)

@@ -100,7 +100,7 @@ class Painter {
   /** Luminance of the first half over that of the reference, in stops. @param {number} place */
   ratio(place) {
     const [test, reference] = ["heuristic", "reference"].map((half) =>
-      Math.max(this.colour(half, place).reduce((sum, value, channel) => sum + page.luminance[channel] * value, 0), 0) + page.epsilon);
+      Math.max(this.colour(half, place).reduce((sum, value, channel) => sum + page.xyz[1][channel] * value, 0), 0) + page.epsilon);
     return Math.log2(test / reference);
   }
 

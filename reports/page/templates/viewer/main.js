@@ -3,6 +3,7 @@
 const address = makeAddress();
 const viewer = new Viewer(byId("viewer"), change);
 const terms = new TermsPanel(byId("terms"));
+const live = new LiveShading(byId("live"));
 let view = DEFAULT_VIEW;
 /** How far the overview was scrolled when it was left. */
 let left = 0;
@@ -58,12 +59,15 @@ function sectionOf(id) {
 
 /** @param {Pictured} scene @param {HTMLElement} section */
 function openScene(scene, section) {
+  live.open(scene, section);
   void Promise.all([viewer.open(scene, section), terms.open(scene, section)]).then(showTerms);
   explainTerms(section);
 }
 
 function showTerms() {
-  if (viewer.painter) terms.show(viewer.painter, view.pixel ?? viewer.panels.worst());
+  if (!viewer.painter) return;
+  terms.show(viewer.painter, view.pixel ?? viewer.panels.worst());
+  live.show(viewer.painter, view.t);
 }
 
 /** @param {number} step */

@@ -29,6 +29,7 @@
  * @property {Effects | null} effects
  * @property {Board | null} board
  * @property {Terms | null} terms
+ * @property {Live | null} live
  * @property {undefined} [failed]
  */
 
@@ -45,7 +46,7 @@
  * @property {string} noEffect
  * @property {Record<string, string>} colours   256 of each map, as "rrggbb"
  * @property {number[][]} mask           colours of pixels: marked, unmarked, not counted, undetermined
- * @property {number[]} luminance        weights of R, G and B
+ * @property {number[][]} xyz            the matrix from linear RGB; white has Y = 1
  * @property {Record<string, string>} terms   meanings, from the glossary
  * @property {number} epsilon
  */

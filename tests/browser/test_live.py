@@ -1,0 +1,253 @@
+"""Shading again on the page: as the kernel does, and what follows the sliders."""
+
+import json
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from comparisons import pixel_terms
+from comparisons.departure.colour import BT709, Viewing, rgb_to_xyz
+from comparisons.departure.metrics import LEADING
+from heuristic import DirectionalLight, Material, PointLight, SpotLight, shade
+from reference.records import plain
+from reference.rendering.gbuffer import image_size, pixel_rays
+from reference.rendering.renderer import variant
+from reports.page.templating import TEMPLATES
+from reports.page.why_view import live_view
+from tests.browser.conftest import EXACT, NOISY, NOISY_ID
+from tests.browser.test_page_at_large import PHONE, violations
+from tests.test_pixel_terms import prepared
+
+SCENE = f"#scene={NOISY_ID}"
+SCENES = (
+    "fig-8-5b", "fig-8-6b", "fig-8-9", "fig-8-11-n9", "fig-6-5-m40", "fig-6-10", "lambert-sphere",
+    "plastic-spheres", "cornell-box", "two-intensities",
+)  # fmt: skip
+SCRIPTS = ("page", "images", "terms", "shading")
+
+STEP = 1 / 255
+"""What a screen of 8 bits can show."""
+
+SHADED = """
+const points = pointsOf(data.live, await decode(data.live.grid, data.text));
+return data.settings.map((each) => [...shaded(points, each)]);"""
+
+DIFFERENCES = """
+page.xyz = data.xyz;
+const [first, second] = data.colours.map((each) => labOf(Float64Array.from(each), data.exposure));
+return [...differencesOf(first, second)];"""
+
+
+@pytest.fixture(scope="module")
+def run(chromium):
+    """A function that runs a body of JavaScript on data, with the page's functions."""
+    code = "\n".join((TEMPLATES / f"viewer/{name}.js").read_text() for name in SCRIPTS)
+    tab = chromium.new_page()
+    yield lambda body, data: tab.evaluate(f"async (data) => {{ {code}\n{body} }}", data)
+    tab.close()
+
+
+def changed(rng, start):
+    """Return settings with every number moved at random."""
+    settings = json.loads(json.dumps(start))
+    for material in settings["materials"]:
+        for name in ("k_a", "k_d", "k_s"):
+            material[name] = (np.array(material[name]) * rng.uniform(0, 1.5)).tolist()
+        material["n"] *= rng.uniform(0.5, 2)
+    for light in settings["lights"]:
+        key = "position" if "position" in light else "direction"
+        light[key] = (np.array(light[key]) + rng.normal(0, 0.3, 3)).tolist()
+        for name in ("diffuse_intensity", "specular_intensity"):
+            light[name] = (np.array(light[name]) * rng.uniform(0.5, 1.5)).tolist()
+    return settings
+
+
+def kernel(half, index, settings):
+    """Return the kernel's values (H, W, 3) at the centres of a half's pixels."""
+    width, height = image_size(half.scene)
+    places = np.meshgrid(np.arange(width), np.arange(height))
+    ray = pixel_rays(half.scene, (width, height), *places)
+    si = half.scene.ray_intersect(ray)
+    normal, _ = half.integrator.seen_side(half.scene, si, si.is_valid())
+    if settings["is_flat"]:
+        normal = dr.select(dr.dot(si.n, ray.d) < 0, si.n, -si.n)
+    lights, total = [light_of(light) for light in settings["lights"]], 0.0
+    for place, one in enumerate(settings["materials"]):
+        own = Material(**{key: one[key] for key in ("k_i", "k_a", "k_d", "k_s", "n", "form")})
+        value = shade(si.p, normal, -ray.d, own, lights, tuple(one["ambient"]))
+        value = np.array(value + dr.zeros(mi.Color3f, width * height)).T
+        total = total + np.where(index.reshape(-1, 1) == place + 1, value, 0)
+    return total.reshape(height, width, 3)
+
+
+def light_of(numbers):
+    """Return the kernel's light of the page's."""
+    given = {key: value for key, value in numbers.items() if key != "name"}
+    for key in {"cutoff", "exponent", "clamped", "shell"} & given.keys():
+        (given[key],) = given[key]
+    kind = SpotLight if "cutoff" in given else PointLight if "position" in given else None
+    return (kind or DirectionalLight)(**{k: tuple(v) if isinstance(v, list) else v
+                                         for k, v in given.items()})  # fmt: skip
+
+
+@pytest.mark.guarantee("kernel", "A page shades its points again as the kernel does, to 1/255.")
+@pytest.mark.parametrize("name", SCENES)
+def test_the_page_shades_as_the_kernel_does(run, name):
+    ready, options = prepared(name, resolution=(40, 30))
+    half = ready.heuristic
+    points = pixel_terms.live(half, options)
+    view = live_view(points)
+    start = plain({"materials": view.materials, "lights": view.lights, "is_flat": view.is_flat})
+    rng = np.random.default_rng(3)
+    settings = [start, *(changed(rng, start) for _ in range(4)), start | {"is_flat": True}]
+    data = {"live": view.manifest(), "text": view.grid.data, "settings": settings}
+    found = np.reshape(run(SHADED, data), (len(settings), 30, 40, 3))
+    with variant(half.variant):
+        expected = np.array([kernel(half, points.planes["material"], each) for each in settings])
+    assert expected.max() > 0.1
+    assert (abs(found - expected) / np.maximum(expected, 1)).max() <= STEP
+    moved = abs(expected[1:-1] - expected[0]).max(axis=(1, 2, 3))
+    assert moved.min() > STEP
+
+
+def test_differences_of_colours_are_those_of_the_metric(run):
+    rng = np.random.default_rng(1)
+    first = rng.uniform(-0.1, 2, (500, 3)) ** 2
+    second = first * rng.uniform(0.5, 1.5, (500, 3))
+    greys = np.repeat(rng.uniform(0, 1, (2, 40, 1)), 3, axis=2)
+    pair = np.concatenate((first, greys[0])), np.concatenate((second, greys[1]))
+    viewing = Viewing(exposure=0.7)
+    data = {"xyz": rgb_to_xyz(BT709).tolist(), "exposure": viewing.exposure}
+    found = run(DIFFERENCES, data | {"colours": [each.ravel().tolist() for each in pair]})
+    np.testing.assert_allclose(found, LEADING(*pair, viewing), rtol=1e-6, atol=1e-6)
+
+
+# --- On the page -------------------------------------------------------------------------------
+
+
+def opened(visitor):
+    """Open the section of a scene's page, and return the section."""
+    page = visitor.open(SCENE)
+    section = page.locator("#live")
+    section.locator("summary").click()
+    page.wait_for_function("document.querySelector('#live [data-part=size]').textContent")
+    visitor.settle()
+    return section
+
+
+def slider(section, name):
+    return section.locator(f"input[name={name}]")
+
+
+def drag(visitor, section, name, part):
+    """Drag a slider's handle to a part of its length."""
+    slider(section, name).scroll_into_view_if_needed()
+    box = slider(section, name).bounding_box()
+    mouse = visitor.page.mouse
+    places = float(slider(section, name).evaluate("e => (e.value - e.min) / (e.max - e.min)")), part
+    for place, act in zip(places, (mouse.down, mouse.up), strict=True):
+        middle = box["y"] + box["height"] / 2
+        mouse.move(box["x"] + 8 + place * (box["width"] - 16), middle, steps=4)
+        act()
+    visitor.settle()
+
+
+def shown(section):
+    """Return the numbers, and the pictures as bytes."""
+    parts = ("mean", "first", "best")
+    numbers = {name: float(section.locator(f"[data-part={name}]").text_content()) for name in parts}
+    pixels = """element => {
+      const copy = Object.assign(document.createElement("canvas"), { width: 48, height: 32 });
+      const context = copy.getContext("2d", { willReadFrequently: true });
+      context.drawImage(element, 0, 0);
+      return [...context.getImageData(0, 0, 48, 32).data];
+    }"""
+    canvases = ("shown", "reference", "error")
+    pictures = {n: section.locator(f"canvas[data-part={n}]").evaluate(pixels) for n in canvases}
+    return numbers, pictures
+
+
+def test_the_start_is_the_stored_picture(visitor, report):
+    numbers, pictures = shown(opened(visitor))
+    channels = report.channels[NOISY]
+    halves = [
+        np.stack([channels[f"{half}.{c}"] for c in "RGB"], axis=-1)
+        for half in ("heuristic", "reference")
+    ]
+    viewing = Viewing(**report.records[NOISY]["viewing"])
+    mean = LEADING(*halves, viewing)[1:].mean()  # its first row does not count
+    assert numbers == dict.fromkeys(numbers, pytest.approx(mean, rel=1e-2))
+    linear = np.clip(halves[0] * viewing.exposure, 0, 1)
+    levels = 255 * np.where(linear < 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    found = np.reshape(pictures["shown"], (*levels.shape[:2], 4))[..., :3]
+    np.testing.assert_allclose(found, levels, atol=1.01)
+
+
+def test_map_mean_and_best_follow_a_slider_and_start_again_restores_all(visitor):
+    section = opened(visitor)
+    numbers, pictures = shown(section)
+    best = [numbers["best"]]
+    for name, part in (("k_d", 0.9), ("intensity", 0.6), ("x", 0.3), ("k_d", 0.02), ("n", 0.4)):
+        before = shown(section)
+        drag(visitor, section, name, part)
+        now = shown(section)
+        assert now[0]["first"] == numbers["first"]
+        if name != "n":  # the first material is matt
+            assert now[0]["mean"] != before[0]["mean"]
+            assert now[1]["error"] != before[1]["error"]
+            assert now[1]["shown"] != before[1]["shown"]
+        assert now[1]["reference"] == pictures["reference"]
+        best.append(now[0]["mean"])
+        assert now[0]["best"] <= min(best)
+        assert now[0]["best"] <= before[0]["best"]
+    assert now[0]["best"] == min(best)
+    assert len(set(best)) > 3
+    section.get_by_role("button", name="Start again").click()
+    visitor.settle()
+    again = shown(section)
+    assert again == (numbers | {"best": now[0]["best"]}, pictures)
+
+
+def test_keys_materials_lights_and_normals(visitor):
+    section = opened(visitor)
+    start = shown(section)
+    slider(section, "k_d").focus()
+    for _ in range(5):
+        visitor.page.keyboard.press("ArrowLeft")
+    visitor.settle()
+    assert float(slider(section, "k_d").get_attribute("aria-valuetext")) < 0.6
+    assert shown(section)[0]["mean"] != start[0]["mean"]
+    material, light, normals = section.locator("select").all()
+    material.select_option("shiny")
+    assert float(slider(section, "n").get_attribute("aria-valuetext")) == 12
+    assert float(slider(section, "k_d").get_attribute("aria-valuetext")) == 0.6
+    light.select_option("1")
+    assert "Direction" in section.locator("[data-part=place]").text_content()
+    before = shown(section)
+    drag(visitor, section, "x", 0.9)
+    assert shown(section)[1]["shown"] != before[1]["shown"]
+    section.get_by_role("button", name="Start again").click()
+    normals.select_option("flat")
+    visitor.settle()
+    image = [np.reshape(each[1]["shown"], (32, 48, 4)) for each in (start, shown(section))]
+    change = abs(image[1] - image[0])
+    assert change[:, :24].max() <= 1  # no steps there
+    assert change[:, 24:].max() > 20
+
+
+def test_a_scene_without_points_says_why(visitor):
+    page = visitor.open(f"#scene={EXACT}")
+    assert "more than 16 lights" in page.locator("#live").text_content()
+    assert not page.locator("#live details").is_visible()
+
+
+@pytest.mark.parametrize(
+    "visitor", [{}, {"color_scheme": "dark"}, PHONE], indirect=True, ids=["light", "dark", "phone"]
+)
+def test_the_open_section_is_for_everybody(visitor):
+    opened(visitor)
+    assert not violations(visitor.page)
+    narrow = "document.documentElement.scrollWidth - window.innerWidth"
+    assert visitor.page.evaluate(narrow) <= 0
