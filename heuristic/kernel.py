@@ -130,14 +130,14 @@ def sum_lights(
             dr.eval(sums)  # the last block's sums stay open, for the caller's kernel
         parts: dict[str, Array] = {}
         for light in block:
-            arrival = light.illuminate(position, visible)
-            cos_incidence = dr.dot(normal, arrival.toward)
+            toward, diffuse, specular, _ = light.illuminate(position, visible)
+            cos_incidence = dr.dot(normal, toward)
             if has_diffuse:
-                term = terms.diffuse(arrival.diffuse, 1, cos_incidence)
+                term = terms.diffuse(diffuse, 1, cos_incidence)
                 parts["diffuse"] = parts["diffuse"] + term if "diffuse" in parts else term
             if lobe:
-                cosine = lobe(light, position, arrival.toward, cos_incidence)
-                term = terms.specular(arrival.specular, 1, cosine, material.n)
+                cosine = lobe(light, position, toward, cos_incidence)
+                term = terms.specular(specular, 1, cosine, material.n)
                 parts["specular"] = parts["specular"] + term if "specular" in parts else term
         for name, part in parts.items():
             # A sum of thousands would lose terms below its last digit (Neumaier).

@@ -55,8 +55,8 @@ class Light:
 
     plugin: ClassVar[str]
     intensity: Colour
-    diffuse_intensity: Colour | None
-    specular_intensity: Colour | None
+    diffuse_intensity: Colour
+    specular_intensity: Colour
     position: Position
     attenuation: tuple[Number, Number, Number]
     clamped: bool
@@ -68,12 +68,11 @@ class Light:
                 object.__setattr__(self, name, check(getattr(self, name)))
 
     @property
-    def intensities(self) -> tuple[Colour, ...]:
-        """``L_d`` and ``L_s``; one colour alone if the light has none of its own for a term."""
+    def intensities(self) -> list[Colour]:
+        """``L_d`` and ``L_s``; one colour alone if it is the same."""
         own = self.diffuse_intensity, self.specular_intensity
-        if all(each is None for each in own):
-            return (self.intensity,)
-        return tuple(self.intensity if each is None else each for each in own)
+        colours = [self.intensity if each is None else each for each in own]
+        return colours[:1] if colours[0] is colours[1] else colours
 
     def illuminate(self, position: Position, visible: Callable[..., Mask] | None = None) -> Arrival:
         """Return how light arrives; black where ``visible(toward, distance)`` is false."""
@@ -83,7 +82,7 @@ class Light:
             colours = [dr.select(is_seen, colour, 0) for colour in colours]
         return Arrival(toward, colours[0], colours[-1], distance)
 
-    def rays(self, position: Position) -> tuple[Direction, Number, list[Colour]]:
+    def rays(self, position: Position) -> tuple:
         """Return ``L`` (6.26), ``d``, and intensities times ``f_att`` (6.1, 8.6) and cone (6.3)."""
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
@@ -152,10 +151,10 @@ class DirectionalLight(Light):
 
     direction: Direction
     intensity: Colour
-    diffuse_intensity: Colour | None = None
-    specular_intensity: Colour | None = None
+    diffuse_intensity: Colour = None
+    specular_intensity: Colour = None
 
-    def rays(self, position: Position) -> tuple[Direction, Number, list[Colour]]:
+    def rays(self, position: Position) -> tuple:
         """Return ``L = -direction / |direction|``, an infinite distance and the intensities."""
         vector_type = type(position)
         toward = -vectors.normalise(vector_type(self.direction))
@@ -187,8 +186,8 @@ class PointLight(Light):
     attenuation: tuple[Number, Number, Number] = UNATTENUATED
     clamped: bool = False
     shell: Number = 0
-    diffuse_intensity: Colour | None = None
-    specular_intensity: Colour | None = None
+    diffuse_intensity: Colour = None
+    specular_intensity: Colour = None
 
 
 @dataclass(frozen=True)
@@ -210,8 +209,8 @@ class SpotLight(Light):
     attenuation: tuple[Number, Number, Number] = UNATTENUATED
     clamped: bool = False
     shell: Number = 0
-    diffuse_intensity: Colour | None = None
-    specular_intensity: Colour | None = None
+    diffuse_intensity: Colour = None
+    specular_intensity: Colour = None
 
     def cone(self, toward: Direction) -> Number:
         """Equation 6.3: 1 within the cone, else 0; times the fall-off of 6.4 where ``m > 0``."""

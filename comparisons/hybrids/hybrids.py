@@ -264,20 +264,19 @@ class HybridImages:
 
     def _kernel(self, effects: frozenset[Effect]) -> NDArray:
         """Return the image of the kernel with some of :data:`OF_KERNEL`."""
-        if effects in self._kernels:
-            return self._kernels[effects]
         pairs, scene = self._pairs, self._ready.heuristic.scene
-        with variant(pairs.heuristic_variant):
-            if effects:
-                has_polygons = POLYGONS not in effects
-                pair = pairs.of(pairs.options.polygon_shading) if has_polygons else pairs.plain()
-                graph = with_sampler(pair.heuristic, self._ready.plan.sampler)
-                if ONE_INTENSITY in effects:
-                    lights.give_one_intensity(graph)
-                scene = graph.instantiate()
-            (found,) = self._passes(Renderer(scene, None, self._finer_spp, "image of the kernel"))
-        self._kernels[effects] = found
-        return found
+        if effects not in self._kernels:
+            with variant(pairs.heuristic_variant):
+                if effects:
+                    is_smooth = POLYGONS in effects
+                    pair = pairs.plain() if is_smooth else pairs.of(pairs.options.polygon_shading)
+                    graph = with_sampler(pair.heuristic, self._ready.plan.sampler)
+                    if ONE_INTENSITY in effects:
+                        lights.give_one_intensity(graph)
+                    scene = graph.instantiate()
+                renderer = Renderer(scene, None, self._finer_spp, "image of the kernel")
+                (self._kernels[effects],) = self._passes(renderer)
+        return self._kernels[effects]
 
     def _group(self, effects: frozenset[Effect]) -> tuple[str, frozenset[Effect]]:
         """Return the variant and what all images of one rendering have in common."""

@@ -72,8 +72,11 @@ def define() -> dict[str, Any]:
         def __init__(self, props):
             super().__init__(props)
             self.model = PLUGINS[props.plugin_name()]
-            given = [name for name in INTENSITIES if name == "intensity" or name in props]
-            self.intensities = {name: emitted(props, name, 1.0) for name in given}
+            self.intensities = {
+                name: emitted(props, name, 1.0)
+                for name in INTENSITIES
+                if name == "intensity" or name in props
+            }
             self.numbers = []  # names of the parameters that are opaque numbers
             names = {field.name for field in fields(self.model)}
             for name, (kind, default) in parameters.items():
@@ -121,16 +124,15 @@ def define() -> dict[str, Any]:
             return UNATTENUATED if self.unattenuated else (self.k0, self.k1, self.k2)
 
         def sample_direction(self, it, sample, active=True):
-            arrival = self.light(it, active).illuminate(mi.Vector3f(it.p))
-            distance = arrival.distance
+            toward, intensity, _, distance = self.light(it, active).illuminate(mi.Vector3f(it.p))
             ds = dr.zeros(mi.DirectionSample3f)
-            ds.d, ds.dist = arrival.toward, FAR if isinstance(distance, float) else distance
-            ds.p, ds.n = it.p + ds.d * ds.dist, -ds.d
+            ds.d, ds.dist = toward, FAR if isinstance(distance, float) else distance
+            ds.p, ds.n = it.p + toward * ds.dist, -toward
             ds.time = it.time
             ds.pdf = 1.0
             ds.delta = True
             ds.emitter = mi.EmitterPtr(self)
-            return ds, IRRADIANCE_PER_INTENSITY * mi.Spectrum(arrival.diffuse) & active
+            return ds, IRRADIANCE_PER_INTENSITY * mi.Spectrum(intensity) & active
 
         def eval(self, si, active=True):
             return mi.Spectrum(0)

@@ -25,7 +25,13 @@ import numpy as np
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
 from reference.pairing.factors import Convention, Replacements
-from reference.pairing.lights import LightNode, heuristic, is_heuristic, level
+from reference.pairing.lights import (
+    SECOND_INTENSITY,
+    LightNode,
+    heuristic,
+    is_heuristic,
+    level,
+)
 from reference.scene import values
 from reference.scene.graph import Graph, properties
 
@@ -65,7 +71,9 @@ def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements
     """Replace heuristic lights by physical ones; ``surface()`` returns the visible `GBuffer`."""
     for index in [i for i in graph.nodes(EMITTER) if is_heuristic(graph.plugin(i))]:
         light = LightNode(graph, index, surface=surface, replaced=replaced)
-        light.lose_second_intensity()
+        if len(set(light.intensities())) > 1:
+            nearest = "its diffuse intensity L_d, for all reflection"
+            replaced.lose(light.label, light.plugin, SECOND_INTENSITY, nearest)
         if light.plugin == "heuristic_point":
             factor, note = level(light, lambda travel: 1.0, lambda travel: 1.0, 1.0)
             place, intensity = mi.ScalarPoint3d(*light.position()), light.scaled_intensity(factor)

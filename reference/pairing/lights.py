@@ -2,22 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.lights import (
-    INTENSITIES,
-    INVERSE_SQUARE,
-    PLUGINS,
-    DirectionalLight,
-    Light,
-    PointLight,
-    SpotLight,
-)
+from heuristic.lights import INVERSE_SQUARE, PLUGINS, DirectionalLight, Light, PointLight, SpotLight
 from reference.pairing.factors import INTENSITY_FACTOR, Replacements
 from reference.scene import values
 from reference.scene.graph import Graph, properties
@@ -87,25 +79,16 @@ class LightNode:
         """Return the direction in which parallel light travels, (3,) in world space."""
         return self.vector("direction", (0, 0, 1), 2)
 
-    def intensities(self) -> tuple[tuple[float, ...], ...]:
+    def intensities(self) -> tuple:
         """Return ``L_d`` and ``L_s`` of a heuristic light, without its scale."""
-        common, *own = INTENSITIES
-        given = self.graph.props(self.index)
-        names = (name if name in given else common for name in own)
-        diffuse, specular = (values.colour(self.graph, self.index, name, 1.0) for name in names)
-        return diffuse, specular
+        colour = partial(values.colour, self.graph, self.index)
+        common = colour("intensity", 1.0)
+        return colour("diffuse_intensity", common), colour("specular_intensity", common)
 
     def scaled_intensity(self, factor: float) -> tuple[float, ...]:
         """Return ``L_d`` of a heuristic light times a factor."""
         colour, _ = self.intensities()
         return tuple((np.multiply(colour, factor * self.number("scale", 1.0))).tolist())
-
-    def lose_second_intensity(self) -> None:
-        """Record that the physical light has only one of two intensities."""
-        diffuse, specular = self.intensities()
-        if specular != diffuse:
-            nearest = "its diffuse intensity L_d, for all reflection"
-            self.replaced.lose(self.label, self.plugin, SECOND_INTENSITY, nearest)
 
     def replace(
         self,
@@ -202,11 +185,11 @@ def is_heuristic(plugin: str) -> bool:
 
 def give_one_intensity(graph: Graph) -> None:
     """Let the heuristic lights of a graph have their diffuse intensity for both terms."""
-    common, diffuse, specular = INTENSITIES
     for index in graph.nodes(mi.ObjectType.Emitter):
         props = graph.props(index)
-        if is_heuristic(graph.plugin(index)) and (diffuse in props or specular in props):
-            props[specular] = props.get(diffuse, props.get(common, 1.0))
+        if is_heuristic(graph.plugin(index)):
+            both = props.get("diffuse_intensity", props.get("intensity", 1.0))
+            props["specular_intensity"] = both
 
 
 def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: Any) -> mi.Properties:

@@ -29,9 +29,6 @@ STEP, UNCOUNTED = 0.1, 255
 LARGEST_CODE = 65535
 """The largest code of the planes of terms and normals."""
 
-LIGHT = ("name", "intensity", "specular_intensity")
-"""Fields of a light that all pixels share."""
-
 
 def why_view(
     maps: Mapping[str, NDArray],
@@ -101,7 +98,14 @@ def terms_view(grid: TermGrid) -> TermsView:
         grid=packed(planes),
         tops=tops,
         materials=tuple(vars(material) for material in grid.materials),
-        lights=tuple({name: getattr(each, name) for name in LIGHT} for each in grid.lights),
+        lights=tuple(
+            {
+                "name": each.name,
+                "intensity": each.intensity,
+                "specular_intensity": each.specular_intensity,
+            }
+            for each in grid.lights
+        ),
     )
 
 
