@@ -115,8 +115,7 @@ def sum_lights(
     there is nothing to evaluate (scalar arrays) or it is impossible (in a symbolic loop or call).
     """
     has_diffuse = not materials.is_zero(material.k_d)
-    is_mirror = numerics.is_number(material.n, inf)
-    has_specular = not (is_mirror or materials.is_zero(material.k_s))
+    has_specular = not (materials.is_zero(material.k_s) or numerics.is_number(material.n, inf))
     if not (has_diffuse or has_specular):
         return None, None
     in_blocks = (

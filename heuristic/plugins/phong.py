@@ -95,7 +95,7 @@ def define() -> dict[str, Any]:
             return kind(**coefficients, n=n, form=form, n_is_moderate=self.n_is_moderate)
 
         def exponent(self, si, active=True):
-            """Return ``n`` at a surface interaction; 1 for a mirror, whose lobe is not used."""
+            """Return ``n`` at a surface interaction; 1 for a mirror, which has no lobe."""
             if self.is_mirror:
                 return mi.Float(1)
             if isinstance(self.n, mi.Texture):
@@ -120,34 +120,25 @@ def define() -> dict[str, Any]:
             wi, wo = self._facing(si.wi, wo)
             above = active & (wi.z > 0) & (wo.z > 0)
             probability = self._specular_probability(ctx, si, above)
-            reflected = 1 - sum(self._single_directions(ctx, si, above))
+            reflected = 1 - self._through_probability(ctx, si, above)
             diffuse = mi.warp.square_to_cosine_hemisphere_pdf(wo)
             specular = self._lobe_pdf(wi, wo, self.exponent(si, above))
             return dr.select(above, reflected * dr.lerp(diffuse, specular, probability), 0)
 
         def sample(self, ctx, si, sample1, sample2, active=True):
-            if not (self.is_clear or self.is_mirror):
+            if not self.is_clear:
                 return self._reflected(ctx, si, sample1, sample2, active)
-            clear, mirrored = self._single_directions(ctx, si, active)
-            both = clear + mirrored
-            chosen = active & (sample1 < both)
-            passes = chosen & (sample1 < clear)
+            probability = self._through_probability(ctx, si, active)
+            passes = active & (sample1 < probability)
             # The rest of the number is uniform again, and chooses between the other two.
-            sample1 = dr.select(chosen, 0, (sample1 - both) / (1 - both))
-            reflected, weight = self._reflected(ctx, si, sample1, sample2, active & ~chosen)
-            single = dr.zeros(mi.BSDFSample3f)
-            single.wo = dr.select(passes, -si.wi, mi.reflect(si.wi))
-            single.eta, single.pdf = 1.0, dr.select(passes, clear, mirrored)
-            single.sampled_component = dr.select(passes, mi.UInt32(2), 0)
-            flags = (mi.BSDFFlags.Null, mi.BSDFFlags.DeltaReflection)
-            single.sampled_type = dr.select(passes, *(mi.UInt32(+flag) for flag in flags))
-            value = dr.select(
-                passes,
-                self.transmittance.eval(si, passes),
-                terms.mirror(1, self.k_s.eval(si, chosen & ~passes)),
-            )
-            weight = dr.select(chosen, value / dr.select(chosen, single.pdf, 1), weight)
-            return dr.select(chosen, single, reflected), weight
+            sample1 = dr.select(passes, 0, (sample1 - probability) / (1 - probability))
+            reflected, weight = self._reflected(ctx, si, sample1, sample2, active & ~passes)
+            straight = dr.zeros(mi.BSDFSample3f)
+            straight.wo, straight.eta, straight.pdf = -si.wi, 1.0, probability
+            straight.sampled_component = mi.UInt32(2)
+            straight.sampled_type = mi.UInt32(+mi.BSDFFlags.Null)
+            passed = self.transmittance.eval(si, passes) / probability
+            return dr.select(passes, straight, reflected), dr.select(passes, passed, weight)
 
         def eval_null_transmission(self, si, active=True):
             return mi.Spectrum(self.transmittance.eval(si, active))
@@ -172,7 +163,9 @@ def define() -> dict[str, Any]:
             is_specular = sample1 < probability
             wo = dr.select(
                 is_specular,
-                self._sample_lobe(wi, sample2, self.exponent(si, active)),
+                mi.reflect(wi)
+                if self.is_mirror
+                else self._sample_lobe(wi, sample2, self.exponent(si, active)),
                 mi.warp.square_to_cosine_hemisphere(sample2),
             )
             if self.twosided:
@@ -183,10 +176,15 @@ def define() -> dict[str, Any]:
             bs.sampled_component = dr.select(is_specular, mi.UInt32(0), mi.UInt32(1))
             bs.sampled_type = dr.select(
                 is_specular,
-                mi.UInt32(+mi.BSDFFlags.GlossyReflection),
+                mi.UInt32(+self.specular),
                 mi.UInt32(+mi.BSDFFlags.DiffuseReflection),
             )
             value, bs.pdf = self.eval_pdf(ctx, si, wo, active)
+            if self.is_mirror:
+                mirrored = terms.mirror(1, self.k_s.eval(si, active))
+                value = dr.select(is_specular, mirrored, value)
+                share = probability * (1 - self._through_probability(ctx, si, active))
+                bs.pdf = dr.select(is_specular, share, bs.pdf)
             active &= bs.pdf > 0
             return bs, dr.select(active, value / bs.pdf, 0)
 
@@ -220,8 +218,8 @@ def define() -> dict[str, Any]:
             front, back = mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide
             sides = front | (back if self.twosided else 0)
             flags = mi.BSDFFlags
-            specular = flags.DeltaReflection if self.is_mirror else flags.GlossyReflection
-            components = [specular | sides, flags.DiffuseReflection | sides]
+            self.specular = flags.DeltaReflection if self.is_mirror else flags.GlossyReflection
+            components = [self.specular | sides, flags.DiffuseReflection | sides]
             if self.is_clear:
                 components.append(flags.Null | front | back)
             self.m_components = components  # Mitsuba copies the list
@@ -239,27 +237,22 @@ def define() -> dict[str, Any]:
 
         def _specular_probability(self, ctx, si, active):
             """Share of samples for the lobe: its part of the albedo at normal incidence."""
+            has_specular = "k_s" in self.present or self.is_mirror
+            if not (has_specular and ctx.is_enabled(self.specular, 0)):
+                return mi.Float(0)
             if not ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 1) or "k_d" not in self.present:
                 return mi.Float(1)
-            if not ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0) or "k_s" not in self.present:
-                return mi.Float(0)
             diffuse, specular = self._albedos(si, active)
             total = diffuse + specular
             return dr.select(total > 0, specular / total, 0.5)
 
-        def _single_directions(self, ctx, si, active):
-            """Return the shares of samples that pass straight through, and that are mirrored."""
-            clear, mirrored = mi.Float(0), mi.Float(0)
-            if self.is_clear or self.is_mirror:
-                passing = dr.mean(self.transmittance.eval(si, active))
-                diffuse, specular = self._albedos(si, active)
-                total = passing + diffuse + specular
-                if self.is_clear and ctx.is_enabled(mi.BSDFFlags.Null, 2):
-                    clear = dr.select(total > 0, passing / total, 0)
-                if self.is_mirror and ctx.is_enabled(mi.BSDFFlags.DeltaReflection, 0):
-                    lit = (total > 0) & (self.twosided | (si.wi.z > 0))
-                    mirrored = dr.select(lit, specular / total, 0)
-            return clear, mirrored
+        def _through_probability(self, ctx, si, active):
+            """Share of samples that pass straight through."""
+            if not self.is_clear or not ctx.is_enabled(mi.BSDFFlags.Null, 2):
+                return mi.Float(0)
+            clear = dr.mean(self.transmittance.eval(si, active))
+            total = clear + sum(self._albedos(si, active))
+            return dr.select(total > 0, clear / total, 0)
 
         def _albedos(self, si, active):
             """Return the albedo of the two parts at normal incidence, the mean over channels."""
@@ -295,8 +288,10 @@ def define() -> dict[str, Any]:
         def _lobe_pdf(self, wi, wo, n):
             """Density of ``wo``; mirroring at ``H`` spreads solid angle by ``4 (wi.H)``.
 
-            ``wi.H = |wi + wo| / 2``, which is 0 only for opposite directions.
+            ``wi.H = |wi + wo| / 2``, which is 0 only for opposite directions. A mirror has none.
             """
+            if self.is_mirror:
+                return mi.Float(0)
             density = (n + 1) * dr.inv_two_pi * terms.power(self._lobe_cosine(wi, wo), n)
             if self.form == "blinn":
                 density /= numerics.at_least(2 * dr.norm(wi + wo), numerics.smallest(wo))

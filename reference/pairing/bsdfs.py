@@ -188,13 +188,10 @@ def to_physical(graph: Graph, convention: Convention, replaced: Replacements) ->
         label, given = graph.label(index), graph.props(index)
         plugin, parameters, misses = physical_partner(graph, index, convention)
         replaced.misses += misses
-        recorded, note = parameters, ""
-        if plugin == "diffuse":
-            recorded = {"reflectance": _base(given)}
-        elif "int_ior" in parameters:
-            (low, high), ior = PLASTICS, parameters["int_ior"] / parameters["ext_ior"]
-            note = f"no real plastic has the index {ior:.3g}: they have {low:g} to {high:g}"
-            note = "" if low <= ior <= high else note
+        (low, high), ior = PLASTICS, parameters.get("int_ior", 1.5) / parameters.get("ext_ior", 1.0)
+        note = f"no real plastic has the index {ior:.3g}: they have {low:g} to {high:g}"
+        note = "" if low <= ior <= high else note
+        recorded = {"reflectance": _base(given)} if plugin == "diffuse" else parameters
         replaced.bsdf(label, "phong", plugin, recorded, note)
         props = properties(plugin, **parameters)
         is_twosided = given.get("twosided", False)
@@ -214,17 +211,16 @@ def physical_partner(
     if any(values.colour(graph, index, "k_s", 0.0)):
         from reference.pairing import albedo  # loaded late: only lobes need it
 
-        given = phong(graph, index)
-        if given.n == inf and not any(given.k_d):
-            reflected, misses = albedo.up_to_1("specular reflectance", given.k_s)
-            metal = {"material": "none", "specular_reflectance": reflected}
-            return "conductor", metal, misses
-        plastic, misses = albedo.to_roughplastic(given, convention)
+        material = phong(graph, index)
+        if material.n == inf and not any(material.k_d):
+            reflected, misses = albedo.up_to_1("specular reflectance", material.k_s)
+            return "conductor", {"material": "none", "specular_reflectance": reflected}, misses
+        plastic, misses = albedo.to_roughplastic(material, convention)
+        parameters = asdict(plastic)
         if plastic.alpha:
-            return "roughplastic", asdict(plastic), misses
-        smooth = asdict(plastic)
-        del smooth["alpha"], smooth["distribution"]
-        return "plastic", smooth, misses
+            return "roughplastic", parameters, misses
+        del parameters["alpha"], parameters["distribution"]
+        return "plastic", parameters, misses
     given = graph.props(index)
     return "diffuse", {"reflectance": given.get(_base(given), 0.0)}, ()
 
@@ -247,7 +243,8 @@ def phong(graph: Graph, index: int) -> Phong:
 
 def is_mirror(props: mi.Properties) -> bool:
     """Return whether a ``phong`` is a mirror (8.7)."""
-    return values.plain(props.get("n", 1.0)) == inf
+    has_lobe = values.may_be_nonzero(props.get("k_s", 0.0))
+    return has_lobe and values.plain(props.get("n", 1.0)) == inf
 
 
 def itself(context: Context, index: int) -> NearestPhong:
@@ -264,7 +261,7 @@ def itself(context: Context, index: int) -> NearestPhong:
             physical = context.physical(own["diffuse_reflectance"], alpha, ior)
     names = ("k_i", "k_a", "k_d", "k_s", "n", "form", "normalised", "twosided", "transmittance")
     given = {name: props[name] for name in (*names, "tilt") if name in props}
-    lost = (UNSEEN,) if is_mirror(props) and values.may_be_nonzero(props.get("k_s", 0.0)) else ()
+    lost = (UNSEEN,) if is_mirror(props) else ()
     return NearestPhong(**given, lost=lost, physical=physical)
 
 

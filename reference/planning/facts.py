@@ -389,8 +389,7 @@ class Facts:
             name
             for name in COEFFICIENTS
             if any(
-                name in props
-                and values.may_be_nonzero(props[name])
+                values.may_be_nonzero(props.get(name, 0.0))
                 and not (name == "k_s" and is_mirror(props))
                 for props in self.materials
             )

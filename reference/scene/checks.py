@@ -6,7 +6,6 @@ missing, an infinite index of refraction is black.
 
 from collections.abc import Iterator
 from functools import lru_cache
-from math import inf
 from typing import Any
 
 import mitsuba as mi
@@ -93,7 +92,7 @@ def _objections(plugin: str, key: str, value: Any) -> Iterator[str]:
             is_met = numbers.any() if ends is ANY else (ends[0] <= numbers) & (numbers <= ends[1])
             if not np.all(is_met):
                 yield allowed
-    if not (np.abs(numbers) <= LARGEST).all() and (plugin, key, value) != ("phong", "n", inf):
+    if not (np.abs(numbers) <= LARGEST).all() and (plugin, key, value) != ("phong", "n", INFINITY):
         yield f"finite numbers of at most {LARGEST:.2g}"
 
 
