@@ -13,7 +13,7 @@ from heuristic import program
 from heuristic.errors import InputError, suggestion
 from reference.planning.plan import wants_spectra
 from reference.scene.graph import set_variant
-from reference.scene.source import Source
+from reference.scene.source import Script, Source
 
 RGB, SPECTRAL = "llvm_ad_rgb", "llvm_ad_spectral"
 
@@ -71,8 +71,6 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
     if path is not None:
         content: Any = path
         if path.suffix == ".py":
-            from reference.scene.source import Script
-
             end_after_task()  # the script may change this process
             content = Script(path)
         return _complete(Source(name or path.stem, content, options.define), options, str(path))

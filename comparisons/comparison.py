@@ -60,11 +60,8 @@ def machine() -> Machine:
     except OSError:
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    return Machine(
-        processor=names[0] if names else platform.processor() or platform.machine(),
-        cores=cores(),
-        system=f"{platform.system()} {platform.machine()}",
-    )
+    processor = names[0] if names else platform.processor() or platform.machine()
+    return Machine(processor, cores(), f"{platform.system()} {platform.machine()}")
 
 
 class Significant(Record):

@@ -369,14 +369,8 @@ def picture_record(
     template, (height, width) = np.array(half.half.render(0), float), images.counted.shape
     expected = [geometry_edges(scene, width, height), picture_edges(template)]
     shift, edges = measure(np.mean(half.images, axis=0), expected)
-    record = PictureRecord(
-        files=options.image,
-        transfer=options.transfer,
-        repeats=len(options.image),
-        shift=shift,
-        edges=edges,
-        ratio=ratios(shown, reference),
-    )
+    files, ratio = options.image, ratios(shown, reference)
+    record = PictureRecord(files, options.transfer, len(files), shift, edges, ratio)
     odd = describe(record, images.heuristic, images.reference, images.counted)
     return structs.replace(record, odd=tuple(odd))
 

@@ -1,7 +1,5 @@
 """A scene made ready to be rendered: paired, planned, probed, with a renderer for each half."""
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -99,10 +97,9 @@ class Prepared:
         asks_for_volumes = pair.media or pair.integrator in ("volpath", "volpathmis")
         if plan.stock_integrator == "volpath" and not asks_for_volumes:
             used = "volpath: others err on curved shapes behind hidden lamps"
-            found.append(Override(what="integrator", given=pair.integrator or "path", used=used))
+            found.append(Override("integrator", pair.integrator or "path", used))
         if pair.rr_depth is not None and pair.rr_depth != plan.rr_depth:
-            depths = {"given": str(pair.rr_depth), "used": str(plan.rr_depth)}
-            found.append(Override(what="rr_depth", **depths))
+            found.append(Override("rr_depth", str(pair.rr_depth), str(plan.rr_depth)))
         return tuple(found)
 
     def plan_record(self, passes: int) -> Plan:

@@ -11,7 +11,6 @@ from comparisons.departure import marks
 from comparisons.departure.metrics import leading_distance
 from comparisons.options import Options
 from comparisons.prepared import Prepared, prepare
-from reference.planning.plan import Plan
 from reference.records import VERSION, Record
 from reference.rendering.renderer import Progress, Renderer, Stream, pass_seed, passes
 from reference.rendering.sampler import with_sampler
@@ -81,13 +80,14 @@ def verify(
     distance = leading_distance(options.viewing)
     marked = marks.find(apart.estimate(), mean, counted, distance, level=level)
     seconds = [side.reference.pass_times().median_s for side in sides]
+    depth = "" if planned.plan.max_depth == 2 else f", depth {planned.plan.max_depth}"
     # A plan without noise would divide by zero.
     noise = [
         max(np.sqrt(count * np.mean(total.standard_error()[counted] ** 2)), 1e-7) for total in own
     ]
     return Verification(
         scene=source.name,
-        planned=_words(planned.plan),
+        planned=f"{planned.plan.simulation}{depth}, {planned.plan.sampler}",
         resolution=counted.shape[::-1],
         significant=int((marked == marks.MARKED).sum()),
         pixels=int(counted.sum()),
@@ -108,10 +108,3 @@ def _kernel_difference(planned: Prepared, everything: Prepared, seed: int) -> fl
         renderer = Renderer(scene, None, planned.heuristic.spp, "heuristic image")
         images.append(np.array(renderer.render(pass_seed(seed, 0))))
     return float(np.abs(images[0] - images[1]).max())
-
-
-def _words(plan: Plan) -> str:
-    depth = "" if plan.max_depth == 2 else f" {plan.max_depth}"
-    extra = "" if plan.shadows else ", no shadow rays"
-    extra += ", tabulated environment" if plan.tabulated_environment else ""
-    return f"{plan.integrator}{depth}{extra}, {plan.sampler}"

@@ -44,13 +44,9 @@ class InstallationError(FotismosError):
 class NonFiniteError(FotismosError):
     """A NaN or an infinity in an image; the message names the image and the place."""
 
-    exit_code = 1
-
 
 class LostProcessError(FotismosError):
     """A process or scheduler that had work to do is gone; the finished work is kept."""
-
-    exit_code = 1
 
 
 def unknown(what: str, given: object, allowed: Iterable[str]) -> InputError:

@@ -81,18 +81,8 @@ def find_wheel() -> Path | None:
         wheel = importlib.metadata.distribution(WHEEL)
     except importlib.metadata.PackageNotFoundError:
         return None
-    listed = wheel.files
-    if listed is None:  # an installer may keep no list
-        paths = list(Path(sys.prefix, "lib").glob("*"))
-    else:
-        paths = [Path(str(file.locate())) for file in listed]
-    libraries = [
-        path
-        for path in paths
-        if path.name.startswith("libLLVM")
-        and any(suffix in path.name for suffix in (".so", ".dylib", ".dll"))
-        and path.is_file()
-    ]
+    paths = (Path(str(file.locate())) for file in wheel.files or ())
+    libraries = (path for path in paths if path.match("libLLVM*.so*") and path.is_file())
     best = min(libraries, key=lambda path: (len(path.name), path.name), default=None)
     return best and best.parent.resolve() / best.name
 

@@ -76,32 +76,25 @@ def to_json(record: Any) -> str:
 
 def read(kind: type[Kind], text: str, where: str) -> Kind:
     """Read a record from JSON; InputError names the file ``where`` if it holds none."""
+    version: Any = None
     try:
         content = json.loads(text)
-        version = content.get("record_version") if isinstance(content, dict) else None
-        if isinstance(content, dict) and version not in (2, VERSION):
-            found = "of fotismos 0.1" if version is None else f"version {version}"
-            raise InputError(
-                f"{where}: this record is {found}, not version {VERSION}. Make it again."
-            )
-        if version == 2:
-            return _of_version_2(kind, content, where)
+        if isinstance(content, dict):
+            version = content.get("record_version")
+            if version not in (2, VERSION):
+                found = "of fotismos 0.1" if version is None else f"version {version}"
+                raise InputError(
+                    f"{where}: this record is {found}, not version {VERSION}. Make it again."
+                )
+            content["record_version"] = VERSION
         return msgspec.convert(content, kind)
     except json.JSONDecodeError as error:
         raise InputError(f"{where}: this is not JSON: {error}. Make it again.") from error
     except RecursionError as error:
         raise InputError(f"{where}: it is nested too deep. Make it again.") from error
     except (ValueError, msgspec.ValidationError) as error:
-        raise InputError(f"{where}: {error}. Make it again.") from error
-
-
-def _of_version_2(kind: type[Kind], content: dict[str, Any], where: str) -> Kind:
-    try:
-        return msgspec.convert(content | {"record_version": VERSION}, kind)
-    except msgspec.ValidationError as error:
-        raise InputError(
-            f"{where}: this record is version 2; {CHANGES} ({error}). Make it again."
-        ) from error
+        reason = f"this record is version 2; {CHANGES} ({error})" if version == 2 else error
+        raise InputError(f"{where}: {reason}. Make it again.") from error
 
 
 def _numpy(value: Any) -> Any:

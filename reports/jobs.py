@@ -1,7 +1,5 @@
 """Options that commands share, and the requests and processes made from them."""
 
-from __future__ import annotations
-
 import gc
 import logging
 import math
@@ -20,7 +18,7 @@ from click.shell_completion import CompletionItem
 from msgspec import inspect
 
 from comparisons.options import Options
-from comparisons.processes.pool import Pool, cores
+from comparisons.processes.pool import Pool, Task, cores
 from heuristic import llvm, program
 from heuristic.errors import InputError
 from reports.terminal.words import echo, level, quiet_option, verbose_option
@@ -30,12 +28,12 @@ Decorator: TypeAlias = Callable[[Any], Any]
 
 def resolution(text: str) -> tuple[int, int]:
     """Parse ``WIDTHxHEIGHT``, two integers of at least 1."""
-    width, separator, height = text.lower().partition("x")
-    if not (separator and width.isdecimal() and height.isdecimal()):
-        raise click.BadParameter(f"{text!r} is not a resolution; write it like 512x512.")
-    if not (int(width) and int(height)):
-        raise click.BadParameter(f"{text!r} is not a resolution: width and height are at least 1.")
-    return int(width), int(height)
+    sides = re.fullmatch(r"(?i)0*([1-9]\d*)x0*([1-9]\d*)", text)
+    if sides is None:
+        raise click.BadParameter(
+            f"{text!r} is not a resolution; write it like 512x512, with sides of at least 1."
+        )
+    return int(sides[1]), int(sides[2])
 
 
 def _definition(text: str) -> tuple[str, str]:
@@ -303,6 +301,32 @@ def pool(
     # As a context it gives a Cluster, which does what a Pool does.
     ready = Ready(level(), None, os.getcwd(), shlex.join(program.program()))
     return cast(Pool, cluster.connected(scheduler, ready))
+
+
+def results_of(
+    output: Path,
+    kind: str,
+    timeout: float,
+    scenes: Sequence[str],
+    work: Callable[..., Any],
+    *words: Any,
+) -> dict[Path, Any]:
+    """Return what ``work(scene, *words, folder, progress)`` returns for each scene, by its folder.
+
+    The folders are below ``output/kind``.
+    """
+    with pool(timeout) as processes:
+        processes.start()
+        from reports.files import results
+        from reports.terminal import progress
+
+        with results.hold(output, command_line()) as top, progress.shown() as bar:
+            folder = results.own(top / kind)
+            tasks = [
+                Task(place, work, (scene, *words, folder / place), bar.of(place))
+                for place, scene in results.places(folder, scenes).items()
+            ]
+            return {folder / each.name: done.result() for each, done in processes.each(tasks)}
 
 
 @dataclass(frozen=True)

@@ -112,11 +112,9 @@ def _describe(heuristic: Heuristic) -> Iterator[str]:
 def _explain(model: Model, seen: Array, counts: Array) -> tuple[str, TermFit] | None:
     """Return the mistake that explains the values seen, and its fit; no words if there is none."""
     right = model.terms()
-    changed = [(words, model.terms(**change(model))) for words, change in MISTAKES]
-    encoded = [(f"its {symptom}", undo(seen)) for symptom, undo in ENCODINGS.items()]
-
-    candidates = [("", right, seen), *((words, right, values) for words, values in encoded)]
-    candidates += [(words, terms, seen) for words, terms in changed]
+    candidates = [("", right, seen)]
+    candidates += [(f"its {symptom}", right, undo(seen)) for symptom, undo in ENCODINGS.items()]
+    candidates += [(words, model.terms(**change(model)), seen) for words, change in MISTAKES]
     for words, terms, values in candidates:
         fit = _fit(terms, values, counts)
         if fit[1] < ALIKE:

@@ -8,8 +8,6 @@ fixed order, with a line per number and its error, or per block's colours. Value
 digits, far finer than rounding errors, and errors 3.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -93,7 +91,7 @@ class Measurement(Record):
     heuristic: Half
     reference: Half
 
-    def of(self, metrics: Iterable[str]) -> Measurement:
+    def of(self, metrics: Iterable[str]) -> "Measurement":
         """Return the measurement with only these metrics."""
         return structs.replace(self, metrics={name: self.metrics[name] for name in metrics})
 
@@ -162,9 +160,7 @@ def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
     the jackknife's. Metrics are not linear, and noise raises them: compare only measurements with
     equal numbers of passes and samples.
     """
-    metrics = dict.fromkeys(
-        (*METRICS, RATIO.name), MetricAmount(value=0.0, error=0.0, noise_floor=0.0)
-    )
+    metrics = dict.fromkeys((*METRICS, RATIO.name), MetricAmount(0.0, 0.0, 0.0))
     if counted.any():
         metrics = _metrics(images, counted, viewing)
     halves = {half: _half(images[:, index]) for index, half in enumerate(HALVES)}
@@ -193,7 +189,7 @@ def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metri
         for name, metric in METRICS.items()
     }
     return {
-        name: MetricAmount(value=float(value), error=float(error), noise_floor=floors.get(name))
+        name: MetricAmount(float(value), float(error), floors.get(name))
         for name, value, error in zip((*METRICS, RATIO.name), values, errors, strict=True)
     }
 

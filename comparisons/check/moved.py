@@ -4,8 +4,6 @@ Welch's t-test, many at once. Before and after are independent measurements. If 
 unchanged numbers differ by even less than the test allows for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
@@ -127,15 +125,12 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     corrected = sidak(p, len(pairs))
     return tuple(
         Move(
-            quantity=old[0],
-            half=old[1],
-            block=old[2],
-            before=old[3],
-            after=new[3],
-            error=float(np.sqrt(total[i])),
-            standard_errors=float(t[i]) if spread[i] else None,
-            p=float(p[i]),
-            p_corrected=float(corrected[i]),
+            *old[:4],
+            new[3],
+            float(np.sqrt(total[i])),
+            float(t[i]) if spread[i] else None,
+            float(p[i]),
+            float(corrected[i]),
         )
         for i, (old, new) in enumerate(pairs)
     )

@@ -100,7 +100,7 @@ def cost(
         attribution=attribution(found, known),
         closure=known.record.closure,
         viewing=options.viewing,
-        pixels=Pixels(counted=int(counted.sum()), total=counted.size),
+        pixels=Pixels(int(counted.sum()), counted.size),
         machine=machine(),
         versions=versions(),
         command=command,
@@ -110,7 +110,7 @@ def cost(
         measured=measured,
         left_out=ladder.left_out,
     )
-    return Study(record=made, methods=found.images, reference=found.reference.mean)
+    return Study(made, found.images, found.reference.mean)
 
 
 def quick(
@@ -164,18 +164,11 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
         values = samples * found.lines[name].per_sample
         return times.interval(values, times.UNSEEN * float(values[0]))
 
-    return CostAttribution(
-        effects=tuple(
-            EffectCost(**structs.asdict(one), adds_s=adds(one.effect))
-            for one in causes.record.effects
-        ),
-        departure=causes.record.departure,
-        kernel_s=takes(first.name),
-        plan_s=takes(last.name),
-        renderer_s=adds(""),
-        resolution=found.size,
-        spp=SPP,
+    effects = (
+        EffectCost(**structs.asdict(one), adds_s=adds(one.effect)) for one in causes.record.effects
     )
+    seconds = takes(first.name), takes(last.name), adds("")
+    return CostAttribution(tuple(effects), causes.record.departure, *seconds, found.size, SPP)
 
 
 class Choice(Record, kw_only=True):

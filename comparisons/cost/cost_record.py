@@ -3,6 +3,7 @@
 from typing import Annotated, Literal
 
 from msgspec import Meta
+from msgspec.structs import astuple
 
 from comparisons.comparison import Contribution, MeanError
 from comparisons.departure.colour import Viewing
@@ -98,11 +99,8 @@ class TimedMethod(Method, kw_only=True):
 
     def seconds(self, samples: int) -> Estimated:
         """Return the time of an image with some samples over all pixels."""
-        ends = {
-            end: max(getattr(self.overhead_s, end) + samples * getattr(self.per_sample_s, end), 0.0)
-            for end in ("value", "low", "high")
-        }
-        return Estimated(**ends)
+        ends = zip(astuple(self.overhead_s), astuple(self.per_sample_s), strict=True)
+        return Estimated(*(max(fixed + samples * each, 0.0) for fixed, each in ends))
 
 
 class Point(Record):

@@ -188,21 +188,15 @@ def measure_ladder(
         size=size,
         reference=reference,
         converged=Converged(
-            integrator=ready.plan.integrator,
-            max_depth=ready.plan.max_depth,
-            spp=REFERENCE_SPP * reference.passes,
-            passes=reference.passes,
-            noise_floor=judge(reference.mean + reference.noise)[0],
+            ready.plan.integrator,
+            ready.plan.max_depth,
+            REFERENCE_SPP * reference.passes,
+            reference.passes,
+            judge(reference.mean + reference.noise)[0],
         ),
         methods=methods,
         points=tuple(
-            Point(
-                method=one.name,
-                spp=spp,
-                seconds=one.seconds(spp * size[0] * size[1]),
-                error=errors[one.name, spp][0],
-                tolerance=errors[one.name, spp][1],
-            )
+            Point(one.name, spp, one.seconds(spp * size[0] * size[1]), *errors[one.name, spp])
             for one in methods
             for spp in counts[one.name]
         ),
@@ -231,7 +225,7 @@ def tried(
     firsts: Mapping[str, Renderer],
     counts: Mapping[str, Collection[int]],
     pixels: int,
-    progress: Progress | None = None,
+    progress: Progress = lambda *_: None,
 ) -> dict[Key, Renderer]:
     """Return ``{(name, samples per pixel): renderer}`` for ``counts``, and some for the time.
 
@@ -240,8 +234,7 @@ def tried(
     """
     renderers: dict[Key, Renderer] = {}
     for number, (name, first) in enumerate(firsts.items()):
-        if progress:
-            progress("compiling", number, len(firsts))
+        progress("compiling", number, len(firsts))
         own = {first.spp: first}
         last = first
         while True:
@@ -254,8 +247,7 @@ def tried(
         for spp in {*counts[name], max(1, last.spp // 4), max(1, last.spp // 16)} - own.keys():
             own[spp] = first.sampled(spp)
         renderers |= {(name, spp): own[spp] for spp in sorted(own)}
-    if progress:
-        progress("compiling", len(firsts), len(firsts))
+    progress("compiling", len(firsts), len(firsts))
     return renderers
 
 
@@ -287,7 +279,7 @@ def _mean_errors(errors: ArrayLike) -> tuple[MeanError, MeanError]:
     each = np.asarray(errors)
     means, halves = each.mean(axis=0), SURE * each.std(axis=0, ddof=1) / sqrt(len(each))
     mean, tolerance = (
-        MeanError(mean=float(m), low=float(m - half), high=float(m + half))
+        MeanError(float(m), float(m - half), float(m + half))
         for m, half in zip(means, halves, strict=True)
     )
     return mean, tolerance
@@ -336,13 +328,7 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
     )
     resize(scene, found.size)
     return tuple(
-        Point(
-            method=name,
-            spp=spp,
-            seconds=Estimated(min(took), min(took), max(took)),
-            error=errors[name, spp][0],
-            tolerance=errors[name, spp][1],
-        )
+        Point(name, spp, Estimated(min(took), min(took), max(took)), *errors[name, spp])
         for (name, spp), renderer in renderers.items()
         if (took := renderer.times[-MEASURED_ROUNDS:])
     )

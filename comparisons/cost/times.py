@@ -85,13 +85,8 @@ def _line(counts: NDArray, wall: NDArray, per_sample: Draws, processors: float) 
     overhead = np.maximum(wall[0] - per_sample * counts[0], 0.0)
     between = int(np.argmin(np.abs(counts - counts[-1] / 4)))
     chord = np.interp(counts[between], counts[[0, -1]], wall[[0, -1], 0])
-    return Line(
-        overhead=overhead,
-        per_sample=per_sample,
-        processors=processors,
-        bend=float(wall[between, 0] / chord - 1),
-        shortest=float(wall[0, 0]),
-    )
+    bend = float(wall[between, 0] / chord - 1)
+    return Line(overhead, per_sample, processors, bend, float(wall[0, 0]))
 
 
 def interval(values: ArrayLike, unseen: float) -> Estimated:

@@ -1,7 +1,5 @@
 """Blocks of pixels: sums, neighbourhoods, and values spread over the pixels again."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -9,8 +9,6 @@ Sources: CIE 15:2018 (L*a*b*), ITU-R BT.2100-2 (ICtCp), Li et al., Color Res. Ap
 (CAM16), Sharma, Wu and Dalal, Color Res. Appl. 30(1), 2005 (CIE DE2000).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial

@@ -4,8 +4,6 @@ The share of counted pixels whose difference is above a threshold t decides, wit
 that noise leaves undecided widen its interval, and so a scene may be undecided, too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Literal
 
@@ -35,13 +33,7 @@ def checked_threshold(threshold: float) -> float:
 
 def share_above(visible: Sequence[VisibleShare], threshold: float = TOLERANCE) -> VisibleShare:
     """Return the share of pixels above a threshold, from a summary's ``visible``."""
-    for share in visible:
-        if share.threshold == threshold:
-            return share
-    listed = ", ".join(f"{share.threshold:g}" for share in visible)
-    raise InputError(
-        f"no share of pixels above {threshold:g} is recorded: give one of {listed or 'none'}."
-    )
+    return next(share for share in visible if share.threshold == threshold)
 
 
 def decide(

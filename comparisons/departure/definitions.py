@@ -4,8 +4,6 @@ They take as long as rendering does, so the compiled ones (`comparisons.departur
 instead; the tests and ``fotismos doctor`` compare them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

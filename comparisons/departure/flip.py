@@ -10,8 +10,6 @@ two products with a band matrix; the formulas in between are compiled. So it tak
 time of the authors' program (512 x 512 pixels: 71 against 370 ms, HDR-FLIP 129 against 736).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -151,7 +149,7 @@ class _Eye:
 
     @classmethod
     @lru_cache(maxsize=2)
-    def at(cls, pixels: float) -> _Eye:
+    def at(cls, pixels: float) -> "_Eye":
         widest = max(width for parts in _SENSITIVITY for _, width in parts)
         reach = ceil(3.0 * sqrt(widest / 2.0) / pi * pixels)
         spread = 0.5 * _FEATURE * pixels

@@ -32,8 +32,6 @@ If only the positions of camera rays are random, and both images share them, the
 pixels that differ by more than rounding differ.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -155,7 +153,7 @@ class _Around:
     own_freedom: int
 
     @classmethod
-    def of(cls, difference: DifferenceEstimate, counted: NDArray[np.bool_]) -> _Around:
+    def of(cls, difference: DifferenceEstimate, counted: NDArray[np.bool_]) -> "_Around":
         parts = [_sums(difference, counted, rows) for rows in bands(len(counted))]
         pixels, mean, variance, squares, *skewed = map(np.concatenate, zip(*parts, strict=True))
         third, moved = np.array(skewed[:2]), np.array(skewed[2:])
@@ -236,7 +234,7 @@ class _Pixels:
     @classmethod
     def of(
         cls, difference: DifferenceEstimate, around: _Around, rows: slice, mask: NDArray[np.bool_]
-    ) -> _Pixels:
+    ) -> "_Pixels":
         """Return the pixels of some rows that are in a mask (H, W) of the whole image."""
         mask = mask[rows]
         mean, own = difference.mean[rows][mask], _variance(difference, rows)[mask]

@@ -33,8 +33,6 @@ Every image is a float array (H, W, 3) of linear light with the sRGB primaries (
 1.0 is display white. Statistics over an image are in `comparisons.departure.statistics`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -36,8 +36,6 @@ All of it is computed on sampled blocks (`reference.rendering.sums.sample`), at 
 pixels; the bias found there is applied to the whole image.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -116,10 +114,7 @@ def _fields(metric: Metric, value: float, low: float, high: float, shares: Array
     shares[2] = np.maximum.accumulate(shares[2][::-1])[::-1]
     shares[0] = np.clip(np.minimum.accumulate(shares[0]), *shares[1:])
     rows = np.column_stack([metric.visible, shares.T]).tolist()
-    visible = tuple(
-        VisibleShare(threshold=limit, value=share, low=least, high=most)
-        for limit, share, least, most in rows
-    )
+    visible = tuple(VisibleShare(*row) for row in rows)
     return {"debiased": value, "low": low, "high": high, "visible": visible}
 
 
@@ -237,7 +232,7 @@ class _Extrapolated:
     @classmethod
     def of(
         cls, metric: Metric, distances: Distances, grouped: Grouped, chosen: Sequence[int]
-    ) -> _Extrapolated:
+    ) -> "_Extrapolated":
         means, sizes = grouped.means[chosen], grouped.sizes[chosen]
         mean = np.average(means, axis=0, weights=sizes)
         added_noise = np.tensordot(contrasts(sizes), means, 1)

@@ -10,8 +10,6 @@ Every counted pixel belongs to the first surface that the ray through its centre
 of all shapes add up to 1, as do the shares of all materials.
 """
 
-from __future__ import annotations
-
 from operator import itemgetter
 from typing import Annotated, Any
 

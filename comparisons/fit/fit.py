@@ -129,7 +129,7 @@ def fit(
         viewing=options.viewing,
         pairing=options.pairing,
         loss={"name": loss, "unit": LOSSES[loss].unit},
-        pixels=Pixels(counted=int(rendered.counted.sum()), total=rendered.counted.size),
+        pixels=Pixels(int(rendered.counted.sum()), rendered.counted.size),
         fits=tuple(one for one, _, _ in fits),
         best=best,
         warnings=tuple(ready.warnings()),
@@ -216,10 +216,10 @@ def _best(
     physical = physical_materials(rendered.ready.pair.physical)
     materials = tuple(
         FittedMaterial(
-            name=name,
-            reference=physical.get(name),
-            pixels=fitted.reached[owner],
-            parameters=tuple(
+            name,
+            physical.get(name),
+            fitted.reached[owner],
+            tuple(
                 parameter_record(fitted, place, x, certainties, covariance)
                 for place, parameter in enumerate(fitted.parameters)
                 if parameter.owner == owner
@@ -280,11 +280,8 @@ def departures(
         first, maps[name] = (
             metric(image, reference, viewing) for image in (rendered.before, after)
         )
-        means = [metric.mean(values[counted]) for values in (first, maps[name])]
-        by_metric[name] = FitDeparture(
-            before=means[0],
-            after=means[1],
-            p95_after=float(np.percentile(maps[name][counted], 95)),
-            noise_floor=noise_floor(metric, reference, rendered.difference.noise, counted, viewing),
-        )
+        before, after_fit = (metric.mean(values[counted]) for values in (first, maps[name]))
+        p95 = float(np.percentile(maps[name][counted], 95))
+        floor = noise_floor(metric, reference, rendered.difference.noise, counted, viewing)
+        by_metric[name] = FitDeparture(before, after_fit, p95, floor)
     return by_metric, maps

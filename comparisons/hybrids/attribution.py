@@ -212,18 +212,17 @@ def attribute(images: HybridImages, meter: ErrorMeter, shapes: ObjectIds, seed: 
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
     contributions = tuple(
         Contribution(
-            effect=effect.label,
-            removes=jackknifed(removed[effect.label].mean(axis=1)),
-            alone=float((error(nothing) - error(frozenset({effect})))[0].mean()),
-            last=float((error(everything - {effect}) - error(everything))[0].mean()),
-            sampling_error=sampling_error,
+            effect.label,
+            jackknifed(removed[effect.label].mean(axis=1)),
+            float((error(nothing) - error(frozenset({effect})))[0].mean()),
+            float((error(everything - {effect}) - error(everything))[0].mean()),
+            sampling_error,
         )
         for effect, sampling_error in zip(effects, sampling_errors, strict=True)
     )
     closure = jackknifed(error(everything).mean(axis=1))
     hybrids = [
-        Hybrid(effects=labels(effects, each), error=float(found[0].mean()))
-        for each, found in errors.items()
+        Hybrid(labels(effects, each), float(found[0].mean())) for each, found in errors.items()
     ]
 
     def filled(values: NDArray) -> NDArray[np.float64]:
@@ -239,7 +238,7 @@ def attribute(images: HybridImages, meter: ErrorMeter, shapes: ObjectIds, seed: 
         record=Attribution(
             effects=contributions,
             departure=float(departure[0].mean()),
-            closure=MeanError(mean=closure.value, low=closure.low, high=closure.high),
+            closure=MeanError(*structs.astuple(closure)),
             implementation=float(rounding.mean()),
             resolution=meter.counted.shape[::-1],
             spp=images.spp,
@@ -270,12 +269,12 @@ def by_object(
     remaining = means(left, rows, count)
     return tuple(
         ObjectContribution(
-            name=one.name,
-            pixels=one.pixels,
-            share=one.share,
-            departure=one.mean_dE2000,
-            removes=tuple(jackknifed(each[:, row]) for each in gains),
-            left=float(remaining[row]),
+            one.name,
+            one.pixels,
+            one.share,
+            one.mean_dE2000,
+            tuple(jackknifed(each[:, row]) for each in gains),
+            float(remaining[row]),
         )
         for row, one in enumerate(found)
     )

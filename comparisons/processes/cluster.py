@@ -15,7 +15,7 @@ from threading import Lock
 from typing import Any
 from uuid import uuid4
 
-from comparisons.processes.pool import Task, once
+from comparisons.processes.pool import Pool, Task, once
 from heuristic import program
 from heuristic.errors import FotismosError, InstallationError, LostProcessError
 
@@ -42,7 +42,7 @@ def silent(*words: object) -> None:
     """Discard progress."""
 
 
-class Cluster:
+class Cluster(Pool):
     """Does tasks on a Dask cluster, as a pool does in processes here.
 
     ``prepare`` is called once in each worker, before its first task. It must be picklable, and
@@ -58,11 +58,6 @@ class Cluster:
     def end(self) -> None:
         """Release all tasks."""
         self._client.close()
-
-    def do(self, task: Task) -> Any:
-        """Do one task, and return what it returned, or raise what it raised."""
-        ((_, outcome),) = self.each([task])
-        return outcome.result()
 
     def each(self, tasks: Iterable[Task]) -> Iterator[tuple[Task, Future[Any]]]:
         """Do tasks; yield each with its outcome when it finishes.

@@ -239,9 +239,7 @@ def hemisphere() -> tuple[np.ndarray, np.ndarray]:
     projected solid angle, and sum to 1.
     """
     x, w = np.polynomial.legendre.leggauss(HEIGHTS)
-    w = w / 2
     y, v = np.polynomial.legendre.leggauss(AZIMUTHS)
-    v = v / 2
     theta, phi = np.meshgrid((x + 1) * 45, (y + 1) * 90)
     weight = np.outer(v, w * np.sin(np.deg2rad(x * 90 + 90)))
     return direction(theta.ravel(), phi.ravel()), weight.ravel() / weight.sum()

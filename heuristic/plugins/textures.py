@@ -34,15 +34,16 @@ Mitsuba's ``normalmap`` and ``bumpmap`` define it (Blinn 1978): for heights ``h`
 displaced surface is ``(dp/du + dh/du n) x (dp/dv + dh/dv n)``.
 """
 
+from numbers import Real
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
 from heuristic.materials import SMALLEST_ALPHA
+from heuristic.plugins.coefficients import coefficient
 
 SCALARS = ("weight", "alpha")
-NUMBERS = ("scale", "return")
 LARGEST = 1e9
 
 
@@ -82,7 +83,10 @@ def define() -> dict[str, Any]:
         def __init__(self, props):
             super().__init__(props)
             names, self.operation = OPERATIONS[props.plugin_name()]
-            self.operands = {name: _operand(props, name) for name in names}
+            self.operands = {
+                name: props[name] if isinstance(props[name], Real) else coefficient(props, name)
+                for name in names
+            }
 
         def eval(self, si, active=True):
             return mi.Spectrum(self._value("eval", si, active))
@@ -162,15 +166,3 @@ def define() -> dict[str, Any]:
             return si.to_local(normal)
 
     return dict.fromkeys(OPERATIONS, Computed) | {"heuristic_tilt": Tilt}
-
-
-def _operand(props, name):
-    """Read an operand; plain numbers and colours may be larger than a reflectance."""
-    value = props[name]
-    if name in NUMBERS:
-        return value
-    is_colour = isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d)
-    components = tuple(value) if is_colour else (value,)
-    if all(isinstance(part, (int, float)) for part in components) and max(components) > 1:
-        return props.get_unbounded_texture(name)
-    return props.get_texture(name)

@@ -25,7 +25,7 @@ both signs, and Beckmann's slopes along x and y are independent.
 
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from math import exp, log, sqrt
+from math import exp, log
 from typing import NamedTuple
 
 import drjit as dr
@@ -157,32 +157,23 @@ def of_smooth_plastic(
 def ior_of_lobe(plastic: RoughPlastic, albedo: float) -> float:
     """Return the IOR at which the specular part has an albedo, or the nearest one allowed.
 
-    The search begins at the inverse of a smooth surface's ``((ior - 1) / (ior + 1))^2``.
+    The search is over the logarithm of ``ior - 1``: the albedo falls with its square.
     """
     largest = LARGEST_IOR if plastic.alpha else LARGEST_SMOOTH_IOR
 
-    def reached(log_ior):
-        int_ior = exp(min(max(log_ior, log(SMALLEST_IOR)), log(largest)))
-        return max(specular_of(replace(plastic, int_ior=int_ior)))
+    def distance(x):
+        return log(max(specular_of(replace(plastic, int_ior=1 + exp(x)))) / albedo)
 
     if albedo <= 0:
         return LITERAL_IOR
-    if albedo >= reached(log(largest)):
+    low, high = log(SMALLEST_IOR - 1), log(largest - 1)
+    if distance(high) <= 0:
         return largest
-    if albedo <= reached(log(SMALLEST_IOR)):
+    if distance(low) >= 0:
         return SMALLEST_IOR
-    from scipy.optimize import root_scalar  # loaded late: a tenth of a command's start
+    from scipy.optimize import brentq  # loaded late: a tenth of a command's start
 
-    root = min(sqrt(albedo), 0.8)
-    guess = log((1 + root) / (1 - root))
-    found = root_scalar(
-        lambda log_ior: log(reached(log_ior) / albedo),
-        x0=guess,
-        x1=1.1 * guess,
-        method="secant",
-        xtol=1e-7,
-    )
-    return exp(found.root)
+    return 1 + exp(brentq(distance, low, high, xtol=1e-7))
 
 
 def nearest_ior(plastic: RoughPlastic, albedo: Albedo) -> float:
@@ -333,7 +324,7 @@ def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic,
         for target, value in zip(targets, getattr(of_roughplastic(plastic), part), strict=True):
             if abs(value - target) > MATCHING_TOLERANCE * max(target, 1e-3):
                 what = f"{part} albedo at normal incidence"
-                missed[part, target] = Miss(what=what, wanted=float(target), reached=float(value))
+                missed[part, target] = Miss(what, float(target), float(value))
     return plastic, tuple(missed.values())
 
 

@@ -123,9 +123,9 @@ class Replacements:
     misses: list[Miss] = field(default_factory=list)
     lost: list[Unrepresentable] = field(default_factory=list)
 
-    def lose(self, name: str, plugin: str, lost: str, nearest: str) -> None:
-        """Record what has no form in the heuristic model, and what replaces it."""
-        self.lost.append(Unrepresentable(name=name, plugin=plugin, lost=lost, nearest=nearest))
+    def lose(self, *words: str) -> None:
+        """Record what has no form in the heuristic model, see :class:`Unrepresentable`."""
+        self.lost.append(Unrepresentable(*words))
 
     def bsdf(self, name: str, given: str, derived: str, parameters: dict, note: str = "") -> None:
         """Record the partner of a BSDF; a tuple of equal components becomes one number."""
@@ -133,19 +133,13 @@ class Replacements:
             key: value[0] if isinstance(value, tuple) and len(set(value)) == 1 else value
             for key, value in parameters.items()
         }
-        self.bsdfs.append(
-            BsdfPair(name=name, given=given, derived=derived, parameters=short, note=note)
-        )
+        self.bsdfs.append(BsdfPair(name, given, derived, short, note))
 
     def emitter(
         self, name: str, given: str, derived: str, factor: float, exact: bool = True, note: str = ""
     ) -> None:
         """Record the partner of a light."""
-        self.emitters.append(
-            EmitterPair(
-                name=name, given=given, derived=derived, factor=factor, exact=exact, note=note
-            )
-        )
+        self.emitters.append(EmitterPair(name, given, derived, factor, exact, note))
 
 
 def alpha_of(n: float, form: str = "phong") -> float:

@@ -132,6 +132,12 @@ class Plan(Record):
     heuristic_reads: tuple[str, ...] = ()
     guard: Guard | None = None
 
+    @property
+    def simulation(self) -> str:
+        """The integrator, and what it does without, in words."""
+        rays = "" if self.shadows else ", no shadow rays"
+        return self.integrator + rays + ", environment from a table" * self.tabulated_environment
+
     def calls_for(self, effect: Effect) -> bool:
         """Return whether the scene needs an effect."""
         return next(d.called_for for d in self.effects if d.name == effect.label)
@@ -278,13 +284,9 @@ def wants_spectra(graph: Graph) -> bool:
 
     Tabulated spectra, black bodies and spectral films; not Mitsuba's daylight (``d65``).
     """
-    if any(graph.plugin(i) == "specfilm" for i in graph.nodes(mi.ObjectType.Film)):
-        return True
-    tabulated = ("regular", "irregular", "blackbody")
-    if any(graph.plugin(i) in tabulated for i in graph.nodes(mi.ObjectType.Texture)):
-        return True
-    return any(
+    in_use, tabulated = graph.nodes_in_use(), ("regular", "irregular", "blackbody", "specfilm")
+    return any(graph.plugin(index) in tabulated for index in in_use) or any(
         hasattr(value, "is_uniform") and not value.is_uniform()
-        for index in graph.nodes_in_use()
+        for index in in_use
         for _, value in graph.props(index).items()
     )

@@ -69,12 +69,8 @@ class PruningRule:
         if self.name not in facts.rule_results:
             objections = ((p.sentence, p.against(facts)) for p in self.premises)
             premise, found = next((pair for pair in objections if pair[1] is not None), ("", None))
-            facts.rule_results[self.name] = RuleResult(
-                name=self.name,
-                applies=found is None,
-                premise=premise,
-                evidence=self.absent if found is None else found,
-            )
+            evidence = self.absent if found is None else found
+            facts.rule_results[self.name] = RuleResult(self.name, found is None, premise, evidence)
         return facts.rule_results[self.name]
 
     def objection(self, facts: Facts) -> str | None:

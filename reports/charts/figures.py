@@ -4,8 +4,6 @@ The map has the fixed range of its metric, so that strips of different scenes ca
 Pictures are kept pixel for pixel. The files are reproducible: they hold no date.
 """
 
-from __future__ import annotations
-
 from io import BytesIO
 from pathlib import Path
 from typing import Any

@@ -214,22 +214,22 @@ def of_comparison(
 ) -> str:
     """Return the summary of a run: its verdict, a row for each scene, and its gates."""
     headings = ("Scene", "Pixels that differ", f"Mean {LEADING.label}", "What to do")
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for record, cost in scenes:
         numbers = (
             percent(verdict.share(record, threshold).value),
             number(record.metrics[LEADING.name].mean),
         )
         words = f"{verdict.cause(record)} {verdict.sentence(record, cost, threshold)}"
-        rows.append((escaped(record.scene), *numbers, escaped(words.strip())))
+        rows.append((record.scene, *numbers, words.strip()))
     records = [record for record, _ in scenes]
     first = verdict.headline(records, threshold)
     second = verdict.most_missing(records, threshold)
     parts = ["### fotismos compare", escaped(f"{first} {second}".strip())]
-    parts.append("\n".join(markdown([headings, *rows])))
+    parts.append(_marked_down([headings, *rows]))
     if gates:
-        cells = [[escaped(text) for text in gate.cells()] for gate in gates]
-        parts += ["\n".join(markdown([GATE_HEADINGS, *cells])), gate_outcome(gates)]
+        rows = [gate.cells() for gate in gates]
+        parts += [_marked_down([GATE_HEADINGS, *rows]), gate_outcome(gates)]
     return "\n\n".join([*parts, _where(page)]) + "\n\n"
 
 
@@ -244,9 +244,12 @@ def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
             what, *numbers = made.moved[0].cells()
             cells = (f"{what} ({len(made.moved)} in all)", *numbers)
         rows.append((made.name, made.status, *cells))
-    table = markdown([rows[0], *([escaped(cell) for cell in row] for row in rows[1:])], right=3)
-    parts = ["### fotismos check", outcome(checks, level), "\n".join(table)]
+    parts = ["### fotismos check", outcome(checks, level), _marked_down(rows, right=3)]
     return "\n\n".join([*parts, *([_where(page)] if page else ())]) + "\n\n"
+
+
+def _marked_down(rows: Sequence[Sequence[str]], right: int = 1) -> str:
+    return "\n".join(markdown([[*map(escaped, row)] for row in rows], right))
 
 
 def _where(page: str) -> str:

@@ -1,7 +1,5 @@
 """Assertions on a scene: how far it departs from physics, and that nothing moved."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -33,7 +31,7 @@ class Departure(float):
     noise_floor: float | None
     passes: int
 
-    def __new__(cls, value: float, **about: Any) -> Departure:
+    def __new__(cls, value: float, **about: Any) -> "Departure":
         """Return the number with its attributes."""
         made = super().__new__(cls, value)
         vars(made).update(about)
@@ -135,7 +133,11 @@ class Fotismos:
             checks.update(file, case, significance)
         else:
             result, _ = checks.examine(file, case, significance, self.pictures() / path.stem)
-            _require_passed(result)
+            if result.status != "passed":
+                text = [f"{path}: {len(result.moved or ())} of {result.tested} moved"]
+                text += [*summary.moved_lines(result), result.versions_line]
+                text += [f"pictures: {result.pictures}"]
+                raise AssertionError("\n".join(filter(None, text)))
             if result.message:
                 warnings.warn(f"{path}: {result.message}", stacklevel=2)
         return True
@@ -192,12 +194,3 @@ def _name(scene: Scene) -> str:
     if isinstance(scene, Mapping):
         raise InputError("a scene that is a dictionary needs a name: unchanged(scene, name=...).")
     return baselines.name_of(scene)
-
-
-def _require_passed(made: checks.CheckRecord) -> None:
-    if made.status == "passed":
-        return
-    text = [f"{made.baseline}: {len(made.moved or ())} of {made.tested} moved"]
-    text += summary.moved_lines(made)
-    text += [line for line in (made.versions_line, f"pictures: {made.pictures}") if line]
-    raise AssertionError("\n".join(text))

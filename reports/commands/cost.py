@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from comparisons.processes.pool import Task
 from heuristic.errors import InputError
 from reports import jobs
 from reports.terminal.words import tell, tell_where
@@ -54,23 +53,18 @@ def cost(
     """  # noqa: D301 click reads the \b as: keep these lines
     if is_measured and at is None:
         raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
-    with jobs.pool(timeout) as pool:
-        pool.start()
-        from reference.records import to_json
-        from reports.files.results import PAGE, hold, own, places
-        from reports.terminal import cost_tables, progress
+    words = (jobs.request(rendering), rounds, at, is_measured)
+    found = jobs.results_of(output, "cost", timeout, [scene], measured, *words)
+    from reference.records import to_json
+    from reports.files.results import PAGE
+    from reports.terminal import cost_tables
 
-        with hold(output, jobs.command_line()) as top:
-            folder = own(top / "cost")
-            (place,) = places(folder, [scene])
-            with progress.shown() as bar:
-                asked = (scene, jobs.request(rendering), rounds, at, is_measured)
-                record = pool.do(Task(place, measured, (*asked, folder / place), bar.of(place)))
+    ((folder, record),) = found.items()
     if as_json:
         click.echo(to_json(record), nl=False)
         return
     tell(cost_tables.lines(record))
-    tell_where(folder / place / PAGE)
+    tell_where(folder / PAGE)
 
 
 def measured(

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 from comparisons.options import Options
-from comparisons.processes.pool import Task
 from reports import jobs
 from reports.terminal.words import tell_where
 
@@ -26,19 +25,12 @@ def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
       fotismos export cornell-box
       fotismos export my_scene.xml --resolution 640x480 -o for_my_engine
     """  # noqa: D301 click reads the \b as: keep these lines
-    with jobs.pool(timeout) as pool:
-        pool.start()
-        from reports.files.results import hold, own, places
-
-        with hold(output, jobs.command_line()) as top:
-            folder = own(top / "export")
-            (place,) = places(folder, [scene])
-            words = (scene, jobs.request(rendering), folder / place)
-            pool.do(Task(place, exported, words))
-    tell_where(folder / place)
+    request = jobs.request(rendering)
+    (folder,) = jobs.results_of(output, "export", timeout, [scene], exported, request)
+    tell_where(folder)
 
 
-def exported(name: str, request: Options, place: Path) -> None:
+def exported(name: str, request: Options, place: Path, progress: Any) -> None:
     """Write the files that another program needs to render a scene."""
     from comparisons.case import open_case
     from comparisons.plain_scene import plain_scene

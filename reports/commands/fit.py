@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from comparisons.processes.pool import Task
 from reports import jobs
 from reports.terminal.words import tell, tell_where
 
@@ -59,48 +58,33 @@ def fit(
       fotismos fit fig-8-9
       fotismos fit my_scene.xml --loss linear --form phong
     """  # noqa: D301 click reads the \b as: keep these lines
-    with jobs.pool(timeout) as pool:
-        pool.start()
-        from heuristic.materials import FORMS
-        from reference.records import plain
-        from reports.files.results import PAGE, hold, own, places
-        from reports.run import fit_files
-        from reports.terminal import progress
+    given = {"loss": loss, "form": form}
+    found = jobs.results_of(output, "fit", timeout, scenes, fitted, jobs.request(words), given)
+    from reference.records import plain
+    from reports.files.results import PAGE
+    from reports.run import fit_files
 
-        forms = FORMS if form == "all" else (form,)
-        common = (jobs.request(words), forms, {"loss": loss, "form": form})
-        with hold(output, jobs.command_line()) as top:
-            folder = own(top / "fit")
-            folders = places(folder, scenes)
-            with progress.shown() as bar:
-                fits = [
-                    Task(place, fitted, (scene, *common, folder / place), bar.of(place))
-                    for place, scene in folders.items()
-                ]
-                records = [outcome.result() for _, outcome in pool.each(fits)]
     if as_json:
-        click.echo(json.dumps(plain(records), indent=2, ensure_ascii=False))
+        click.echo(json.dumps(plain([*found.values()]), indent=2, ensure_ascii=False))
         return
-    for record in records:
+    for record in found.values():
         tell(fit_files.lines(record))
-    tell_where(folder / next(iter(folders)) / PAGE if len(folders) == 1 else folder)
+    folder, *others = found
+    tell_where(folder.parent if others else folder / PAGE)
 
 
 def fitted(
-    name: str,
-    request: Options,
-    forms: tuple[str, ...],
-    words: dict[str, str],
-    place: Path,
-    progress: Any,
+    name: str, request: Options, words: dict[str, str], place: Path, progress: Any
 ) -> FitRecord:
-    """Fit the heuristic to a scene, and write the fit's files; ``words`` are for its command."""
+    """Fit the heuristic to a scene, and write the fit's files; ``words`` are the command's."""
     from comparisons.case import open_case
     from comparisons.fit.fit import fit
+    from heuristic.materials import FORMS
     from reports.run import fit_files
 
     case = open_case(name, request)
     command = case.command("fit", **words)
+    forms = FORMS if words["form"] == "all" else (words["form"],)
     result = fit(case.source, case.options, words["loss"], forms, progress, command)
     fit_files.write(place, result)
     return result.record

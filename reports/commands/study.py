@@ -42,7 +42,9 @@ def study(
     with hold(output, jobs.command_line()) as top:
         studies = own(top / "study")
         (place,) = assigned(studies, [(chosen.name, file)])
-        folder = study_files.prepare(studies / place)
+        folder = studies / place
+        for part in (folder, folder / study_files.FIGURES, folder / running.POINTS):
+            own(part)  # a study replaces only its own results
         with jobs.pool(timeout, tasks, workers, scheduler) as pool, progress.shown("points") as bar:
             table, done = running.run(chosen, folder, pool, bar.of(chosen.name), points)
         places = study_files.write(chosen, table, folder)

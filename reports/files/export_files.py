@@ -107,7 +107,8 @@ def gltf(scene: PlainScene) -> dict[str, Any]:
         "meshes": meshes,
         "accessors": [_accessor(number, array) for number, array in enumerate(arrays)],
         "bufferViews": [
-            {"buffer": 0, "byteOffset": start, "byteLength": array.nbytes, "target": _target(array)}
+            {"buffer": 0, "byteOffset": start, "byteLength": array.nbytes}
+            | {"target": 34963 if array.ndim == 1 else 34962}  # indices, attributes of vertices
             for start, array in zip(starts, arrays, strict=False)
         ],
         "buffers": [
@@ -144,10 +145,6 @@ def _accessor(number: int, array: np.ndarray) -> dict[str, Any]:
         "type": kind,
         **(bounds if kind == "VEC3" else {}),
     }
-
-
-def _target(array: np.ndarray) -> int:
-    return 34963 if array.ndim == 1 else 34962  # indices, attributes of vertices
 
 
 def _material(material: dict[str, Any]) -> dict[str, Any]:

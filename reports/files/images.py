@@ -5,8 +5,6 @@ Colour maps are Matplotlib's tables, read without pyplot: magma for errors, RdBu
 printed next to the picture; values beyond them take the end's colour.
 """
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping, Sequence
 from functools import lru_cache

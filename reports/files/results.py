@@ -6,8 +6,6 @@ One command at a time writes to a folder. A scene's record is removed first and 
 (:mod:`reports.run.scene`): without it, the scene is unfinished, and begins again.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 import os
@@ -16,7 +14,7 @@ import unicodedata
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated
@@ -242,10 +240,7 @@ def _candidates(name: str) -> Iterator[str]:
     plain = plain.encode(errors="replace")[:LONGEST].decode(errors="ignore").strip(".") or "scene"
     if plain.casefold() not in RESERVED:
         yield plain
-    number = 1
-    while True:
-        number += 1
-        yield f"{plain}-{number}"
+    yield from (f"{plain}-{number}" for number in count(2))
 
 
 def _subject_of(place: Path) -> str:

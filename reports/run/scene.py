@@ -200,7 +200,7 @@ def write(
     digests = {file: _digest(content) for file, content in made.items()}
     digests[PICTURE] = _digest_of(place / PICTURE)
     results.clear(place, earlier - digests.keys())
-    finished = Finished(view=view, digests=digests)
+    finished = Finished(view, digests)
     atomic.Entry(place / VIEW, key or "none").save(plain(finished))
     results.write(place / RECORD, made[RECORD])
     return view

@@ -7,18 +7,10 @@ import pyarrow as pa
 
 from comparisons.study import dataset
 from comparisons.study.design import StudyFile
-from comparisons.study.running import POINTS
 from reports.charts import study_charts, vega
 from reports.files import results
 
 FIGURES = "figures"
-
-
-def prepare(folder: Path) -> Path:
-    """Make a study's folder, and ensure that the study will replace only its own results."""
-    for place in (folder, folder / FIGURES, folder / POINTS):
-        results.own(place)
-    return folder
 
 
 def write(study: StudyFile, table: pa.Table, folder: Path) -> tuple[Path, Path]:

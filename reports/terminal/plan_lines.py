@@ -55,15 +55,8 @@ def plan_report(scene: str, ready: Prepared, variant: str) -> PlanReport:
 def _planned(decision: Decision) -> PlannedEffect:
     effect = labelled(decision.name)
     rule, _, evidence = decision.rule.partition(": ")
-    return PlannedEffect(
-        name=effect.label,
-        called_for=decision.called_for,
-        rule=rule,
-        evidence=evidence,
-        heuristic=effect.heuristic,
-        reference=effect.reference,
-        cost=effect.cost,
-    )
+    forms = effect.heuristic, effect.reference, effect.cost
+    return PlannedEffect(effect.label, decision.called_for, rule, evidence, *forms)
 
 
 def plan_lines(plan: PlanReport) -> Iterator[str]:
@@ -79,13 +72,11 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
         yield from printed([headings, *rules])
         yield ""
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
-    rays = "" if plan.shadows else ", no shadow rays"
-    rays += ", environment from a table" if plan.tabulated_environment else ""
     reads = ", ".join(plan.heuristic_reads) or "nothing"
     yield f"heuristic     {plan.shading}, which reads {reads}"
     yield f"kernel terms  {', '.join(plan.kernel_terms) or 'none'}"
     yield f"variant       {plan.variant}"
-    yield f"integrator    {plan.integrator}{rays}"
+    yield f"integrator    {plan.simulation}"
     yield f"depth         {depth}"
     yield f"samples       {plan.spp} per pixel in {plan.passes} passes, {plan.sampler}"
     yield f"planning      {plan.planning_s * 1e3:.0f} ms"

@@ -1,7 +1,5 @@
 """Tables of results, on the terminal and as CSV and Markdown."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -174,10 +172,9 @@ def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:
 def details(record: ComparisonRecord) -> Iterator[str]:
     """Yield the verbose lines of a scene: simulation, pairing, losses, warnings, times."""
     plan, pairing = record.plan, record.pairing
-    shadows = "" if plan.shadows else ", no shadow rays"
     yield (
-        f"{record.scene}: {plan.integrator}{shadows}, {plan.spp} samples per pixel in"
-        f" {plan.passes} passes, {plan.sampler}"
+        f"{record.scene}: {plan.simulation}, {plan.spp} samples per pixel in {plan.passes} passes,"
+        f" {plan.sampler}"
     )
     for light in pairing.emitters:
         note = f" ({light.note})" if light.note else ""

@@ -4,8 +4,6 @@ Results go to standard output, everything else to standard error. Numbers are th
 and on every page.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re
