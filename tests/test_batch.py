@@ -148,7 +148,7 @@ def test_a_batch_killed_at_random_moments_goes_on_to_the_results_of_a_whole_one(
     whole = _start(box_filtered, tmp_path / "whole")
     assert whole.communicate(timeout=300)[1] == ""
     seconds, out, kept = time.perf_counter() - begin, tmp_path / "killed", {}
-    for number in range(6):
+    for number in range(3):
         batch = _start(box_filtered, out)
         time.sleep(seconds * random.uniform(0.3, 0.9))
         batch.kill()

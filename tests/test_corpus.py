@@ -1,4 +1,4 @@
-"""Every plugin that Mitsuba ships goes through `compare`, or is refused for Mitsuba's own reason.
+"""Every plugin that Mitsuba ships is rendered in both halves, or refused for Mitsuba's own reason.
 
 The scenes of `tests/corpus` are small and one feature each; the files that they read are made by
 `tests.corpus_files`.
@@ -14,6 +14,7 @@ import pytest
 
 from comparisons.compare import compare
 from comparisons.options import Options
+from comparisons.prepared import prepare
 from heuristic.errors import InputError
 from reference import Source
 from reference.planning.plan import wants_spectra
@@ -35,7 +36,8 @@ IN_EVERY_RUN = (
     "emitter-area", "emitter-envmap", "film-crop", "medium-homogeneous", "sensor-several",
     "shape-instance", "shape-merge",
 )  # fmt: skip
-"""What the project's code treats in its own way; the rest is rendered with --all."""
+"""What the project's code treats in its own way goes all through `compare`; with --all the halves
+of the rest are rendered."""
 
 EXCEPTIONS = {
     "measured_polarized": "only polarised variants have it",
@@ -97,10 +99,8 @@ def unnumbered(refusal):
     return re.sub(r"\(r\d+\)", "", str(refusal.value))
 
 
-def check(path):
-    mi.set_variant(variant_of(path))
-    comparison = compare(Source(path.stem, path), Options(spp=4))
-    for image in (comparison.images.heuristic, comparison.images.reference):
+def require_pictures(*images):
+    for image in images:
         assert np.isfinite(image).all()
         assert image.max() > 0, "a black picture compares nothing"
 
@@ -120,13 +120,19 @@ ENDS_PYTHON = ("sensor-batch",)
 
 @pytest.mark.parametrize("name", IN_EVERY_RUN)
 def test_a_scene_is_compared(name, rgb, corpus):
-    check(corpus / f"{name}.xml")
+    path = corpus / f"{name}.xml"
+    mi.set_variant(variant_of(path))
+    images = compare(Source(name, path), Options(spp=4)).images
+    require_pictures(images.heuristic, images.reference)
 
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("name", sorted({*NAMES} - {*IN_EVERY_RUN, *REFUSED, *ENDS_PYTHON}))
-def test_any_other_scene_is_compared(name, rgb, corpus):
-    check(corpus / f"{name}.xml")
+def test_the_halves_of_any_other_scene_are_rendered(name, rgb, corpus):
+    path = corpus / f"{name}.xml"
+    mi.set_variant(variant_of(path))
+    ready = prepare(Source(name, path), Options(spp=4))
+    require_pictures(*(np.array(half.render(0)) for half in (ready.heuristic, ready.reference)))
 
 
 def test_the_corpus_covers_all_plugins_but_those_that_it_says():

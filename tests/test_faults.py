@@ -24,15 +24,15 @@ COMPARE = ("compare", "a.xml", *SMALL)
 STUDY = """[[part]]
 scene = "lobe"
 [part.parameters]
-alpha = { from = 0.1, to = 0.8, steps = 9 }
+alpha = { from = 0.1, to = 0.8, steps = 4 }
 """
 RIGHTS = "exec setpriv --bounding-set -dac_override,-dac_read_search,-fowner "
 """Rights of files hold for root, too."""
 
 FAULTS = (
-    ("no scene", ("compare", "text.xml", *SMALL), "", 2, "text.xml: .*not valid|XML|syntax"),
     ("a script that exits", ("compare", "exit.py", *SMALL), "", 2, "exit.py"),
-    ("a script that is killed", ("compare", "kill.py", *SMALL), "", 1, "SIGKILL"),
+    ("no scene, and a script that is killed", ("compare", "text.xml", "kill.py", *SMALL), "", 2,
+     "2 of 2 scenes failed, among them: text"),
     ("no time", (*COMPARE, "--timeout", "1e-9"), "", 1, "made no progress"),
     ("no scheduler", (*COMPARE, "--scheduler", "x"), "", 2, "scheduler"),
     ("a file in the way", ("compare", "a.xml", "-o", "mine.txt"), "", 2, "mine.txt"),
@@ -121,9 +121,9 @@ def test_an_interrupted_command_goes_on(words, folder):
     whole, _ = finish()
     shutil.rmtree(folder / "out")
     _, seconds = finish()  # its kernels are there, as for all others
+    shutil.rmtree(folder / "out")
     random = Random(words[0])
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
-        shutil.rmtree(folder / "out")
+    for number in (signal.SIGINT, signal.SIGTERM):
         mark = uuid.uuid4().hex
         process = started(folder, words, "exec", mark)
         time.sleep(random.uniform(0.3, 0.9) * seconds)
@@ -132,4 +132,4 @@ def test_an_interrupted_command_goes_on(words, folder):
         assert process.returncode in (0, 128 + number, -number), printed
         assert "Traceback" not in printed or process.returncode == -number
         assert not orphans(mark)
-        assert finish()[0] == whole
+    assert finish()[0] == whole

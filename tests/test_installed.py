@@ -16,11 +16,13 @@ pytestmark = pytest.mark.thorough
 def installed(tmp_path_factory):
     """The folder of programs of an environment in which a wheel of this project is installed."""
     folder = tmp_path_factory.mktemp("installed")
-    do(sys.executable, "-m", "pip", "wheel", "-q", "--no-deps", "-w", folder, ROOT)
+    pip = (sys.executable, "-m", "pip", "-q", "--disable-pip-version-check")
+    do(*pip, "wheel", "--no-deps", "-w", folder, ROOT)
     (wheel,) = folder.glob("fotismos-*.whl")
-    do(sys.executable, "-m", "venv", folder / "env")
+    do(sys.executable, "-m", "venv", "--without-pip", folder / "env")
     programs = folder / "env/bin"
-    do(programs / "python", "-m", "pip", "install", "-q", wheel, "pytest")
+    # What nobody imports need not be compiled.
+    do(*pip, "--python", programs / "python", "install", "--no-compile", wheel, "pytest")
     return programs
 
 

@@ -26,20 +26,14 @@ def scene():
 """
 
 DEEDS = {
-    "changes folder": "import os; os.chdir('/')",
-    "changes umask": "import os; os.umask(0o777)",
-    "changes environment": "import os; os.environ.clear()",
-    "changes path": "import sys; sys.path.clear(); sys.argv.clear()",
-    "forks": "import os; os.fork()",
+    "changes its process": "import os, sys; os.chdir('/'); os.umask(0o777); os.environ.clear();"
+    " os.write(1, b'words'); print('more'); sys.path.clear(); sys.argv.clear();"
+    " mi.set_variant('scalar_rgb') if 'scalar_rgb' in mi.variants() else None",
     "forks twice": "import os; os.fork() or os.fork()",
-    "starts a process": "import subprocess; subprocess.Popen(['sleep', '1000'])",
-    "starts a thread": "import threading, time; threading.Thread(target=time.sleep,"
-    " args=(1000,)).start()",
-    "prints": "import os; os.write(1, b'words'); print('more')",
-    "ignores signals": "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN)",
+    "does not end": "import signal, subprocess, threading, time;"
+    " signal.signal(signal.SIGTERM, signal.SIG_IGN); subprocess.Popen(['sleep', '1000']);"
+    " threading.Thread(target=time.sleep, args=(1000,)).start()",
     "breaks modules": "import json, comparisons.compare as c; json.dumps = c.compare = None",
-    "sets a seed": "import mitsuba as mi; mi.set_variant('scalar_rgb')"
-    " if 'scalar_rgb' in mi.variants() else None",
 }
 
 

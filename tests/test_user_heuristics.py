@@ -274,7 +274,7 @@ def test_a_process_apart_reads_the_file_and_a_changed_one_again(run, apart, writ
     """Finished results are found again as long as no file changes that the heuristic is made of."""
     written("LEVEL = 0.25\n", "level.py")
     name = written("import level\ndef shade(point): return point.ambient * 0 + level.LEVEL\n")
-    words = ("compare", "fig-8-9", "--heuristic", name, "--resolution", "8x8", "--spp", 4)
+    words = ("compare", "lambert-sphere", "--heuristic", name, "--resolution", "8x8", "--spp", 4)
     means, stamps = [], []
     for text in ("LEVEL = 0.25\n", "LEVEL = 0.25\n", "LEVEL = 0.75\n"):
         written(text, "level.py")
