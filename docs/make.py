@@ -75,6 +75,7 @@ def main(words):
     _shaders()
     _renderers()
     _audits()
+    _lessons()
     _notebook()
 
 
@@ -272,6 +273,14 @@ def _renderers():
     programs = next(iter(found.values())).images
     rows = [[one.images[program] for one in found.values()] for program in programs]
     _sheet("renderers.png", list(found), rows)
+
+
+def _lessons():
+    """Render the pixels of docs/lessons.md."""
+    import lessons  # next to this script
+
+    for lesson in lessons.LESSONS:
+        replace("lessons.md", lesson, lessons.table(lesson))
 
 
 def _notebook():

@@ -141,7 +141,7 @@ def define() -> dict[str, Any]:
             return mi.Float(0)
 
         def eval_direction(self, it, ds, active=True):
-            return mi.Spectrum(0)
+            return self.sample_direction(it, None, active)[1]  # Mitsuba takes derivatives here
 
         def bbox(self):
             if self.model is DirectionalLight:
