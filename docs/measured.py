@@ -92,7 +92,7 @@ def attribution() -> Iterator[str]:
         f" after {seconds(kernel.seconds.value)}, and more samples do not bring it nearer; the full"
         f" plan is {few.error.mean:.1f} away after {seconds(few.seconds.value)} and"
         f" {many.error.mean:.1f} after {seconds(many.seconds.value)}. Adding shadows alone gives"
-        f" {shadows.error.mean:.1f}, because the light between surfaces that would fill them is"
+        f" {shadows.error.mean:.1f}, because the interreflection that would fill them is"
         " missing."
     )
 

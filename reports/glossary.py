@@ -74,7 +74,7 @@ COSTS: Terms = {
     ),
     ("overhead",): "The part of an image’s time that does not depend on its samples.",
     ("first image",): "It also traces and compiles the program.",
-    ("suffices at",): "The ΔE2000 that 5 % of the pixels exceed: the method passes from there on.",
+    ("passes at",): "The ΔE2000 that 5 % of the pixels exceed: the method passes from there on.",
     ("too close to call",): "Other methods of the front whose time and error may be the same.",
     ("error against time",): (
         "Each point is a method with a number of samples. Further left is faster, lower is better."
@@ -131,7 +131,7 @@ METHODS: Terms = {
     ("kernel with shadows",): "The textbook’s model with a shadow ray to each light.",
     ("shadow map",): "Shadows from a depth image as each light sees it.",
     ("hemisphere ambient",): (
-        "Ambient light in place of light between surfaces: two colours, for up and down."
+        "Ambient light in place of interreflection: two colours, for up and down."
     ),
     ("phong BSDF, full transport",): "Textbook materials under all light transport.",
     ("direct",): "Physical materials under the light that comes straight from lights.",

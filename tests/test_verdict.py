@@ -143,12 +143,12 @@ def test_a_run_counts_scenes_and_names_what_those_that_fail_lack_by_pixels():
     assert verdict.missing(made[0]) == {"interreflection": 0.75, "spectral": 0.25}
     expected = "Textbook shading looks right in 1 of 4 scenes; 1 is too close to call."
     assert verdict.headline(made) == expected
-    expected = "Mostly missing: light between surfaces, spectral light, shadows."
+    expected = "Mostly missing: interreflection, spectral light, occlusion."
     assert verdict.most_missing(made) == expected
     assert verdict.most_missing([scene()]) == ""
     lines = list(verdict.advice(scenes))
     assert [line.partition(":")[0] for line in lines] == ["a", "b", "d"]
-    assert lines[0].startswith("a: Mostly missing: light between surfaces. None of the ")
+    assert lines[0].startswith("a: Mostly missing: interreflection. None of the ")
 
 
 def test_a_run_ends_with_its_verdict_and_finds_causes_unless_told_not_to(

@@ -278,7 +278,6 @@ def _ambient_light(phong: mi.Properties, facts: Facts) -> dict:
 
 ATTENUATION = Effect(
     label="distance attenuation",
-    noun="fall-off with distance",
     heuristic="f_att (6.1, 8.6)",
     reference="1 / d^2",
     cost="a division per light",
@@ -290,7 +289,6 @@ ATTENUATION = Effect(
 
 CONE = Effect(
     label="spot cone",
-    noun="the fall-off in a spot's cone",
     heuristic="6.2-6.4",
     reference="spot",
     cost="a comparison and a power per light",
@@ -302,7 +300,6 @@ CONE = Effect(
 
 EXTENDED = Effect(
     label="extended lights",
-    noun="the size of the lamps",
     heuristic="a spot or point",
     reference="sampled area lights",
     cost="samples, two rays each",
@@ -368,7 +365,6 @@ def _reflected(facts: Facts) -> tuple[bool, str]:
 
 MICROFACETS = Effect(
     label="microfacets and Fresnel",
-    noun="microfacets",
     heuristic="none",
     reference="roughplastic",
     cost="a BSDF evaluation per light",
@@ -398,7 +394,6 @@ TRANSMISSION = Effect(
 
 OCCLUSION = Effect(
     label="occlusion",
-    noun="shadows",
     heuristic="none, or if requested",
     reference="shadow rays",
     cost="a ray per light",
@@ -412,7 +407,6 @@ OCCLUSION = Effect(
 
 INTERREFLECTION = Effect(
     label="interreflection",
-    noun="light between surfaces",
     heuristic="none",
     reference="paths",
     cost="samples, two rays per reflection",
