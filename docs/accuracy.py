@@ -93,7 +93,7 @@ def charts(records: Sequence[Cost]) -> Iterator[tuple[Cost, str]]:
 
 
 def methods(records: Sequence[Cost]) -> Iterator[str]:
-    """Yield the fastest method that suffices, with one row for scenes that have the same ones."""
+    """Yield the fastest method that passes, with one row for scenes that have the same ones."""
     yield (
         "The fastest method of which at most 5 % of the pixels exceed a ΔE2000, with its samples"
         f" per pixel, at {SIZE[0]} by {SIZE[1]} pixels; in brackets its time over that of the"
@@ -117,7 +117,7 @@ def methods(records: Sequence[Cost]) -> Iterator[str]:
         full = median(_ratio(record, _longest(record)) for record, _ in group)
         scenes = ", ".join(record.scene for record, _ in group)
         rows.append((scenes, *cells, number(full)))
-    head = "Scenes", *(f"within {parameter(t)}" for t in TOLERANCES), "Full plan"
+    head = "Scenes", *(f"at {parameter(t)}" for t in TOLERANCES), "Full plan"
     yield from markdown([head, *rows], right=4)
 
 
@@ -166,7 +166,7 @@ def _within(records, limit):
             full = record.method(FULL_PLAN.name).per_sample_s.value
             saved.append(full / record.method(chosen.method).per_sample_s.value)
     said = (
-        f"At ΔE2000 {parameter(limit)} a kernel is the fastest method that suffices in {enough} of"
+        f"At ΔE2000 {parameter(limit)} a kernel is the fastest method that passes in {enough} of"
         f" {len(records)} scenes"
     )
     return (

@@ -254,7 +254,7 @@ def test_sizes_that_cannot_be_predicted_or_measured_are_refused(run):
         assert reason in error
 
 
-def test_plan_within_names_the_fastest_that_suffices_and_exits_with_1_if_none_does(
+def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does(
     rgb, run, monkeypatch
 ):
     source, few = SCENES["lambert-sphere"].source(), Options(resolution=(12, 12))
@@ -273,7 +273,8 @@ def test_plan_within_names_the_fastest_that_suffices_and_exits_with_1_if_none_do
     monkeypatch.setattr(studies, "measure_ladder", lambda *_, **__: replace(found, points=points))
     code, said, _ = run(*words, "--within", 10)
     assert code == 1
-    assert said.startswith("At 12x12 no measured method suffices at ΔE2000 10")
+    assert said.startswith("At 12x12 no measured method passes at ΔE2000 10")
+    assert "More samples (--spp) decide" in said
     for within, more, reason in ((1, ("--verify",), "give one"), (1.1, (), "in steps of 0.25")):
         code, _, said = run(*words, "--within", within, *more)
         assert code == 2

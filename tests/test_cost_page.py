@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from math import ceil
 
 import jsonschema
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 import vl_convert
 from msgspec import convert, structs
 
+from comparisons.comparison import MeanError
 from comparisons.cost.cost_record import Point
 from reports.charts import cost_charts
 from reports.page import page
@@ -66,6 +68,24 @@ def test_page_and_terminal_name_what_cannot_be_measured_a_busy_machine_and_ties(
             assert "the scene's own paths end at depth 3" in said
     assert "Phong kernel" in text
     assert "22.25" in text
+
+
+def test_page_and_terminal_say_which_sample_count_would_pass(study):
+    """By the two counts of the full plan: the noise's square falls with the samples."""
+    record = study.record
+    few, many = (point.tolerance.mean**2 for point in record.points[1:])
+    left = (4 * many - few) / 3
+    spp = 16 * (many - left) / (4 - left)
+    expected = (
+        f"No measured method passes at ΔE2000 2. About {ceil(spp)} samples per pixel of full plan"
+        " would, in "
+    )
+    enough = structs.replace(record.points[2], tolerance=MeanError(1.0, 0.9, 1.1))
+    for points, is_said in ((record.points, True), ((*record.points, enough), False)):
+        changed = structs.replace(record, points=points)
+        text = "\n".join(cost_tables.lines(changed))
+        for said in (Page(shown(replace(study, record=changed))).text, text):
+            assert (expected in said) is is_said
 
 
 def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_cost(study):

@@ -4,12 +4,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 from msgspec.structs import astuple
 
 from comparisons.comparison import MeanError
 from comparisons.cost import times
 from comparisons.cost.cost_record import Method, Point
-from comparisons.cost.front import at_size, beats, fronted, sufficient
+from comparisons.cost.front import at_size, beats, fronted, reach, sufficient
 from comparisons.cost.measure import QUICK, Effort, timed, tried
 from heuristic.errors import InputError
 from reference.records import Estimated
@@ -170,9 +171,9 @@ def test_what_is_too_close_to_call_is_not_ranked():
         assert not any(beats(a, b) and beats(b, a) for a in points for b in points)
 
 
-def test_the_fastest_that_surely_suffices_is_chosen():
+def test_the_fastest_that_surely_passes_is_chosen():
     points = [
-        made("kernel", 4, 0.01, 2.0, 0.1),  # suffices at 6.6
+        made("kernel", 4, 0.01, 2.0, 0.1),  # passes at 6.6
         made("direct", 4, 0.1, 0.6, 0.1),  # at 1.98
         made("path", 4, 0.11, 0.5, 0.1),  # too close to call, and more accurate
         made("plan", 16, 1.0, 0.1, 0.1),
@@ -182,6 +183,38 @@ def test_the_fastest_that_surely_suffices_is_chosen():
     assert (found.method, found.ties) == ("path", ("direct",))
     assert sufficient(points, 1.0).method == "plan"
     assert sufficient(points, 0.1) is None
+
+
+def by_law(name, left, noise, per_sample, counts=(4, 16, 64)):
+    """Points of a method whose tolerance is left and noise, added in squares."""
+    found = []
+    for spp in counts:
+        tolerance = np.hypot(left, noise / np.sqrt(spp))
+        point = made(name, spp, per_sample * spp, 1.0, 0.01)
+        near = MeanError(tolerance, 0.99 * tolerance, 1.01 * tolerance)
+        found.append(structs.replace(point, tolerance=near))
+    return found
+
+
+def test_the_samples_that_a_tolerance_takes_follow_from_two_counts():
+    for seed in range(50):
+        left, noise, tolerance = np.random.default_rng(seed).uniform((0, 30, 2), (1.5, 60, 3))
+        slow, biased = by_law("slow", left, noise, 2.0), by_law("biased", 9.0, noise, 0.1)
+        fast = by_law("fast", 0.9 * left, noise, 1.0)
+        found = reach([*slow, *biased, *fast], tolerance)
+        expected = noise**2 / (tolerance**2 - (0.9 * left) ** 2)
+        assert found.method == "fast"
+        assert expected <= found.spp <= max(expected + 1.001, 65)
+        assert found.left == pytest.approx(0.9 * left, abs=1e-3)
+        assert found.seconds == pytest.approx(found.spp)
+
+
+def test_bias_is_told_from_noise():
+    near, far = by_law("near", 4.0, 3.0, 1.0), by_law("far", 9.0, 3.0, 1.0)
+    found = reach([*far, *near], 2.0)
+    assert (found.method, found.spp, found.seconds) == ("near", None, None)
+    assert found.left == pytest.approx(4.0)
+    assert reach(by_law("one", 0.0, 30.0, 1.0, (4,)), 2.0) is None
 
 
 def test_the_time_at_another_size_follows_from_overhead_and_time_per_sample():

@@ -12,7 +12,7 @@ from msgspec import structs
 from comparisons.comparison import Causes, machine, versions
 from comparisons.cost import times
 from comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
-from comparisons.cost.front import at_size, fronted, sufficient
+from comparisons.cost.front import Reach, at_size, fronted, reach, sufficient
 from comparisons.cost.measure import (
     LARGEST_CERTAIN,
     QUICK,
@@ -181,13 +181,15 @@ class Choice(Record, kw_only=True):
     within
         The tolerance, ΔE2000.
     chosen
-        The fastest point that suffices; None if none does.
+        The fastest point that passes; None if none does.
     best
-        The one that suffices at the smallest tolerance.
+        The one that passes at the smallest tolerance.
     full
-        The full plan with the fewest samples that suffice, else with the most samples.
+        The full plan with the fewest samples that pass, else with the most samples.
     left_out
         Methods that the scene cannot have, and why.
+    reach
+        If none passes: what more samples would do, if known.
     """
 
     scene: str
@@ -198,6 +200,7 @@ class Choice(Record, kw_only=True):
     best: Point
     full: Point
     left_out: dict[str, str]
+    reach: Reach | None = None
     record_version: int = VERSION
 
 
@@ -217,13 +220,15 @@ def choose(
     points = at_size(found.points, found.methods, size)
     full = next(one.name for one in found.methods if FULL_PLAN.name in one.names)
     of_full = [point for point in points if point.method == full]
+    chosen = sufficient(points, within)
     return Choice(
         scene=source.name,
         resolution=size,
         measured=found.size,
         within=within,
-        chosen=sufficient(points, within),
+        chosen=chosen,
         best=min(points, key=lambda point: (point.tolerance.mean, point.seconds.value)),
         full=sufficient(of_full, within) or max(of_full, key=lambda point: point.spp),
         left_out=found.ladder.left_out,
+        reach=None if chosen else reach(points, within),
     )

@@ -115,7 +115,7 @@ class Point(Record):
     error
         Mean ΔE2000 of one image to the reference.
     tolerance
-        The ΔE2000 that at most 5 % of an image's pixels exceed: the method suffices at this
+        The ΔE2000 that at most 5 % of an image's pixels exceed: the method passes at this
         tolerance and at larger ones.
     front
         Whether no other point is clearly faster or clearly more accurate without being clearly

@@ -1,17 +1,18 @@
-"""Which methods are worth their time: the front of time and error, and what suffices.
+"""Which methods are worth their time: the front of time and error, and what passes.
 
-A method suffices at a tolerance t if at most 5 % of the pixels of its image exceed ΔE2000 t
+A method passes at a tolerance t if at most 5 % of the pixels of its image exceed ΔE2000 t
 (:mod:`comparisons.departure.criterion`). Intervals decide: what lies inside one another's is too
 close to call.
 """
 
 from collections.abc import Sequence
+from math import ceil, sqrt
 
 from msgspec import structs
 
 from comparisons.comparison import MeanError
 from comparisons.cost.cost_record import Point, TimedMethod
-from reference.records import Estimated
+from reference.records import Amount, Estimated, Record, Size
 
 Interval = Estimated | MeanError
 
@@ -51,7 +52,7 @@ def _differ(one: Point, other: Point) -> bool:
 
 
 def sufficient(points: Sequence[Point], tolerance: float) -> Point | None:
-    """Return the fastest point that surely suffices at a tolerance; None if none does.
+    """Return the fastest point that surely passes at a tolerance; None if none does.
 
     Of those whose times are too close to call it is the most accurate; the others are its ties.
     """
@@ -74,3 +75,45 @@ def at_size(
     return [
         structs.replace(one, seconds=known[one.method].seconds(one.spp * samples)) for one in points
     ]
+
+
+class Reach(Record):
+    """How near a method comes to the reference with any number of samples.
+
+    Attributes
+    ----------
+    left
+        ΔE2000 that 5 % of the pixels exceed without noise.
+    spp, seconds
+        Samples per pixel with which the method should pass at a tolerance, about, and their time;
+        None if too much is left.
+    """
+
+    method: str
+    left: Amount
+    spp: Size | None = None
+    seconds: Amount | None = None
+
+
+def reach(points: Sequence[Point], tolerance: float) -> Reach | None:
+    """Return the fastest method that should pass at a tolerance with more samples than measured.
+
+    What is left without noise follows from a method's two largest counts: the tolerances T at them
+    obey ``T² = left² + noise² / spp``. If too much is left with every method, the nearest one is
+    returned; None if each was measured at one count.
+    """
+    found = []
+    for name in dict.fromkeys(point.method for point in points):
+        own = [one for one in points if one.method == name]
+        if len(own) < 2:
+            continue
+        fewer, more = own[-2:]
+        step, square = more.spp - fewer.spp, more.tolerance.mean**2
+        left = max(square - (fewer.tolerance.mean**2 - square) * fewer.spp / step, 0.0)
+        room, spp, time = tolerance**2 - left, None, None
+        if room > 0:
+            spp = max(ceil(more.spp * (square - left) / room), more.spp + 1)
+            each = (more.seconds.value - fewer.seconds.value) / step
+            time = more.seconds.value + each * (spp - more.spp)
+        found.append(Reach(name, sqrt(left), spp, time))
+    return min(found, key=lambda one: (one.spp is None, one.seconds or one.left), default=None)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     "--within",
     type=jobs.Within(min=0, min_open=True),
     metavar="ERROR",
-    help="Measure the methods of `cost`, and name the fastest that suffices: at most 5 % of its"
+    help="Measure the methods of `cost`, and name the fastest that passes: at most 5 % of its"
     " pixels exceed this ΔE2000.",
 )
 @jobs.timeout_option
@@ -37,7 +37,7 @@ def plan(
 ) -> None:
     """List the effects that a scene calls for, by which rule, and what will be simulated.
 
-    With --within, the exit code is 1 if no measured method suffices.
+    With --within, the exit code is 1 if no measured method passes.
 
     \b
     Examples:
@@ -99,7 +99,7 @@ def verified(
 
 
 def chosen(name: str, request: Options, within: float, progress: Any) -> Choice:
-    """Measure the methods of a scene, and name the fastest that suffices at a tolerance."""
+    """Measure the methods of a scene, and name the fastest that passes at a tolerance."""
     from comparisons.case import open_case
     from comparisons.cost.cost import choose
 

@@ -12,7 +12,7 @@ from reports.charts import theme, vega
 from reports.files import images, results
 from reports.page.scene_view import CostView
 from reports.page.templating import HELP, rendered
-from reports.terminal.cost_tables import busy, closure, together
+from reports.terminal.cost_tables import busy, closure, together, unreached
 
 if TYPE_CHECKING:
     from comparisons.cost.cost import Study
@@ -84,5 +84,6 @@ def view(study: Study) -> CostView:
         },
         said=re.sub(r"(?<!\d)-(?=\d)", "−", " ".join(said)),
         busy=busy(record) if record.is_busy else "",
+        unreached=unreached(record),
         colours=tuple(theme.EFFECT_COLOURS[one.effect] for one in effects),
     )

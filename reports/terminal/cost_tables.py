@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
+from comparisons.cost.front import Reach, reach, sufficient
+from comparisons.departure.criterion import TOLERANCE
 from comparisons.departure.metrics import LEADING
 from reports.glossary import meanings
 from reports.terminal.tables import printed
@@ -47,6 +49,7 @@ def lines(record: Cost) -> Iterator[str]:
     for name, reason in record.left_out.items():
         yield f"left out: {name}: {reason}"
     yield from _section(f"Error and time of one image at {size}", _points(record.points))
+    yield from filter(None, [unreached(record)])
     if record.attribution.effects:
         yield from _section("What each effect removes and adds", _attribution(record))
         yield "removed: Shapley value, the mean over all orders of adding the effects"
@@ -86,6 +89,15 @@ def together(record: Cost) -> str:
     )
 
 
+def unreached(record: Cost) -> str:
+    """Return that no method measured looks right, and whether more samples would; else nothing."""
+    points = record.predicted or record.points
+    if sufficient(points, TOLERANCE):
+        return ""
+    label = f"{LEADING.label} {TOLERANCE:g}"
+    return f"No measured method passes at {label}. {beyond(reach(points, TOLERANCE))}"
+
+
 def closure(record: Cost) -> str:
     """Return the sum of the attribution, and whether the rest is more than noise."""
     left, departure = record.closure, record.attribution.departure
@@ -107,11 +119,11 @@ def choice_lines(choice: Choice) -> Iterator[str]:
     chosen, full = choice.chosen, choice.full
     if chosen is None:
         yield (
-            f"At {size} no measured method suffices at {within}. The nearest is"
-            f" {_offer(choice.best)}. Give more samples with --spp, or a larger tolerance."
+            f"At {size} no measured method passes at {within}. The nearest is"
+            f" {_offer(choice.best)}. {beyond(choice.reach)}"
         )
     elif chosen.method == full.method:
-        yield f"At {size}: {_offer(chosen)}. Nothing faster suffices at {within}."
+        yield f"At {size}: {_offer(chosen)}. Nothing faster passes at {within}."
     else:
         yield f"At {size}: {_offer(chosen)}, in place of {_offer(full)}."
     if chosen and chosen.ties:
@@ -122,6 +134,21 @@ def choice_lines(choice: Choice) -> Iterator[str]:
     for method in dict.fromkeys(((chosen or choice.best).method, full.method)):
         if method in known:
             yield f"{method}: {known[method]}"
+
+
+def beyond(found: Reach | None) -> str:
+    """Return what more samples than measured would do at a tolerance that no method passes at."""
+    if found is None:
+        return "More samples (--spp) decide."
+    if found.spp is None:
+        return (
+            f"No sample count would: with {found.method}, the nearest, 5 % of the pixels exceed"
+            f" {LEADING.label} {number(found.left)} without any noise. Bias remains."
+        )
+    return (
+        f"About {found.spp:,} samples per pixel of {found.method} would, in"
+        f" {seconds(found.seconds)}; --spp measures more."
+    )
 
 
 def _offer(point: Point) -> str:
@@ -147,7 +174,7 @@ def _times(record: Cost) -> Rows:
 
 
 def _points(points: Sequence[Point]) -> Rows:
-    yield "method", "samples", "time", "interval", "mean ΔE2000", "suffices at", "front"
+    yield "method", "samples", "time", "interval", "mean ΔE2000", "passes at", "front"
     for point in points:
         close = f"front, too close to call: {', '.join(point.ties)}" if point.ties else "front"
         yield (
