@@ -13,6 +13,7 @@ import pytest
 from drjit.llvm.ad import Array3f64
 
 from comparisons.departure.colour import DEFAULT_VIEWING
+from comparisons.departure.metrics import LEADING
 from comparisons.fit import fit as fitting
 from comparisons.fit.fit import fit
 from comparisons.fit.model import OwnModel, PhongModel, bounds, see, start
@@ -26,6 +27,7 @@ from heuristic.terms import normalisation
 from reference.rendering.gbuffer import gbuffer
 from reference.rendering.renderer import Renderer
 from reference.scene.source import Source
+from reports.terminal.words import percent
 from tests.misplanned import scene as described
 from tests.parts import look_at, moved, rgb_of
 from tests.schemas import schema
@@ -255,6 +257,9 @@ def test_the_errors_are_those_of_the_loss_that_was_minimised(name, rgb):
     nearest = fitted.record.nearest
     assert nearest.loss == pytest.approx(found[1], rel=1e-4)
     assert nearest.loss + nearest.parameter_error == pytest.approx(found[0], rel=1e-4)
+    for image, share in zip((fitted.before, fitted.after), nearest.differ, strict=True):
+        above = LEADING(image, fitted.reference, DEFAULT_VIEWING)[counted] > 2
+        assert share.value == pytest.approx(above.mean(), abs=0.01)
 
 
 # --- A heuristic's own parameters -----------------------------------------------------------------
@@ -318,7 +323,18 @@ def test_the_command_writes_a_record_and_a_picture_and_repeats_itself(run, tmp_p
         assert word in printed
     page = (tmp_path / "a/fit/fig-8-6a/index.html").read_text(encoding="utf-8")
     assert len(set(re.findall(r'src="data:image/webp[^"]*"', page))) == 4
-    for word in ("the best parameters remove", "noise floor", "95 %, by noise", data["command"]):
+    paired, fitted = (share["value"] for share in data["fits"][data["best"]]["differ"])
+    assert paired > fitted > 0.05
+    judged = f"ΔE2000 2: paired {percent(paired)} (fail), fitted {percent(fitted)} (fail)."
+    assert judged in printed
+    assert "paired 0 % (pass), fitted 0 % (pass)." in printed  # the exact one
+    for word in (
+        "the best parameters remove",
+        "noise floor",
+        "95 %, by noise",
+        data["command"],
+        judged,
+    ):
         assert word in page
     code, printed, _ = run(*shlex.split(data["command"])[1:], "--json", "-o", tmp_path / "b")
     (again,) = json.loads(printed)

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from comparisons.comparison import versions
 from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import drawn
-from comparisons.departure.statistics import noise_floor
+from comparisons.departure.criterion import share_above
+from comparisons.departure.metrics import LEADING, drawn
+from comparisons.departure.statistics import noise_floor, summarise
 from comparisons.fit import model
 from comparisons.fit.fit_record import (
     FitDeparture,
@@ -229,11 +230,17 @@ def _best(
     )
     after = fitted.whole(x).reshape(rendered.before.shape)
     by_metric, maps = departures(rendered, after)
+    truth, noise = rendered.reference.mean, rendered.difference.noise
+    judged = (
+        summarise(LEADING, image, truth, counted, rendered.viewing, noise)[0]
+        for image in (rendered.before, after)
+    )
     record = FormFit(
         form=fitted.form,
         loss=least,
         parameter_error=objective.value_of(rendered.before[counted]) - least,
         departure=by_metric,
+        differ=tuple(share_above(found.visible) for found in judged),
         materials=materials,
         converged=converged,
     )

@@ -9,6 +9,7 @@ from msgspec import Meta
 from numpy.typing import NDArray
 
 from comparisons.departure.colour import Viewing
+from comparisons.departure.noise import VisibleShare
 from comparisons.fit.model import OwnModel, PhongModel
 from comparisons.fit.search import AT_BOUND, COVERAGE, Certainty
 from heuristic.terms import normalisation
@@ -69,6 +70,10 @@ class FormFit(Record, kw_only=True):
     ]
     parameter_error: Annotated[float, Meta(description="What better parameters remove of it.")]
     departure: Annotated[dict[str, FitDeparture], Meta(description="By metric.")]
+    differ: Annotated[
+        tuple[VisibleShare, ...],
+        Meta(description="Pixels above ΔE2000 2, with the paired and the fitted parameters."),
+    ]
     materials: Annotated[
         tuple[FittedMaterial, ...], Meta(description="Or the heuristic, with its own parameters.")
     ]

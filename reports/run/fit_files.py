@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from comparisons.departure.criterion import LIMIT, TOLERANCE, decide
 from comparisons.departure.metrics import LEADING, drawn
 from comparisons.fit.fit import Fit
 from comparisons.fit.fit_record import FitRecord, FormFit
@@ -41,6 +42,7 @@ def page(fit: Fit) -> str:
     return rendered(
         "fit_page.html.j2",
         title=headline(record),
+        judgement=judgement(record),
         r=record,
         pictures={name: images.webp(picture, lossless=True) for name, picture in shown.items()},
         departures=list(_departures(record)),
@@ -58,10 +60,22 @@ def headline(record: FitRecord) -> str:
     return f"{record.scene}: the best parameters remove {removed} of the {record.loss['name']} loss"
 
 
+def judgement(record: FitRecord) -> str:
+    """Return whether the paired and the fitted parameters pass the criterion."""
+    paired, fitted = (
+        f"{percent(share.value)} ({decide([share])})" for share in record.nearest.differ
+    )
+    return (
+        f"At most {percent(LIMIT)} of the pixels may differ by more than {LEADING.label}"
+        f" {TOLERANCE:g}: paired {paired}, fitted {fitted}."
+    )
+
+
 def lines(record: FitRecord) -> Iterator[str]:
     """Yield the lines of a fit: departures by form, then the parameters of the best form."""
     best = record.nearest
     yield f"{headline(record)}; {best.form} comes nearest"
+    yield judgement(record)
     yield ""
     yield from tables.printed(_departures(record))
     yield ""
