@@ -41,6 +41,9 @@ CHOICES = ("--heuristic", "--pairing", "--interpolation")
 TEXTBOOK = ("phong", "blinn")
 """The heuristics of the chapters."""
 
+FIND = "To find the cheapest method that passes: "
+"""Begins the sentence on a command; the overview says it once for all scenes."""
+
 
 @dataclass(frozen=True)
 class Judged:
@@ -114,7 +117,7 @@ def sentence(
     if record.picture:
         return "The map shows where the picture is wrong."
     if cost is None:
-        return f"To find the cheapest method that passes: `{search(record, threshold)}`."
+        return f"{FIND}`{search(record, threshold)}`."
     return _remedy(record, cost, threshold)
 
 

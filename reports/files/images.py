@@ -6,7 +6,7 @@ printed next to the picture; values beyond them take the end's colour.
 """
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
@@ -20,15 +20,11 @@ from comparisons.comparison import Images
 from comparisons.departure import marks
 from comparisons.departure.colour import to_srgb
 from comparisons.departure.metrics import LEADING, RATIO, drawn
-from reference.records import Record
 
 Bytes = NDArray[np.uint8]
 
 #: Quality of WebP pictures, from 0 to 100.
 QUALITY = 80
-
-#: Previews in a row of a sheet.
-COLUMNS = 4
 
 #: Colour maps by purpose.
 ERROR_COLOURS, SIGNED_COLOURS = "magma", "RdBu_r"
@@ -134,25 +130,6 @@ def _table(colormap: str) -> Bytes:
 
 
 # --- Small pictures for the page ---------------------------------------------------------------
-
-
-class Sheet(Record):
-    """Previews of `width` by `height` pixels in rows of `COLUMNS`, as one WebP file."""
-
-    width: int
-    height: int
-    webp: bytes
-
-
-def sheet(previews: Sequence[Image.Image], lossless: bool = False) -> Sheet:
-    """Return the sheet of previews of one size, in order."""
-    width, height = previews[0].size
-    rows = -(-len(previews) // COLUMNS)
-    whole = Image.new("RGB", (width * COLUMNS, height * rows))
-    for place, preview in enumerate(previews):
-        row, column = divmod(place, COLUMNS)
-        whole.paste(preview, (column * width, row * height))
-    return Sheet(width, height, webp(whole, lossless))
 
 
 def webp(picture: Image.Image, lossless: bool = False) -> bytes:

@@ -89,6 +89,7 @@ def render(
         "usual": threshold,
         "headlines": _runs(lambda t: verdict.headline(records, t)),
         "missing": _runs(lambda t: verdict.most_missing(records, t)),
+        "find": verdict.FIND,
         "terms": glossary.meanings(),
         **_drawing(),
     }
@@ -187,9 +188,7 @@ def _board(why: WhyView | None, found: Attribution | None) -> dict[str, Any] | N
     if not why or not why.pictures or not found:
         return None
     return {
-        "width": why.pictures.width,
-        "height": why.pictures.height,
-        "columns": images.COLUMNS,
+        "images": why.pictures.manifest(),
         "hybrids": [
             {
                 "on": [why.effects.names.index(effect) for effect in each.effects],

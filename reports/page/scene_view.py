@@ -9,7 +9,6 @@ from msgspec import field
 from comparisons.comparison import ComparisonRecord
 from reference.records import Record, plain
 from reports.charts.vega import Figure
-from reports.files.images import Sheet
 from reports.page.embedding import Embedded
 
 
@@ -26,13 +25,12 @@ class EffectMap(Record):
 class WhyView(Record):
     """A page's data of causes.
 
-    ``pictures`` are the hybrids of the record in their order, and ``maps`` what each leaves of the
-    error, in levels of a tenth of ΔE2000; both are None for fewer than two.
+    ``pictures`` has a plane of each channel of the record's hybrids, in their order, and of the
+    error that each leaves, such as ``0.R`` and ``0.dE2000``; None for fewer than two hybrids.
     """
 
     effects: EffectMap
-    pictures: Sheet | None = None
-    maps: Sheet | None = None
+    pictures: Embedded | None = None
 
 
 class TermsView(Record):
@@ -71,13 +69,15 @@ class CostView(Record):
 
     ``record`` is a :class:`comparisons.cost.cost_record.Cost`, whose type few pages need to load.
     ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are sentences on
-    its sums and on the machine; ``colours`` are those of the effects.
+    its sums and on the machine, ``unreached`` one on more samples; ``colours`` are those of the
+    effects.
     """
 
     record: Any
     images: dict[str, bytes]
     said: str
     busy: str
+    unreached: str
     colours: tuple[str, ...]
 
 

@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from comparisons.departure.colour import Viewing
 from comparisons.departure.metrics import LEADING
 from comparisons.hybrids.attribution import dominating
 from reports.charts.theme import EFFECT_COLOURS
-from reports.files import images
-from reports.page.embedding import packed
+from reports.page.embedding import COUNTED, encode, packed
 from reports.page.scene_view import EffectMap, LiveView, TermsView, WhyView
 
 if TYPE_CHECKING:
@@ -23,8 +21,8 @@ if TYPE_CHECKING:
 LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789a"))
 """Codes of the map: no effect, a pixel that does not count, and the effects' places."""
 
-STEP, UNCOUNTED = 0.1, 255
-"""ΔE2000 of a level of the maps, and the level of pixels that do not count; as in switches.js."""
+ROUNDED = 16
+"""Half floats of hybrids are rounded to multiples of this code, by up to 0.8 %."""
 
 LARGEST_CODE = 65535
 """The largest code of the planes of terms and normals."""
@@ -53,14 +51,12 @@ def why_view(
     if len(previews) < 2:
         return WhyView(found)
     times = len(previews[0]) // len(counted)
-    shown = counted.repeat(times, axis=0).repeat(times, axis=1)
-    levels = [np.rint(LEADING(each, previews[-1], viewing) / STEP) for each in previews]
-    left = [np.where(shown, np.minimum(each, UNCOUNTED - 1), UNCOUNTED) for each in levels]
-    return WhyView(
-        found,
-        images.sheet([images.tonemap(each, viewing.exposure) for each in previews]),
-        images.sheet([Image.fromarray(each.astype(np.uint8)) for each in left], lossless=True),
-    )
+    planes = {"flags": np.uint16(COUNTED) * counted.repeat(times, axis=0).repeat(times, axis=1)}
+    for place, each in enumerate(previews):
+        layers = {c: each[..., i] for i, c in enumerate("RGB")}
+        layers[LEADING.name] = LEADING(each, previews[-1], viewing)
+        planes |= {f"{place}.{c}": encode(values, ROUNDED) for c, values in layers.items()}
+    return WhyView(found, packed(planes))
 
 
 def terms_view(grid: TermGrid) -> TermsView:

@@ -201,13 +201,17 @@ class Visitor:
         return self.page.locator("#viewer > canvas")
 
     def place_of(self, x, y, zoom=None, centre=(WIDTH / 2, HEIGHT / 2), pane=None):
-        """Where on the canvas the middle of a pixel is, in CSS pixels; ``pane`` is one of three."""
+        """Where on the canvas the middle of a pixel is, in CSS pixels, and in which pane."""
         box = self.canvas().bounding_box()
-        width = box["width"] if pane is None else (box["width"] - 8) / 3
-        zoom = zoom or min(width / WIDTH, box["height"] / HEIGHT)
+        panes = 1 if pane is None else 4 if "on" in self.state() else 3
+        columns = 2 if panes == 4 and box["width"] < 680 else panes
+        row, column = divmod(pane or 0, columns)
+        rows = -(-panes // columns)
+        width, height = (box["width"] + 4) / columns - 4, (box["height"] + 4) / rows - 4
+        zoom = zoom or min(width / WIDTH, height / HEIGHT)
         return (
-            (pane or 0) * (width + 4) + width / 2 + (x + 0.5 - centre[0]) * zoom,
-            box["height"] / 2 + (y + 0.5 - centre[1]) * zoom,
+            column * (width + 4) + width / 2 + (x + 0.5 - centre[0]) * zoom,
+            row * (height + 4) + height / 2 + (y + 0.5 - centre[1]) * zoom,
         )
 
     def colour_at(self, left, top):

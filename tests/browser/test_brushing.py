@@ -1,6 +1,7 @@
 """Rectangles in the picture and the threshold in the histogram: numbers, maps and links."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -51,6 +52,16 @@ def test_a_rectangle_has_the_numbers_of_its_pixels_and_its_address(visitor, repo
     visitor.page.goto(page.url)
     visitor.wait_for_viewer()
     assert numbers(visitor.page) == shown
+
+
+def test_a_rectangle_tells_what_is_shown_to_differ_and_how_much_of_it_is_visible(visitor, report):
+    page = visitor.open(f"{SCENE}&box=20,8,20,20&t=5")
+    marked = report.channels[NOISY]["significant.Y"][8:28, 20:40] == 1
+    both = marked & (values(report)[0][8:28, 20:40] > 5)
+    told = re.fullmatch(r"(\S+) %, (\S+) % above 5", numbers(page)["shown"]).groups()
+    expected = [100 * each.mean() for each in (marked, both)]
+    assert [*map(float, told)] == pytest.approx(expected, rel=0.02)
+    assert 0 < both.sum() < marked.sum() < marked.size
 
 
 def test_pixels_that_do_not_count_are_in_no_number(visitor, report):

@@ -102,3 +102,18 @@ def test_paper_gets_the_pictures_of_the_open_scene_and_no_controls(visitor):
     visitor.open()
     assert page.locator(".scene:visible").count() == 0
     assert page.locator(".worst img:visible").count() == 6
+
+
+@pytest.mark.parametrize("visitor", [{"viewport": {"width": 718, "height": 1000}}], indirect=True)
+def test_paper_cuts_nothing_off_and_names_the_threshold(visitor):
+    for fragment in ("", f"#scene={NOISY_ID}"):
+        page = visitor.open(fragment)
+        if fragment:
+            visitor.unfold()
+        page.emulate_media(media="print")
+        visitor.settle()
+        assert page.evaluate("document.documentElement.scrollWidth") <= 718
+        said = page.locator(".threshold:visible").inner_text()
+        assert " ".join(said.split()).endswith("differ by more than ΔE2000 2")
+    page.goto(visitor.report.url.replace("index", "details"))
+    assert page.evaluate("document.documentElement.scrollWidth") <= 718

@@ -2,6 +2,8 @@
 
 import pytest
 
+from reports.page.page import render
+from tests import records
 from tests.browser.conftest import EXACT, FAILED, NOISY, NOISY_ID
 from tests.browser.test_page_at_large import PHONE
 
@@ -95,3 +97,40 @@ def test_the_navigation_stays_and_leads_to_scenes_and_details(visitor):
     page.get_by_role("link", name="Details").click()
     assert page.get_by_role("heading", level=1).text_content() == "Details"
     assert page.locator("#glossary").count() == 1
+
+
+LABELS = """bars => bars.map((bar) => {
+  const range = document.createRange(), box = bar.getBoundingClientRect();
+  range.selectNodeContents(bar);
+  const label = range.getBoundingClientRect();
+  const fits = label.left >= box.left && label.right <= box.right && label.top < box.bottom;
+  return fits ? "whole" : label.top >= box.bottom ? "hidden" : "cut";
+})"""
+
+
+@pytest.mark.parametrize("visitor", [DESK, PHONE], indirect=True)
+def test_labels_of_bars_are_whole_or_hidden(visitor):
+    found = set()
+    for threshold in (1, 1.25, 1.5, 1.75, 2, 2.5, 3, 5):
+        page = visitor.open(f"#t={threshold}")
+        found |= {*page.locator(".bars .bar i:not(:empty)").evaluate_all(LABELS)}
+    assert found == {"whole", "hidden"}
+
+
+def test_the_overview_says_once_what_commands_do(chromium, tmp_path):
+    """Rows have their own commands alone, at each threshold."""
+    wrong = records.data()
+    for share in wrong["metrics"]["dE2000"]["visible"]:
+        share |= dict.fromkeys(("value", "low", "high"), 0.9)
+    views = [records.view(wrong | {"scene": name}) for name in ("a", "b")]
+    file, page = tmp_path / "index.html", chromium.new_page()
+    file.write_text(render(views))
+    for threshold in (2, 3):
+        page.goto(f"{file.as_uri()}#t={threshold}")
+        shown = page.locator(".bars .advice").all_text_contents()
+        assert [text.split(" 1 ")[0].split(" 2 ")[0].strip() for text in shown] == [
+            f"fotismos plan fig-8-9 --within {threshold}."
+        ] * 2
+        said = page.locator("#scenes").text_content()
+        assert said.count("the cheapest method that passes") == 1
+    page.close()

@@ -69,14 +69,16 @@ function differenceColours(t, top) {
 
 /** Pictures of one scene, kept until they change. */
 class Painter {
-  /** @param {Scene} scene @param {Images} images */
-  constructor(scene, images) {
+  /** @param {Scene} scene @param {Images} images @param {Painter | null} whole of the scene, if these images are smaller */
+  constructor(scene, images, whole = null) {
     this.scene = scene;
     this.images = images;
     this.differences = Float64Array.from(images.codes.dE2000, (code) => VALUES[code]);
     const sizes = this.differences.filter((_, place) => this.counts(place)).sort();
     /** The end of the map's colours, by what most pixels have. */
-    this.top = [5, 10, 20, 40].find((end) => end >= (sizes[Math.floor(0.95 * sizes.length)] ?? 0)) ?? 100;
+    this.top = whole?.top ?? [5, 10, 20, 40].find((end) => end >= (sizes[Math.floor(0.95 * sizes.length)] ?? 0)) ?? 100;
+    /** Pixels of the scene in a place, to the right and down. */
+    this.step = whole ? [scene.width / images.width, scene.height / images.height] : [images.block, images.block];
     /** @type {Map<string, {key: string, canvas: HTMLCanvasElement}>} */
     this.kept = new Map();
   }
@@ -88,8 +90,7 @@ class Painter {
 
   /** The place of a pixel of the image. @param {number[]} pixel */
   placeOf([x, y]) {
-    const { block, width } = this.images;
-    return Math.floor(y / block) * width + Math.floor(x / block);
+    return Math.floor(y / this.step[1]) * this.images.width + Math.floor(x / this.step[0]);
   }
 
   /** Linear red, green and blue. @param {string} half @param {number} place */

@@ -23,7 +23,10 @@ function showOverview(t) {
 /** @param {HTMLElement} item @param {Scene} scene @param {number} place */
 function showScene(item, scene, place) {
   for (const part of item.querySelectorAll("[data-show=share]")) part.textContent = percentText(scene.shares[place]);
-  for (const part of item.querySelectorAll("[data-show=advice]")) part.replaceChildren(...coded(textAt(scene.advice, place)));
+  for (const part of item.querySelectorAll("[data-show=advice]")) {
+    const advice = textAt(scene.advice, place);
+    part.replaceChildren(...coded(part.hasAttribute("data-own") ? advice.replace(page.find, "") : advice));
+  }
   item.dataset.verdict = scene.verdicts[place];
   item.style.setProperty("--share", String(scene.shares[place]));
 }

@@ -6,7 +6,7 @@
  * @typedef {{x: number, y: number, width: number, height: number, effect: string | null}} Region
  * @typedef {{width: number, height: number, names: string[], colours: string[], map: string}} Effects
  * @typedef {{on: number[], mean: string}} Hybrid
- * @typedef {{width: number, height: number, columns: number, hybrids: Hybrid[]}} Board
+ * @typedef {{images: Manifest, hybrids: Hybrid[]}} Board
  * @typedef {{name: string, k_i: number[], k_a: number[], k_d: number[], k_s: number[], n: number, form: string, ambient: number[]}} Material
  * @typedef {{name: string, intensity: number[], specular_intensity: number[]}} Lamp
  * @typedef {{grid: Manifest | null, tops: Record<string, number>, materials: Material[], lights: Lamp[], missing: string}} Terms
@@ -42,6 +42,7 @@
  * @property {number} usual              the threshold shown first
  * @property {Runs} headlines
  * @property {Runs} missing
+ * @property {string} find              the sentence on commands, which rows of the overview leave out
  * @property {MapOf[]} maps
  * @property {string} noEffect
  * @property {Record<string, string>} colours   256 of each map, as "rrggbb"

@@ -3,6 +3,9 @@
 /** Bars of the histogram, from 0 to the end of the map's colours. */
 const BARS = 40;
 
+/** In place of what a picture with effects does not tell. */
+const UNKNOWN = "–";
+
 class Panels {
   /** @param {Viewer} viewer */
   constructor(viewer) {
@@ -38,20 +41,21 @@ class Panels {
 
   show() {
     this.inspect();
-    const { painter, view, scene } = this.viewer, box = this.viewer.box();
-    const key = JSON.stringify([scene.id, view.t, box]);
+    const { shown: painter, added, view, scene } = this.viewer, box = this.viewer.box();
+    const key = JSON.stringify([scene.id, view.t, box, view.on]);
     if (!painter || this.key === key) return;
     this.key = key;
     const all = summarise(painter, null, view.t), some = box ? summarise(painter, box, view.t) : all;
-    this.part("title").textContent = `ΔE2000 in ${box ? "the selection" : "the whole image"}`;
+    this.part("title").textContent = `ΔE2000 ${added ? "left " : ""}in ${box ? "the selection" : "the whole image"}`;
     const tallest = Math.max(...all.bars, ...some.bars, 1e-9);
     this.part("some").setAttribute("d", outlineOf(some.bars, tallest));
     this.part("all").setAttribute("d", outlineOf(all.bars, tallest));
     this.part("line").setAttribute("x", String((100 * view.t) / painter.top));
     this.part("end").textContent = `≥ ${painter.top}`;
     const texts = {
-      mean: differenceText(some.mean), visible: percentText(box ? some.visible : scene.shares[placeOf(view.t)]), pixels: box ? percentText(some.count / all.count) : "all",
-      error: percentText(all.sum ? some.sum / all.sum : 0), cause: causesIn(painter, box),
+      mean: added && !box ? added.mean : differenceText(some.mean), visible: percentText(box || added ? some.visible : scene.shares[placeOf(view.t)]),
+      shown: added ? UNKNOWN : `${percentText(some.marked)}, ${percentText(some.both)} above ${view.t}`,
+      pixels: box ? percentText(some.count / all.count) : "all", error: percentText(all.sum ? some.sum / all.sum : 0), cause: added ? UNKNOWN : causesIn(painter, box),
     };
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text;
     this.part("clear").hidden = !box;
@@ -75,23 +79,25 @@ class Panels {
 
   /** Write the numbers of the pixel into the page. */
   inspect() {
-    const { painter, scene, view } = this.viewer;
+    const { shown: painter, added, scene, view } = this.viewer;
     if (!painter) return;
     const pixel = this.viewer.pixel(), place = painter.placeOf(pixel);
-    const { codes, block } = painter.images, flags = codes.flags[place];
+    const { codes, block, width, height } = painter.images, flags = codes.flags[place];
     const [textbook, physical] = ["heuristic", "reference"].map((half) => painter.colour(half, place));
     const seen = (/** @type {number[]} */ rgb) => `#${rgb.map((value) => srgb(value * scene.exposure * 2 ** view.ev).toString(16).padStart(2, "0")).join("")}`;
     const marked = flags & SIGNIFICANT ? "yes" : flags & UNDETERMINED ? "undetermined" : "no";
     const short = (/** @type {number} */ value) => significant(value, Math.abs(value) < 1e-3 ? 2 : 3);
-    const isWorst = !this.viewer.hovered && !view.pixel;
+    const isWorst = !this.viewer.hovered && !view.pixel && !added;
+    const size = added ? ` + ${added.name}, at ${width} × ${height}` : block > 1 ? `: mean of ${block} × ${block}` : "";
     /** @type {Record<string, string | string[]>} */
     const texts = {
-      position: `${isWorst ? "Worst pixel" : "Pixel"} ${pixel.join(", ")}${block > 1 ? `: mean of ${block} × ${block}` : ""}`,
-      cause: causeAt(painter, pixel) || "unknown",
+      position: `${isWorst ? "Worst pixel" : "Pixel"} ${pixel.join(", ")}${size}`,
+      cause: added ? UNKNOWN : causeAt(painter, pixel) || "unknown",
       heuristic: textbook.map(short), reference: physical.map(short),
       heuristic_hex: seen(textbook), reference_hex: seen(physical), dE2000: differenceText(painter.differences[place]),
       log2_luminance: `${significant(painter.ratio(place), 2)} stops`,
-      standard_error: significant(VALUES[codes.standard_error[place]], 2), significant: flags & COUNTED ? marked : "not counted",
+      standard_error: added ? UNKNOWN : significant(VALUES[codes.standard_error[place]], 2),
+      significant: !(flags & COUNTED) ? "not counted" : added ? UNKNOWN : marked,
     };
     for (const cell of /** @type {NodeListOf<HTMLElement>} */ (this.inspector.querySelectorAll("[data-value]"))) {
       const [name, index] = cell.dataset.value?.split(".") ?? [];
@@ -110,24 +116,26 @@ function causeAt({ scene }, [x, y]) {
 /** Statistics of a rectangle, or of the whole image. @param {Painter} painter @param {number[] | null} box @param {number} t */
 function summarise(painter, box, t) {
   const bars = new Array(BARS).fill(0);
-  let count = 0, sum = 0, visible = 0;
+  let count = 0, sum = 0, visible = 0, marked = 0, both = 0;
   eachPlace(painter, box, (place) => {
-    const value = painter.differences[place];
+    const value = painter.differences[place], isMarked = painter.images.codes.flags[place] & SIGNIFICANT;
     count += 1;
     sum += value;
     visible += Number(value > t);
+    marked += Number(isMarked > 0);
+    both += Number(isMarked && value > t);
     bars[clamp(Math.floor((BARS * value) / painter.top), 0, BARS - 1)] += 1;
   });
   const share = (/** @type {number} */ part) => (count ? part / count : 0);
-  return { count, sum, mean: share(sum), visible: share(visible), bars: bars.map(share) };
+  return { count, sum, mean: share(sum), visible: share(visible), marked: share(marked), both: share(both), bars: bars.map(share) };
 }
 
 /** Call with each counted place of a rectangle of the image. @param {Painter} painter @param {number[] | null} box @param {(place: number) => void} visit */
 function eachPlace(painter, box, visit) {
-  const { width, height, block } = painter.images;
-  const [x, y, w, h] = box ?? [0, 0, width * block, height * block];
-  for (let row = Math.floor(y / block); row < Math.min(Math.ceil((y + h) / block), height); row++) {
-    for (let column = Math.floor(x / block); column < Math.min(Math.ceil((x + w) / block), width); column++) {
+  const { scene, step: [right, down], images: { width, height } } = painter;
+  const [x, y, w, h] = box ?? [0, 0, scene.width, scene.height];
+  for (let row = Math.floor(y / down); row < Math.min(Math.ceil((y + h) / down), height); row++) {
+    for (let column = Math.floor(x / right); column < Math.min(Math.ceil((x + w) / right), width); column++) {
       if (painter.counts(row * width + column)) visit(row * width + column);
     }
   }

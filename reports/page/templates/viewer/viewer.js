@@ -52,14 +52,14 @@ class Viewer {
     section.querySelector(".viewer-slot")?.append(this.element);
     section.querySelector(".side")?.prepend(...this.panels.elements);
     for (const part of [this.element, ...this.panels.elements]) part.hidden = false;
-    for (const one of document.querySelectorAll("[data-judged]")) one.textContent = scene.judged.title;
     this.element.dataset.ready = "";
     this.part("[data-part=switches]").hidden = !scene.board;
-    const [images, switches] = await Promise.all([imagesIn(`data-${scene.id}`, scene.images), scene.board && Switches.of(scene, scene.board, section)]);
+    const waiting = scene.board && imagesIn(`data-board-${scene.id}`, scene.board.images);
+    const [images, small] = await Promise.all([imagesIn(`data-${scene.id}`, scene.images), waiting]);
     if (this.scene !== scene) return; // another one was opened meanwhile
     this.painter = new Painter(scene, images);
-    this.switches = switches;
-    this.part("[data-part=switches] .choices").replaceChildren(...(switches?.buttons ?? []));
+    this.switches = scene.board && small && new Switches(this.painter, scene.board, small);
+    this.part("[data-part=switches] .choices").replaceChildren(...(this.switches?.buttons ?? []));
     this.element.dataset.ready = scene.id;
     this.show(this.view);
   }
@@ -109,18 +109,15 @@ class Viewer {
   }
 
   paint() {
-    const { painter, scene, view } = this;
-    if (!painter || !this.canvas.clientWidth) return;
-    const hybrid = view.on ? this.switches?.find(view.on) : undefined;
-    const map = this.map(), box = this.box();
+    const { painter, shown, added, scene, view } = this;
+    if (!painter || !shown || !this.canvas.clientWidth) return;
+    const map = added ? page.maps[0] : this.map(), box = this.box();
     const textbook = { picture: painter.rendering("heuristic", view.ev), title: scene.judged.name };
-    const second = hybrid
-      ? { picture: hybrid.picture, title: `+ ${hybrid.name}`, smooth: true }
-      : { picture: painter.rendering("reference", view.ev), title: "physical" };
-    const third = hybrid
-      ? { picture: hybrid.map(view.t, painter.top), title: "error left" }
-      : { picture: painter.picture("map", `${map.name} ${view.t}`, painter.colours(map, view.t)), title: map.kind === "difference" ? "error" : map.title };
-    const contents = { side: [textbook, second, third], split: [textbook, second] }[view.mode] ?? [third];
+    const more = added ? [{ picture: added.painter.rendering("heuristic", view.ev), title: `+ ${added.name}`, smooth: true }] : [];
+    const physical = { picture: painter.rendering("reference", view.ev), title: "physical" };
+    const kind = map.kind === "difference" ? "error" : map.title;
+    const error = { picture: shown.picture("map", `${map.name} ${view.t}`, shown.colours(map, view.t)), title: added ? "error left" : kind };
+    const contents = { side: [textbook, ...more, physical, error], split: [more[0] ?? textbook, physical] }[view.mode] ?? [error];
     /** @type {[number[], string][]} */
     const outlines = scene.regions.slice(0, 1).map(({ x, y, width, height }) => [[x, y, width, height], OVERLAY.worst]);
     if (box) outlines.push([box, OVERLAY.selection]);
@@ -128,20 +125,33 @@ class Viewer {
     this.drawing.draw(view, this.viewport, contents, outlines);
     this.canvas.style.touchAction = view.zoom === null && !this.selecting ? "pan-y" : "none";
     this.canvas.setAttribute("aria-label", `${scene.name}: ${contents.map((one) => one.title).join(", ")}. Press ? for the keys.`);
-    this.part("[data-part=numbers]").textContent = this.numbers(hybrid);
+    this.part("[data-part=numbers]").textContent = this.numbers(added);
+    for (const one of document.querySelectorAll("[data-judged]")) one.textContent = `${scene.judged.title}${added ? " +" : ""}`;
     this.switches?.show(view.on);
     this.panels.show();
     showLegend(this.part(".legend"), this);
   }
 
-  /** @param {ReturnType<Switches["find"]>} hybrid */
-  numbers(hybrid) {
+  /** The textbook with the effects that are on, or null. */
+  get added() {
+    return (this.view.on && this.switches?.find(this.view.on)) ?? null;
+  }
+
+  /** The painter of the picture that is judged. */
+  get shown() {
+    return this.added?.painter ?? this.painter;
+  }
+
+  /** The numbers of the whole image, and at which size. @param {Added | null} added */
+  numbers(added) {
     const { scene, view } = this;
-    const visibly = `of the pixels differ visibly (ΔE2000 above ${view.t})`;
-    if (!hybrid) return `${percentText(scene.shares[placeOf(view.t)])} ${visibly}, mean ${scene.mean}`;
-    const none = /** @type {NonNullable<typeof hybrid>} */ (this.switches?.find([]));
-    const { width, height } = hybrid.picture;
-    return `${percentText(none.share(view.t))} → ${percentText(hybrid.share(view.t))} ${visibly}, mean ${none.mean} → ${hybrid.mean}; at ${width} × ${height}`;
+    const visibly = `of the pixels differ visibly (ΔE2000 above ${view.t}), mean`;
+    const share = percentText(scene.shares[placeOf(view.t)]), size = `at ${scene.width} × ${scene.height}`;
+    const none = added && this.switches?.find([]);
+    if (!none) return `${share} ${visibly} ${scene.mean}; ${size}`;
+    const [before, after] = [none, added].map(({ painter }) => percentText(summarise(painter, null, view.t).visible));
+    const { width, height } = none.painter.images;
+    return `${before} → ${after} ${visibly} ${none.mean} → ${added.mean}; at ${width} × ${height} (${size}: ${share}, mean ${scene.mean})`;
   }
 
   /** @param {number[] | null} place */

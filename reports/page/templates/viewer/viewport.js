@@ -1,6 +1,6 @@
 // The places of the image's pixels on the canvas: zoom, pan, and the panes of side by side.
 
-/** Narrower canvases stack the panes of side by side (CSS pixels). */
+/** Narrower canvases stack the panes of side by side (CSS pixels); four stand in two rows below twice this. */
 const STACKED_BELOW = 340;
 
 /** Most screen pixels per image pixel, and the greatest height relative to the window's. */
@@ -22,14 +22,14 @@ class Viewport {
 
   /** Lay out panes over a canvas of a width, and return their height. @param {number} count @param {number} available */
   arrange(count, available) {
-    const gap = 4, stacked = count > 1 && available < STACKED_BELOW;
-    const width = stacked ? available : (available - gap * (count - 1)) / count;
+    const gap = 4, columns = available < STACKED_BELOW ? 1 : count > 3 && available < 2 * STACKED_BELOW ? 2 : count;
+    const width = (available - gap * (columns - 1)) / columns;
     const height = Math.round(Math.min((width * this.height) / this.width, GREATEST_PART * window.innerHeight));
     this.panes = Array.from({ length: count }, (_, place) => ({
-      left: stacked ? 0 : place * (width + gap), top: stacked ? place * (height + gap) : 0, width, height,
+      left: (place % columns) * (width + gap), top: Math.floor(place / columns) * (height + gap), width, height,
     }));
     this.fit = Math.min(width / this.width, height / this.height);
-    return stacked ? count * (height + gap) - gap : height;
+    return Math.ceil(count / columns) * (height + gap) - gap;
   }
 
   /** @param {View} view */
