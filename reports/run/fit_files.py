@@ -108,7 +108,7 @@ def _departures(record: FitRecord) -> Iterator[Cells]:
 
 
 def _parameters(fit: FormFit) -> Iterator[Cells]:
-    yield "material", "parameter", "paired", "fitted", "95 %, by noise", ""
+    yield "material", "parameter", "paired", "fitted", "95 %, by noise", "note"
     owned = [(each.name, parameter) for each in fit.materials for parameter in each.parameters]
     for owner, parameter in owned:
         interval, note = parameter.interval, "at its bound" if parameter.at_bound else ""
