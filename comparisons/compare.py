@@ -6,7 +6,10 @@ The seed of pass ``i`` is hashed from the run's seed and ``i``.
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from importlib import import_module
+from threading import Thread
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +19,7 @@ from msgspec import structs
 from comparisons.comparison import (
     Comparison,
     ComparisonRecord,
+    Deviations,
     Images,
     NoiseTarget,
     Significant,
@@ -47,6 +51,12 @@ if TYPE_CHECKING:
 
 PERCENTILE = 95
 """A noise target is for this percentile of the noise over the counted pixels."""
+
+COMPUTED_TWICE = 4096
+"""Counted pixels at which colour-science computes differences, too; all if there are fewer."""
+
+DEVIATION_ALLOWED = 1e-3
+"""Deviation from colour-science above which a record warns."""
 
 
 @dataclass(frozen=True)
@@ -82,16 +92,52 @@ def compare(
     """
     options = options or Options()
     printed: list[str] = []
-    with collect_messages(printed):
-        comparison, ready = _compare(source, options, progress, command, why)
-    lines = count_messages([*source.messages, *printed])
-    made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *lines))
-    comparison = replace(comparison, record=made)
-    if not why or options.image:  # no effect can be added to a picture
-        return comparison
-    from comparisons.hybrids import attribution  # loaded late: --no-why needs none of it
+    with ExitStack() as formulas:
+        if options.colour_science:
+            from comparisons.departure import definitions  # loaded late: it takes a second
 
-    return attribution.explained(comparison, ready, source, options, progress)
+            formulas.enter_context(definitions.in_use())
+        with collect_messages(printed):
+            comparison, ready = _compare(source, options, progress, command, why)
+        lines = count_messages([*source.messages, *printed])
+        made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *lines))
+        comparison = replace(comparison, record=made)
+        if why and not options.image:  # no effect can be added to a picture
+            from comparisons.hybrids import attribution  # loaded late: --no-why needs none of it
+
+            comparison = attribution.explained(comparison, ready, source, options, progress)
+        return _computed_twice(comparison)
+
+
+def _load() -> None:
+    """Load colour-science in a thread, which takes a second; importing it waits for the thread."""
+    import scipy.optimize  # noqa: F401  not by two threads at once
+
+    Thread(target=import_module, args=("comparisons.departure.definitions",)).start()
+
+
+def _computed_twice(comparison: Comparison) -> Comparison:
+    """Note how far colour differences are from those of colour-science, and warn if it is far."""
+    from comparisons.departure import definitions
+
+    shown, record = comparison.images, comparison.record
+    some = np.random.default_rng(0).permutation(np.flatnonzero(shown.counted))[:COMPUTED_TWICE]
+    first, second = (half.reshape(-1, 3)[some] for half in (shown.heuristic, shown.reference))
+    found = {name: values.ravel()[some] for name, values in shown.maps.items()}
+    largest = definitions.deviations(first, second, found, record.viewing)
+    warnings = [
+        f"{METRICS[name].label} deviates from colour-science's by up to {most:.2g}, and"
+        f" {DEVIATION_ALLOWED:g} is allowed: a formula is wrong here. Give --colour-science to do"
+        " without it, and report this scene."
+        for name, most in largest.items()
+        if most > DEVIATION_ALLOWED
+    ]
+    made = structs.replace(
+        record,
+        colour_science=Deviations(pixels=len(some), largest=largest),
+        warnings=(*record.warnings, *warnings),
+    )
+    return replace(comparison, record=made)
 
 
 def _compare(
@@ -113,6 +159,7 @@ def _compare(
     done("scene and pairing", ready.planning_seconds + guard.seconds)
     stages |= {"planning": ready.planning_seconds, "guard": guard.seconds}
     estimates = render(ready, options, ready.counted, progress)
+    _load()  # not beside the passes, whose times are compared
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
     exact = ready.plan.exact and not options.image
     numbers, images = _measure(estimates, ready.surface, options, exact)
@@ -131,6 +178,8 @@ def _compare(
 
         traced = pixel_terms.trace(ready.heuristic, options)
         live = pixel_terms.live(ready.heuristic, options)
+        terms = pixel_terms.layers(ready.heuristic, options, images.heuristic)
+        images = replace(images, terms=terms)
         done("terms")
     mistakes: tuple[str, ...] = ()
     if not options.image and not heuristics.named(options.heuristic).is_own:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -259,6 +259,21 @@ class PictureRecord(Record):
     odd: tuple[str, ...] = ()
 
 
+class Deviations(Record):
+    """How far the colour differences are from those that colour-science itself computes.
+
+    Attributes
+    ----------
+    pixels
+        Number of counted pixels at which both were computed, drawn with a fixed seed.
+    largest
+        Largest deviation of each metric that colour-science has.
+    """
+
+    pixels: Count
+    largest: dict[str, Amount]
+
+
 class ComparisonRecord(Record, kw_only=True):
     """One scene by textbook shading (heuristic) and by physically based rendering (reference).
 
@@ -309,6 +324,7 @@ class ComparisonRecord(Record, kw_only=True):
     mistakes: Annotated[
         tuple[str, ...], Meta(description="Mistakes that the heuristic seems to make, in words.")
     ] = ()
+    colour_science: Deviations | None = None
     record_version: int = VERSION
 
 
@@ -318,6 +334,7 @@ class Images:
 
     ``maps`` are those of the perceptual metrics and ``log2_luminance``. ``objects`` and
     ``materials`` hold the index in the record of what each pixel sees, -1 for uncounted pixels.
+    ``terms`` are those of 8.10 in the heuristic half, by layer, if it has any.
     """
 
     heuristic: np.ndarray
@@ -330,6 +347,7 @@ class Images:
     counted: np.ndarray
     objects: np.ndarray
     materials: np.ndarray
+    terms: dict[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

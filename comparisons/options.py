@@ -106,6 +106,9 @@ class Options(
     pixels_per_degree: Annotated[
         Density | None, _help("FLIP: pixels per degree of vision.", "67")
     ] = None
+    colour_science: Annotated[
+        bool, _help("Compute all colour differences with colour-science, which takes longer.")
+    ] = False
 
     def __post_init__(self) -> None:
         for field in structs.fields(self):

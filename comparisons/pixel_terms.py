@@ -1,10 +1,11 @@
-"""Equation 8.10 at a grid of pixels, term by term, as the kernel has it.
+"""Equation 8.10 term by term, as the kernel has it: at a grid of pixels, and as images.
 
-The terms are at the centres of pixels, one in the middle of each cell of a regular grid.
+Those of the grid are at the centres of pixels, one in the middle of each cell.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import drjit as dr
@@ -19,7 +20,7 @@ from heuristic.errors import InputError
 from heuristic.heuristics import Interpolation
 from heuristic.materials import COEFFICIENTS, FORMS, Material
 from reference.rendering.gbuffer import image_size, pixel_rays
-from reference.rendering.renderer import Renderer, variant
+from reference.rendering.renderer import Renderer, pass_seed, variant
 
 SIDE = 64
 """Points along the longer side of the grid, at most."""
@@ -44,6 +45,9 @@ LIVE_LIGHTS = 16
 
 SAME = 1e-3
 """Largest difference of normals that are the same for the page."""
+
+MODELS = "phong", "blinn"
+"""The heuristics that are the sum of 8.10."""
 
 
 Colour = tuple[float, float, float]
@@ -233,7 +237,7 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
     """Return why equation 8.10 does not describe a half's shading; empty if it does."""
     if options.image:
         return "The heuristic half is a picture, which has no terms."
-    if options.heuristic not in ("phong", "blinn"):
+    if options.heuristic not in MODELS:
         return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
     if options.polygon_shading not in allowed:
         shading = options.polygon_shading.value.capitalize()
@@ -409,3 +413,48 @@ class _Points:
         arrays = (*each, self.select(lobe))
         colours = map(_colour, np.split(intensity, 2))
         return GridLight(emitter.id(), *colours, *(a.reshape(shape) for a in arrays))
+
+
+# --- As images ---------------------------------------------------------------------------------
+
+
+TERMS = dict(zip(("emission", "ambient", "diffuse", "specular"), COEFFICIENTS, strict=True))
+"""The coefficient of each term."""
+
+
+def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArray]:
+    """Return the terms of a heuristic half as layers that add up to its image ``whole``, (H, W, 3).
+
+    Each has its share of the half's first pass, rendered once more: all passes would add a quarter
+    to some runs, and AOVs lengthen the passes, whose times are compared. Backgrounds are emission.
+    Other heuristics have no such terms.
+    """
+    if options.image or options.heuristic not in MODELS:
+        return {}
+    integrator, scene = half.integrator, half.scene
+    hidden, found = integrator.hide_emitters, dict.fromkeys(TERMS, 0 * whole)
+    with variant(half.variant):
+        bsdfs = integrator.known(scene).materials.bsdfs
+        there = {*(k for bsdf in bsdfs for k in bsdf.present), *["k_i"] * bool(scene.environment())}
+        names = [name for name, k in TERMS.items() if k in there]
+        for name in names:
+            model = partial(_shade, dict.fromkeys({*COEFFICIENTS} - {TERMS[name]}, 0.0))
+            integrator.model_at = lambda *_, model=model: model
+            integrator.hide_emitters = hidden or name != "emission"
+            own = Renderer(scene, integrator, half.spp, name)
+            found[name] = np.array(own.render(pass_seed(options.seed, 0)))
+    vars(integrator).pop("model_at", None)
+    integrator.hide_emitters = hidden
+    together, rest = sum(found.values()), whole
+    for name in names[:-1]:
+        share = np.divide(found[name], together, out=0 * whole, where=together != 0)
+        found[name] = whole * share.clip(0, 1)
+        rest = rest - found[name]
+    found[names[-1] if names else "emission"] = rest
+    return {f"term.{name}": image for name, image in found.items()}
+
+
+def _shade(changes: dict[str, float], *given: Any) -> Any:
+    """Return the kernel's value of a material with changes."""
+    position, normal, view, material, *lit = given
+    return kernel.shade(position, normal, view, replace(material, **changes), *lit)

@@ -1,7 +1,10 @@
 """Equation 8.10 term by term: what the records and the page hold is what the kernel has."""
 
+from dataclasses import replace
+
 import mitsuba as mi
 import numpy as np
+import OpenEXR
 import pytest
 
 from comparisons import pixel_terms
@@ -10,10 +13,15 @@ from comparisons.gallery.builtin import SCENES
 from comparisons.options import Options
 from comparisons.prepared import prepare
 from reference.rendering.gbuffer import pixel_rays
-from reference.rendering.renderer import variant
+from reference.rendering.renderer import passes, variant
+from reports.files import results
+from reports.page import page
 from reports.page.why_view import terms_view
+from reports.run.scene import view_of, write
+from tests import records
 from tests.misplanned import scene as described
 from tests.oracle import unit
+from tests.parts import rgb_of, shown_by
 from tests.test_embedding import codes
 
 KERNEL = 1e-5
@@ -181,3 +189,125 @@ def test_other_shading_has_no_terms_and_says_why():
         grid, missing = pixel_terms.trace(ready.heuristic, given)
         assert grid is None
         assert reason in missing
+
+
+# --- As images ------------------------------------------------------------------------------------
+
+
+def textbook(ready, count=1):
+    """Return the mean of passes of the heuristic half, (H, W, 3)."""
+    return np.mean([np.array(one.images[0]) for one in passes([ready.heuristic], 0, count)], axis=0)
+
+
+def images(scene, **options):
+    """Return the layers of a scene's terms, and its textbook image."""
+    ready, given = prepared(scene, **{"resolution": (24, 24), "spp": 8, **options})
+    whole = textbook(ready)
+    return pixel_terms.layers(ready.heuristic, given, whole), whole
+
+
+def of_terms(**coefficients):
+    ambient = {"ambient": 0.5} if "k_a" in coefficients else {}
+    return shown_by("phong", {"type": "phong", "n": 9, **coefficients}, **ambient)
+
+
+ALONE = {
+    "term.emission": {"k_i": 0.1},
+    "term.ambient": {"k_a": rgb_of(0.3, 0.2, 0.1)},
+    "term.diffuse": {"k_d": rgb_of(0.1, 0.5, 0.4)},
+    "term.specular": {"k_s": 0.7},
+}
+
+
+WHOLE = {name: k for each in ALONE.values() for name, k in each.items()}
+
+FORMS = {
+    "box": {},
+    "wide filter": {"rfilter": "gaussian"},
+    "grey": {"variant": "llvm_ad_mono"},
+    "spectral": {"variant": "llvm_ad_spectral"},
+    "Blinn": {"heuristic": "blinn"},
+    "flat": {"interpolation": "flat", "tessellation": 8},
+    "Gouraud": {"interpolation": "gouraud", "tessellation": 8},
+}
+
+
+@pytest.mark.guarantee("kernel", "The layer of each term is the image of that term alone.")
+@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+def test_each_layer_is_the_image_of_a_scene_with_that_term_alone(form):
+    def made(coefficients, rfilter="box", **options):
+        scene = of_terms(**coefficients)
+        scene["sensor"]["film"]["rfilter"] = {"type": rfilter}
+        return images(scene, **options)
+
+    layers, whole = made(WHOLE, **form)
+    assert list(layers) == list(ALONE)
+    np.testing.assert_allclose(sum(layers.values()), whole, atol=1e-6)
+    for name, coefficients in ALONE.items():
+        _, alone = made(coefficients, **form)
+        assert alone.max() > 0.04
+        np.testing.assert_allclose(layers[name], alone, atol=2e-6 * whole.max(), err_msg=name)
+
+
+def test_layers_hold_the_terms_in_closed_form():
+    """Figure 8.11 in float64: each light has a channel of its own."""
+    layers, _ = images("fig-8-11-n9", resolution=(64, 64), spp=32)
+    viewer = np.array((-3.0, 0.0, 1.0))
+    lamps = np.array([(-4.24, 0, 0), (-3.5, -3.5, 0), (0, -4.24, 0)])
+    for x, y in ((26, 28), (32, 32), (44, 36)):
+        normal = seen_on_the_unit_sphere(x, y, 64, viewer)
+        toward = unit(lamps - normal)
+        cosine = toward @ normal
+        reflection = (2 * cosine[:, None] * normal - toward) @ unit(viewer - normal)
+        lobe = np.where(cosine > 0, np.maximum(reflection, 0) ** 9, 0)
+        expected = {"emission": 0, "ambient": 0.3, "diffuse": 0.5 * np.maximum(cosine, 0)}
+        for name, value in (expected | {"specular": 0.7 * lobe}).items():
+            np.testing.assert_allclose(layers[f"term.{name}"][y, x], value, atol=0.01, err_msg=name)
+
+
+def test_with_more_passes_shares_of_the_first_one_are_near(rgb):
+    """Exactly a sum, and off by little where shares change within a pixel."""
+    ready, given = prepared(of_terms(**WHOLE), resolution=(24, 24), spp=128)
+    whole = textbook(ready, 16)
+    layers = pixel_terms.layers(ready.heuristic, given, whole)
+    np.testing.assert_allclose(sum(layers.values()), whole, atol=1e-6)
+    assert min(layer.min() for layer in layers.values()) > -1e-6
+    for name, coefficients in ALONE.items():
+        alone, _ = prepared(of_terms(**coefficients), resolution=(24, 24), spp=128)
+        off = abs(layers[name] - textbook(alone, 16))
+        assert off.mean() < 5e-4
+        assert off.max() < 0.04
+
+
+def test_what_shines_behind_a_surface_is_emission(rgb):
+    sky = {"type": "constant", "radiance": 0.25}
+    layers, whole = images(sphere(PLASTIC, lamp(2)) | {"sky": sky})
+    assert layers["term.emission"][0, 0] == pytest.approx(whole[0, 0])
+    assert whole[0, 0].min() == pytest.approx(0.25)
+    assert layers["term.emission"][12, 12] == pytest.approx(0, abs=1e-6)
+    assert abs(sum(layers.values()) - whole).max() <= 1e-5 * whole.max()
+
+
+def test_other_heuristics_have_no_layers(rgb):
+    assert images("fig-8-9", resolution=(8, 8), heuristic="hemisphere-ambient")[0] == {}
+
+
+def test_the_layers_are_in_the_file_and_their_sum_on_the_page(tmp_path):
+    rng = np.random.default_rng(0)
+    layers = {name: rng.random((4, 6, 3), np.float32) for name in ALONE}
+    layers["term.emission"][:] = 0
+    found = records.comparison(4, 6)
+    found = replace(found, images=replace(found.images, terms=layers))
+    view = write(results.own(tmp_path / "out"), "ball", found)
+    with OpenEXR.File(str(tmp_path / "out/ball/comparison.exr"), separate_channels=True) as file:
+        channels = file.channels()
+        for name, image in layers.items():
+            for place, letter in enumerate("RGB"):
+                np.testing.assert_array_equal(
+                    channels[f"{name}.{letter}"].pixels, image[..., place]
+                )
+    html = page.render([view])
+    shown = [name for name in ALONE if f"{name[5:]} term" in html]
+    assert shown == ["term.ambient", "term.diffuse", "term.specular"]  # emission is black
+    assert ', sum of the terms"' in html
+    assert ', sum of the terms"' not in page.render([view_of(records.comparison())])

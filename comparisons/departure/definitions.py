@@ -1,14 +1,17 @@
 """The colour differences as colour-science defines them.
 
-They take as long as rendering does, so the compiled ones (`comparisons.departure.colour`) are used
-instead; the tests and ``fotismos doctor`` compare them.
+They take ten times as long as the compiled ones (`comparisons.departure.colour`), which are used
+instead. Every comparison, ``fotismos doctor`` and the tests compare the two.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
-import colour
 import numpy as np
+
+with np.printoptions():  # which colour-science changes
+    import colour  # noqa: F401
 from colour.appearance import VIEWING_CONDITIONS_CAM16, XYZ_to_CAM16
 from colour.difference import delta_E_CIE2000
 from colour.models import (
@@ -71,13 +74,34 @@ DEFINED: dict[str, tuple[Callable[..., Array], Callable[..., Any]]] = {
 """Space and difference of each metric that colour-science defines."""
 
 
+@np.errstate(all="ignore")  # black has no hue
+def deviations(
+    test: Array, reference: Array, found: Mapping[str, Array], viewing: Viewing = DEFAULT_VIEWING
+) -> dict[str, float]:
+    """Return the largest deviation of each metric ``found``, (N,), for linear colours (N, 3)."""
+    apart = {}
+    for name, (space, difference) in DEFINED.items():
+        defined = difference(space(test, viewing), space(reference, viewing))
+        apart[name] = float(np.abs(found[name] - defined).max(initial=0))
+    return apart
+
+
 def farthest() -> float:
     """Return the largest deviation of the compiled differences, over random colours."""
     test, reference = np.random.default_rng(0).random((2, 4096, 3))
-    viewing, apart = DEFAULT_VIEWING, 0.0
-    with np.errstate(all="ignore"), colour.utilities.suppress_warnings(python_warnings=True):
+    found = {name: METRICS[name](test[None], reference[None])[0] for name in DEFINED}
+    return max(deviations(test, reference, found).values())
+
+
+@contextmanager
+def in_use() -> Iterator[None]:
+    """Let metrics be computed by colour-science in the block, not by the compiled formulas."""
+    compiled = {name: dict(vars(METRICS[name])) for name in DEFINED}
+    try:
         for name, (space, difference) in DEFINED.items():
-            defined = difference(space(test, viewing), space(reference, viewing))
-            compiled = METRICS[name](test[None], reference[None], viewing)[0]
-            apart = max(apart, float(np.abs(compiled - defined).max()))
-    return apart
+            vars(METRICS[name]).update(coordinates=space, difference=difference)
+        with np.errstate(all="ignore"):
+            yield
+    finally:
+        for name, fields in compiled.items():
+            vars(METRICS[name]).update(fields)

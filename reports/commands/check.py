@@ -106,7 +106,9 @@ def check(
                 )
                 title = f"fotismos check: {summaries.outcome(found, significance)}"
                 if views:
-                    results.write(folder / page.DETAILS, page.details(len(views)))
+                    records = [view.record for view in views]
+                    details = page.details(len(views), records=records)
+                    results.write(folder / page.DETAILS, details)
                     results.write(folder / results.PAGE, page.render(views, title))
                 else:
                     results.clear(folder, (results.PAGE, page.DETAILS))

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 @jobs.option("transfer")
 @jobs.verbosity_options
 @jobs.option("noise")
+@jobs.option("colour_science")
 @click.option(
     "--why/--no-why",
     "with_causes",

@@ -41,6 +41,7 @@ VERIFIED_QUICKLY = slice(3, None, 4)
 @jobs.fresh_option
 @jobs.process_options
 @jobs.rendering_options
+@jobs.option("colour_science")
 @jobs.verbosity_options
 @click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
 @jobs.open_option

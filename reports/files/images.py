@@ -93,12 +93,13 @@ def pictures(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
 
 
 def thumbnails(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
-    """Small WebP files for cards: both halves, and the map of the leading metric."""
+    """Small WebP files: both halves, the leading metric's map, and terms that are not black."""
     made = {
         "heuristic": tonemap(shown.heuristic, exposure),
         "reference": tonemap(shown.reference, exposure),
         LEADING.name: error_map(shown.maps[LEADING.name], LEADING.map_range[1]),
     }
+    made |= {name: tonemap(term, exposure) for name, term in shown.terms.items() if term.any()}
     return {name: webp(_small(picture)) for name, picture in made.items()}
 
 
@@ -146,7 +147,7 @@ def webp_uri(file: bytes) -> str:
 
 # --- OpenEXR ----------------------------------------------------------------------------------
 
-#: Layers that keep float32; the others are maps, for which half's 11 bits are enough.
+#: Layers that keep float32, as terms do; the others are maps, for which half's 11 bits are enough.
 FULL_PRECISION = frozenset({"heuristic", "reference", "reference_stderr", "P", "N"})
 
 #: Layers with X, Y, Z instead of R, G, B.
@@ -183,13 +184,15 @@ def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
     """Return images of one size as OpenEXR channels: contiguous (H, W) half or float32.
 
     (H, W, 3) becomes ``name.R``, ``name.G``, ``name.B``, or ``.X``, ``.Y``, ``.Z`` for "P" and "N";
-    (H, W), also boolean, becomes ``name.Y``. `FULL_PRECISION`, and values beyond half, are float32.
+    (H, W), also boolean, becomes ``name.Y``. `FULL_PRECISION`, terms and values beyond half are
+    float32.
     """
     result: dict[str, np.ndarray] = {}
     for name, values in layers.items():
         image = np.asarray(values)
         is_large = bool(image.size) and np.abs(image).max() > HALF_MAX
-        precision = np.float32 if name in FULL_PRECISION or is_large else np.float16
+        is_full = is_large or name in FULL_PRECISION or name.startswith("term.")
+        precision = np.float32 if is_full else np.float16
         suffixes = "Y" if image.ndim == 2 else "XYZ" if name in VECTORS else "RGB"
         planes = image[..., None] if image.ndim == 2 else image
         for index, suffix in enumerate(suffixes):

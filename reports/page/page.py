@@ -30,7 +30,7 @@ from reports.page.templating import HELP, rendered
 from reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
-    from comparisons.comparison import Attribution
+    from comparisons.comparison import Attribution, ComparisonRecord
     from comparisons.hard_cases import HardCases
     from comparisons.verification import Verification
 
@@ -116,10 +116,12 @@ def details(
     verifications: Sequence[Verification] = (),
     hard_cases: HardCases | None = None,
     run: RunRecord | None = None,
+    records: Sequence[ComparisonRecord] = (),
 ) -> str:
     """The page beside that of so many scenes: how to read it, and what was checked.
 
-    Parts that are not given are left out; `run` says where the time went.
+    Parts that are not given are left out; `run` says where the time went, and `records` how far
+    colour differences are from colour-science's.
     """
     return rendered(
         "details.html.j2",
@@ -132,6 +134,7 @@ def details(
         verifications=verifications,
         hard_cases=hard_cases,
         run=run,
+        compared=[record for record in records if record.colour_science],
     )
 
 

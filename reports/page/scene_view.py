@@ -98,7 +98,7 @@ class Before(Record):
 class SceneView(Record):
     """A comparison as the page shows it.
 
-    ``thumbnails`` are small named WebP files of both halves and of the leading metric's map;
+    ``thumbnails`` are small named WebP files of both halves, the leading metric's map and terms;
     without ``embedded`` images, the scene has only these. ``files`` are labels, and paths relative
     to the page. ``before`` is what moved since a baseline, on the page of a check.
     """

@@ -104,7 +104,9 @@ class Batch:
             state = f"Interrupted: {done}; the same command resumes the run."
         elif self.done < len(self.places):
             state = f"In progress: {done}; reload to see more."
-        results.write(self.folder / page.DETAILS, page.details(len(self.ordered), **content))
+        records = [view.record for view in self.ordered]
+        details = page.details(len(records), records=records, **content)
+        results.write(self.folder / page.DETAILS, details)
         html = page.render(
             self.ordered, failures=self.failures(), state=state, threshold=self.within
         )

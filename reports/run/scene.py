@@ -284,6 +284,7 @@ def _layers(shown: Images) -> dict[str, Any]:
         "N": shown.normal,
         **{name: shown.maps[name] for name in drawn()},
         "significant": shown.significant,
+        **shown.terms,
     }
 
 

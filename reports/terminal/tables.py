@@ -190,6 +190,9 @@ def details(record: ComparisonRecord) -> Iterator[str]:
         yield f"  not used: {setting.what} {setting.given}, but {setting.used}"
     for warning in record.warnings:
         yield f"  warning: {warning}"
+    if compared := record.colour_science:
+        apart = ", ".join(f"{name} {most:.1e}" for name, most in compared.largest.items())
+        yield f"  largest deviations from colour-science, at {compared.pixels} pixels: {apart}"
     stages = record.time.stages
     yield "  " + ", ".join(f"{name} {seconds(value)}" for name, value in stages.items())
 
