@@ -24,6 +24,9 @@ LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789a"))
 ROUNDED = 16
 """Half floats of hybrids are rounded to multiples of this code, by up to 0.8 %."""
 
+LIVE_CODE = 16383
+"""The largest code of points to shade again: 14 bits, which pack better than 16."""
+
 LARGEST_CODE = 65535
 """The largest code of the planes of terms and normals."""
 
@@ -108,14 +111,14 @@ def terms_view(grid: TermGrid) -> TermsView:
 def live_view(points: LivePoints) -> LiveView:
     """Return the page's data of the points that it can shade again.
 
-    A value ``v`` has the code ``65535 (1 + v / top) / 2``, with the plane's ``top``.
+    A value ``v`` has the code ``16383 (1 + v / top) / 2``, with the plane's ``top``.
     ``templates/viewer/shading.js`` reads them.
     """
     tops, rows = {}, {}
     for name, plane in points.planes.items():
         plane = np.where(points.planes["material"], plane, 0.0)
         tops[name] = float(abs(plane).max()) or 1.0
-        codes = np.rint(LARGEST_CODE * (1 + plane / tops[name]) / 2).astype(np.uint16)
+        codes = np.rint(LIVE_CODE * (1 + plane / tops[name]) / 2).astype(np.uint16)
         rows[name] = np.diff(codes, axis=0, prepend=np.uint16(0))
     return LiveView(
         grid=packed(rows),

@@ -17,7 +17,7 @@ function pointsOf({ tops, rays }, { width, height, codes }) {
   const plane = (/** @type {string} */ name) => {
     const values = codes[name].slice();
     for (let place = width; place < count; place++) values[place] += values[place - width];
-    return Float64Array.from(values, (code) => tops[name] * ((2 * code) / LARGEST_CODE - 1));
+    return Float64Array.from(values, (code) => tops[name] * ((2 * code) / 16383 - 1)); // LIVE_CODE
   };
   const vectors = (/** @type {string} */ name) => {
     if (!(`${name}.x` in codes)) return null;
@@ -102,10 +102,10 @@ function shaded({ material, position, view, normal, face_normal, k_d }, { materi
 function labOf(rgb, exposure) {
   const white = page.xyz.map((row) => row[0] + row[1] + row[2]), found = new Float64Array(rgb.length), f = [0, 0, 0];
   for (let p = 0; p < rgb.length; p += 3) {
-    const [r, g, b] = [rgb[p], rgb[p + 1], rgb[p + 2]].map((value) => clamp(value * exposure, 0, 1));
+    const r = clamp(rgb[p] * exposure, 0, 1), g = clamp(rgb[p + 1] * exposure, 0, 1), b = clamp(rgb[p + 2] * exposure, 0, 1);
     for (let row = 0; row < 3; row++) {
       const m = page.xyz[row], ratio = (m[0] * r + m[1] * g + m[2] * b) / white[row];
-      f[row] = ratio > (24 / 116) ** 3 ? Math.cbrt(ratio) : (841 / 108) * ratio + 16 / 116;
+      f[row] = ratio > 216 / 24389 ? Math.cbrt(ratio) : (841 / 108) * ratio + 16 / 116;
     }
     found[p] = 116 * f[1] - 16; found[p + 1] = 500 * (f[0] - f[1]); found[p + 2] = 200 * (f[1] - f[2]);
   }
@@ -114,13 +114,13 @@ function labOf(rgb, exposure) {
 
 /** ΔE2000 of the colours at each place of two arrays of L*a*b*. @param {Float64Array} first @param {Float64Array} second */
 function differencesOf(first, second) {
-  const degree = Math.PI / 180, saturation = (/** @type {number} */ chroma) => Math.sqrt(chroma ** 7 / (chroma ** 7 + 25 ** 7));
+  const degree = Math.PI / 180, saturation = (/** @type {number} */ chroma) => 1 / Math.sqrt(1 + (25 / chroma) ** 7);
   const hueOf = (/** @type {number} */ a, /** @type {number} */ b) => (Math.atan2(b, a) / degree + 360) % 360;
-  return Float64Array.from({ length: first.length / 3 }, (_, place) => {
+  return new Float64Array(first.length / 3).map((_, place) => {
     const p = 3 * place, l1 = first[p], l2 = second[p], b1 = first[p + 2], b2 = second[p + 2];
-    const stretch = 1.5 - 0.5 * saturation((Math.hypot(first[p + 1], b1) + Math.hypot(second[p + 1], b2)) / 2);
+    const stretch = 1.5 - 0.5 * saturation((Math.sqrt(first[p + 1] ** 2 + b1 * b1) + Math.sqrt(second[p + 1] ** 2 + b2 * b2)) / 2);
     const a1 = first[p + 1] * stretch, a2 = second[p + 1] * stretch;
-    const c1 = Math.hypot(a1, b1), c2 = Math.hypot(a2, b2), h1 = hueOf(a1, b1), h2 = hueOf(a2, b2);
+    const c1 = Math.sqrt(a1 * a1 + b1 * b1), c2 = Math.sqrt(a2 * a2 + b2 * b2), h1 = hueOf(a1, b1), h2 = hueOf(a2, b2);
     let turn = h2 - h1, hue = h1 + h2;
     if (!(c1 * c2)) turn = 0;
     else if (Math.abs(turn) <= 180 + 1e-9) hue /= 2;
