@@ -78,7 +78,7 @@ def test_page_and_terminal_say_which_sample_count_would_pass(study):
     spp = 16 * (many - left) / (4 - left)
     expected = (
         f"No measured method passes at ΔE2000 2. About {ceil(spp)} samples per pixel of full plan"
-        " would, in "
+        " would;"
     )
     enough = structs.replace(record.points[2], tolerance=MeanError(1.0, 0.9, 1.1))
     for points, is_said in ((record.points, True), ((*record.points, enough), False)):

@@ -12,7 +12,7 @@ from msgspec import structs
 
 from comparisons.comparison import MeanError
 from comparisons.cost.cost_record import Point, TimedMethod
-from reference.records import Amount, Estimated, Record, Size
+from reference.records import Estimated, Record
 
 Interval = Estimated | MeanError
 
@@ -84,19 +84,17 @@ class Reach(Record):
     ----------
     left
         ΔE2000 that 5 % of the pixels exceed without noise.
-    spp, seconds
-        Samples per pixel with which the method should pass at a tolerance, about, and their time;
-        None if too much is left.
+    spp
+        Samples per pixel with which it should pass at a tolerance; None if too much is left.
     """
 
     method: str
-    left: Amount
-    spp: Size | None = None
-    seconds: Amount | None = None
+    left: float
+    spp: int | None = None
 
 
 def reach(points: Sequence[Point], tolerance: float) -> Reach | None:
-    """Return the fastest method that should pass at a tolerance with more samples than measured.
+    """Return the method that should pass at a tolerance with the fewest more samples than measured.
 
     What is left without noise follows from a method's two largest counts: the tolerances T at them
     obey ``T² = left² + noise² / spp``. If too much is left with every method, the nearest one is
@@ -110,10 +108,8 @@ def reach(points: Sequence[Point], tolerance: float) -> Reach | None:
         fewer, more = own[-2:]
         step, square = more.spp - fewer.spp, more.tolerance.mean**2
         left = max(square - (fewer.tolerance.mean**2 - square) * fewer.spp / step, 0.0)
-        room, spp, time = tolerance**2 - left, None, None
+        room, spp = tolerance**2 - left, None
         if room > 0:
             spp = max(ceil(more.spp * (square - left) / room), more.spp + 1)
-            each = (more.seconds.value - fewer.seconds.value) / step
-            time = more.seconds.value + each * (spp - more.spp)
-        found.append(Reach(name, sqrt(left), spp, time))
-    return min(found, key=lambda one: (one.spp is None, one.seconds or one.left), default=None)
+        found.append(Reach(name, sqrt(left), spp))
+    return min(found, key=lambda one: (one.spp is None, one.spp or one.left), default=None)

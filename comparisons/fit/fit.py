@@ -230,17 +230,14 @@ def _best(
     )
     after = fitted.whole(x).reshape(rendered.before.shape)
     by_metric, maps = departures(rendered, after)
-    truth, noise = rendered.reference.mean, rendered.difference.noise
-    judged = (
-        summarise(LEADING, image, truth, counted, rendered.viewing, noise)[0]
-        for image in (rendered.before, after)
-    )
+    common = rendered.reference.mean, counted, rendered.viewing, rendered.difference.noise
+    judged = (summarise(LEADING, image, *common) for image in (rendered.before, after))
     record = FormFit(
         form=fitted.form,
         loss=least,
         parameter_error=objective.value_of(rendered.before[counted]) - least,
         departure=by_metric,
-        differ=tuple(share_above(found.visible) for found in judged),
+        differ=tuple(share_above(found.visible) for found, _ in judged),
         materials=materials,
         converged=converged,
     )

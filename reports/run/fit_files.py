@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from comparisons.departure.criterion import LIMIT, TOLERANCE, decide
+from comparisons.departure.criterion import TOLERANCE, decide
 from comparisons.departure.metrics import LEADING, drawn
 from comparisons.fit.fit import Fit
 from comparisons.fit.fit_record import FitRecord, FormFit
@@ -66,7 +66,7 @@ def judgement(record: FitRecord) -> str:
         f"{percent(share.value)} ({decide([share])})" for share in record.nearest.differ
     )
     return (
-        f"At most {percent(LIMIT)} of the pixels may differ by more than {LEADING.label}"
+        f"At most 5 % of the pixels may differ by more than {LEADING.label}"
         f" {TOLERANCE:g}: paired {paired}, fitted {fitted}."
     )
 

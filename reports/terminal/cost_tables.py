@@ -94,8 +94,8 @@ def unreached(record: Cost) -> str:
     points = record.predicted or record.points
     if sufficient(points, TOLERANCE):
         return ""
-    label = f"{LEADING.label} {TOLERANCE:g}"
-    return f"No measured method passes at {label}. {beyond(reach(points, TOLERANCE))}"
+    found = beyond(reach(points, TOLERANCE))
+    return f"No measured method passes at {LEADING.label} {TOLERANCE:g}. {found}"
 
 
 def closure(record: Cost) -> str:
@@ -143,12 +143,10 @@ def beyond(found: Reach | None) -> str:
     if found.spp is None:
         return (
             f"No sample count would: with {found.method}, the nearest, 5 % of the pixels exceed"
-            f" {LEADING.label} {number(found.left)} without any noise. Bias remains."
+            f" {LEADING.label} {number(found.left)} without its noise: bias, or the"
+            " reference's own noise, remains."
         )
-    return (
-        f"About {found.spp:,} samples per pixel of {found.method} would, in"
-        f" {seconds(found.seconds)}; --spp measures more."
-    )
+    return f"About {found.spp:,} samples per pixel of {found.method} would; --spp measures more."
 
 
 def _offer(point: Point) -> str:
