@@ -180,6 +180,7 @@ FAILING = (
 )  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_each_check_can_fail(rgb):
     for number, (function, expected) in enumerate(FAILING):
         found = failing(checked(small(shaded(function), (48, 36)))[0])
@@ -218,6 +219,7 @@ def test_a_density_that_is_wrong_is_found(rgb):
 # --- Hard cases ----------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 @pytest.mark.guarantee(
     "kernel", "Every built-in heuristic and example shader passes an audit's hard cases."
 )

@@ -26,6 +26,7 @@ def scene():
 """
 
 DEEDS = {
+    "breaks modules": "import json, comparisons.compare as c; json.dumps = c.compare = None",
     "changes its process": "import os, sys; os.chdir('/'); os.umask(0o777); os.environ.clear();"
     " os.write(1, b'words'); print('more'); sys.path.clear(); sys.argv.clear();"
     " mi.set_variant('scalar_rgb') if 'scalar_rgb' in mi.variants() else None",
@@ -33,7 +34,6 @@ DEEDS = {
     "does not end": "import signal, subprocess, threading, time;"
     " signal.signal(signal.SIGTERM, signal.SIG_IGN); subprocess.Popen(['sleep', '1000']);"
     " threading.Thread(target=time.sleep, args=(1000,)).start()",
-    "breaks modules": "import json, comparisons.compare as c; json.dumps = c.compare = None",
 }
 
 
