@@ -128,7 +128,7 @@ def test_plan_prints_a_table_and_json(run):
     assert "box around a light" in shadows["premise"]
     assert "may stand between" in shadows["evidence"]
     data = json.loads(run("plan", "fig-8-9", "--json", "--everything")[1])
-    assert (data["integrator"], len(data["effects"])) == ("path", 14)
+    assert (data["integrator"], len(data["effects"])) == ("path", 15)
     assert all(effect["called_for"] for effect in data["effects"])
 
 
