@@ -219,6 +219,19 @@ def test_every_pair_of_colours_has_a_finite_symmetric_distance(metric):
         assert np.isfinite(metric(ROWS, COLUMNS, viewing)).all()
 
 
+@pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS)
+def test_a_map_is_not_a_view_of_the_memory_of_dr_jit(metric):
+    """Dr.Jit could wait for ever for a lock when it gives back an array that is made of one."""
+    images = np.random.default_rng(7).random((2, 16, 16, 3))
+    made = [metric(*images)]
+    if isinstance(metric, Pixelwise):
+        made += [metric.coordinates(image, Viewing()) for image in images]
+    for owner in made:
+        while isinstance(owner, np.ndarray) and owner.base is not None:
+            owner = owner.base
+        assert isinstance(owner, np.ndarray)
+
+
 def test_a_pixel_that_is_not_finite_is_named_with_layer_count_and_place():
     for wrong in (np.nan, np.inf, -np.inf):
         bad = np.zeros((4, 5, 3))

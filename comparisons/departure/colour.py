@@ -248,6 +248,10 @@ def opaque(value: float) -> Float64:
 
 
 # --- Arrays ---
+#
+# Results are copies, not views of Dr.Jit's memory: Dr.Jit gives back an array that was made of such
+# a view in a thread that has Python's lock and waits for Dr.Jit's, while a rendering has the latter
+# and waits for the former.
 
 
 @dataclass(frozen=True)
@@ -263,7 +267,7 @@ class Space:
         rgb = np.asarray(rgb)
         if not rgb.size:
             return np.zeros(rgb.shape)
-        return np.asarray(dr.ravel(self.formula(viewing)(_colours(rgb)))).reshape(rgb.shape)
+        return np.array(dr.ravel(self.formula(viewing)(_colours(rgb)))).reshape(rgb.shape)
 
 
 @dataclass(frozen=True)
@@ -276,7 +280,7 @@ class Distance:
         a, b = np.asarray(a), np.asarray(b)
         if not a.size:
             return np.zeros(a.shape[:-1])
-        return self.formula(_colours(a), _colours(b)).numpy().reshape(a.shape[:-1])
+        return np.array(self.formula(_colours(a), _colours(b))).reshape(a.shape[:-1])
 
 
 def _colours(pixels: Array) -> Array3f64:

@@ -239,7 +239,7 @@ def _error(truth: tuple, shown: tuple) -> NDArray[np.float32]:
     feature = sqrt(sqrt(0.5)) * dr.sqrt(dr.maximum(slopes, curvatures))
     colour = _redistributed(_apart(first, second))
     # Equal colours are 0 apart, whatever the power.
-    return dr.select(colour > 0.0, dr.power(colour, 1.0 - feature), 0.0).numpy()
+    return np.array(dr.select(colour > 0.0, dr.power(colour, 1.0 - feature), 0.0))
 
 
 def _hunted(opponent: Array3f) -> Array3f:
