@@ -1,6 +1,7 @@
 """The wheel in an environment of its own, with all dependencies from the package registry."""
 
 import os
+import shutil
 import subprocess
 import sys
 
@@ -17,7 +18,10 @@ def installed(tmp_path_factory):
     """The folder of programs of an environment in which a wheel of this project is installed."""
     folder = tmp_path_factory.mktemp("installed")
     pip = (sys.executable, "-m", "pip", "-q", "--disable-pip-version-check")
-    do(*pip, "wheel", "--no-deps", "-w", folder, ROOT)
+    # Made of a copy: what a wheel leaves behind would be found as another plugin of pytest.
+    source = folder / "source"
+    shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns(".*", "node_modules", "out"))
+    do(*pip, "wheel", "--no-deps", "-w", folder, source)
     (wheel,) = folder.glob("fotismos-*.whl")
     do(sys.executable, "-m", "venv", "--without-pip", folder / "env")
     programs = folder / "env/bin"

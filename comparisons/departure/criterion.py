@@ -33,7 +33,13 @@ def checked_threshold(threshold: float) -> float:
 
 def share_above(visible: Sequence[VisibleShare], threshold: float = TOLERANCE) -> VisibleShare:
     """Return the share of pixels above a threshold, from a summary's ``visible``."""
-    return next(share for share in visible if share.threshold == threshold)
+    for share in visible:
+        if share.threshold == threshold:
+            return share
+    listed = ", ".join(f"{share.threshold:g}" for share in visible)
+    raise InputError(
+        f"no share of pixels above {threshold:g} is recorded: give one of {listed or 'none'}."
+    )
 
 
 def decide(

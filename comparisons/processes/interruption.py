@@ -10,7 +10,12 @@ SIGNALS = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
 """Ctrl-C, the end of a job, and the end of a terminal."""
 
 PAUSE_S = 0.02
-"""Seconds after which a signal that arrived during an import is tried again."""
+"""Seconds after which a signal that arrived in delicate code is tried again."""
+
+DELICATE = "<frozen importlib._bootstrap>", "popen_spawn_posix.py"
+"""Files whose functions must end: a native module that is loading would crash or swallow the
+exception, and a process that is starting would print that its parent is gone. A blocked signal can
+still arrive there: another thread takes it, and Python calls the handler in the main one."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -47,16 +52,15 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     for each in SIGNALS:
         if signal.getsignal(each) is _interrupt:
             signal.signal(each, lambda number, _: os._exit(128 + number))
-    if not _is_importing(frame):
+    if not _is_delicate(frame):
         raise Interrupted(number)
-    # A native module that is loading would crash or swallow the exception, so try again later.
     signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(number, frame))
     signal.setitimer(signal.ITIMER_REAL, PAUSE_S)
 
 
-def _is_importing(frame: FrameType | None) -> bool:
+def _is_delicate(frame: FrameType | None) -> bool:
     while frame is not None:
-        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+        if frame.f_code.co_filename.endswith(DELICATE):
             return True
         frame = frame.f_back
     return False
