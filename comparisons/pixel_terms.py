@@ -243,7 +243,7 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
         shading = options.polygon_shading.value.capitalize()
         return f"{shading} shading does not evaluate 8.10 at pixels."
     if half.integrator.occlusion:
-        return "Shadow rays hide lights, which is no part of equation 8.10."
+        return "Shadow rays hide lights, and equation 8.10 has no shadows."
     if mi.is_spectral:
         return "The heuristic half is rendered by wavelength, so its terms are not RGB."
     if len(half.scene.emitters()) > MOST_LIGHTS:

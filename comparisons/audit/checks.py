@@ -151,11 +151,11 @@ def curve(subject: Subject, material: str) -> MaterialCurves:
     response, alpha = partial(subject.response, material), subject.materials[material]
     lights = LIGHTS if alpha in (None, PICTURED) else ()
     return MaterialCurves(
-        material,
-        alpha,
-        tuple(furnace.seen(response, angle, subject.grid) for angle in ANGLES),
-        tuple(furnace.returned(response, angle, subject.grid) for angle in ANGLES),
-        tuple(lobe(subject, material, angle) for angle in lights),
+        material=material,
+        alpha=alpha,
+        seen=tuple(furnace.seen(response, angle, subject.grid) for angle in ANGLES),
+        returned=tuple(furnace.returned(response, angle, subject.grid) for angle in ANGLES),
+        lobes=tuple(lobe(subject, material, angle) for angle in lights),
     )
 
 

@@ -125,12 +125,15 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     corrected = sidak(p, len(pairs))
     return tuple(
         Move(
-            *old[:4],
-            new[3],
-            float(np.sqrt(total[i])),
-            float(t[i]) if spread[i] else None,
-            float(p[i]),
-            float(corrected[i]),
+            quantity=old[0],
+            half=old[1],
+            block=old[2],
+            before=old[3],
+            after=new[3],
+            error=float(np.sqrt(total[i])),
+            standard_errors=float(t[i]) if spread[i] else None,
+            p=float(p[i]),
+            p_corrected=float(corrected[i]),
         )
         for i, (old, new) in enumerate(pairs)
     )

@@ -212,11 +212,11 @@ def attribute(images: HybridImages, meter: ErrorMeter, shapes: ObjectIds, seed: 
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
     contributions = tuple(
         Contribution(
-            effect.label,
-            jackknifed(removed[effect.label].mean(axis=1)),
-            float((error(nothing) - error(frozenset({effect})))[0].mean()),
-            float((error(everything - {effect}) - error(everything))[0].mean()),
-            sampling_error,
+            effect=effect.label,
+            removes=jackknifed(removed[effect.label].mean(axis=1)),
+            alone=float((error(nothing) - error(frozenset({effect})))[0].mean()),
+            last=float((error(everything - {effect}) - error(everything))[0].mean()),
+            sampling_error=sampling_error,
         )
         for effect, sampling_error in zip(effects, sampling_errors, strict=True)
     )
@@ -269,12 +269,12 @@ def by_object(
     remaining = means(left, rows, count)
     return tuple(
         ObjectContribution(
-            one.name,
-            one.pixels,
-            one.share,
-            one.mean_dE2000,
-            tuple(jackknifed(each[:, row]) for each in gains),
-            float(remaining[row]),
+            name=one.name,
+            pixels=one.pixels,
+            share=one.share,
+            departure=one.mean_dE2000,
+            removes=tuple(jackknifed(each[:, row]) for each in gains),
+            left=float(remaining[row]),
         )
         for row, one in enumerate(found)
     )

@@ -79,8 +79,13 @@ class Tally:
     def guard(self, disagrees: bool, rays: int, begin: float) -> Guard:
         """Return the result of the probe, by these rays."""
         scale = self.level or 1.0
-        departure, error, seconds = self.mean / scale, self.error / scale, perf_counter() - begin
-        return Guard("disagreed" if disagrees else "agreed", rays, departure, error, seconds)
+        return Guard(
+            state="disagreed" if disagrees else "agreed",
+            rays=rays,
+            departure=self.mean / scale,
+            error=self.error / scale,
+            seconds=perf_counter() - begin,
+        )
 
 
 def _quantile(level: float) -> float:
