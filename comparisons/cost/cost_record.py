@@ -156,8 +156,10 @@ class CostAttribution(Record):
     ----------
     effects
         One for each effect. What they add, and ``renderer_s``, is ``plan_s`` less ``kernel_s``.
+        What they remove is measured like ``departure``.
     departure
-        Mean ΔE2000 of the heuristic half, without noise.
+        Mean ΔE2000 of the heuristic half, without noise, on the small film that causes are found
+        on: at most 48 pixels wide, so fine highlights are averaged.
     kernel_s, plan_s
         Seconds that the samples of an image take with no effect, and with all of them, without
         overhead.
@@ -165,7 +167,7 @@ class CostAttribution(Record):
         Seconds that Mitsuba's integrator, on the scene's own shapes, takes more than the kernel to
         simulate the same effects.
     resolution, spp
-        Size of that image, and its samples per pixel.
+        Size of the image that the seconds are of, and its samples per pixel.
     """
 
     effects: tuple[EffectCost, ...]
