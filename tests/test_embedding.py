@@ -17,9 +17,14 @@ ROUNDING, ERROR_ROUNDING = 0.0025, 2**-4
 def codes(embedded):
     """The planes of 16 bits and their names, from their differences."""
     raw = zlib.decompress(base64.b64decode(embedded.data))
-    found = np.cumsum(np.frombuffer(raw, "<u2"), dtype=np.uint16)
-    found = found.reshape(len(embedded.names), embedded.height, embedded.width)
-    return dict(zip(embedded.names, found, strict=True))
+    low, high = np.frombuffer(raw, np.uint8).reshape(2, -1).astype(int)
+    signed = low + 256 * high
+    steps = np.where(signed % 2, -(signed + 1) // 2, signed // 2)
+    found = np.cumsum(steps).reshape(len(embedded.names), embedded.height, embedded.width)
+    for place, name in enumerate(embedded.names):
+        if name.split(".")[-1] in ("G", "B"):
+            found[place] += found[place - 1]
+    return dict(zip(embedded.names, (found % 2**16).astype(np.uint16), strict=True))
 
 
 def read(embedded):

@@ -228,3 +228,23 @@ def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
     expected = np.mean([np.array(one.images[0]) for one in loop], axis=0)
     np.testing.assert_allclose(image.mean(axis=0), expected, rtol=1e-3, atol=1e-4)
     assert abs(image - hybrids.simulating(())).max() > 0.05
+
+
+@pytest.mark.guarantee(
+    "attribution", "Previews with light between surfaces have half the noise of their samples."
+)
+def test_a_clean_reference_takes_noise_out_of_previews(rgb):
+    """By two runs that share nothing but the scene; the means stay."""
+    case = open_case("cornell-box", Options(resolution=(48, 48)))
+    ladder = Ladder(case.source, case.options, guarded(case.source, case.options))
+    ladder.ready.reference.spp = 256
+    total = whole(ladder.ready.reference)
+    clean = total.mean, total.standard_error
+    runs = [HybridImages(ladder.pairs, ladder.scenes, 4, 16, seed, (24, 24)) for seed in (1, 2)]
+    for effects in ({INTERREFLECTION}, {INTERREFLECTION, OCCLUSION}, runs[0].effects):
+        plain, quiet = (
+            [each.preview(frozenset(effects), given) for each in runs] for given in (None, clean)
+        )
+        before, after = (np.sqrt(np.mean((one - two) ** 2)) for one, two in (plain, quiet))
+        assert after < 0.5 * before
+        assert np.mean(quiet) == pytest.approx(np.mean(plain), rel=0.02)

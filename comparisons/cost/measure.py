@@ -60,7 +60,7 @@ MOST_SAMPLES = 2**24
 """Samples of one image, at most."""
 
 WARM = 2
-"""Rounds before those that are timed: the first traces and compiles, the second warms caches."""
+"""Images before those that are timed: the first traces and compiles, the second warms caches."""
 
 
 @dataclass(frozen=True)
@@ -166,12 +166,12 @@ def measure_ladder(
     wanted = {one.name: one for step in steps for one in (step.before, step.after)}
     wanted |= {one.name: one for one in ladder.methods}
     counts = {name: effort.counts(one) for name, one in wanted.items()}
+    renderers = tried(
+        {name: ladder.renderer(one, counts[name][-1]) for name, one in wanted.items()},
+        counts, size[0] * size[1], progress,
+    )  # fmt: skip
+    judged = {(one.name, spp) for one in ladder.methods for spp in counts[one.name]}
     with alone or nullcontext():
-        renderers = tried(
-            {name: ladder.renderer(one, counts[name][-1]) for name, one in wanted.items()},
-            counts, size[0] * size[1], progress,
-        )  # fmt: skip
-        judged = {(one.name, spp) for one in ladder.methods for spp in counts[one.name]}
         errors, images = rendered(
             renderers, judge, judged, effort.rounds, options.seed, progress, "timing"
         )
@@ -230,7 +230,7 @@ def tried(
     """Return ``{(name, samples per pixel): renderer}`` for ``counts``, and some for the time.
 
     The largest takes at least :data:`times.LEAST_S`, and one a fourth of its samples. ``firsts``
-    have the most samples of the method's counts.
+    have the most samples of the method's counts. All have rendered :data:`WARM` images.
     """
     renderers: dict[Key, Renderer] = {}
     for number, (name, first) in enumerate(firsts.items()):
@@ -238,17 +238,23 @@ def tried(
         own = {first.spp: first}
         last = first
         while True:
-            for seed in (0, 1):
-                last.render(seed)
+            warm(last)
             if last.times[-1] >= times.LEAST_S or 4 * last.spp * pixels > MOST_SAMPLES:
                 break
             last = first.sampled(4 * last.spp)
             own[last.spp] = last
         for spp in {*counts[name], max(1, last.spp // 4), max(1, last.spp // 16)} - own.keys():
             own[spp] = first.sampled(spp)
+            warm(own[spp])
         renderers |= {(name, spp): own[spp] for spp in sorted(own)}
     progress("compiling", len(firsts), len(firsts))
     return renderers
+
+
+def warm(renderer: Renderer) -> None:
+    """Render the images that are not timed."""
+    for seed in range(WARM):
+        renderer.render(seed)
 
 
 def rendered(
@@ -266,10 +272,10 @@ def rendered(
     """
     errors: dict[Key, list[tuple[float, float]]] = {key: [] for key in renderers if key in judged}
     images: dict[Key, NDArray] = {}
-    loop = passes([*renderers.values()], seed, rounds + WARM, progress=progress, stage=stage)
+    loop = passes([*renderers.values()], seed, rounds, progress=progress, stage=stage)
     for one in loop:
         for key, image in zip(renderers, one.images, strict=True):
-            if key in judged and one.number >= WARM:
+            if key in judged:
                 images[key] = np.array(image)
                 errors[key].append(judge(images[key]))
     return {key: _mean_errors(each) for key, each in errors.items()}, images
@@ -323,6 +329,8 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
         for one in found.methods
         for spp in found.effort.counts(one)[:1]
     }
+    for renderer in renderers.values():
+        warm(renderer)
     errors, _ = rendered(
         renderers, judge, renderers, MEASURED_ROUNDS, options.seed, progress, "measuring"
     )

@@ -1,9 +1,10 @@
 """Blocks of pixels: sums, neighbourhoods, and values spread over the pixels again."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
 from reference.rendering.sums import BLOCK
 
@@ -43,3 +44,11 @@ def ratio(above: Array, below: Array) -> Array:
     """Return ``above / below``, 0 where ``below`` is not positive."""
     above, below = np.broadcast_arrays(above, below)
     return np.divide(above, below, out=np.zeros(above.shape), where=below > 0.0)
+
+
+def averaged(image: NDArray[np.floating], shape: Sequence[int]) -> Array:
+    """Average an image (H, W, 3) down to ``shape``, whose first sides are height and width."""
+    height, width = shape[:2]
+    planes = [Image.fromarray(image[..., channel].astype(np.float32)) for channel in range(3)]
+    small = [plane.resize((width, height), Image.Resampling.BOX) for plane in planes]
+    return np.stack([np.asarray(plane, float) for plane in small], axis=-1)

@@ -54,9 +54,10 @@ WIDTH, NARROW, MANY = 48, 32, 64
 """Width of the images that causes are found in, at most, and that for more than MANY lights or
 shapes: each sample takes longer there."""
 
-REPLICATES, SPP = 4, 64
-"""Replicates of each image, and samples per pixel of each: with 16 instead of 64, skewed noise left
-2 % of the Cornell box's departure in the closure."""
+REPLICATES, SPP, EXACT_SPP = 4, 64, 16
+"""Replicates of each image, samples per pixel of each, and those of scenes whose plan is exact: only
+the pixel filter needs them. With 16 instead of 64, skewed noise left 2 % of the Cornell box's
+departure in the closure."""
 
 EXACT_EFFECTS, ORDERS = 4, 8
 """Largest number of effects for which every subset is rendered, and orders drawn for more."""
@@ -86,7 +87,8 @@ def explained(
     """
     begin, record = perf_counter(), comparison.record
     try:
-        causes = find(ready, source, options, progress)
+        clean = comparison.images.reference, comparison.images.reference_stderr
+        causes = find(ready, source, options, progress, clean)
     except FotismosError as error:
         warnings = (*record.warnings, f"The causes are unknown: {error}")
         return replace(comparison, record=structs.replace(record, warnings=warnings))
@@ -97,16 +99,25 @@ def explained(
 
 
 def find(
-    ready: Prepared, source: Source, options: Options, progress: Progress | None = None
+    ready: Prepared,
+    source: Source,
+    options: Options,
+    progress: Progress | None = None,
+    clean: tuple[NDArray, NDArray] | None = None,
 ) -> "Causes":
-    """Attribute the departure of a prepared scene, on a film of at most :data:`WIDTH` pixels."""
+    """Attribute the departure of a prepared scene, on a film of at most :data:`WIDTH` pixels.
+
+    ``clean`` are the reference (H, W, 3) on the scene's own film and its standard error, if known:
+    they make previews less noisy.
+    """
     width, height = image_size(ready.scene)
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
     most = NARROW if is_large else WIDTH
     size = min(most, width), max(1, round(height * min(1, most / width)))
+    spp = EXACT_SPP if ready.plan.exact else SPP
     surface = gbuffer(ready.scene, *size)
     require_surface(surface.hit, source.name)
-    reference = Renderer(ready.scene, ready.reference.integrator, SPP, "reference image", size)
+    reference = Renderer(ready.scene, ready.reference.integrator, spp, "reference image", size)
     # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
     loop = passes(
         [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
@@ -116,10 +127,10 @@ def find(
     meter = ErrorMeter(groups, surface.hit, options.viewing)
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
-    images = HybridImages(pairs, scenes, REPLICATES, SPP, options.seed, size)
+    images = HybridImages(pairs, scenes, REPLICATES, spp, options.seed, size)
     if progress:
         progress(CAUSES, 0, 1)
-    found = attribute(images, meter, surface.shape, options.seed)
+    found = attribute(images, meter, surface.shape, options.seed, clean)
     resize(ready.scene, (width, height))
     if progress:
         progress(CAUSES, 1, 1)
@@ -183,10 +194,16 @@ class ErrorMeter:
         return [LEADING.coordinates(pixels, self.viewing) for pixels in shown]
 
 
-def attribute(images: HybridImages, meter: ErrorMeter, shapes: ObjectIds, seed: int) -> Causes:
+def attribute(
+    images: HybridImages,
+    meter: ErrorMeter,
+    shapes: ObjectIds,
+    seed: int,
+    clean: tuple[NDArray, NDArray] | None = None,
+) -> Causes:
     """Attribute the departure to the effects, as a whole, on each shape, and in each pixel.
 
-    ``shapes`` are what each pixel sees; ``seed`` draws the orders.
+    ``shapes`` are what each pixel sees; ``seed`` draws the orders. For ``clean`` see :func:`find`.
     """
     effects, everything = images.effects, frozenset(images.effects)
     nothing: frozenset[Effect] = frozenset()
@@ -251,7 +268,7 @@ def attribute(images: HybridImages, meter: ErrorMeter, shapes: ObjectIds, seed: 
         departure=filled(departure[0]),
         left=filled(left[0]),
         counted=meter.counted,
-        previews={labels(effects, each): images.simulating(each).mean(axis=0) for each in errors},
+        previews={labels(effects, each): images.preview(each, clean) for each in errors},
     )
 
 

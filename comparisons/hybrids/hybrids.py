@@ -19,6 +19,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.departure.blocks import averaged, ratio
 from comparisons.options import Options
 from comparisons.prepared import Prepared
 from heuristic.convention import Scene
@@ -55,6 +56,9 @@ OF_KERNEL = frozenset({POLYGONS, ONE_INTENSITY})
 
 UNWEIGHTED = "perspective", "orthographic", "thinlens"
 """Cameras that leave light as it is."""
+
+NEAR = 9
+"""Width of the square of pixels over which the noise of two previews is correlated."""
 
 FINER = 2
 """Pixels of a preview per pixel of an image, in each direction."""
@@ -324,3 +328,36 @@ class HybridImages:
         width, height = self.size
         blocks = fine.reshape(len(fine), height, self.finer, width, self.finer, 3)
         return blocks.mean(axis=(2, 4))
+
+    def preview(
+        self, effects: Set[Effect], clean: tuple[NDArray, NDArray] | None = None
+    ) -> NDArray[np.float64]:
+        """Return the mean (f H, f W, 3) of an image's replicates, with less noise if possible.
+
+        ``clean`` are the reference (H', W', 3) on a film of at least the preview's size, and its
+        standard error. All images share camera rays and paths, so what the full plan's replicates
+        F deviate from the clean C tells part of the noise of an image X (a control variate)::
+
+            X - beta (F - C),  beta = cor(X, F) sqrt(var X / (var F + var C))
+
+        with the correlation over :data:`NEAR` pixels around each one, and variances over 3.
+        """
+        from scipy.ndimage import uniform_filter
+
+        own, full = self.simulating(effects), self.simulating(frozenset(self.effects))
+        mean, (height, width) = own.mean(axis=0), own.shape[1:3]
+        if clean is None or self.finer == 1 or len(clean[0]) < height:
+            return mean
+        picture, error = (averaged(each, (height, width)) for each in clean)
+        one, other = (each - each.mean(axis=0) for each in (own, full))
+
+        def product(one: NDArray, other: NDArray) -> NDArray[np.float64]:
+            return (one * other).sum(axis=0).mean(axis=-1) / (len(own) * (len(own) - 1))
+
+        noise, known = (
+            np.sqrt(np.maximum(uniform_filter(product(each, each), 3), 0)) for each in (one, other)
+        )
+        alike = uniform_filter(ratio(product(one, other), noise * known), NEAR).clip(-1, 1)
+        share = height * width / clean[1][..., 0].size
+        beta = ratio(alike * noise, np.hypot(known, np.sqrt(share) * error.mean(axis=-1)))
+        return mean - beta[..., None] * (full.mean(axis=0) - picture)

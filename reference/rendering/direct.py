@@ -96,12 +96,8 @@ def _define(_variant: str) -> None:
                     extended.append(emitter)
             colours = [colour] * len(self.transports)
             colours = sums(colours, _of_all(delta, True, *given))
-            colours = sums(colours, _of_all(extended, False, *given))
-            looks = any(each.bsdf_samples for each in self.transports)
-            if extended and (looks or _has_delta(scene)):
-                colours = sums(colours, _from_bsdf(*given))
             deep = [each for each in self.transports if each.max_depth != 2]
-            if deep:
+            if deep:  # first, so that paths have the same random numbers whatever lights there are
                 # Loaded late: most plans have direct light alone.
                 from reference.rendering.indirect import indirect_light
 
@@ -110,6 +106,10 @@ def _define(_variant: str) -> None:
                 indirect = indirect_light(scene, sampler, si, bsdf, *parameters)
                 added = dict(zip(deep, indirect, strict=True))
                 colours = sums(colours, [added.get(each, 0) for each in self.transports])
+            colours = sums(colours, _of_all(extended, False, *given))
+            looks = any(each.bsdf_samples for each in self.transports)
+            if extended and (looks or _has_delta(scene)):
+                colours = sums(colours, _from_bsdf(*given))
             return colours[0], valid, [channel for each in colours[1:] for channel in each]
 
         def aov_names(self):

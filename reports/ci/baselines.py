@@ -1,7 +1,7 @@
 """Baselines as files: finding them, reading and writing them, and the scenes that they name."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
-from PIL import Image
 
 from comparisons import atomic
 from comparisons.atomic import content, require_regular
 from comparisons.case import SUFFIXES, Case, file_of, open_case
 from comparisons.check.measurement import HALVES, Baseline, read_baseline
+from comparisons.departure.blocks import averaged
 from comparisons.options import Options
 from heuristic import program
 from heuristic.errors import InputError
@@ -107,7 +107,7 @@ def write(path: Path, baseline: Baseline, pictures: Kept | None = None) -> None:
             size = pictures[HALVES[0]].shape
             scale = min(1.0, LONGEST_KEPT / max(size[:2]))
             small = [max(1, round(side * scale)) for side in size[:2]]
-            layers = {f"baseline.{half}": reduced(pictures[half], small) for half in HALVES}
+            layers = {f"baseline.{half}": averaged(pictures[half], small) for half in HALVES}
             images.write_exr(place, layers, {"scene": baseline.scene})
             baseline = structs.replace(baseline, images=place.name)
         atomic.write(path, baseline.text())
@@ -115,14 +115,6 @@ def write(path: Path, baseline: Baseline, pictures: Kept | None = None) -> None:
         raise InputError(
             f"baseline {path}: {error.strerror or error}. Name another place for it."
         ) from error
-
-
-def reduced(image: NDArray[np.floating], shape: Sequence[int]) -> NDArray[np.floating]:
-    """Average an image (H, W, 3) down to ``shape``, whose first sides are height and width."""
-    height, width = shape[:2]
-    planes = [Image.fromarray(image[..., channel].astype(np.float32)) for channel in range(3)]
-    small = [plane.resize((width, height), Image.Resampling.BOX) for plane in planes]
-    return np.stack([np.asarray(plane, float) for plane in small], axis=-1)
 
 
 def scene_from(scene: str, path: Path) -> str:

@@ -12,6 +12,7 @@ from comparisons.check.measurement import baseline_of, made_small, measure_scene
 from comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
 from comparisons.compare import compare
 from comparisons.comparison import versions
+from comparisons.departure.blocks import averaged
 from comparisons.departure.metrics import LEADING
 from comparisons.options import Options
 from comparisons.processes.pool import Pool, Task
@@ -211,7 +212,7 @@ def _before(made: CheckRecord, found: Check, pictures: baselines.Kept | None) ->
     """Return the section of the page on what moved."""
     shown = {}
     for half, old in (pictures or {}).items():
-        now = baselines.reduced(found.now.pictures[half], old.shape)
+        now = averaged(found.now.pictures[half], old.shape)
         error = images.error_map(LEADING(now, old), LARGEST_ERROR)
         for name, picture in ((half, images.tonemap(old)), (f"{half}-error", error)):
             shown[name] = images.webp(picture, lossless=True)

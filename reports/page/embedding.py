@@ -1,7 +1,8 @@
 """Images inside the page, as half-precision numbers: three decimal digits.
 
-Planes of 16-bit codes follow each other, as differences to the code before (modulo 2^16), deflated
-(RFC 1950), in base64. ``templates/viewer/images.js`` reverses this.
+Planes of 16-bit codes follow each other. Green and blue are differences to the plane before, and all
+are differences to the code before (modulo 2^16), with the sign in the last bit, the low bytes before
+the high ones, deflated (RFC 1950), in base64. ``templates/viewer/images.js`` reverses this.
 """
 
 from __future__ import annotations
@@ -78,9 +79,14 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
 def packed(planes: Mapping[str, Codes], block: int = 1) -> Embedded:
     """Return planes of codes (H, W) as the page holds them."""
     height, width = next(iter(planes.values())).shape
-    codes = np.concatenate([codes.ravel() for codes in planes.values()])
-    differences = np.diff(codes, prepend=np.uint16(0)).astype("<u2")
-    data = base64.b64encode(zlib.compress(differences.tobytes())).decode("ascii")
+    before, parts = np.zeros((height, width), np.uint16), []
+    for name, codes in planes.items():
+        parts.append((codes - before if name.endswith((".G", ".B")) else codes).ravel())
+        before = codes
+    steps = np.diff(np.concatenate(parts), prepend=np.uint16(0)).view(np.int16)
+    signed = ((steps << 1) ^ (steps >> 15)).view(np.uint16)  # small steps of both signs are small
+    halves = np.stack([signed & 0xFF, signed >> 8]).astype(np.uint8)
+    data = base64.b64encode(zlib.compress(halves.tobytes())).decode("ascii")
     return Embedded(width, height, block, tuple(planes), data)
 
 

@@ -31,9 +31,17 @@ function imagesIn(id, manifest) {
 async function decode(manifest, text) {
   const bytes = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const codes = new Uint16Array(await new Response(stream).arrayBuffer());
-  for (let place = 1; place < codes.length; place++) codes[place] += codes[place - 1];
+  const halves = new Uint8Array(await new Response(stream).arrayBuffer());
+  const codes = new Uint16Array(halves.length / 2);
+  for (let place = 0, last = 0; place < codes.length; place++) {
+    const signed = halves[place] | (halves[place + codes.length] << 8);
+    codes[place] = last += (signed >>> 1) ^ -(signed & 1);
+  }
   const size = manifest.width * manifest.height;
+  manifest.names.forEach((name, i) => {
+    if (!/[.][GB]$/.test(name)) return;
+    for (let place = i * size; place < (i + 1) * size; place++) codes[place] += codes[place - size];
+  });
   return { ...manifest, codes: Object.fromEntries(manifest.names.map((name, i) => [name, codes.subarray(i * size, (i + 1) * size)])) };
 }
 
