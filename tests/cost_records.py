@@ -121,6 +121,7 @@ def _record(scene):
                 for removes, seconds in zip(REMOVES, adds, strict=True)
             ],
             "departure": 8.765,
+            "size": [24, 16],
             "kernel_s": interval(0.0052, 0.0001),
             "plan_s": interval(0.0617, 0.0013),
             "renderer_s": interval(0.0111, 0.0014),

@@ -82,7 +82,7 @@ def cost(
     predicted = at_size(found.points, found.methods, at) if at else ()
     measured = measure_at(found, at, progress) if at and is_measured else ()
     ladder.forget()  # its scenes would slow later work
-    known = causes or find(ready, source, options, progress)
+    known = causes or find(ready, source, options, progress, most=found.size[0])
     made = Cost(
         scene=source.name,
         variant=ready.reference.variant,
@@ -146,7 +146,10 @@ def require(name: str, target: Size, size: Size, is_measured: bool) -> None:
 
 
 def attribution(found: Measurements, causes: Causes) -> CostAttribution:
-    """Return what each effect removes, and what it adds to an image of the study's size."""
+    """Return what each effect removes, and what it adds to an image of the study's size.
+
+    ``causes`` may be of another size.
+    """
     samples = SPP * found.size[0] * found.size[1]
     first, last = found.steps[0].before, found.steps[-1].after
 
@@ -168,7 +171,8 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
         EffectCost(**structs.asdict(one), adds_s=adds(one.effect)) for one in causes.record.effects
     )
     seconds = takes(first.name), takes(last.name), adds("")
-    return CostAttribution(tuple(effects), causes.record.departure, *seconds, found.size, SPP)
+    errors = causes.record.departure, causes.record.resolution
+    return CostAttribution(tuple(effects), *errors, *seconds, found.size, SPP)
 
 
 class Choice(Record, kw_only=True):

@@ -157,9 +157,10 @@ class CostAttribution(Record):
     effects
         One for each effect. What they add, and ``renderer_s``, is ``plan_s`` less ``kernel_s``.
         What they remove is measured like ``departure``.
-    departure
-        Mean ΔE2000 of the heuristic half, without noise, on the small film that causes are found
-        on: at most 48 pixels wide, so fine highlights are averaged.
+    departure, size
+        Mean ΔE2000 of the heuristic half, without noise, and the size of the images that it and
+        what is removed are measured on. In a report this is the small film of its causes, at most
+        48 pixels wide, on which fine highlights are averaged.
     kernel_s, plan_s
         Seconds that the samples of an image take with no effect, and with all of them, without
         overhead.
@@ -172,6 +173,7 @@ class CostAttribution(Record):
 
     effects: tuple[EffectCost, ...]
     departure: float
+    size: Resolution
     kernel_s: Estimated
     plan_s: Estimated
     renderer_s: Estimated

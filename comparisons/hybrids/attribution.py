@@ -55,9 +55,9 @@ WIDTH, NARROW, MANY = 48, 32, 64
 shapes: each sample takes longer there."""
 
 REPLICATES, SPP, EXACT_SPP = 4, 64, 16
-"""Replicates of each image, samples per pixel of each, and those of scenes whose plan is exact: only
-the pixel filter needs them. With 16 instead of 64, skewed noise left 2 % of the Cornell box's
-departure in the closure."""
+"""Replicates of each image, samples per pixel of each, and those where plans are exact: only the
+pixel filter needs them. With 16 instead of 64, skewed noise left 2 % of the Cornell box's departure
+in the closure."""
 
 EXACT_EFFECTS, ORDERS = 4, 8
 """Largest number of effects for which every subset is rendered, and orders drawn for more."""
@@ -104,15 +104,16 @@ def find(
     options: Options,
     progress: Progress | None = None,
     clean: tuple[NDArray, NDArray] | None = None,
+    most: int | None = None,
 ) -> "Causes":
-    """Attribute the departure of a prepared scene, on a film of at most :data:`WIDTH` pixels.
+    """Attribute the departure of a prepared scene, on a film of at most ``most`` pixels' width.
 
-    ``clean`` are the reference (H, W, 3) on the scene's own film and its standard error, if known:
-    they make previews less noisy.
+    If ``most`` is omitted, it is :data:`WIDTH` or :data:`NARROW`. ``clean`` are the reference (H,
+    W, 3) on the scene's own film and its standard error, if known: they make previews less noisy.
     """
     width, height = image_size(ready.scene)
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
-    most = NARROW if is_large else WIDTH
+    most = most or (NARROW if is_large else WIDTH)
     size = min(most, width), max(1, round(height * min(1, most / width)))
     spp = EXACT_SPP if ready.plan.exact else SPP
     surface = gbuffer(ready.scene, *size)

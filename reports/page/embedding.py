@@ -1,8 +1,9 @@
 """Images inside the page, as half-precision numbers: three decimal digits.
 
-Planes of 16-bit codes follow each other. Green and blue are differences to the plane before, and all
-are differences to the code before (modulo 2^16), with the sign in the last bit, the low bytes before
-the high ones, deflated (RFC 1950), in base64. ``templates/viewer/images.js`` reverses this.
+Planes of 16-bit codes follow each other. Green and blue are differences to the plane before, then
+all are differences to the code before (modulo 2^16), with the sign in the last bit. Their low bytes
+come before the high ones, deflated (RFC 1950), in base64. ``templates/viewer/images.js`` reverses
+this.
 """
 
 from __future__ import annotations

@@ -52,7 +52,8 @@ def lines(record: Cost) -> Iterator[str]:
     yield from filter(None, [unreached(record)])
     if record.attribution.effects:
         yield from _section("What each effect removes and adds", _attribution(record))
-        yield "removed: Shapley value, the mean over all orders of adding the effects"
+        measured = sized(record.attribution.size)
+        yield f"removed, at {measured}: Shapley value, the mean over all orders of adding effects"
         yield "alone, last: added first, added last"
         yield together(record)
         yield closure(record)

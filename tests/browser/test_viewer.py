@@ -66,7 +66,7 @@ def test_a_scene_opens_on_the_worst_pixel_of_its_worst_region(visitor, report):
     map_ = report.channels[NOISY]["dE2000.Y"][top : top + height, left : left + width]
     y, x = np.unravel_index(map_.argmax(), map_.shape)
     shown = visitor.inspected()
-    assert shown["position"] == f"Worst pixel {left + x}, {top + y}"
+    assert shown["position"] == f"Worst pixel outlined {left + x}, {top + y}"
     assert shown["cause"] in ("occlusion", "interreflection")
     assert page.locator("#viewer button[aria-pressed=true]").first.text_content() == "Side by side"
     edge = visitor.place_of(left + width // 2, top, pane=1)
@@ -254,7 +254,7 @@ def test_the_address_holds_the_view(visitor):
     assert visitor.inspected()["position"] == "Pixel 7, 9"
     nonsense = "&mode=x&ev=1e9&zoom=-3&pixel=a,b&split=&toString=1&x=NaN&t=2.1&on=9&map=?"
     visitor.open(f"{SCENE}{nonsense}")
-    assert visitor.inspected()["position"].startswith("Worst pixel")
+    assert visitor.inspected()["position"].startswith("Worst pixel outlined")
     assert visitor.page.locator("#viewer [data-threshold]").input_value() == "2"
     visitor.open(f"{SCENE}&pixel=900,900")
     visitor.settle()

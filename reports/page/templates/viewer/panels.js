@@ -91,7 +91,7 @@ class Panels {
     const size = added ? ` + ${added.name}, at ${width} × ${height}` : block > 1 ? `: mean of ${block} × ${block}` : "";
     /** @type {Record<string, string | string[]>} */
     const texts = {
-      position: `${isWorst ? "Worst pixel" : "Pixel"} ${pixel.join(", ")}${size}`,
+      position: `${isWorst ? "Worst pixel outlined" : "Pixel"} ${pixel.join(", ")}${size}`,
       cause: added ? UNKNOWN : causeAt(painter, pixel) || "unknown",
       heuristic: textbook.map(short), reference: physical.map(short),
       heuristic_hex: seen(textbook), reference_hex: seen(physical), dE2000: differenceText(painter.differences[place]),
