@@ -350,6 +350,7 @@ class _Points:
         self.hit = np.array(self.si.is_valid() & is_shaded)
         self.position, normal, view = kernel.checked_vectors(self.si.p, normal, mi.Vector3f(-ray.d))
         self.normal, self.view = vectors.normalise(normal), vectors.normalise(view)
+        dr.eval(self.si, self.position, self.normal, self.view)  # else each value intersects again
         self.known = integrator.known(scene).materials
         self.present = self.known.at(self.si, self.si.is_valid())
         self.ambient = integrator.ambient_at(self.si, self.si.is_valid())

@@ -239,9 +239,14 @@ def tried(
         last = first
         while True:
             warm(last)
-            if last.times[-1] >= times.LEAST_S or 4 * last.spp * pixels > MOST_SAMPLES:
+            seconds = last.times[-1]
+            if seconds >= times.LEAST_S or 4 * last.spp * pixels > MOST_SAMPLES:
                 break
-            last = first.sampled(4 * last.spp)
+            # With a fourth of these samples it would take less than LEAST_S: counts are skipped.
+            more = 4
+            while more * seconds < times.LEAST_S and 4 * more * last.spp * pixels <= MOST_SAMPLES:
+                more *= 4
+            last = first.sampled(more * last.spp)
             own[last.spp] = last
         for spp in {*counts[name], max(1, last.spp // 4), max(1, last.spp // 16)} - own.keys():
             own[spp] = first.sampled(spp)

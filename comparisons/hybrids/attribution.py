@@ -54,10 +54,10 @@ WIDTH, NARROW, MANY = 48, 32, 64
 """Width of the images that causes are found in, at most, and that for more than MANY lights or
 shapes: each sample takes longer there."""
 
-REPLICATES, SPP, EXACT_SPP = 4, 64, 16
-"""Replicates of each image, samples per pixel of each, and those where plans are exact: only the
-pixel filter needs them. With 16 instead of 64, skewed noise left 2 % of the Cornell box's departure
-in the closure."""
+REPLICATES, SPP, FEW_SPP, EXACT_SPP = 4, 64, 32, 16
+"""Replicates of each image, samples per pixel of each, those for MANY lights or shapes, and those
+where plans are exact: only the pixel filter needs them. With 16 instead of 64, skewed noise left
+2 % of the Cornell box's departure in the closure."""
 
 EXACT_EFFECTS, ORDERS = 4, 8
 """Largest number of effects for which every subset is rendered, and orders drawn for more."""
@@ -115,7 +115,7 @@ def find(
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
     most = most or (NARROW if is_large else WIDTH)
     size = min(most, width), max(1, round(height * min(1, most / width)))
-    spp = EXACT_SPP if ready.plan.exact else SPP
+    spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
     surface = gbuffer(ready.scene, *size)
     require_surface(surface.hit, source.name)
     reference = Renderer(ready.scene, ready.reference.integrator, spp, "reference image", size)
