@@ -438,14 +438,16 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
         bsdfs = integrator.known(scene).materials.bsdfs
         there = {*(k for bsdf in bsdfs for k in bsdf.present), *["k_i"] * bool(scene.environment())}
         names = [name for name, k in TERMS.items() if k in there]
-        for name in names:
-            model = partial(_shade, dict.fromkeys({*COEFFICIENTS} - {TERMS[name]}, 0.0))
-            integrator.model_at = lambda *_, model=model: model
-            integrator.hide_emitters = hidden or name != "emission"
-            own = Renderer(scene, integrator, half.spp, name)
-            found[name] = np.array(own.render(pass_seed(options.seed, 0)))
-    vars(integrator).pop("model_at", None)
-    integrator.hide_emitters = hidden
+        try:
+            for name in names:
+                model = partial(_shade, dict.fromkeys({*COEFFICIENTS} - {TERMS[name]}, 0.0))
+                integrator.model_at = lambda *_, model=model: model
+                integrator.hide_emitters = hidden or name != "emission"
+                own = Renderer(scene, integrator, half.spp, name)
+                found[name] = np.array(own.render(pass_seed(options.seed, 0)))
+        finally:
+            vars(integrator).pop("model_at", None)
+            integrator.hide_emitters = hidden
     together, rest = sum(found.values()), whole
     for name in names[:-1]:
         share = np.divide(found[name], together, out=0 * whole, where=together != 0)
