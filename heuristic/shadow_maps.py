@@ -18,7 +18,7 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic import meshes
-from heuristic.convention import Array
+from heuristic.convention import Array, Doubles
 from heuristic.heuristics import INPUTS, Heuristic, Parameter, Point
 from heuristic.lights import FAR, DirectionalLight
 
@@ -91,7 +91,7 @@ def light_map(scene: Any, light: Any, resolution: int) -> DepthImage:
     return DepthImage(resolution, depths, centre, frame, size)
 
 
-def box(scene: Any) -> tuple[np.ndarray, np.ndarray]:
+def box(scene: Any) -> tuple[Doubles, Doubles]:
     """Return the corners (3,) of a scene's box; Mitsuba's leaves out meshes that it merged."""
     corners = [np.zeros((0, 3))]
     for shape in scene.shapes():

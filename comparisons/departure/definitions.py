@@ -46,7 +46,7 @@ def cam16ucs(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
         compute_H=False,
     )
     correlates = [np.asarray(each, float) for each in (found.J, found.M, found.h)]
-    return JMh_CAM16_to_CAM16UCS(np.stack(correlates, axis=-1))
+    return np.asarray(JMh_CAM16_to_CAM16UCS(np.stack(correlates, axis=-1)))
 
 
 def itp(rgb: Array, viewing: Viewing) -> Array:
@@ -63,7 +63,7 @@ def _shown(rgb: Array, viewing: Viewing, white: float) -> Array:
 
 
 def _distance(a: Array, b: Array) -> Array:
-    return np.linalg.norm(a - b, axis=-1)
+    return np.asarray(np.linalg.norm(a - b, axis=-1))
 
 
 DEFINED: dict[str, tuple[Callable[..., Array], Callable[..., Any]]] = {

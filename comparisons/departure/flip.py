@@ -25,6 +25,8 @@ from comparisons.departure.colour import Array, Viewing, luminance, rgb_to_xyz, 
 
 Plane = NDArray[np.float32]
 Curve = Callable[[Array3f], Array3f]
+Blurs = tuple[tuple[np.float32, Plane], ...]
+Seen = tuple[Array3f, Float32, Float32]
 
 SHOWN = 2.118872
 """Luminance that the tone curve of HDR-FLIP (ACES, by Narkowicz) shows as 0.85."""
@@ -142,7 +144,7 @@ class _Eye:
     """
 
     reach: int
-    blurs: tuple[tuple[tuple[float, Plane], ...], ...]
+    blurs: tuple[Blurs, ...]
     smooth: Plane
     edge: Plane
     point: Plane
@@ -159,7 +161,7 @@ class _Eye:
         blurs = tuple(_blurs(parts, x / pixels) for parts in _SENSITIVITY)
         return cls(reach, blurs, *map(_band, (smooth / smooth.sum(), *map(_balanced, derivatives))))
 
-    def seen(self, rgb: Array3f, height: int) -> tuple[Array3f, Float32, Float32]:
+    def seen(self, rgb: Array3f, height: int) -> Seen:
         """Return the blurred colours, the slope and the curvature of lightness, without margins.
 
         The displayed colours ``rgb`` are of ``height`` rows, 2 reach of them margins.
@@ -183,7 +185,7 @@ class _Eye:
         return found
 
 
-def _blurs(parts: tuple[tuple[float, float], ...], degrees: Array) -> tuple:
+def _blurs(parts: tuple[tuple[float, float], ...], degrees: Array) -> Blurs:
     """Return the shares and the bands of a channel's Gaussians, sampled at some degrees."""
     curves = [np.exp(-(pi**2) * degrees**2 / width) for _, width in parts]
     shares = [
@@ -198,8 +200,8 @@ def _blurs(parts: tuple[tuple[float, float], ...], degrees: Array) -> tuple:
 
 def _balanced(weights: Array) -> Array:
     """Scale weights so that the positive ones add up to 1, and the negative ones to -1."""
-    sides = [np.maximum(sign * weights, 0.0) for sign in (1.0, -1.0)]
-    return sides[0] / sides[0].sum() - sides[1] / sides[1].sum()
+    above, below = np.maximum(weights, 0.0), np.maximum(-weights, 0.0)
+    return above / float(above.sum()) - below / float(below.sum())
 
 
 def _band(weights: Array) -> Plane:
@@ -232,7 +234,7 @@ def _values(plane: Plane) -> Float32:
     return Float32(plane.ravel())
 
 
-def _error(truth: tuple, shown: tuple) -> NDArray[np.float32]:
+def _error(truth: Seen, shown: Seen) -> Plane:
     """Return FLIP (N,) of what is seen of two images."""
     (first, *edges), (second, *others) = truth, shown
     slopes, curvatures = (dr.abs(a - b) for a, b in zip(edges, others, strict=True))

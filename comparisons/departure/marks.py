@@ -40,6 +40,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure.blocks import bands, block_sums, neighbourhood, ratio, spread_out
+from comparisons.departure.colour import Array
 from reference.rendering.renderer import require_finite
 from reference.rendering.sums import BLOCK, DifferenceEstimate
 
@@ -54,7 +55,6 @@ ABSOLUTE_ROUNDING, RELATIVE_ROUNDING = 1e-6, 1e-5
 _NORMAL = 1e6
 """Degrees of freedom of variances that are practically known."""
 
-Array = NDArray[np.float64]
 Distance = Callable[[Array, Array], Array]
 
 
@@ -184,7 +184,7 @@ class _Around:
         """Student's quantile at 97.5 % for the pixels of each block, which share their freedom."""
         from scipy.special import stdtrit
 
-        return stdtrit(self.pooled_freedom + self.own_freedom, 0.975)
+        return np.asarray(stdtrit(self.pooled_freedom + self.own_freedom, 0.975))
 
     def differing(self, level: float, inflation: float) -> NDArray[np.bool_]:
         """Return which blocks (h, w) differ.
@@ -260,7 +260,7 @@ class _Pixels:
         t = self.quantile
         half = t * t * self.sizes / 2.0
         below, above = half + np.sqrt(half**2 + t * t * self.variance)
-        found = (below + above == 0.0).all(axis=-1)
+        found: NDArray[np.bool_] = (below + above == 0.0).all(axis=-1)
         for end in (below, -above):
             rest = ~found
             reached = shown[rest] - self.difference[rest] + end[rest]

@@ -18,6 +18,7 @@ from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure.blocks import block_sums
+from comparisons.departure.colour import Floats
 from reference.records import Amount, Count, Record, Share, Size
 from reference.rendering.gbuffer import ObjectIds
 
@@ -115,7 +116,7 @@ def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
     return slice(int(top[pair]), int(bottom[pair])), slice(first, last + 1), value
 
 
-def bounds(mask: NDArray) -> dict[str, Any]:
+def bounds(mask: NDArray[np.bool_]) -> dict[str, Any]:
     """Return ``x, y, width, height`` of the box around a mask (H, W) of at least one pixel."""
     y, x = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     width, height = int(x[-1] - x[0] + 1), int(y[-1] - y[0] + 1)
@@ -123,8 +124,8 @@ def bounds(mask: NDArray) -> dict[str, Any]:
 
 
 def find_objects(
-    error: NDArray, counted: NDArray, owners: ObjectIds, materials: ObjectIds | None = None
-) -> tuple[tuple[ObjectShare, ...], NDArray]:
+    error: Floats, counted: NDArray[np.bool_], owners: ObjectIds, materials: ObjectIds | None = None
+) -> tuple[tuple[ObjectShare, ...], NDArray[np.int_]]:
     """Return each object's share in a map of ΔE2000 (H, W), largest first, and a map of them.
 
     The map (H, W) holds the index of each pixel's object, or -1 if the pixel does not count. If
@@ -149,7 +150,7 @@ def find_objects(
 
 
 def _object_share(
-    name: str, error: NDArray, mask: NDArray, total: float, materials: ObjectIds | None
+    name: str, error: Floats, mask: NDArray[np.bool_], total: float, materials: ObjectIds | None
 ) -> ObjectShare:
     held = error[mask].sum(dtype=np.float64)
     return ObjectShare(
@@ -162,6 +163,6 @@ def _object_share(
     )
 
 
-def _material(mask: NDArray, materials: ObjectIds) -> str:
+def _material(mask: NDArray[np.bool_], materials: ObjectIds) -> str:
     own = np.unique(materials.places[mask])
     return materials.names[own[0]] if len(own) == 1 else "several"

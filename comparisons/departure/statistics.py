@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure.colour import DEFAULT_VIEWING, Array, Viewing
+from comparisons.departure.colour import DEFAULT_VIEWING, Array, Floats, Viewing
 from comparisons.departure.metrics import Metric, Pixelwise, checked_pair, log2_luminance_ratio
 from comparisons.departure.noise import VisibleShare, debiased, exactly, roughly
 from reference.records import Amount, Positive, Record
@@ -159,7 +159,7 @@ def noise_floor(
     return metric.mean(np.concatenate(values))
 
 
-def _numbers(metric: Metric, values: NDArray) -> dict[str, float]:
+def _numbers(metric: Metric, values: Floats) -> dict[str, float]:
     if not values.size:
         return dict.fromkeys(("mean", "p50", "p95", "max"), 0.0)
     p50, p95 = map(float, np.percentile(values, (50, 95)))

@@ -62,5 +62,5 @@ def _plugin(name: str, module: str, props: Any) -> Any:
 
 
 @cache
-def _classes(module: str, variant: str) -> dict[str, Any]:
+def _classes(module: str, variant: str) -> Any:
     return import_module(f"heuristic.plugins.{module}").define()
