@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import drjit as dr
 
 from heuristic import materials, numerics, terms, vectors
-from heuristic.convention import Colour, Direction, Number, Position, Vector, Visibility
+from heuristic.convention import Colour, Direction, Number, Position, Scene, Vector, Visibility
 from heuristic.errors import InputError
 from heuristic.numerics import is_number
 
@@ -229,6 +229,11 @@ class SpotLight(Light):
 KINDS: tuple[type[Light], ...] = (DirectionalLight, PointLight, SpotLight)
 PLUGINS: dict[str, type[Light]] = {kind.plugin: kind for kind in KINDS}
 """The kinds of light, by their emitter plugin in a Mitsuba scene."""
+
+
+def lamps(scene: Scene) -> list[Any]:
+    """Return the emitters of a scene that the kernel knows as lights."""
+    return [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
 
 
 def is_unattenuated(coefficients: Sequence[Number]) -> bool:

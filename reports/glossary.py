@@ -153,13 +153,13 @@ GROUPS: dict[str, Terms] = {
 
 def meanings() -> dict[str, str]:
     """Return the sentence of each name of a term, metrics included."""
-    found = {
+    sentences = {
         name: f"{metric.definition} {metric.caution}"
         for metric in METRICS.values()
         for name in (metric.label, metric.heading, f"mean {metric.label}")
     }
-    found[RATIO.label] = f"Stops: {RATIO.definition}."
-    return found | {
+    sentences[RATIO.label] = f"Stops: {RATIO.definition}."
+    return sentences | {
         name: meaning
         for terms in GROUPS.values()
         for names, meaning in terms.items()

@@ -134,8 +134,8 @@ def fit(
 def check(baseline: str | Path, significance: float = LEVEL) -> CheckRecord:
     """Return whether the scene of a baseline's file moved from what was measured before."""
     file = baselines.read(Path(baseline))
-    made, _ = checks.examine(file, file.open(), significance)
-    return made
+    result, _ = checks.examine(file, file.open(), significance)
+    return result
 
 
 def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: Any) -> Audit:

@@ -106,16 +106,16 @@ def exposures(reference: Array) -> tuple[float, float]:
 def _flip(test: Array, reference: Array, viewing: Viewing, curves: Sequence[Curve]) -> Plane:
     """Return the largest FLIP over tone curves, by bands of rows to keep temporaries small."""
     eye = _Eye.at(float(viewing.pixels_per_degree))
-    found: Plane = np.zeros(test.shape[:2], np.float32)
-    height, width = found.shape
+    result: Plane = np.zeros(test.shape[:2], np.float32)
+    height, width = result.shape
     columns = np.clip(np.arange(-eye.reach, width + eye.reach), 0, width - 1)
     for rows in bands(height):
         near = np.clip(np.arange(rows.start - eye.reach, rows.stop + eye.reach), 0, height - 1)
         images = [_light(image[np.ix_(near, columns)], viewing) for image in (reference, test)]
         for curve in curves:
             error = _error(*(eye.seen(curve(image), len(near)) for image in images))
-            np.maximum(found[rows], error.reshape(-1, width), out=found[rows])
-    return found
+            np.maximum(result[rows], error.reshape(-1, width), out=result[rows])
+    return result
 
 
 def _exposed(image: Array, viewing: Viewing) -> Array:
@@ -180,9 +180,9 @@ class _Eye:
             )
             for band in (self.edge, self.point)
         )
-        found = _hunted(Array3f(*map(_values, blurred))), slope, curvature
-        dr.eval(found)
-        return found
+        result = _hunted(Array3f(*map(_values, blurred))), slope, curvature
+        dr.eval(result)
+        return result
 
 
 def _blurs(parts: tuple[tuple[float, float], ...], degrees: Array) -> Blurs:
@@ -214,15 +214,15 @@ def _band(weights: Array) -> Plane:
 def _down(image: Plane, band: Plane) -> Plane:
     """Filter the columns of an image (h + 2 reach, w)."""
     margin = band.shape[1] - band.shape[0]
-    found = np.empty((len(image) - margin, image.shape[1]), np.float32)
+    filtered = np.empty((len(image) - margin, image.shape[1]), np.float32)
     step = max(1, _PRODUCT // band.size)
-    for top in range(0, len(found), _TILE):
+    for top in range(0, len(filtered), _TILE):
         for left in range(0, image.shape[1], step):
-            part = found[top : top + _TILE, left : left + step]
+            part = filtered[top : top + _TILE, left : left + step]
             size = len(part)
             around = image[top : top + size + margin, left : left + step]
             np.matmul(band[:size, : size + margin], around, out=part)
-    return found
+    return filtered
 
 
 def _across(image: Plane, band: Plane) -> Plane:

@@ -260,12 +260,12 @@ class _Pixels:
         t = self.quantile
         half = t * t * self.sizes / 2.0
         below, above = half + np.sqrt(half**2 + t * t * self.variance)
-        found: NDArray[np.bool_] = (below + above == 0.0).all(axis=-1)
+        are_visible: NDArray[np.bool_] = (below + above == 0.0).all(axis=-1)
         for end in (below, -above):
-            rest = ~found
+            rest = ~are_visible
             reached = shown[rest] - self.difference[rest] + end[rest]
-            found[rest] = distance(shown[rest], reached) > VISIBLE
-        return found
+            are_visible[rest] = distance(shown[rest], reached) > VISIBLE
+        return are_visible
 
 
 def _prior_freedom(scatter: Array, freedom: int) -> Array:
@@ -275,8 +275,8 @@ def _prior_freedom(scatter: Array, freedom: int) -> Array:
     with ``d`` have a relative variance of ``2 (d + d0 − 2) / (d (d0 − 4))``, solved for ``d0``.
     """
     more = scatter * freedom - 2.0
-    found = ratio(2.0 * freedom - 4.0 + 4.0 * scatter * freedom, more)
-    return np.where(more > 0.0, np.minimum(found, _NORMAL), _NORMAL)
+    prior = ratio(2.0 * freedom - 4.0 + 4.0 * scatter * freedom, more)
+    return np.where(more > 0.0, np.minimum(prior, _NORMAL), _NORMAL)
 
 
 def _inflation(difference: DifferenceEstimate) -> float:
@@ -289,7 +289,7 @@ def _inflation(difference: DifferenceEstimate) -> float:
     independent = grouped.by_block(own)
     sums = np.stack([grouped.by_block(one) for one in grouped.means])
     weights = grouped.sizes[:, None, None]
-    found = (weights * (sums - np.average(sums, axis=0, weights=grouped.sizes)) ** 2).sum(axis=0)
-    found /= max(len(weights) - 1, 1) * weights.sum()
+    spread = (weights * (sums - np.average(sums, axis=0, weights=grouped.sizes)) ** 2).sum(axis=0)
+    spread /= max(len(weights) - 1, 1) * weights.sum()
     noisy = independent > 0.0
-    return max(1.0, float((found[noisy] / independent[noisy]).mean())) if noisy.any() else 1.0
+    return max(1.0, float((spread[noisy] / independent[noisy]).mean())) if noisy.any() else 1.0

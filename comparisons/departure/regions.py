@@ -80,8 +80,8 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
     cell = -(-max(error.shape) // CELLS)
     sums, sizes = (block_sums(image.astype(np.float64), cell) for image in (error, counted))
     worth = sums - CONTRAST * total / pixels * sizes
-    found: list[Region] = []
-    while len(found) < MOST:
+    boxes: list[Region] = []
+    while len(boxes) < MOST:
         rows, columns, value = _best_box(worth)
         if not value > 0.0:
             break
@@ -89,14 +89,14 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
         down, across = (slice(part.start * cell, part.stop * cell) for part in (rows, columns))
         inside = np.zeros_like(counted)
         inside[down, across] = counted[down, across]
-        held = error[down, across].sum(dtype=np.float64)
-        share = float(held / total)
+        amount = error[down, across].sum(dtype=np.float64)
+        share = float(amount / total)
         if share >= LEAST_SHARE:
-            mean = float(held / inside.sum())
-            found.append(Region(share=share, mean_dE2000=mean, **bounds(inside)))
+            mean = float(amount / inside.sum())
+            boxes.append(Region(share=share, mean_dE2000=mean, **bounds(inside)))
         elif value < LEAST_SHARE * total / MOST:  # only specks are left
             break
-    return tuple(found)
+    return tuple(boxes)
 
 
 def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
@@ -132,17 +132,17 @@ def find_objects(
     ``materials`` is given, the objects are shapes with their materials.
     """
     places = np.where(counted, owners.places, -1)
-    seen = np.unique(places[places >= 0])
+    present = np.unique(places[places >= 0])
     sums = np.bincount(places[places >= 0], error[places >= 0], len(owners.names))
-    ranked = sorted(seen, key=lambda place: -sums[place])
+    ranked = sorted(present, key=lambda place: -sums[place])
     if len(ranked) > MOST_OBJECTS:
         ranked = ranked[: MOST_OBJECTS - 1]
     rows = np.full(len(owners.names) + 1, len(ranked))
     rows[ranked], rows[-1] = np.arange(len(ranked)), -1
     found = rows[places]
     names = [owners.names[place] for place in ranked]
-    if len(seen) > len(names):
-        names.append(f"{len(seen) - len(names)} others")
+    if len(present) > len(names):
+        names.append(f"{len(present) - len(names)} others")
     total = error[counted].sum(dtype=np.float64)
     return tuple(
         _object_share(name, error, found == row, total, materials) for row, name in enumerate(names)
@@ -152,13 +152,13 @@ def find_objects(
 def _object_share(
     name: str, error: Floats, mask: NDArray[np.bool_], total: float, materials: ObjectIds | None
 ) -> ObjectShare:
-    held = error[mask].sum(dtype=np.float64)
+    amount = error[mask].sum(dtype=np.float64)
     return ObjectShare(
         name=name,
         material=_material(mask, materials) if materials else "",
         pixels=int(mask.sum()),
-        share=float(held / total) if total > 0 else 0.0,
-        mean_dE2000=float(held / mask.sum()),
+        share=float(amount / total) if total > 0 else 0.0,
+        mean_dE2000=float(amount / mask.sum()),
         **bounds(mask),
     )
 

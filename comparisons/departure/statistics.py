@@ -97,7 +97,7 @@ def summarise(
         distances = metric.against(reference[rows], measured, viewing)
         for place, image in images.items():
             maps[place][rows][measured] = distances(image)
-    values, exposed, noise_alone = (found[mask] for found in maps)
+    values, exposed, noise_alone = (each[mask] for each in maps)
     numbers: dict[str, Any] = _numbers(metric, values)
     after = numbers
     if factor != 1.0:
@@ -226,8 +226,8 @@ def best_exposure(
     whole_stops = np.arange(-EXPOSURE_STOPS, EXPOSURE_STOPS + 1.0)
     bracketing = 2.0 ** whole_stops[:, None, None] * shown[:_BRACKET_PIXELS]
     some = np.broadcast_to(truth[:_BRACKET_PIXELS], bracketing.shape)
-    found = metric.against(some, ..., viewing)(bracketing)
-    start = whole_stops[np.argmin([metric.mean(each) for each in found])]
+    at_stops = metric.against(some, ..., viewing)(bracketing)
+    start = whole_stops[np.argmin([metric.mean(each) for each in at_stops])]
     bounds = max(start - 1.0, -EXPOSURE_STOPS), min(start + 1.0, EXPOSURE_STOPS)
     finest = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
     least_squares = np.log2(least_squares_factor(shown, truth))

@@ -119,7 +119,9 @@ def define() -> dict[str, Any]:
                 value += terms.diffuse(convention.RADIANCE_PER_IRRADIANCE, k_d, wo.z)
             if "k_s" in self.present and ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
                 n = self.exponent(si, above)
-                k_s = self.k_s.eval(si, above) * self._scale(n)
+                k_s = self.k_s.eval(si, above)
+                if self.normalised:
+                    k_s = k_s * terms.normalisation(self.form, n)
                 cosine = vectors.local_lobe(self.form, self.n_is_moderate, wi, wo)
                 value += terms.specular(convention.RADIANCE_PER_IRRADIANCE, k_s, cosine, n)
             return dr.select(above, value, 0)
@@ -274,9 +276,6 @@ def define() -> dict[str, Any]:
             if self.is_mirror or self.normalised:
                 return k_d, k_s
             return k_d, k_s * (1 / terms.normalisation(self.form, self.exponent(si, active)))
-
-        def _scale(self, n: Number) -> Number:
-            return terms.normalisation(self.form, n) if self.normalised else 1
 
         def _sample_lobe(self, wi: Direction, sample2: Any, n: Number) -> Direction:
             """Draw ``wo``: its lobe vector has the density ``(n + 1) / (2 pi) cos^n``.

@@ -46,6 +46,7 @@ from heuristic.materials import SMALLEST_ALPHA
 from heuristic.plugins.coefficients import coefficient
 
 SCALARS = ("weight", "alpha")
+MAPS = ("normals", "heights")
 LARGEST = 1e9
 
 
@@ -130,13 +131,14 @@ def define() -> dict[str, Any]:
 
         def __init__(self, props: Properties):
             super().__init__(props)
-            self.normals: Any = props.get_texture("normals") if "normals" in props else None
-            self.heights: Any = props.get_texture("heights") if "heights" in props else None
+            self.maps = {name: props.get_texture(name) for name in MAPS if name in props}
             self.scale = props.get("scale", 1.0)
             self.flip = props.get("flip", True)
 
         def eval_3(self, si: Interaction, active: Mask = True) -> Colour:
-            normal = self._mapped(si, active) if self.normals else self._displaced(si, active)
+            normal = (
+                self._mapped(si, active) if "normals" in self.maps else self._displaced(si, active)
+            )
             if self.flip:
                 mirrored = mi.Vector3f(-normal.x, -normal.y, normal.z)
                 normal = dr.select(dr.dot(normal, si.wi) * si.wi.z > 0, normal, mirrored)
@@ -146,18 +148,17 @@ def define() -> dict[str, Any]:
             return True
 
         def traverse(self, callback: Any) -> None:
-            for name in ("normals", "heights"):
-                if getattr(self, name):
-                    callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+            for name, value in self.maps.items():
+                callback.put(name, value, mi.ParamFlags.Differentiable)
 
         def to_string(self) -> str:
-            return f"Tilt[normals = {self.normals}, heights = {self.heights}]"
+            return f"Tilt[{self.maps}]"
 
         def _mapped(self, si: Interaction, active: Mask) -> Direction:
-            return dr.normalize(mi.Vector3f(self.normals.eval_3(si, active)) * 2 - 1)
+            return dr.normalize(mi.Vector3f(self.maps["normals"].eval_3(si, active)) * 2 - 1)
 
         def _displaced(self, si: Interaction, active: Mask) -> Direction:
-            slope = self.scale * self.heights.eval_1_grad(si, active)
+            slope = self.scale * self.maps["heights"].eval_1_grad(si, active)
             n = mi.Vector3f(si.sh_frame.n)
             across = [
                 dp + n * (rise - dr.dot(n, dp))

@@ -118,9 +118,8 @@ def _paired(
 
         context.rule_of = nearest.rule_of
     bsdfs.to_heuristic(context, replaced)
-    for index in half.nodes(BSDF) if model.form else ():
-        if half.plugin(index) == "phong":
-            half.props(index)["form"] = model.form
+    for index in half.nodes(BSDF, "phong") if model.form else ():
+        half.props(index)["form"] = model.form
     radiance = emitters.to_heuristic(half, geometry, settings.hide_emitters, replaced)
     ambient = settings.ambient if settings.ambient is not None else radiance
     props = properties(
@@ -173,8 +172,7 @@ def _paired(
 
 
 def _energy_warnings(graph):
-    phongs = [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]
-    for index in phongs:
+    for index in graph.nodes(BSDF, "phong"):
         try:
             material = bsdfs.phong(graph, index)
         except InputError:

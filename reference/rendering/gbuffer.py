@@ -120,8 +120,8 @@ def _named_apart(materials: ObjectIds, shapes: ObjectIds) -> ObjectIds:
 def _object_ids(pointers, seen):
     """Return the :class:`ObjectIds` of an array of pointers, one per pixel."""
     numbers = np.array(dr.reinterpret_array(mi.UInt32, pointers)).reshape(seen.shape)
-    found, first, places = np.unique(numbers, return_index=True, return_inverse=True)
-    named = zip(found, first, strict=True)
+    ids, first, places = np.unique(numbers, return_index=True, return_inverse=True)
+    named = zip(ids, first, strict=True)
     names = tuple((pointers[int(at)].id() or UNNAMED) if number else "" for number, at in named)
     return ObjectIds(np.where(seen, places.reshape(seen.shape), -1), names)
 

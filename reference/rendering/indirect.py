@@ -49,12 +49,12 @@ def indirect_light(
         # The first ray's hit shines directly on the surface that it left, which is not ours.
         emitter = si.emitter(scene, active)
         ds = mi.DirectionSample3f(scene, si, previous)
-        seen = active & (depth > 2)
+        is_indirect = active & (depth > 2)
         # Emitter samples never take the direction that a mirror, glass or a mask needs.
-        emitter_pdf = scene.pdf_emitter_direction(previous, ds, seen & ~previous_delta)
+        emitter_pdf = scene.pdf_emitter_direction(previous, ds, is_indirect & ~previous_delta)
         share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
-        value = throughput * emitter.eval(si, seen) * share
-        light = sums(light, found_by_bsdf(seen, previous_delta, value, transports))
+        value = throughput * emitter.eval(si, is_indirect) * share
+        light = sums(light, found_by_bsdf(is_indirect, previous_delta, value, transports))
 
         active &= si.is_valid() & (depth < limit)
         vertex = si.bsdf(ray)
