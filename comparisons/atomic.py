@@ -134,7 +134,7 @@ def require_regular(path: str | Path, largest: int | None = None) -> None:
 class Entry:
     """A JSON file that keeps a mapping under ``key``, the text of all that it depends on.
 
-    A checksum detects a damaged file, which is no result.
+    A checksum detects a damaged file, which does not count.
     """
 
     def __init__(self, path: str | Path, key: str) -> None:

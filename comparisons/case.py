@@ -99,8 +99,7 @@ def file_of(scene: str | Path) -> Path | None:
         siblings = map(str, path.parent.glob("*")) if path.parent.is_dir() else ()
         raise InputError(
             f"{scene}: there is no such file{suggestion(str(scene), siblings)}. Give a Mitsuba"
-            " scene (.xml), a Python file"
-            " that makes one (.py), or the name of a built-in scene"
+            " scene (.xml), a Python file that makes one (.py), or the name of a built-in scene"
             f" (listed by `{program.command('scenes')}`)."
         )
     try:

@@ -336,8 +336,8 @@ declare = HEURISTICS.declare
 def named(name: str) -> Heuristic:
     """Return a declared heuristic, or the one in a user's file."""
     if file := in_file(name):
-        known: Heuristic = pkgutil.resolve_name(LOADERS[Path(file[0]).suffix])(name)
-        return known
+        heuristic: Heuristic = pkgutil.resolve_name(LOADERS[Path(file[0]).suffix])(name)
+        return heuristic
     if name not in HEURISTICS:
         raise InputError(
             f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}, or"

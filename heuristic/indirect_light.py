@@ -60,16 +60,14 @@ def weighted_mean(arriving: Doubles, k_d: Doubles) -> Doubles:
     ``k_d`` times it has the same mean over the image as ``k_d`` times the arriving light.
     """
     weight, total = k_d.sum(axis=0), (arriving * k_d).sum(axis=0)
-    mean: Doubles = np.divide(total, weight, out=np.zeros_like(total), where=weight > 0)
-    return mean
+    return np.asarray(np.divide(total, weight, out=np.zeros_like(total), where=weight > 0))
 
 
 def _by_point(value: Any) -> Doubles:
     """Return the means of the directions of each point, (N, channels)."""
     value = mi.Spectrum(value) + dr.zeros(mi.Spectrum, RAYS)
     rows = np.array(value, float).reshape(-1, RAYS).T
-    means: Doubles = rows.reshape(GRID**2, STRATA**2, -1).mean(axis=1)
-    return means
+    return np.asarray(rows.reshape(GRID**2, STRATA**2, -1).mean(axis=1))
 
 
 def _seen(scene: Any) -> tuple[Any, Any, Any]:
@@ -131,8 +129,7 @@ def upward(scene: Any) -> Doubles:
     matrix = np.array(scene.sensors()[0].world_transform().matrix, float)
     column = matrix.reshape(4, 4, -1)[:3, 1, 0]
     axis = int(np.argmax(np.abs(column)))
-    up: Doubles = np.sign(column[axis]) * np.eye(3)[axis]
-    return up
+    return np.asarray(np.sign(column[axis]) * np.eye(3)[axis])
 
 
 def fit(normal: Doubles, arriving: Doubles, k_d: Doubles, up: Doubles) -> tuple[Doubles, Doubles]:

@@ -173,7 +173,7 @@ class PointLight(Light):
 
     ``position`` is ``P_L`` in world space, ``intensity`` ``I_0`` (chapter 8: ``I_p0``),
     display-linear. ``attenuation`` is ``(k0, k1, k2)`` of 6.1, each 0 or more and not all 0: ``(1,
-    0, 0)`` is no attenuation, ``(0, 0, 1)`` the inverse square of 8.6. ``clamped`` is the other
+    0, 0)`` means none, ``(0, 0, 1)`` the inverse square of 8.6. ``clamped`` is the other
     form of 8.6, ``min(1 / (c1 + c2 d + c3 d^2), 1)``. Within the radius ``shell`` about the
     position, the body of the lamp, nothing casts a shadow.
     """

@@ -31,8 +31,7 @@ def neighbourhood(values: Array, first: int = 0) -> Array:
     around[first] = around[first + 1] = (1, 1)
     padded = np.pad(values, around)
     windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3), (first, first + 1))
-    sums: Array = windows.sum(axis=(-2, -1))
-    return sums
+    return np.asarray(windows.sum(axis=(-2, -1)))
 
 
 def spread_out(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:

@@ -15,7 +15,7 @@ Plugin                      Kind        What it is
 ``heuristic_tilt``          texture     the normal from a bump or normal map
 ==========================  ==========  ==========================================================
 
-Each module defines its classes anew for a variant, when a scene first has one of them.
+Each module defines its classes again for each variant, when a scene first has one of them.
 """
 
 from functools import cache, partial

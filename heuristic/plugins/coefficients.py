@@ -121,7 +121,7 @@ class SceneMaterials:
         ]
 
     def _read(self, bsdf: Any, present: Sequence[str], si: Interaction, active: Mask) -> Any:
-        material = bsdf.material(si, active, form=self.form, physical=self.physical)
+        material = bsdf.material(si, active, True, self.form, self.physical)
         values = {name: mi.Spectrum(getattr(material, name)) for name in present}
         if self.physical:
             values["base_color"] = mi.Spectrum(material.base_color)

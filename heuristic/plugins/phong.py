@@ -24,7 +24,7 @@ All but ``twosided`` are exposed to ``mitsuba.traverse``. Python::
     {'type': 'phong', 'k_d': {'type': 'rgb', 'value': [0.5, 0.4, 0.3]}, 'k_s': 0.7, 'n': 9}
 
 The reflected radiance for irradiance ``E`` at normal incidence is 8.10's for ``I_p = E / pi``
-(:mod:`heuristic.convention`), hence ``f cos = [k_d (N.L) + k_s (R.V)^n] / pi``. The specular part
+(:mod:`heuristic.convention`): ``f cos = [k_d (N.L) + k_s (R.V)^n] / pi``. The specular part
 has no cosine factor; as in the chapters, it neither conserves energy nor is reciprocal.
 """
 
@@ -74,12 +74,7 @@ def define() -> dict[str, Any]:
             self.parameters_changed()
 
         def material(
-            self,
-            si: Interaction,
-            active: Mask = True,
-            prune: bool = True,
-            form: str | None = None,
-            physical: bool = False,
+            self, si: Interaction, active: Mask, prune: bool, form: str | None, physical: bool
         ) -> Material:
             """Return the material at a surface interaction; absent terms are plain zeros.
 

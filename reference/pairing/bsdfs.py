@@ -161,8 +161,8 @@ Rule = Callable[[Context, int], NearestPhong]
 def to_heuristic(context: Context, replaced: Replacements) -> None:
     """Replace the BSDFs of all shapes by the nearest ``phong``.
 
-    Those that were not ``phong`` are recorded, also nested ones, but not those around others; and
-    what is lost.
+    Those that were not ``phong`` are recorded, and what is lost; nested ones, too, but not those
+    around them.
     """
     graph = context.graph
     for shape in graph.nodes(mi.ObjectType.Shape):

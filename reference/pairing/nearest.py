@@ -6,8 +6,8 @@ straight or refracted, becomes the transmittance, reflected light a lobe. A clos
 surfaces on each path.
 
 Users' heuristics also read physical parameters: a plugin's own, with ``alpha`` at least 1e-4 and
-``ior`` the index inside over the one outside. Of conductors ``base_color`` is the albedo at normal
-incidence, ``metallic`` 1 and ``ior`` 1; of dielectrics ``base_color`` is 0. What is measured has
+``ior`` the index inside over the one outside. For conductors ``base_color`` is the albedo at normal
+incidence, ``metallic`` 1 and ``ior`` 1; for dielectrics ``base_color`` is 0. A measured BSDF has
 the albedo of its diffuse part, and the index of its lobe's albedo. Index 1 means no interface.
 """
 
@@ -143,8 +143,8 @@ def roughplastic(context: Context, index: int) -> NearestPhong:
 def plastic(context: Context, index: int) -> NearestPhong:
     """``plastic``: ``roughplastic`` in the limit of ``alpha`` to 0.
 
-    The diffuse part is matched likewise; the coat's mirror image becomes a narrow highlight with
-    Fresnel's reflectance at normal incidence.
+    The diffuse part is matched in the same way; the coat's mirror image becomes a narrow highlight
+    with Fresnel's reflectance at normal incidence.
     """
     graph = context.graph
     base = context.value(index, "diffuse_reflectance", 0.5)
@@ -403,7 +403,7 @@ def normal_map(context: Context, index: int) -> NearestPhong:
 
 
 def bump_map(context: Context, index: int) -> NearestPhong:
-    """``bumpmap``: the nested material, with the displaced surface's normal (exact likewise)."""
+    """``bumpmap``: the nested material, with the displaced surface's normal (exact as above)."""
     ((key, _),) = context.graph.children(index, TEXTURE)
     scale, heights = float(context.value(index, "scale", 1.0)), context.graph.props(index)[key]
     _require(context, index, heights, "eval_1_grad", "slope")
@@ -411,7 +411,7 @@ def bump_map(context: Context, index: int) -> NearestPhong:
 
 
 def _require(context: Context, index: int, texture: Any, ability: str, what: str) -> None:
-    """Reject a texture that lacks what its map evaluates; otherwise only shading would find out.
+    """Reject a texture that lacks what its map evaluates; otherwise only shading would reveal it.
 
     Mitsuba accepts such a texture only with integrators that do not evaluate materials.
     """

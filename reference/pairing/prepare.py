@@ -167,7 +167,7 @@ def _resize(props, resolution):
 
 
 def _give_weights(graph, settings):
-    """Let lights be sampled that are not: each plan would treat them in another way."""
+    """Sample lights that the scene does not sample: each plan would treat them differently."""
     kind = mi.ObjectType.Emitter
     owners = {
         child: shape for shape in graph.nodes(SHAPE) for _, child in graph.children(shape, kind)

@@ -186,8 +186,8 @@ ONE_INTENSITY = Effect(
     reference="one",
     cost="nothing",
     rule=lambda facts: (
-        bool(found := _of_two_intensities(facts)),
-        f"lights of two intensities: {', '.join(found) or 'none'}",
+        bool(names := _of_two_intensities(facts)),
+        f"lights of two intensities: {', '.join(names) or 'none'}",
     ),
     colour="#332288",
     sites=_of_two_intensities,

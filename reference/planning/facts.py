@@ -223,7 +223,7 @@ class ShapeFacts:
 
 
 def _is_sampled_as_hit(graph: Graph, index: int | None, shape: mi.Shape) -> bool:
-    """Return whether it is a shape whose samples Mitsuba 3.9 is known to place right.
+    """Return whether Mitsuba 3.9 is known to place its samples on a shape correctly.
 
     On a cylinder that is mirrored they face the other way, and on one that is not round they lie
     beside it.

@@ -128,8 +128,8 @@ def _define(_variant: str) -> None:
 def _beyond_lamps(scene, ray, active):
     """Return the first surface that does not shine.
 
-    Mitsuba's own integrators go on with the first ray after the last one has hit: its origin is
-    another, so on spheres, disks and cylinders they find another point.
+    Mitsuba's own integrators take the point of the last hit from the first ray: its origin differs,
+    so on spheres, disks and cylinders they find another point.
     """
     si = scene.ray_intersect(ray, mi.RayFlags.All, True, active)
     skip = active & si.is_valid() & (si.shape.emitter() != None)  # noqa: E711  lane-wise

@@ -127,7 +127,7 @@ class Source:
                 state = Parser.parse_dict(config, dict(content))
             else:
                 path = Path(content)
-                text_of(path)  # Mitsuba takes any bytes, which later are no names
+                text_of(path)  # Mitsuba takes any bytes, which later cannot be names
                 resolver = mi.FileResolver(mi.file_resolver())
                 resolver.prepend(str(path.resolve().parent))  # first, as for Mitsuba's command
                 with resolving(resolver):

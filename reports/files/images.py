@@ -158,7 +158,7 @@ HALF_MAX = 65_504.0
 
 
 def write_exr(path: Path, layers: Mapping[str, ArrayLike], header: Mapping[str, object]) -> None:
-    """Write images by name to a file atomically, as one scanline part, ZIP-compressed.
+    """Write named images to a file atomically, as one scanline part, ZIP-compressed.
 
     See :func:`channels`. The header is metadata, e.g. seed, samples and versions; BT.709's
     chromaticities are added.
