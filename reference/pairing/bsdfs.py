@@ -84,19 +84,12 @@ class NearestPhong:
 
     def properties(self) -> mi.Properties:
         """Return the properties of the node ``phong``, without defaults."""
-        props = properties("phong")
-        for name in (*COEFFICIENTS, "n", "transmittance"):
-            value = getattr(self, name)
-            if name in ("k_d", "n") or not values.is_zero(value):
-                props[name] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
-        for name, default in (("normalised", False), ("twosided", False), ("form", "phong")):
-            if getattr(self, name) != default:
-                props[name] = getattr(self, name)
-        if self.tilt is not None:
-            props["tilt"] = self.tilt
-        for name, value in self.physical.items():
-            props[name] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
-        return props
+        own = {name: getattr(self, name) for name in (*COEFFICIENTS, "n", "transmittance")}
+        own = {k: v for k, v in own.items() if k in ("k_d", "n") or not values.is_zero(v)}
+        for name in ("normalised", "twosided", "form", "tilt"):
+            if getattr(self, name) not in (False, "phong", None):
+                own[name] = getattr(self, name)
+        return properties("phong", **own, **self.physical)
 
     def parameters(self) -> dict[str, Any]:
         """Return the coefficients for records: numbers, or the word ``texture``."""

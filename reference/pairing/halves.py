@@ -122,6 +122,7 @@ def _paired(
         half.props(index)["form"] = model.form
     radiance = emitters.to_heuristic(half, geometry, settings.hide_emitters, replaced)
     ambient = settings.ambient if settings.ambient is not None else radiance
+    own = {} if ambient is None else {"ambient": ambient}
     props = properties(
         "heuristic",
         hide_emitters=settings.hide_emitters,
@@ -129,9 +130,8 @@ def _paired(
         interpolation=interpolation.value,
         prune=prune,
         model=model.name,
+        **own,
     )
-    if ambient is not None:
-        props["ambient"] = mi.ScalarColor3f(ambient) if isinstance(ambient, tuple) else ambient
     props.set_id("integrator")  # identifies its parameters
     half.attach(0, "integrator", half.add(INTEGRATOR, props))
     if interpolation is not Interpolation.PHONG or tessellation is not None:
