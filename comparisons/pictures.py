@@ -23,7 +23,7 @@ import numpy as np
 from msgspec import structs
 
 from comparisons.comparison import Images, PictureRecord
-from comparisons.departure.colour import CHROMATICITIES, from_srgb, to_srgb
+from comparisons.departure.colour import CHROMATICITIES, from_srgb, luminance, to_srgb
 from comparisons.options import Options
 from heuristic.errors import InputError, NonFiniteError, suggestion
 from reference.pairing.prepare import film_size
@@ -248,9 +248,9 @@ def geometry_edges(scene: mi.Scene, width: int, height: int) -> np.ndarray:
 
 def picture_edges(image: np.ndarray) -> np.ndarray:
     """Return how much an image changes at each pixel, in stops, up to 1."""
-    luminance = np.maximum(np.asarray(image, float) @ (0.2126, 0.7152, 0.0722), 0)
-    least = 0.02 * np.percentile(luminance, 95) + 1e-6
-    return _edges(np.log2(luminance + least)[..., None])
+    light = np.maximum(luminance(image), 0)
+    least = 0.02 * np.percentile(light, 95) + 1e-6
+    return _edges(np.log2(light + least)[..., None])
 
 
 def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Place:
