@@ -124,17 +124,17 @@ def content(path: str | Path, largest: int = LARGEST) -> bytes:
 
 def require_regular(path: str | Path, largest: int | None = None) -> None:
     """Raise ``OSError`` for anything but a regular file of at most ``largest`` bytes."""
-    found = os.stat(path)
-    if not stat.S_ISREG(found.st_mode):
+    state = os.stat(path)
+    if not stat.S_ISREG(state.st_mode):
         raise OSError(None, "it is not a regular file")
-    if largest is not None and found.st_size > largest:
-        raise OSError(None, f"it has {found.st_size} bytes, and at most {largest} are read")
+    if largest is not None and state.st_size > largest:
+        raise OSError(None, f"it has {state.st_size} bytes, and at most {largest} are read")
 
 
 class Entry:
     """A JSON file that keeps a mapping under ``key``, the text of all that it depends on.
 
-    A checksum detects a damaged file, which is no result.
+    A checksum detects a damaged file, which does not count.
     """
 
     def __init__(self, path: str | Path, key: str) -> None:
@@ -148,10 +148,10 @@ class Entry:
         try:
             text = content(self.path)
             body = text[len(self._head(b"")) : -1]
-            found = json.loads(body) if text == self._head(body) + body + b"}" else None
+            result = json.loads(body) if text == self._head(body) + body + b"}" else None
         except (OSError, ValueError, RecursionError):
             return None
-        return found if isinstance(found, dict) else None
+        return result if isinstance(result, dict) else None
 
     def save(self, content: Mapping[str, Any]) -> None:
         """Save a mapping, in place of the old one."""

@@ -75,17 +75,17 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
             content = Script(path)
         return _complete(Source(name or path.stem, content, options.define), options, str(path))
     if isinstance(scene, (str, Path)):
-        known = builtin(str(scene))
-        both = known.heuristic_variant if options.variant is None else None
+        entry = builtin(str(scene))
+        both = entry.heuristic_variant if options.variant is None else None
         own = {
             # A requested variant is meant for both halves.
-            "variant": known.variant,
+            "variant": entry.variant,
             "heuristic_variant": both,
-            "interpolation": known.interpolation,
-            "tessellation": known.tessellation,
+            "interpolation": entry.interpolation,
+            "tessellation": entry.tessellation,
         }
         changes = {key: value for key, value in own.items() if getattr(options, key) is None}
-        return _complete(known.source(), options.changed(**changes), known.name)
+        return _complete(entry.source(), options.changed(**changes), entry.name)
     own_name = name or str(getattr(scene, "__name__", "scene"))
     return _complete(Source(own_name, scene), options, own_name)
 
@@ -99,8 +99,7 @@ def file_of(scene: str | Path) -> Path | None:
         siblings = map(str, path.parent.glob("*")) if path.parent.is_dir() else ()
         raise InputError(
             f"{scene}: there is no such file{suggestion(str(scene), siblings)}. Give a Mitsuba"
-            " scene (.xml), a Python file"
-            " that makes one (.py), or the name of a built-in scene"
+            " scene (.xml), a Python file that makes one (.py), or the name of a built-in scene"
             f" (listed by `{program.command('scenes')}`)."
         )
     try:

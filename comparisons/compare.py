@@ -100,8 +100,9 @@ def compare(
         with collect_messages(printed):
             comparison, ready = _compare(source, options, progress, command, why)
         lines = count_messages([*source.messages, *printed])
-        made = structs.replace(comparison.record, warnings=(*comparison.record.warnings, *lines))
-        comparison = replace(comparison, record=made)
+        record = comparison.record
+        record = structs.replace(record, warnings=(*record.warnings, *lines))
+        comparison = replace(comparison, record=record)
         if why and not options.image:  # no effect can be added to a picture
             from comparisons.hybrids import attribution  # loaded late: --no-why needs none of it
 
@@ -123,8 +124,8 @@ def _computed_twice(comparison: Comparison) -> Comparison:
     shown, record = comparison.images, comparison.record
     some = np.random.default_rng(0).permutation(np.flatnonzero(shown.counted))[:COMPUTED_TWICE]
     first, second = (half.reshape(-1, 3)[some] for half in (shown.heuristic, shown.reference))
-    found = {name: values.ravel()[some] for name, values in shown.maps.items()}
-    largest = definitions.deviations(first, second, found, record.viewing)
+    distances = {name: values.ravel()[some] for name, values in shown.maps.items()}
+    largest = definitions.deviations(first, second, distances, record.viewing)
     warnings = [
         f"{METRICS[name].label} deviates from colour-science's by up to {most:.2g}, and"
         f" {DEVIATION_ALLOWED:g} is allowed: a formula is wrong here. Give --colour-science to do"
@@ -132,12 +133,12 @@ def _computed_twice(comparison: Comparison) -> Comparison:
         for name, most in largest.items()
         if most > DEVIATION_ALLOWED
     ]
-    made = structs.replace(
+    record = structs.replace(
         record,
         colour_science=Deviations(pixels=len(some), largest=largest),
         warnings=(*record.warnings, *warnings),
     )
-    return replace(comparison, record=made)
+    return replace(comparison, record=record)
 
 
 def _compare(
@@ -186,7 +187,7 @@ def _compare(
         from comparisons.audit import diagnosis  # loaded late: only users' shaders have any
 
         mistakes = diagnosis.describe(options.heuristic)
-    made = ComparisonRecord(
+    record = ComparisonRecord(
         scene=source.name,
         variant=reference.variant,
         heuristic_variant=heuristic.variant,
@@ -214,7 +215,7 @@ def _compare(
         mistakes=mistakes,
         **numbers,
     )
-    return Comparison(made, images, *traced, live), ready
+    return Comparison(record, images, *traced, live), ready
 
 
 def render(
@@ -291,11 +292,11 @@ def _measure(
     counted = surface.hit
     metrics, maps = {}, {}
     for name, metric in METRICS.items():
-        metrics[name], found = statistics.summarise(
+        metrics[name], distances = statistics.summarise(
             metric, test, reference, counted, options.viewing, noise, estimates.difference.grouped
         )
         if metric.drawn:
-            maps[name] = found
+            maps[name] = distances
     ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(test, reference, counted)
     significant = marks.find(
         estimates.difference, test, counted, leading_distance(options.viewing), exact=exact

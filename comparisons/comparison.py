@@ -47,10 +47,10 @@ LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
 
 def versions() -> dict[str, str]:
     """Return the versions that a result depends on."""
-    found = {"fotismos": __version__, "python": platform.python_version()}
-    found |= {library: metadata.version(library) for library in LIBRARIES}
-    found["LLVM"] = ".".join(map(str, dr.detail.llvm_version()))
-    return found
+    numbers = {"fotismos": __version__, "python": platform.python_version()}
+    numbers |= {library: metadata.version(library) for library in LIBRARIES}
+    numbers["LLVM"] = ".".join(map(str, dr.detail.llvm_version()))
+    return numbers
 
 
 def machine() -> Machine:

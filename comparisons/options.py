@@ -180,8 +180,8 @@ class Options(
         """The viewing conditions."""
         from comparisons.departure.colour import DEFAULT_VIEWING, Viewing
 
-        given = self.pixels_per_degree
-        return DEFAULT_VIEWING if given is None else Viewing(pixels_per_degree=given)
+        density = self.pixels_per_degree
+        return DEFAULT_VIEWING if density is None else Viewing(pixels_per_degree=density)
 
     def pair(self, source: Source) -> Pair:
         """Derive both halves of a scene, for the current variant (:func:`reference.pair`)."""

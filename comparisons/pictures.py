@@ -23,7 +23,7 @@ import numpy as np
 from msgspec import structs
 
 from comparisons.comparison import Images, PictureRecord
-from comparisons.departure.colour import from_srgb, to_srgb
+from comparisons.departure.colour import CHROMATICITIES, from_srgb, luminance, to_srgb
 from comparisons.options import Options
 from heuristic.errors import InputError, NonFiniteError, suggestion
 from reference.pairing.prepare import film_size
@@ -32,9 +32,6 @@ from reference.rendering.renderer import Renderer, Times
 from reference.scene.source import Source
 
 SUFFIXES = (".exr", ".png")
-
-BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-"""CIE x, y of red, green, blue and white."""
 
 SAME_PRIMARIES = 2e-3
 """Largest difference of chromaticities that are the same: some files round them."""
@@ -185,10 +182,10 @@ def _require_plain(path: Path, header: Mapping[str, Any]) -> None:
             f" {next(sizes)}. Save the whole picture."
         )
     primaries = header.get("chromaticities")
-    if primaries is not None and max(abs(np.subtract(primaries, BT709))) > SAME_PRIMARIES:
+    if primaries is not None and max(abs(np.subtract(primaries, CHROMATICITIES))) > SAME_PRIMARIES:
         raise InputError(
             f"{path}: its primaries and white are ({', '.join(f'{v:.4g}' for v in primaries)})."
-            f" Convert it to BT.709 (sRGB): {', '.join(map(str, BT709))}."
+            f" Convert it to BT.709 (sRGB): {', '.join(map(str, CHROMATICITIES))}."
         )
 
 
@@ -251,9 +248,9 @@ def geometry_edges(scene: mi.Scene, width: int, height: int) -> np.ndarray:
 
 def picture_edges(image: np.ndarray) -> np.ndarray:
     """Return how much an image changes at each pixel, in stops, up to 1."""
-    luminance = np.maximum(np.asarray(image, float) @ (0.2126, 0.7152, 0.0722), 0)
-    least = 0.02 * np.percentile(luminance, 95) + 1e-6
-    return _edges(np.log2(luminance + least)[..., None])
+    light = np.maximum(luminance(image), 0)
+    least = 0.02 * np.percentile(light, 95) + 1e-6
+    return _edges(np.log2(light + least)[..., None])
 
 
 def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Place:

@@ -18,6 +18,7 @@ from heuristic import kernel, materials, terms, vectors
 from heuristic.convention import Scene
 from heuristic.errors import InputError
 from heuristic.heuristics import Interpolation
+from heuristic.lights import lamps
 from heuristic.materials import COEFFICIENTS, FORMS, Material
 from reference.rendering.gbuffer import image_size, pixel_rays
 from reference.rendering.renderer import Renderer, pass_seed, variant
@@ -255,7 +256,7 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
 
 def _live(half: Renderer, options: Options) -> LivePoints | str:
     scene = half.scene
-    emitters, sensor = _emitters(scene), scene.sensors()[0]
+    emitters, sensor = lamps(scene), scene.sensors()[0]
     if len(emitters) > LIVE_LIGHTS:
         return f"There are more than {LIVE_LIGHTS} lights."
     if not isinstance(sensor, mi.ProjectiveCamera):
@@ -300,7 +301,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
 
 
 def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
-    emitters = _emitters(scene)
+    emitters = lamps(scene)
     resolution = image_size(scene)
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
     points = _Points(scene, integrator, pixel_rays(scene, resolution, *np.meshgrid(columns, rows)))
@@ -316,12 +317,8 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
         return grid
     images = [grid.light_image(light) for light in lights]
     order = np.argsort([-image.sum() for image in images], kind="stable")
-    kept, others = sorted(order[:LIGHTS]), sum(images[number] for number in order[LIGHTS:])
-    return replace(grid, lights=tuple(lights[number] for number in kept), others=others)
-
-
-def _emitters(scene: Scene) -> list[Any]:
-    return [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
+    strongest, others = sorted(order[:LIGHTS]), sum(images[number] for number in order[LIGHTS:])
+    return replace(grid, lights=tuple(lights[number] for number in strongest), others=others)
 
 
 def _size(resolution: tuple[int, int], longest: int) -> tuple[int, int]:
@@ -433,7 +430,7 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
     if options.image or options.heuristic not in MODELS:
         return {}
     integrator, scene = half.integrator, half.scene
-    hidden, found = integrator.hide_emitters, dict.fromkeys(TERMS, 0 * whole)
+    hidden, images = integrator.hide_emitters, dict.fromkeys(TERMS, 0 * whole)
     with variant(half.variant):
         bsdfs = integrator.known(scene).materials.bsdfs
         there = {*(k for bsdf in bsdfs for k in bsdf.present), *["k_i"] * bool(scene.environment())}
@@ -444,17 +441,17 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
                 integrator.model_at = lambda *_, model=model: model
                 integrator.hide_emitters = hidden or name != "emission"
                 own = Renderer(scene, integrator, half.spp, name)
-                found[name] = np.array(own.render(pass_seed(options.seed, 0)))
+                images[name] = np.array(own.render(pass_seed(options.seed, 0)))
         finally:
             vars(integrator).pop("model_at", None)
             integrator.hide_emitters = hidden
-    together, rest = sum(found.values()), whole
+    together, rest = sum(images.values()), whole
     for name in names[:-1]:
-        share = np.divide(found[name], together, out=0 * whole, where=together != 0)
-        found[name] = whole * share.clip(0, 1)
-        rest = rest - found[name]
-    found[names[-1] if names else "emission"] = rest
-    return {f"term.{name}": image for name, image in found.items()}
+        share = np.divide(images[name], together, out=0 * whole, where=together != 0)
+        images[name] = whole * share.clip(0, 1)
+        rest = rest - images[name]
+    images[names[-1] if names else "emission"] = rest
+    return {f"term.{name}": image for name, image in images.items()}
 
 
 def _shade(changes: dict[str, float], *given: Any) -> Any:

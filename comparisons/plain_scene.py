@@ -3,7 +3,7 @@
 Everything is in world space and in the heuristic half's display-linear units.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import radians, tan
 from typing import Any
 
@@ -15,11 +15,11 @@ from comparisons.options import Options
 from heuristic import meshes
 from heuristic.convention import Scene
 from heuristic.errors import InputError
-from heuristic.lights import INTENSITIES, PLUGINS
+from heuristic.lights import INTENSITIES, PLUGINS, lamps
 from heuristic.materials import COEFFICIENTS, PHYSICAL
 from heuristic.tessellation import RESOLUTION, to_mesh
 from reference.pairing.halves import pair
-from reference.rendering.gbuffer import image_size, pixel_rays
+from reference.rendering.gbuffer import gbuffer, image_size
 from reference.scene.source import Source
 
 KINDS = {kind: plugin.removeprefix("heuristic_") for plugin, kind in PLUGINS.items()}
@@ -80,7 +80,7 @@ def plain_scene(source: Source, options: Options) -> PlainScene:
             for shape in scene.shapes()
         ),
         tuple(material_of(bsdf, number, scene) for number, bsdf in enumerate(bsdfs)),
-        tuple(light_of(each, point) for each in scene.emitters() if hasattr(each, "light")),
+        tuple(light_of(lamp, point) for lamp in lamps(scene)),
         tuple(numbers(mi.Color3f(scene.integrator().ambient.eval(point)))),
         _layers(scene),
     )
@@ -88,21 +88,10 @@ def plain_scene(source: Source, options: Options) -> PlainScene:
 
 def _layers(scene: Scene) -> dict[str, np.ndarray]:
     """Trace the rays through the pixel centres."""
-    width, height = image_size(scene)
-    pixels = np.meshgrid(np.arange(width), np.arange(height))
-    si = scene.ray_intersect(pixel_rays(scene, (width, height), *pixels))
-    hit = np.array(si.is_valid()).reshape(height, width)
-    pointers = np.array(dr.reinterpret_array(mi.UInt32, si.shape)).reshape(height, width)
-    numbers_seen = np.zeros((height, width), np.float32)
-    for number, shape in enumerate(scene.shapes(), start=1):
-        own = int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
-        numbers_seen[hit & (pointers == own)] = number
-    normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
-    vectors = {
-        name: np.where(hit[..., None], np.array(value).T.reshape(height, width, 3), 0)
-        for name, value in (("P", mi.Vector3f(si.p)), ("N", normal))
-    }
-    return vectors | {"shape": numbers_seen}
+    seen, ids = gbuffer(scene, *image_size(scene)), [shape.id() for shape in scene.shapes()]
+    numbers = [ids.index(name) + 1 if name in ids else 0 for name in seen.shape.names]
+    shape = np.array([*numbers, 0], np.float32)[seen.shape.places]
+    return {"P": seen.position, "N": seen.normal, "shape": shape}
 
 
 def camera(scene: mi.Scene) -> dict:
@@ -190,15 +179,14 @@ def light_of(emitter: mi.Emitter, point: mi.SurfaceInteraction3f) -> dict:
     """
     light = emitter.light(point, True)
     numbered: dict[str, Any] = {"name": emitter.id(), "type": KINDS[type(light)]}
-    for field in fields(light):
-        value = getattr(light, field.name)
+    for name, value in light.given().items():
         if isinstance(value, tuple):
-            numbered[field.name] = [numbers(each)[0] for each in value]
-        elif field.name == "clamped":
-            numbered[field.name] = bool(value)
-        elif value is not None:
-            several = numbers(mi.Color3f(value) if field.name in INTENSITIES else value)
-            numbered[field.name] = several if len(several) > 1 else several[0]
+            numbered[name] = [numbers(each)[0] for each in value]
+        elif name == "clamped":
+            numbered[name] = bool(value)
+        else:
+            several = numbers(mi.Color3f(value) if name in INTENSITIES else value)
+            numbered[name] = several if len(several) > 1 else several[0]
     return numbered
 
 

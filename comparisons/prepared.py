@@ -76,9 +76,9 @@ class Prepared:
     @property
     def surface(self) -> GBuffer:
         """What each pixel sees. It is traced each time: cached, it would take much memory."""
-        found = gbuffer(self.scene, *image_size(self.scene))
+        surface = gbuffer(self.scene, *image_size(self.scene))
         dr.flush_malloc_cache()
-        return found
+        return surface
 
     @cached_property
     def counted(self) -> np.ndarray:
@@ -90,17 +90,17 @@ class Prepared:
         """The settings of the scene that are not used, and what is used instead."""
         pair, plan = self.pair, self.plan
         used = f"{plan.sampler}, {self.reference.spp * self.passes} samples per pixel"
-        found = [
+        overrides = [
             structs.replace(entry, used=used) if entry.what == "sampler" else entry
             for entry in pair.overridden
         ]
         asks_for_volumes = pair.media or pair.integrator in ("volpath", "volpathmis")
         if plan.stock_integrator == "volpath" and not asks_for_volumes:
             used = "volpath: others err on curved shapes behind hidden lamps"
-            found.append(Override("integrator", pair.integrator or "path", used))
+            overrides.append(Override("integrator", pair.integrator or "path", used))
         if pair.rr_depth is not None and pair.rr_depth != plan.rr_depth:
-            found.append(Override("rr_depth", str(pair.rr_depth), str(plan.rr_depth)))
-        return tuple(found)
+            overrides.append(Override("rr_depth", str(pair.rr_depth), str(plan.rr_depth)))
+        return tuple(overrides)
 
     def plan_record(self, passes: int) -> Plan:
         """Return the plan with the samples and passes that were rendered."""
@@ -199,8 +199,8 @@ def require_light(
     """
     if not counted.any():
         return ""
-    seen = [np.abs(image[counted]) for image in (test, reference)]
-    is_black = [float(values.max()) < BLACK for values in seen]
+    sides = [np.abs(image[counted]) for image in (test, reference)]
+    is_black = [float(values.max()) < BLACK for values in sides]
     if all(is_black) and not options.allow_empty:
         raise InputError(
             f"{name}: both halves are black: no pixel that sees a surface is brighter than {BLACK}"
@@ -211,7 +211,7 @@ def require_light(
         return "Both halves are black, so their difference means nothing."
     if is_black[1]:
         return "The reference is black: check whether its lights reach what the camera sees."
-    if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in seen):
+    if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in sides):
         return "Each half is one colour: the view shows nothing but a uniform surface."
     return ""
 
@@ -224,9 +224,9 @@ def _heuristic_renderer(
         if options.heuristic_variant:
             pair = options.pair(source)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        made = Renderer(scene, None, spp, "heuristic image")
+        renderer = Renderer(scene, None, spp, "heuristic image")
         if not options.image:
-            return made
+            return renderer
         from comparisons import pictures
 
-        return pictures.PictureHalf(pictures.read_all(options), made)
+        return pictures.PictureHalf(pictures.read_all(options), renderer)

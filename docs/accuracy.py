@@ -201,8 +201,8 @@ def _stand_ins(records):
     said = "; ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
     left = f" Never: {'; '.join(never)}." if never else ""
     left += (
-        " Measured, never on one and gone: constant ambient, and in version 0.2 spherical harmonics"
-        " and ambient occlusion; the filtered shadow map was on one."
+        " Removed, since never on one: constant ambient, and in version 0.2 spherical harmonics"
+        " and ambient occlusion. The filtered shadow map, also removed, was on one."
     )
     return f"Stand-ins on the front, by the number of scenes: {said}.{left}"
 

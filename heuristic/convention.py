@@ -16,8 +16,12 @@ turns the normal towards the viewer. Mitsuba's ``diffuse`` and ``twosided`` do t
 to NumPy, so its type is known only at run time: a checker sees ``Any``, the names are for readers.
 """
 
+from collections.abc import Callable
 from math import pi
 from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 IRRADIANCE_PER_INTENSITY = pi
 """Irradiance at normal incidence that a heuristic intensity of 1 represents."""
@@ -26,6 +30,7 @@ RADIANCE_PER_IRRADIANCE = 1.0 / pi
 """Radiance of a white diffuse surface under unit irradiance; the inverse of the factor above."""
 
 Array: TypeAlias = Any  # numbers of any shape; the docstring gives it
+Doubles: TypeAlias = NDArray[np.float64]  # the same in NumPy, where no kernel needs them
 Number: TypeAlias = Any  # one number per point, or one for all, which may be a plain number
 Cosines: TypeAlias = Any  # a heuristic.numerics.Cosine, or the cosine alone, -1..1
 Mask: TypeAlias = Any  # one truth value per point
@@ -37,3 +42,6 @@ Scene: TypeAlias = Any  # a mitsuba.Scene; Mitsuba's classes depend on the curre
 Mesh: TypeAlias = Any  # a mitsuba.Mesh
 Shape: TypeAlias = Any  # a mitsuba.Shape
 Interaction: TypeAlias = Any  # a mitsuba.SurfaceInteraction3f
+Properties: TypeAlias = Any  # a mitsuba.Properties: what a scene gives a plugin
+Sample: TypeAlias = tuple[Any, Colour]  # what Mitsuba calls a sample, and its weight
+Visibility: TypeAlias = Callable[[Direction, Number], Mask]  # what light from there reaches

@@ -202,8 +202,8 @@ class Shader:
     def compiled(self, lights: int) -> Any:
         """Compile it for a number of lights; raise InputError with the faulty lines."""
         context = opengl()
-        known, compute = self._programs.get(lights, (None, None))
-        if known is context:
+        owner, compute = self._programs.get(lights, (None, None))
+        if owner is context:
             return compute
         if lights > LIGHTS:
             raise InputError(

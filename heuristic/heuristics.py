@@ -22,7 +22,7 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 from heuristic import kernel, vectors
-from heuristic.convention import Array
+from heuristic.convention import Array, Visibility
 from heuristic.declared import Declared
 from heuristic.errors import InputError
 from heuristic.materials import Material, check_form
@@ -61,7 +61,7 @@ class ShadingArguments(NamedTuple):
     material: Material
     lights: list[Any]
     ambient: Array = 0
-    visible: Callable[[Array, Array], Array] | None = None
+    visible: Visibility | None = None
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class LightAtPoint:
         return ray(self.toward, self.distance)
 
 
-def _input(read: Callable[["Point"], Any]) -> cached_property:
+def _input(read: Callable[["Point"], Any]) -> cached_property[Any]:
     """Make an attribute of :class:`Point` that a heuristic can read if it declares the need."""
 
     def checked(point: "Point") -> Any:
@@ -267,8 +267,8 @@ class Heuristic:
                 f"heuristic {self.name!r}: a name has lower-case letters, digits and hyphens only."
             )
         if unknown := ", ".join(sorted(set(self.needs) - set(INPUTS))):
-            known = ", ".join(INPUTS)
-            raise InputError(f"heuristic {self.name} needs {unknown}: choose from {known}.")
+            inputs = ", ".join(INPUTS)
+            raise InputError(f"heuristic {self.name} needs {unknown}: choose from {inputs}.")
         names = [parameter.name for parameter in self.parameters]
         if len(set(names)) < len(names):
             raise InputError(f"heuristic {self.name} has two parameters of one name: {names}.")
@@ -336,7 +336,8 @@ declare = HEURISTICS.declare
 def named(name: str) -> Heuristic:
     """Return a declared heuristic, or the one in a user's file."""
     if file := in_file(name):
-        return pkgutil.resolve_name(LOADERS[Path(file[0]).suffix])(name)
+        heuristic: Heuristic = pkgutil.resolve_name(LOADERS[Path(file[0]).suffix])(name)
+        return heuristic
     if name not in HEURISTICS:
         raise InputError(
             f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}, or"
@@ -357,7 +358,7 @@ def known_as(heuristic: "str | Heuristic | Callable[[Point], Array]") -> str:
     if not isinstance(heuristic, Heuristic):
         name = getattr(heuristic, "__name__", "shade").lower().replace("_", "-").strip("-")
         heuristic = pkgutil.resolve_name(OF_FUNCTION)(heuristic, name)
-    return declare(heuristic).name
+    return str(declare(heuristic).name)
 
 
 def in_file(name: str) -> tuple[str, str] | None:

@@ -26,7 +26,7 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic import materials
-from heuristic.convention import RADIANCE_PER_IRRADIANCE, Array
+from heuristic.convention import RADIANCE_PER_IRRADIANCE, Array, Doubles
 from heuristic.heuristics import INPUTS, Heuristic, Point
 from heuristic.plugins.coefficients import SceneMaterials
 
@@ -42,7 +42,7 @@ REFLECTIONS = 16
 """Longest path. Mitsuba ends most paths sooner, by Russian roulette after five."""
 
 
-def gather(scene: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def gather(scene: Any) -> tuple[Doubles, Doubles, Doubles]:
     """Return the light at points that the camera sees, in K channels.
 
     ``normal`` (N, 3), ``arriving`` (N, K): ``E / pi``, the value of a white surface, and ``k_d``
@@ -54,20 +54,20 @@ def gather(scene: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return np.array(normal, float).T[:: STRATA**2], _by_point(light), _by_point(k_d)
 
 
-def weighted_mean(arriving: np.ndarray, k_d: np.ndarray) -> np.ndarray:
+def weighted_mean(arriving: Doubles, k_d: Doubles) -> Doubles:
     """Return the mean (K,) of the arriving light over the image, weighted by ``k_d``.
 
     ``k_d`` times it has the same mean over the image as ``k_d`` times the arriving light.
     """
     weight, total = k_d.sum(axis=0), (arriving * k_d).sum(axis=0)
-    return np.divide(total, weight, out=np.zeros_like(total), where=weight > 0)
+    return np.asarray(np.divide(total, weight, out=np.zeros_like(total), where=weight > 0))
 
 
-def _by_point(value: Any) -> np.ndarray:
+def _by_point(value: Any) -> Doubles:
     """Return the means of the directions of each point, (N, channels)."""
     value = mi.Spectrum(value) + dr.zeros(mi.Spectrum, RAYS)
     rows = np.array(value, float).reshape(-1, RAYS).T
-    return rows.reshape(GRID**2, STRATA**2, -1).mean(axis=1)
+    return np.asarray(rows.reshape(GRID**2, STRATA**2, -1).mean(axis=1))
 
 
 def _seen(scene: Any) -> tuple[Any, Any, Any]:
@@ -124,17 +124,15 @@ EVENNESS = 1e-3
 because all visible surfaces have the same inclination."""
 
 
-def upward(scene: Any) -> np.ndarray:
+def upward(scene: Any) -> Doubles:
     """Return the axis of the world, or its opposite, nearest to the camera's up vector."""
     matrix = np.array(scene.sensors()[0].world_transform().matrix, float)
     column = matrix.reshape(4, 4, -1)[:3, 1, 0]
     axis = int(np.argmax(np.abs(column)))
-    return np.sign(column[axis]) * np.eye(3)[axis]
+    return np.asarray(np.sign(column[axis]) * np.eye(3)[axis])
 
 
-def fit(
-    normal: np.ndarray, arriving: np.ndarray, k_d: np.ndarray, up: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def fit(normal: Doubles, arriving: Doubles, k_d: Doubles, up: Doubles) -> tuple[Doubles, Doubles]:
     """Return sky and ground, (K,) each and not negative, by weighted least squares.
 
     A channel is ``A + B c`` with ``A`` through the mean, and ``|B| <= A``: if sky or ground would

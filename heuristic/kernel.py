@@ -1,7 +1,7 @@
 """The shading kernel: the whole illumination model at many points at once (8.10)."""
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import inf
 from numbers import Real
 from typing import Any
@@ -10,7 +10,7 @@ import drjit as dr
 import numpy as np
 
 from heuristic import materials, numerics, terms, vectors
-from heuristic.convention import Array, Colour, Mask, Position, Vector
+from heuristic.convention import Array, Colour, Position, Vector, Visibility
 from heuristic.errors import InputError, type_of
 from heuristic.lights import INTENSITIES, Light
 from heuristic.materials import COEFFICIENTS, Material
@@ -25,7 +25,7 @@ def shade(
     material: Material,
     lights: Sequence[Light],
     ambient: Colour = 0,
-    visible: Callable[..., Mask] | None = None,
+    visible: Visibility | None = None,
 ) -> Colour:
     """Equations 8.10-8.12, 6.11-6.15: the sum of all terms over all lights.
 
@@ -62,8 +62,9 @@ def shade(
     if not isinstance(material, Material):
         raise InputError(f"material is {type_of(material)}: give a heuristic.Material.")
     ambient = materials.checked_colour("ambient", ambient)
-    _check_sizes((position, normal, view), material, lights, ambient)
     values = {name: getattr(material, name) for name in COEFFICIENTS} | {"ambient": ambient}
+    point = {"position": position, "normal": normal, "view": view, "n": material.n}
+    _check_sizes(point | values, lights)
     own = {
         f"lights[{i}].{name}": value
         for i, light in enumerate(lights)
@@ -105,7 +106,7 @@ def sum_lights(
     view: Vector,
     material: Material,
     lights: Sequence[Light],
-    visible: Callable[..., Mask] | None = None,
+    visible: Visibility | None = None,
 ) -> tuple[Colour | None, Colour | None]:
     """Return the diffuse and specular sums of 8.10, with ``k_d`` and ``k_s`` taken out of them.
 
@@ -164,18 +165,18 @@ def checked_vectors(position: Any, normal: Any, view: Any) -> tuple[Any, ...]:
     Three plain numbers, in a list, tuple or NumPy array, are one vector for all points; at least
     one argument must be a Dr.Jit array. Half precision and integers become single.
     """
-    given = {"position": position, "normal": normal, "view": view}
-    arrays = {name: _array(name, value) for name, value in given.items() if dr.is_array_v(value)}
+    values = {"position": position, "normal": normal, "view": view}
+    arrays = {name: _array(name, value) for name, value in values.items() if dr.is_array_v(value)}
     if not arrays:
         raise InputError(f"position, normal, view: {HOW}; none of them is one.")
     common = type(next(iter(arrays.values())))
     return tuple(
         arrays[name] if name in arrays else common(*_plain(name, value))
-        for name, value in given.items()
+        for name, value in values.items()
     )
 
 
-def _checked_lights(lights: Any) -> Sequence[Light]:
+def _checked_lights(lights: object) -> Sequence[Light]:
     if isinstance(lights, (str, bytes, Mapping)) or not isinstance(lights, Iterable):
         raise InputError(
             f"lights is {type_of(lights)}: give a list of PointLight, DirectionalLight or"
@@ -191,12 +192,10 @@ def _checked_lights(lights: Any) -> Sequence[Light]:
     return lights
 
 
-def _check_sizes(point: tuple, material: Material, lights: Sequence[Light], ambient: Any) -> None:
+def _check_sizes(values: dict[str, Any], lights: Sequence[Light]) -> None:
     """Reject Dr.Jit arrays of different numbers of points; one point fits any number."""
     if dr.flag(dr.JitFlag.SymbolicScope):
         return
-    values = dict(zip(("position", "normal", "view"), point, strict=True)) | {"ambient": ambient}
-    values |= {name: getattr(material, name) for name in (*COEFFICIENTS, "n")}
     for number, light in enumerate(lights):
         values |= {f"lights[{number}].{name}": value for name, value in light.given().items()}
     widths = {name: dr.width(value) for name, value in values.items() if dr.is_jit_v(value)}

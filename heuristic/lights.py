@@ -7,7 +7,7 @@ a kernel.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from math import inf, isfinite
 from numbers import Real
@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import drjit as dr
 
 from heuristic import materials, numerics, terms, vectors
-from heuristic.convention import Colour, Direction, Mask, Number, Position, Vector
+from heuristic.convention import Colour, Direction, Number, Position, Scene, Vector, Visibility
 from heuristic.errors import InputError
 from heuristic.numerics import is_number
 
@@ -74,7 +74,7 @@ class Light:
         colours = [self.intensity if each is None else each for each in own]
         return colours[:1] if colours[0] is colours[1] else colours
 
-    def illuminate(self, position: Position, visible: Callable[..., Mask] | None = None) -> Arrival:
+    def illuminate(self, position: Position, visible: Visibility | None = None) -> Arrival:
         """Return how light arrives; black where ``visible(toward, distance)`` is false."""
         toward, distance, colours = self.rays(position)
         if visible is not None:
@@ -82,7 +82,7 @@ class Light:
             colours = [dr.select(is_seen, colour, 0) for colour in colours]
         return Arrival(toward, colours[0], colours[-1], distance)
 
-    def rays(self, position: Position) -> tuple:
+    def rays(self, position: Position) -> tuple[Direction, Number, list[Colour]]:
         """Return ``L`` (6.26), ``d``, and intensities times ``f_att`` (6.1, 8.6) and cone (6.3)."""
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
@@ -115,7 +115,7 @@ class Light:
         bare = {"shell": 0} if is_number(self.shell, 0) else {}
         return {"clamped": self.clamped} | even | bare
 
-    def structure(self) -> tuple:
+    def structure(self) -> tuple[Any, ...]:
         """Return what determines the light's instructions, apart from its numbers; hashable."""
         counts = map(materials.wavelength_count, self.intensities)
         return type(self), tuple(counts), *self.compiled().items()
@@ -135,8 +135,7 @@ class Light:
             values[name] = vector_type(values[name])
         for name in values.keys() & INTENSITIES:
             values[name] = materials.as_array(values[name], vector_type)
-        light: Any = self
-        return replace(light, **values)
+        return type(self)(**vars(self) | values)
 
 
 @dataclass(frozen=True)
@@ -154,7 +153,7 @@ class DirectionalLight(Light):
     diffuse_intensity: Colour = None
     specular_intensity: Colour = None
 
-    def rays(self, position: Position) -> tuple:
+    def rays(self, position: Position) -> tuple[Direction, Number, list[Colour]]:
         """Return ``L = -direction / |direction|``, an infinite distance and the intensities."""
         vector_type = type(position)
         toward = -vectors.normalise(vector_type(self.direction))
@@ -174,7 +173,7 @@ class PointLight(Light):
 
     ``position`` is ``P_L`` in world space, ``intensity`` ``I_0`` (chapter 8: ``I_p0``),
     display-linear. ``attenuation`` is ``(k0, k1, k2)`` of 6.1, each 0 or more and not all 0: ``(1,
-    0, 0)`` is no attenuation, ``(0, 0, 1)`` the inverse square of 8.6. ``clamped`` is the other
+    0, 0)`` means none, ``(0, 0, 1)`` the inverse square of 8.6. ``clamped`` is the other
     form of 8.6, ``min(1 / (c1 + c2 d + c3 d^2), 1)``. Within the radius ``shell`` about the
     position, the body of the lamp, nothing casts a shadow.
     """
@@ -232,7 +231,12 @@ PLUGINS: dict[str, type[Light]] = {kind.plugin: kind for kind in KINDS}
 """The kinds of light, by their emitter plugin in a Mitsuba scene."""
 
 
-def is_unattenuated(coefficients: Sequence) -> bool:
+def lamps(scene: Scene) -> list[Any]:
+    """Return the emitters of a scene that the kernel knows as lights."""
+    return [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
+
+
+def is_unattenuated(coefficients: Sequence[Number]) -> bool:
     """Return whether coefficients of 6.1 are ``(1, 0, 0)`` by construction."""
     return all(map(is_number, coefficients, UNATTENUATED))
 
@@ -259,7 +263,7 @@ def _direction(value: Any) -> Any:
     return direction
 
 
-def _attenuation(value: Any) -> tuple:
+def _attenuation(value: Any) -> tuple[Any, ...]:
     """Return three checked numbers; if one is a Dr.Jit value, none is checked."""
     coefficients = tuple(value) if isinstance(value, Sequence) else ()
     if len(coefficients) == 3 and any(map(dr.is_array_v, coefficients)):

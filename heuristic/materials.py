@@ -9,7 +9,7 @@ import drjit as dr
 import numpy as np
 
 from heuristic import numerics
-from heuristic.convention import Colour
+from heuristic.convention import Colour, Number
 from heuristic.errors import InputError, unknown
 
 FORMS = ("phong", "blinn")
@@ -44,7 +44,7 @@ def checked_colour(name: str, value: Any) -> Any:
     return components[0] if len(components) == 1 else components
 
 
-def _components(value):
+def _components(value: Any) -> tuple[float, ...] | None:
     """Return the numbers of a value, or None if it is not made of numbers."""
     is_several = isinstance(value, Sequence | np.ndarray) or dr.is_array_v(value)
     if isinstance(value, str) or not (is_several or isinstance(value, Real)):
@@ -139,7 +139,7 @@ class Material:
     normalised: bool = False
     n_is_moderate: bool = False
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         for name in COEFFICIENTS:
             object.__setattr__(self, name, checked_colour(name, getattr(self, name)))
         object.__setattr__(self, "n", _exponent(self.n))
@@ -166,9 +166,9 @@ class PairedMaterial(Material):
     metallic: float = 0
 
 
-def _exponent(n):
+def _exponent(n: Any) -> Number:
     number = numerics.plain(n)
-    if number is None or (isinstance(number, Real) and not number >= 0):
+    if number is None or (isinstance(number, int | float) and not number >= 0):
         raise InputError(
             f"n = {n!r} is not allowed: Phong's exponent is finite and 0 or more;"
             " inf makes a mirror."

@@ -13,6 +13,9 @@ oppose each other, like the two sides of a sheet: the rest of the sum is roundin
 thousands of faces may depend on their order.
 """
 
+from collections.abc import Callable, Sequence
+from typing import Any
+
 import drjit as dr
 from drjit import scalar
 
@@ -145,7 +148,7 @@ def shorter_edges(a: Vector, b: Vector, c: Vector) -> tuple[Vector, Vector]:
     return first, second
 
 
-def _latitude(v):
+def _latitude(v: Number) -> tuple[Number, Number]:
     """Return sine and cosine of a latitude, with a cosine of exactly 0 at the poles.
 
     No float equals pi/2; the cosine of the nearest is a rounding step, which may be negative and
@@ -155,12 +158,12 @@ def _latitude(v):
     return sine, dr.select(abs(cosine) > dr.epsilon(_vector_type(v)), cosine, 0)
 
 
-def _scaled(vector):
+def _scaled(vector: Vector) -> Vector:
     """Return a vector over its largest component, whose square stays in the range."""
     return _over(vector, _largest(vector))
 
 
-def _over(vector, largest):
+def _over(vector: Vector, largest: Number) -> Vector:
     """Divide by the largest component; anything below the smallest normal float becomes zero.
 
     The reciprocal of anything smaller is infinite.
@@ -169,11 +172,11 @@ def _over(vector, largest):
     return dr.select(is_normal, vector / dr.select(is_normal, largest, 1), type(vector)(0))
 
 
-def _largest(vector):
+def _largest(vector: Vector) -> Number:
     return dr.maximum(abs(vector.x), dr.maximum(abs(vector.y), abs(vector.z)))
 
 
-def _vector_type(component):
+def _vector_type(component: Any) -> Any:
     """Return the type of three such components; double precision for plain numbers."""
     if dr.is_jit_v(component):
         return dr.replace_shape_t(type(component), (3, -1))
@@ -233,7 +236,9 @@ def corner_angles(p0: Position, p1: Position, p2: Position) -> tuple[Number, Num
     )
 
 
-def _weighted(positions, faces, weights):
+def _weighted(
+    positions: Position, faces: Array, weights: Callable[..., Sequence[Number]]
+) -> Direction:
     """Sum the faces' normals at each vertex; ``weights`` maps corners to a weight for each."""
     if dr.width(faces) == 0:
         return dr.zeros(type(positions), dr.width(positions))

@@ -13,6 +13,7 @@ The module rests on three ideas:
 """
 
 import sys
+from collections.abc import Sequence
 from math import factorial, inf, log2, nan
 from numbers import Integral, Real
 from typing import Any, NamedTuple
@@ -238,11 +239,11 @@ def inverse_of_power(power_of_two: Number) -> Number:
     return dr.reinterpret_array(type(power_of_two), 0x7F000000 - bits)
 
 
-def _is_single(value):
-    return dr.is_jit_v(value) and dr.itemsize_v(value) == 4
+def _is_single(value: Any) -> bool:
+    return bool(dr.is_jit_v(value) and dr.itemsize_v(value) == 4)
 
 
-def _inverse_root_power(square):
+def _inverse_root_power(square: Number) -> Number:
     """Return a power of two near ``1 / sqrt(square)``, by halving the bits of the exponent.
 
     Any power of two will do, so an overflowed or vanished square is not a special case.
@@ -259,7 +260,7 @@ def _inverse_root_power(square):
     return dr.reinterpret_array(type(square), (integer(magic) - (bits >> 1)) & mask)
 
 
-def _polynomial(x, coefficients):
+def _polynomial(x: Number, coefficients: Sequence[float]) -> Number:
     """Return ``c0 + c1 x + c2 x^2 + ...`` by Horner's scheme."""
     value = type(x)(coefficients[-1])
     for coefficient in reversed(coefficients[:-1]):

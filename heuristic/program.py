@@ -21,12 +21,12 @@ def source_digest() -> str:
     """Return a digest of the sources where fotismos runs from a checkout; empty if installed."""
     if not (ROOT / "pyproject.toml").is_file():
         return ""
-    found = hashlib.sha256()
+    whole = hashlib.sha256()
     for path in sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.*")):
         if "__pycache__" not in path.parts and path.is_file():
-            found.update(f"{path.relative_to(ROOT)}\0".encode())
-            found.update(hashlib.sha256(path.read_bytes()).digest())
-    return found.hexdigest()
+            whole.update(f"{path.relative_to(ROOT)}\0".encode())
+            whole.update(hashlib.sha256(path.read_bytes()).digest())
+    return whole.hexdigest()
 
 
 def program() -> list[str]:

@@ -18,9 +18,9 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic import meshes
-from heuristic.convention import Array
+from heuristic.convention import Array, Doubles
 from heuristic.heuristics import INPUTS, Heuristic, Parameter, Point
-from heuristic.lights import FAR, DirectionalLight
+from heuristic.lights import FAR, DirectionalLight, lamps
 
 LAMPS = 16
 """Lamps with a depth image, at most."""
@@ -91,7 +91,7 @@ def light_map(scene: Any, light: Any, resolution: int) -> DepthImage:
     return DepthImage(resolution, depths, centre, frame, size)
 
 
-def box(scene: Any) -> tuple[np.ndarray, np.ndarray]:
+def box(scene: Any) -> tuple[Doubles, Doubles]:
     """Return the corners (3,) of a scene's box; Mitsuba's leaves out meshes that it merged."""
     corners = [np.zeros((0, 3))]
     for shape in scene.shapes():
@@ -145,19 +145,15 @@ def _cube_texel(place: Any, size: int) -> Any:
 def prepare(scene: Any, resolution: float) -> tuple[DepthImage, ...]:
     """Trace the depth images of all lamps, in their order."""
     si = dr.zeros(mi.SurfaceInteraction3f)
-    return tuple(light_map(scene, lamp.light(si), round(resolution)) for lamp in _lamps(scene))
+    return tuple(light_map(scene, lamp.light(si), round(resolution)) for lamp in lamps(scene))
 
 
 def refuse(scene: Any) -> str:
     """Return why there are no depth images: no lamp, or too many; empty if there are."""
-    count = len(_lamps(scene))
+    count = len(lamps(scene))
     if count == 0:
         return "it has no lamp"
     return "" if count <= LAMPS else f"it has {count} lamps, and at most {LAMPS} get a depth image"
-
-
-def _lamps(scene: Any) -> list[Any]:
-    return [emitter for emitter in scene.emitters() if hasattr(emitter, "light")]
 
 
 def shade(point: Point) -> Array:

@@ -158,11 +158,11 @@ def attenuation_root(
     return root * dr.select(is_far, inverse, 1)
 
 
-def _representable(value):
+def _representable(value: Number) -> Number:
     return numerics.at_most(value, numerics.largest(value))
 
 
-def _inverse_root(value, at_zero):
+def _inverse_root(value: Number, at_zero: Number) -> Number:
     is_positive = value > 0
     return dr.select(is_positive, dr.rsqrt(dr.select(is_positive, value, 1)), at_zero)
 

@@ -5,10 +5,12 @@ the original and no emitter; the original is unchanged. A flipped orientation (`
 becomes the order of the vertices. Call it after ``mitsuba.set_variant``.
 """
 
+from typing import Any
+
 import drjit as dr
 import mitsuba as mi
 
-from heuristic.convention import Direction, Mesh, Shape
+from heuristic.convention import Array, Direction, Interaction, Mesh, Position, Shape
 from heuristic.errors import InputError
 from heuristic.meshes import faces, new_mesh, positions, texture_coordinates
 from heuristic.normals import triangle_normal, vertex_normals
@@ -86,11 +88,11 @@ def normals(mesh: Mesh) -> Direction:
     return -own if mesh.has_flipped_normals() else own
 
 
-def _flat_normals(points, corners):
+def _flat_normals(points: Position, corners: Array) -> Direction:
     return triangle_normal(*(dr.gather(mi.Vector3f, points, corners[i]) for i in range(3)))
 
 
-def _checked_normals(mesh, weighting):
+def _checked_normals(mesh: Mesh, weighting: str) -> Direction:
     corners = faces(mesh)
     computed = vertex_normals(positions(mesh), corners, weighting)
     is_used = dr.zeros(mi.Bool, mesh.vertex_count())
@@ -106,7 +108,7 @@ def _checked_normals(mesh, weighting):
     return computed
 
 
-def _cells(resolution):
+def _cells(resolution: int) -> dict[Any, tuple[int, int]]:
     """Return the number of cells along ``u`` and ``v`` for each type of shape."""
     around = 4 * resolution
     return {
@@ -117,7 +119,7 @@ def _cells(resolution):
     }
 
 
-def _tessellated(shape, kind, columns, rows):
+def _tessellated(shape: Shape, kind: Any, columns: int, rows: int) -> Mesh:
     """Evaluate a shape at the corners of a grid of cells, and join them by triangles."""
     index = dr.arange(mi.UInt32, (columns + 1) * (rows + 1))
     column, row = index % (columns + 1), index // (columns + 1)
@@ -138,7 +140,7 @@ def _tessellated(shape, kind, columns, rows):
     return _build(shape, points, surface_normals, uv, corners)
 
 
-def _surface(shape, kind, uv):
+def _surface(shape: Shape, kind: Any, uv: Array) -> tuple[Position, Direction]:
     """Return points and normals of a shape, one for each of its coordinates."""
     if kind in (mi.ShapeType.Cylinder, mi.ShapeType.Disk):
         # Mitsuba finds the point with a ray, which may miss the rim; the shape is straight across.
@@ -158,7 +160,7 @@ def _surface(shape, kind, uv):
     return mi.Vector3f(points), mi.Vector3f(normals) + everywhere
 
 
-def _evaluated(shape, uv):
+def _evaluated(shape: Shape, uv: Array) -> Interaction:
     si = shape.eval_parameterization(uv)
     if not dr.all(si.is_valid() & dr.all(dr.isfinite(si.p))):
         raise InputError(
@@ -169,7 +171,7 @@ def _evaluated(shape, uv):
     return si
 
 
-def _closed(kind, uv):
+def _closed(kind: Any, uv: Array) -> Array:
     """Make both ends of a circle, and all meridians at a pole or centre, meet in one point."""
     full_turn_u, full_turn_v = dr.select(uv.x < 1, uv.x, 0), dr.select(uv.y < 1, uv.y, 0)
     if kind == mi.ShapeType.Sphere:
@@ -181,9 +183,11 @@ def _closed(kind, uv):
     return uv
 
 
-def _build(original, points, vertex_normals, uv, corners):
+def _build(
+    original: Shape, points: Position, normals: Direction, uv: Array, corners: Array
+) -> Mesh:
     """Make a mesh from its arrays, with the name and BSDF of an original."""
-    mesh = new_mesh(original.id(), points, corners, vertex_normals, uv)
+    mesh = new_mesh(original.id(), points, corners, normals, uv)
     mesh.set_id(original.id())
     mesh.set_bsdf(original.bsdf())
     return mesh

@@ -55,7 +55,7 @@ def wide_light_vector(light_position: Position, position: Position) -> tuple[Vec
     )
 
 
-def _half_offset(light_position, position):
+def _half_offset(light_position: Position, position: Position) -> Vector:
     """Return half of ``P_L - P``, which, unlike the whole, never exceeds the type's range."""
     return dr.fma(position, -0.5, light_position * 0.5)
 
@@ -105,7 +105,7 @@ def lobe(
         )
     normal = unit(normal)
 
-    def sharp(light, position, toward, cos_incidence):
+    def sharp(light: Any, position: Position, toward: Direction, cos_incidence: Number) -> Cosines:
         vector, inverse = light.wide_toward(position)
         cosine = _narrow_cosine(*sides(vector, inverse), type(cos_incidence))
         return cosine._replace(value=dr.select(dr.dot(normal, vector) > 0, cosine.value, 0))
@@ -128,7 +128,9 @@ def local_lobe(form: str, is_moderate: bool, wi: Direction, wo: Direction) -> Co
     return dr.dot(*sides) if is_moderate else _narrow_cosine(*sides, type(wo.z))
 
 
-def _sides(form, normal, view, unit):
+def _sides(
+    form: str, normal: Direction, view: Direction, unit: Callable[[Vector], Direction]
+) -> Callable[[Vector, Number], tuple[Vector, Vector]]:
     """Return a function of ``L`` that gives the two unit vectors with the lobe's angle between.
 
     For ``R.V`` these are ``L`` and the mirror image of ``V``, which is one for all lights.
@@ -139,7 +141,7 @@ def _sides(form, normal, view, unit):
     return lambda toward, inverse: (toward * inverse, mirrored)
 
 
-def _narrow_cosine(a, b, float_type):
+def _narrow_cosine(a: Vector, b: Vector, float_type: type) -> numerics.Cosine:
     """Return the cosine of two unit vectors in double precision, as floats of a smaller type.
 
     The chord gives ``1 - a.b`` an error of 1e-13 of itself, where the scalar product would leave

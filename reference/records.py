@@ -82,9 +82,9 @@ def read(kind: type[Kind], text: str, where: str) -> Kind:
         if isinstance(content, dict):
             version = content.get("record_version")
             if version not in (2, VERSION):
-                found = "of fotismos 0.1" if version is None else f"version {version}"
+                origin = "of fotismos 0.1" if version is None else f"version {version}"
                 raise InputError(
-                    f"{where}: this record is {found}, not version {VERSION}. Make it again."
+                    f"{where}: this record is {origin}, not version {VERSION}. Make it again."
                 )
             content["record_version"] = VERSION
         return msgspec.convert(content, kind)

@@ -63,9 +63,9 @@ def completion(context: click.Context, shell: str) -> None:
     In bash, for the run script of a copy of the project, from its folder:
       source <(./run completion bash); complete -o nosort -F _fotismos_completion ./run
     """  # noqa: D301 click reads the \b as: keep these lines
-    made = get_completion_class(shell)
-    assert made is not None, "click knows these shells"
-    script = made(context.find_root().command, {}, "fotismos", COMPLETION)
+    completer = get_completion_class(shell)
+    assert completer is not None, "click knows these shells"
+    script = completer(context.find_root().command, {}, "fotismos", COMPLETION)
     # Not .source(), which starts a bash to look at its version.
     click.echo(script.source_template % script.source_vars())
 
@@ -88,8 +88,8 @@ class Group(jobs.Helped, click.Group):
         super().format_options(context, formatter)
         for group, names in COMMANDS.items():
             with formatter.section(group):
-                found = ((name, self.get_command(context, name)) for name in names)
-                formatter.write_dl([(n, one.get_short_help_str(1000)) for n, one in found if one])
+                rows = ((name, self.get_command(context, name)) for name in names)
+                formatter.write_dl([(n, one.get_short_help_str(1000)) for n, one in rows if one])
 
     def resolve_command(self, context: click.Context, words: list[str]) -> Any:
         """Find the command that the first word names."""

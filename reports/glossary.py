@@ -61,7 +61,7 @@ VIEWS: Terms = {
     ),
     ("exposure",): "A factor on both images, in stops: one stop doubles the light.",
     ("map of the error",): "Which measure of the difference the map shows.",
-    ("error",): "Grey where no difference is visible, then the brighter, the larger.",
+    ("error",): "Grey where no difference is visible; elsewhere, the brighter, the larger.",
 }
 
 COSTS: Terms = {
@@ -69,8 +69,8 @@ COSTS: Terms = {
     ("method",): "A way to render the scene, from flat shading to all light transport.",
     ("samples",): "Samples per pixel: camera rays whose mean is the pixel’s colour.",
     ("of the kernel’s per sample",): (
-        "How many times as long as one of the textbook kernel a sample takes: much the same on any"
-        " machine, also a busy one."
+        "The time of a sample over that of one of the textbook kernel’s: about the same on any"
+        " machine, even a busy one."
     ),
     ("overhead",): "The part of an image’s time that does not depend on its samples.",
     ("first image",): "It also traces and compiles the program.",
@@ -84,8 +84,8 @@ COSTS: Terms = {
         " orders of adding the effects."
     ),
     ("adds",): (
-        "The time that the samples of an image take more with the effect than without: by kernels,"
-        " or by plans, in this order of effects and in the reverse one."
+        "The extra time that an image’s samples take with the effect: by kernels, or by plans that"
+        " add the effects in this order and in the reverse one."
     ),
     ("first",): "ΔE2000 removed if the effect is added before all others.",
     ("last",): "ΔE2000 removed if the effect is added after all others.",
@@ -105,7 +105,7 @@ PLANS: Terms = {
 }
 
 EFFECTS: Terms = {
-    ("occlusion",): "Shadows: surfaces that hide a light. The textbook lights through them.",
+    ("occlusion",): "Shadows: surfaces that hide a light. The textbook’s light passes them.",
     ("interreflection",): (
         "Light that reaches a surface from other surfaces. The textbook has ambient light instead."
     ),
@@ -117,7 +117,7 @@ EFFECTS: Terms = {
     ("spectral",): "Light by wavelength in place of three colours.",
     ("polygon interpolation",): "Flat and Gouraud shading, which interpolate over polygons.",
     ("transmission",): "Light that passes through surfaces, which the textbook’s cannot.",
-    ("distance attenuation",): "How light weakens with distance: physically by its square.",
+    ("distance attenuation",): "How light weakens with distance: physically, with its square.",
     ("one intensity",): (
         "Physical light has one intensity. The textbook’s may have one for each kind of reflection."
     ),
@@ -136,7 +136,7 @@ METHODS: Terms = {
     ("phong BSDF, full transport",): "Textbook materials under all light transport.",
     ("direct",): "Physical materials under the light that comes straight from lights.",
     ("path 3", "path 4", "path 5"): (
-        "Path tracing that ends after as many steps; 2 is direct light alone."
+        "Path tracing that ends after that many steps; 2 is direct light alone."
     ),
     ("full plan",): "Everything that the scene calls for.",
 }
@@ -153,13 +153,13 @@ GROUPS: dict[str, Terms] = {
 
 def meanings() -> dict[str, str]:
     """Return the sentence of each name of a term, metrics included."""
-    found = {
+    sentences = {
         name: f"{metric.definition} {metric.caution}"
         for metric in METRICS.values()
         for name in (metric.label, metric.heading, f"mean {metric.label}")
     }
-    found[RATIO.label] = f"Stops: {RATIO.definition}."
-    return found | {
+    sentences[RATIO.label] = f"Stops: {RATIO.definition}."
+    return sentences | {
         name: meaning
         for terms in GROUPS.values()
         for names, meaning in terms.items()

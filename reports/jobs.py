@@ -51,8 +51,8 @@ def complete_scene(
     from comparisons.gallery.builtin import SCENES
 
     named = [name for name in SCENES if name.startswith(beginning)]
-    found = [CompletionItem(name, help=SCENES[name].title) for name in named]
-    return found or [CompletionItem(beginning, type="file")]
+    items = [CompletionItem(name, help=SCENES[name].title) for name in named]
+    return items or [CompletionItem(beginning, type="file")]
 
 
 # --- Help ------------------------------------------------------------------------------------
@@ -75,8 +75,8 @@ class Helped(click.Command):
         for parameter in self.get_params(context):
             shown = parameter.get_help_record(context)
             if shown and isinstance(parameter, click.Option):
-                known = (group for group, names in GROUPS.items() if parameter.name in names)
-                rows.setdefault(next(known, "Options"), []).append(shown)
+                groups = (group for group, names in GROUPS.items() if parameter.name in names)
+                rows.setdefault(next(groups, "Options"), []).append(shown)
         for group in ("Options", *GROUPS):
             if group in rows:
                 with formatter.section(group):

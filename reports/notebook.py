@@ -78,12 +78,12 @@ class Shown:
 
     def at(self, x: int, y: int) -> PixelTerms:
         """Return the terms of 8.10 at a column and row, or at the nearest that has them."""
-        if self.comparison.terms is None:
+        grid = self.comparison.terms
+        if grid is None:
             raise InputError(f"there are no terms. {self.comparison.no_terms}")
-        found = self.comparison.terms.at(x, y)
-        if found is None:
+        if (terms := grid.at(x, y)) is None:
             raise InputError(f"pixel {x}, {y} sees no surface. Give one that does.")
-        return found
+        return terms
 
 
 def compare(scene: Scene, name: str | None = None, why: bool = True, **options: Any) -> Shown:
@@ -134,8 +134,8 @@ def fit(
 def check(baseline: str | Path, significance: float = LEVEL) -> CheckRecord:
     """Return whether the scene of a baseline's file moved from what was measured before."""
     file = baselines.read(Path(baseline))
-    made, _ = checks.examine(file, file.open(), significance)
-    return made
+    result, _ = checks.examine(file, file.open(), significance)
+    return result
 
 
 def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: Any) -> Audit:

@@ -9,6 +9,7 @@ import OpenEXR
 import pytest
 from PIL import Image
 
+from comparisons.departure import colour
 from comparisons.departure.metrics import METRICS, RATIO, drawn
 from reference.records import plain
 from reports.files import images
@@ -48,7 +49,7 @@ def test_openexr_reads_back_what_was_written(tmp_path, layers):
                 channels[f"{name}.{suffix}"], expected.astype(kind), strict=True
             )
     assert header["compression"] == OpenEXR.ZIP_COMPRESSION
-    np.testing.assert_allclose(header["chromaticities"], images.BT709, rtol=1e-6)
+    np.testing.assert_allclose(header["chromaticities"], colour.CHROMATICITIES, rtol=1e-6)
     assert (header["seed"], header["fotismos"]) == ("3", "1.0")
     assert header["scene"] == "fig-8-9 <φ>"
     # tev and Blender split a name at its last dot, and take a second one for a group.

@@ -1,14 +1,14 @@
 """Blocks of pixels: sums, neighbourhoods, and values spread over the pixels again."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from comparisons.departure.colour import Array
 from reference.rendering.sums import BLOCK
-
-Array = NDArray[np.float64]
 
 # Rows processed at a time, in whole blocks, to keep temporaries small.
 _ROWS = 32 * BLOCK
@@ -32,10 +32,10 @@ def neighbourhood(values: Array, first: int = 0) -> Array:
     around[first] = around[first + 1] = (1, 1)
     padded = np.pad(values, around)
     windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3), (first, first + 1))
-    return windows.sum(axis=(-2, -1))
+    return np.asarray(windows.sum(axis=(-2, -1)))
 
 
-def spread_out(values: NDArray, shape: tuple[int, ...]) -> NDArray:
+def spread_out(values: NDArray[Any], shape: tuple[int, ...]) -> NDArray[Any]:
     """Return an image of this shape (H, W, ...) with each block's value (h, w, ...)."""
     return values.repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)[: shape[0], : shape[1]]
 

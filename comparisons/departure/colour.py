@@ -25,6 +25,7 @@ from heuristic.errors import InputError
 from reference.records import Positive, Record
 
 Array = NDArray[np.float64]
+Floats = NDArray[np.floating]  # of either precision
 Colour = TypeVar("Colour", Array3f, Array3f64)
 Formula = Callable[[Array3f64], Array3f64]
 
@@ -36,6 +37,8 @@ MOST_PIXELS = 1000.0
 
 BT709 = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.3127, 0.3290))
 """CIE x, y of red, green, blue and white."""
+CHROMATICITIES = tuple(value for place in BT709 for value in place)
+"""The same in a row, as files have them."""
 BT2020 = ((0.708, 0.292), (0.170, 0.797), (0.131, 0.046), (0.3127, 0.3290))
 
 # CIE 15: below this ratio to white, lightness is linear; and its slope there.
@@ -97,10 +100,11 @@ DEFAULT_VIEWING = Viewing()
 
 def luminance(rgb: ArrayLike) -> Array:
     """Return the relative luminance Y of linear BT.709 RGB (..., 3); 1 is display white."""
-    return np.asarray(rgb, np.float64) @ rgb_to_xyz(BT709)[1]
+    weights: Array = rgb_to_xyz(BT709)[1]
+    return np.asarray(rgb, np.float64) @ weights
 
 
-def to_srgb(linear: ArrayLike) -> NDArray:
+def to_srgb(linear: ArrayLike) -> Array:
     """Return values >= 0 by the curve of IEC 61966-2-1.
 
     ``12.92 v`` up to 0.0031308, else ``1.055 v^(1/2.4) - 0.055``.
@@ -110,7 +114,7 @@ def to_srgb(linear: ArrayLike) -> NDArray:
     return np.where(low, 12.92 * linear, 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def from_srgb(encoded: ArrayLike) -> NDArray:
+def from_srgb(encoded: ArrayLike) -> Array:
     """Return linear values: ``v / 12.92`` up to 0.04045, else ((v + 0.055) / 1.055)^2.4."""
     encoded = np.asarray(encoded)
     low = encoded <= 0.04045

@@ -37,7 +37,7 @@ def lab(rgb: Array, viewing: Viewing) -> Array:
 def cam16ucs(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
     """Return CAM16-UCS J'a'b' of linear RGB (..., 3) as displayed, up to `white`."""
     adapted = 100.0 * RGB_COLOURSPACE_BT709.matrix_RGB_to_XYZ.sum(axis=1)
-    found = XYZ_to_CAM16(
+    appearance = XYZ_to_CAM16(
         100.0 * _shown(rgb, viewing, white),
         adapted,
         0.2 * viewing.ambient_illuminance / np.pi,
@@ -45,8 +45,8 @@ def cam16ucs(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
         VIEWING_CONDITIONS_CAM16["Average"],
         compute_H=False,
     )
-    correlates = [np.asarray(each, float) for each in (found.J, found.M, found.h)]
-    return JMh_CAM16_to_CAM16UCS(np.stack(correlates, axis=-1))
+    correlates = [np.asarray(each, float) for each in (appearance.J, appearance.M, appearance.h)]
+    return np.asarray(JMh_CAM16_to_CAM16UCS(np.stack(correlates, axis=-1)))
 
 
 def itp(rgb: Array, viewing: Viewing) -> Array:
@@ -63,7 +63,7 @@ def _shown(rgb: Array, viewing: Viewing, white: float) -> Array:
 
 
 def _distance(a: Array, b: Array) -> Array:
-    return np.linalg.norm(a - b, axis=-1)
+    return np.asarray(np.linalg.norm(a - b, axis=-1))
 
 
 DEFINED: dict[str, tuple[Callable[..., Array], Callable[..., Any]]] = {
@@ -76,21 +76,21 @@ DEFINED: dict[str, tuple[Callable[..., Array], Callable[..., Any]]] = {
 
 @np.errstate(all="ignore")  # black has no hue
 def deviations(
-    test: Array, reference: Array, found: Mapping[str, Array], viewing: Viewing = DEFAULT_VIEWING
+    test: Array, reference: Array, values: Mapping[str, Array], viewing: Viewing = DEFAULT_VIEWING
 ) -> dict[str, float]:
-    """Return the largest deviation of each metric ``found``, (N,), for linear colours (N, 3)."""
+    """Return the largest deviation of each metric's ``values`` (N,), for linear colours (N, 3)."""
     apart = {}
     for name, (space, difference) in DEFINED.items():
         defined = difference(space(test, viewing), space(reference, viewing))
-        apart[name] = float(np.abs(found[name] - defined).max(initial=0))
+        apart[name] = float(np.abs(values[name] - defined).max(initial=0))
     return apart
 
 
 def farthest() -> float:
     """Return the largest deviation of the compiled differences, over random colours."""
     test, reference = np.random.default_rng(0).random((2, 4096, 3))
-    found = {name: METRICS[name](test[None], reference[None])[0] for name in DEFINED}
-    return max(deviations(test, reference, found).values())
+    distances = {name: METRICS[name](test[None], reference[None])[0] for name in DEFINED}
+    return max(deviations(test, reference, distances).values())
 
 
 @contextmanager

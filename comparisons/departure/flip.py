@@ -25,6 +25,8 @@ from comparisons.departure.colour import Array, Viewing, luminance, rgb_to_xyz, 
 
 Plane = NDArray[np.float32]
 Curve = Callable[[Array3f], Array3f]
+Blurs = tuple[tuple[np.float32, Plane], ...]
+Seen = tuple[Array3f, Float32, Float32]
 
 SHOWN = 2.118872
 """Luminance that the tone curve of HDR-FLIP (ACES, by Narkowicz) shows as 0.85."""
@@ -104,16 +106,16 @@ def exposures(reference: Array) -> tuple[float, float]:
 def _flip(test: Array, reference: Array, viewing: Viewing, curves: Sequence[Curve]) -> Plane:
     """Return the largest FLIP over tone curves, by bands of rows to keep temporaries small."""
     eye = _Eye.at(float(viewing.pixels_per_degree))
-    found: Plane = np.zeros(test.shape[:2], np.float32)
-    height, width = found.shape
+    result: Plane = np.zeros(test.shape[:2], np.float32)
+    height, width = result.shape
     columns = np.clip(np.arange(-eye.reach, width + eye.reach), 0, width - 1)
     for rows in bands(height):
         near = np.clip(np.arange(rows.start - eye.reach, rows.stop + eye.reach), 0, height - 1)
         images = [_light(image[np.ix_(near, columns)], viewing) for image in (reference, test)]
         for curve in curves:
             error = _error(*(eye.seen(curve(image), len(near)) for image in images))
-            np.maximum(found[rows], error.reshape(-1, width), out=found[rows])
-    return found
+            np.maximum(result[rows], error.reshape(-1, width), out=result[rows])
+    return result
 
 
 def _exposed(image: Array, viewing: Viewing) -> Array:
@@ -142,7 +144,7 @@ class _Eye:
     """
 
     reach: int
-    blurs: tuple[tuple[tuple[float, Plane], ...], ...]
+    blurs: tuple[Blurs, ...]
     smooth: Plane
     edge: Plane
     point: Plane
@@ -159,7 +161,7 @@ class _Eye:
         blurs = tuple(_blurs(parts, x / pixels) for parts in _SENSITIVITY)
         return cls(reach, blurs, *map(_band, (smooth / smooth.sum(), *map(_balanced, derivatives))))
 
-    def seen(self, rgb: Array3f, height: int) -> tuple[Array3f, Float32, Float32]:
+    def seen(self, rgb: Array3f, height: int) -> Seen:
         """Return the blurred colours, the slope and the curvature of lightness, without margins.
 
         The displayed colours ``rgb`` are of ``height`` rows, 2 reach of them margins.
@@ -178,12 +180,12 @@ class _Eye:
             )
             for band in (self.edge, self.point)
         )
-        found = _hunted(Array3f(*map(_values, blurred))), slope, curvature
-        dr.eval(found)
-        return found
+        result = _hunted(Array3f(*map(_values, blurred))), slope, curvature
+        dr.eval(result)
+        return result
 
 
-def _blurs(parts: tuple[tuple[float, float], ...], degrees: Array) -> tuple:
+def _blurs(parts: tuple[tuple[float, float], ...], degrees: Array) -> Blurs:
     """Return the shares and the bands of a channel's Gaussians, sampled at some degrees."""
     curves = [np.exp(-(pi**2) * degrees**2 / width) for _, width in parts]
     shares = [
@@ -198,8 +200,8 @@ def _blurs(parts: tuple[tuple[float, float], ...], degrees: Array) -> tuple:
 
 def _balanced(weights: Array) -> Array:
     """Scale weights so that the positive ones add up to 1, and the negative ones to -1."""
-    sides = [np.maximum(sign * weights, 0.0) for sign in (1.0, -1.0)]
-    return sides[0] / sides[0].sum() - sides[1] / sides[1].sum()
+    above, below = np.maximum(weights, 0.0), np.maximum(-weights, 0.0)
+    return above / float(above.sum()) - below / float(below.sum())
 
 
 def _band(weights: Array) -> Plane:
@@ -212,15 +214,15 @@ def _band(weights: Array) -> Plane:
 def _down(image: Plane, band: Plane) -> Plane:
     """Filter the columns of an image (h + 2 reach, w)."""
     margin = band.shape[1] - band.shape[0]
-    found = np.empty((len(image) - margin, image.shape[1]), np.float32)
+    filtered = np.empty((len(image) - margin, image.shape[1]), np.float32)
     step = max(1, _PRODUCT // band.size)
-    for top in range(0, len(found), _TILE):
+    for top in range(0, len(filtered), _TILE):
         for left in range(0, image.shape[1], step):
-            part = found[top : top + _TILE, left : left + step]
+            part = filtered[top : top + _TILE, left : left + step]
             size = len(part)
             around = image[top : top + size + margin, left : left + step]
             np.matmul(band[:size, : size + margin], around, out=part)
-    return found
+    return filtered
 
 
 def _across(image: Plane, band: Plane) -> Plane:
@@ -232,7 +234,7 @@ def _values(plane: Plane) -> Float32:
     return Float32(plane.ravel())
 
 
-def _error(truth: tuple, shown: tuple) -> NDArray[np.float32]:
+def _error(truth: Seen, shown: Seen) -> Plane:
     """Return FLIP (N,) of what is seen of two images."""
     (first, *edges), (second, *others) = truth, shown
     slopes, curvatures = (dr.abs(a - b) for a, b in zip(edges, others, strict=True))

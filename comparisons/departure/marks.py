@@ -40,6 +40,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure.blocks import bands, block_sums, neighbourhood, ratio, spread_out
+from comparisons.departure.colour import Array
 from reference.rendering.renderer import require_finite
 from reference.rendering.sums import BLOCK, DifferenceEstimate
 
@@ -54,7 +55,6 @@ ABSOLUTE_ROUNDING, RELATIVE_ROUNDING = 1e-6, 1e-5
 _NORMAL = 1e6
 """Degrees of freedom of variances that are practically known."""
 
-Array = NDArray[np.float64]
 Distance = Callable[[Array, Array], Array]
 
 
@@ -184,7 +184,7 @@ class _Around:
         """Student's quantile at 97.5 % for the pixels of each block, which share their freedom."""
         from scipy.special import stdtrit
 
-        return stdtrit(self.pooled_freedom + self.own_freedom, 0.975)
+        return np.asarray(stdtrit(self.pooled_freedom + self.own_freedom, 0.975))
 
     def differing(self, level: float, inflation: float) -> NDArray[np.bool_]:
         """Return which blocks (h, w) differ.
@@ -260,12 +260,12 @@ class _Pixels:
         t = self.quantile
         half = t * t * self.sizes / 2.0
         below, above = half + np.sqrt(half**2 + t * t * self.variance)
-        found = (below + above == 0.0).all(axis=-1)
+        are_visible: NDArray[np.bool_] = (below + above == 0.0).all(axis=-1)
         for end in (below, -above):
-            rest = ~found
+            rest = ~are_visible
             reached = shown[rest] - self.difference[rest] + end[rest]
-            found[rest] = distance(shown[rest], reached) > VISIBLE
-        return found
+            are_visible[rest] = distance(shown[rest], reached) > VISIBLE
+        return are_visible
 
 
 def _prior_freedom(scatter: Array, freedom: int) -> Array:
@@ -275,8 +275,8 @@ def _prior_freedom(scatter: Array, freedom: int) -> Array:
     with ``d`` have a relative variance of ``2 (d + d0 − 2) / (d (d0 − 4))``, solved for ``d0``.
     """
     more = scatter * freedom - 2.0
-    found = ratio(2.0 * freedom - 4.0 + 4.0 * scatter * freedom, more)
-    return np.where(more > 0.0, np.minimum(found, _NORMAL), _NORMAL)
+    prior = ratio(2.0 * freedom - 4.0 + 4.0 * scatter * freedom, more)
+    return np.where(more > 0.0, np.minimum(prior, _NORMAL), _NORMAL)
 
 
 def _inflation(difference: DifferenceEstimate) -> float:
@@ -289,7 +289,7 @@ def _inflation(difference: DifferenceEstimate) -> float:
     independent = grouped.by_block(own)
     sums = np.stack([grouped.by_block(one) for one in grouped.means])
     weights = grouped.sizes[:, None, None]
-    found = (weights * (sums - np.average(sums, axis=0, weights=grouped.sizes)) ** 2).sum(axis=0)
-    found /= max(len(weights) - 1, 1) * weights.sum()
+    spread = (weights * (sums - np.average(sums, axis=0, weights=grouped.sizes)) ** 2).sum(axis=0)
+    spread /= max(len(weights) - 1, 1) * weights.sum()
     noisy = independent > 0.0
-    return max(1.0, float((found[noisy] / independent[noisy]).mean())) if noisy.any() else 1.0
+    return max(1.0, float((spread[noisy] / independent[noisy]).mean())) if noisy.any() else 1.0

@@ -35,6 +35,7 @@ Every image is a float array (H, W, 3) of linear light with the sRGB primaries (
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import EllipsisType
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,7 @@ from numpy.typing import ArrayLike, NDArray
 from comparisons.departure.colour import (
     DEFAULT_VIEWING,
     Array,
+    Floats,
     Viewing,
     cam16ucs,
     ciede2000,
@@ -72,7 +74,8 @@ RESERVED = frozenset(
 THRESHOLDS = tuple(1.0 + step / 4 for step in range(37))
 """Colour differences above which shares of pixels are counted: 1 to 10 in steps of 0.25."""
 
-Distances = Callable[[Array], NDArray]
+Where = NDArray[Any] | EllipsisType
+Distances = Callable[[Array], Floats]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +99,7 @@ class Metric:
     definition: str
     caution: str
     map_range: tuple[float, float]
-    function: Callable[[Array, Array, Viewing], NDArray] | None = None
+    function: Callable[[Array, Array, Viewing], Floats] | None = None
     visible: tuple[float, ...] = ()
     rounding: float = 1e-3
     heading: str = ""
@@ -114,12 +117,12 @@ class Metric:
 
     def __call__(
         self, test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
-    ) -> NDArray:
+    ) -> Floats:
         """Return the map (H, W) of distances between two linear images (H, W, 3)."""
         test, reference = checked_pair(test, reference)
         return self.against(reference, ..., viewing)(test)
 
-    def against(self, reference: Array, where: Any, viewing: Viewing) -> Distances:
+    def against(self, reference: Array, where: Where, viewing: Viewing) -> Distances:
         """Return a function that maps images (H, W, 3) to distances from the reference, (N,).
 
         ``where`` is any index of pixels, such as a boolean mask (H, W).
@@ -130,13 +133,13 @@ class Metric:
             )
         function = self.function
 
-        def distances(test: Array) -> NDArray:
+        def distances(test: Array) -> Floats:
             shown, truth = (np.asarray(image, np.float64) for image in (test, reference))
             return function(shown, truth, viewing)[where]
 
         return distances
 
-    def mean(self, values: NDArray) -> float:
+    def mean(self, values: Floats) -> float:
         """Return the metric's mean of distances; 0 if there are none."""
         if not values.size:
             return 0.0
@@ -156,7 +159,7 @@ class Pixelwise(Metric):
     coordinates: Callable[[ArrayLike, Viewing], Array]
     difference: Callable[[Array, Array], Array]
 
-    def against(self, reference: Array, where: Any, viewing: Viewing) -> Distances:
+    def against(self, reference: Array, where: Where, viewing: Viewing) -> Distances:
         """Return a function like `Metric.against`; images may be lists of pixels (N, 3)."""
         fixed = self.coordinates(reference[where], viewing)
 

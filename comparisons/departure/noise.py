@@ -41,15 +41,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from comparisons.departure.blocks import ratio
-from comparisons.departure.colour import Viewing
+from comparisons.departure.colour import Array, Floats, Viewing
 from comparisons.departure.metrics import Distances, Metric, Pixelwise
 from reference.records import Positive, Record, Share
 from reference.rendering.sums import Grouped, jackknife_error, student
-
-Array = NDArray[np.float64]
 
 CONTRASTS = 3
 """Noise is added in this many independent ways, and the results are averaged."""
@@ -82,13 +80,13 @@ class VisibleShare(Record):
     high: Share
 
 
-def exactly(metric: Metric, values: NDArray) -> dict[str, Any]:
+def exactly(metric: Metric, values: Floats) -> dict[str, Any]:
     """Return the fields of a summary of distances (N,) without noise."""
     mean, shares = metric.mean(values), shares_above(values, metric.visible)
     return _fields(metric, mean, mean, mean, np.array([shares] * 3))
 
 
-def roughly(metric: Metric, values: NDArray, noise: NDArray) -> dict[str, Any]:
+def roughly(metric: Metric, values: Floats, noise: Floats) -> dict[str, Any]:
     """Debias distances (N,), given those from noise alone, by the triangle inequality."""
     mean, floor = metric.mean(values), metric.mean(noise)
     shares = [
@@ -118,14 +116,14 @@ def _fields(metric: Metric, value: float, low: float, high: float, shares: Array
     return {"debiased": value, "low": low, "high": high, "visible": visible}
 
 
-def shares_above(distances: NDArray, thresholds: Sequence[float]) -> Array:
+def shares_above(distances: Floats, thresholds: Sequence[float]) -> Array:
     """Return the share of distances (N,) above each threshold, (T,), which rise; 0 of none."""
     counts = np.bincount(np.searchsorted(thresholds, distances), minlength=len(thresholds) + 1)
     return counts[:0:-1].cumsum()[::-1] / max(len(distances), 1)
 
 
 def debiased(
-    metric: Pixelwise, test: Array, grouped: Grouped, viewing: Viewing, raw: NDArray
+    metric: Pixelwise, test: Array, grouped: Grouped, viewing: Viewing, raw: Floats
 ) -> dict[str, Any] | None:
     """Return a metric without noise, as fields of a summary; None with too few groups of passes.
 
@@ -161,7 +159,7 @@ def debiased(
 
 
 def _shares(
-    thresholds: Sequence[float], distances: Distances, grouped: Grouped, raw: NDArray
+    thresholds: Sequence[float], distances: Distances, grouped: Grouped, raw: Floats
 ) -> Array:
     """Return shares (3, T) above thresholds, without noise: values, low and high ends."""
     if not thresholds:
@@ -191,26 +189,28 @@ def _draws(mean: Array, noise: Array, grouped: Grouped) -> Array:
     single pixels may depart (Efron and Morris, J. Am. Stat. Assoc. 67, 1972). The block's mean is
     moved towards 0 likewise. Noise is added by the variance that is left.
     """
+    own = grouped.blocks
     pixels = grouped.by_block(np.ones(len(mean)))[:, None]
 
     def split(image: Array) -> tuple[Array, Array]:
         middle = grouped.by_block(image) / pixels
-        return middle, image - middle[grouped.blocks]
+        return middle, image - middle[own]
 
     middle, off = split(mean)
     noise_middle, noise_off = map(np.array, zip(*map(split, noise), strict=True))
     spread = grouped.by_block(np.mean(noise_off**2, axis=0)) / pixels
-    true = 1.0 - ratio(spread, grouped.by_block(off**2) / pixels)[grouped.blocks]
-    most = ratio(np.sqrt(spread)[grouped.blocks], np.abs(off))
+    true = 1.0 - ratio(spread, grouped.by_block(off**2) / pixels)[own]
+    most = ratio(np.sqrt(spread)[own], np.abs(off))
     true = np.clip(np.maximum(true, 1.0 - most), 0.0, 1.0)
     sizes = np.mean(noise_middle**2, axis=0), middle**2
     level = np.clip(1.0 - ratio(*(size.sum(axis=1) for size in sizes)), 0.0, 1.0)
-    level = level[grouped.blocks, None]
-    kept = level * middle[grouped.blocks] + true * off
-    return kept + np.sqrt(level) * noise_middle[:, grouped.blocks] + np.sqrt(true) * noise_off
+    level = level[own, None]
+    kept = level * middle[own] + true * off
+    draws: Array = kept + np.sqrt(level) * noise_middle[:, own] + np.sqrt(true) * noise_off
+    return draws
 
 
-def _mean(metric: Metric, distances: NDArray) -> float:
+def _mean(metric: Metric, distances: Floats) -> float:
     """Return the mean of distances, of a linear metric the mean square."""
     return float(np.mean(distances**2) if metric.linear else distances.mean())
 
@@ -260,7 +260,8 @@ def sampling_error(added: Array, grouped: Grouped) -> Array:
     left = added - np.multiply.outer(pixels, added.sum(axis=0) / pixels.sum())
     share = 1.0 - grouped.sampled / grouped.total
     spread = np.sqrt((left**2).sum(axis=0) / max(len(left) - 1, 1))
-    return np.sqrt(share * len(left)) * spread / pixels.sum()
+    error: Array = np.sqrt(share * len(left)) * spread / pixels.sum()
+    return error
 
 
 def contrasts(sizes: Array) -> Array:
@@ -273,4 +274,5 @@ def contrasts(sizes: Array) -> Array:
     waves = np.cos(np.pi * np.outer(np.arange(count) + 0.5, np.arange(count)) / count)
     waves[:, 0] = np.sqrt(sizes)
     basis, _ = np.linalg.qr(waves)
-    return (basis[:, 1 : 1 + CONTRASTS] * np.sqrt(sizes / sizes.sum())[:, None]).T
+    weights: Array = basis[:, 1 : 1 + CONTRASTS] * np.sqrt(sizes / sizes.sum())[:, None]
+    return weights.T

@@ -18,6 +18,7 @@ from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from comparisons.departure.blocks import block_sums
+from comparisons.departure.colour import Floats
 from reference.records import Amount, Count, Record, Share, Size
 from reference.rendering.gbuffer import ObjectIds
 
@@ -79,8 +80,8 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
     cell = -(-max(error.shape) // CELLS)
     sums, sizes = (block_sums(image.astype(np.float64), cell) for image in (error, counted))
     worth = sums - CONTRAST * total / pixels * sizes
-    found: list[Region] = []
-    while len(found) < MOST:
+    boxes: list[Region] = []
+    while len(boxes) < MOST:
         rows, columns, value = _best_box(worth)
         if not value > 0.0:
             break
@@ -88,14 +89,14 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
         down, across = (slice(part.start * cell, part.stop * cell) for part in (rows, columns))
         inside = np.zeros_like(counted)
         inside[down, across] = counted[down, across]
-        held = error[down, across].sum(dtype=np.float64)
-        share = float(held / total)
+        amount = error[down, across].sum(dtype=np.float64)
+        share = float(amount / total)
         if share >= LEAST_SHARE:
-            mean = float(held / inside.sum())
-            found.append(Region(share=share, mean_dE2000=mean, **bounds(inside)))
+            mean = float(amount / inside.sum())
+            boxes.append(Region(share=share, mean_dE2000=mean, **bounds(inside)))
         elif value < LEAST_SHARE * total / MOST:  # only specks are left
             break
-    return tuple(found)
+    return tuple(boxes)
 
 
 def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
@@ -115,7 +116,7 @@ def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
     return slice(int(top[pair]), int(bottom[pair])), slice(first, last + 1), value
 
 
-def bounds(mask: NDArray) -> dict[str, Any]:
+def bounds(mask: NDArray[np.bool_]) -> dict[str, Any]:
     """Return ``x, y, width, height`` of the box around a mask (H, W) of at least one pixel."""
     y, x = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     width, height = int(x[-1] - x[0] + 1), int(y[-1] - y[0] + 1)
@@ -123,25 +124,25 @@ def bounds(mask: NDArray) -> dict[str, Any]:
 
 
 def find_objects(
-    error: NDArray, counted: NDArray, owners: ObjectIds, materials: ObjectIds | None = None
-) -> tuple[tuple[ObjectShare, ...], NDArray]:
+    error: Floats, counted: NDArray[np.bool_], owners: ObjectIds, materials: ObjectIds | None = None
+) -> tuple[tuple[ObjectShare, ...], NDArray[np.int_]]:
     """Return each object's share in a map of ΔE2000 (H, W), largest first, and a map of them.
 
     The map (H, W) holds the index of each pixel's object, or -1 if the pixel does not count. If
     ``materials`` is given, the objects are shapes with their materials.
     """
     places = np.where(counted, owners.places, -1)
-    seen = np.unique(places[places >= 0])
+    present = np.unique(places[places >= 0])
     sums = np.bincount(places[places >= 0], error[places >= 0], len(owners.names))
-    ranked = sorted(seen, key=lambda place: -sums[place])
+    ranked = sorted(present, key=lambda place: -sums[place])
     if len(ranked) > MOST_OBJECTS:
         ranked = ranked[: MOST_OBJECTS - 1]
     rows = np.full(len(owners.names) + 1, len(ranked))
     rows[ranked], rows[-1] = np.arange(len(ranked)), -1
     found = rows[places]
     names = [owners.names[place] for place in ranked]
-    if len(seen) > len(names):
-        names.append(f"{len(seen) - len(names)} others")
+    if len(present) > len(names):
+        names.append(f"{len(present) - len(names)} others")
     total = error[counted].sum(dtype=np.float64)
     return tuple(
         _object_share(name, error, found == row, total, materials) for row, name in enumerate(names)
@@ -149,19 +150,19 @@ def find_objects(
 
 
 def _object_share(
-    name: str, error: NDArray, mask: NDArray, total: float, materials: ObjectIds | None
+    name: str, error: Floats, mask: NDArray[np.bool_], total: float, materials: ObjectIds | None
 ) -> ObjectShare:
-    held = error[mask].sum(dtype=np.float64)
+    amount = error[mask].sum(dtype=np.float64)
     return ObjectShare(
         name=name,
         material=_material(mask, materials) if materials else "",
         pixels=int(mask.sum()),
-        share=float(held / total) if total > 0 else 0.0,
-        mean_dE2000=float(held / mask.sum()),
+        share=float(amount / total) if total > 0 else 0.0,
+        mean_dE2000=float(amount / mask.sum()),
         **bounds(mask),
     )
 
 
-def _material(mask: NDArray, materials: ObjectIds) -> str:
+def _material(mask: NDArray[np.bool_], materials: ObjectIds) -> str:
     own = np.unique(materials.places[mask])
     return materials.names[own[0]] if len(own) == 1 else "several"

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure.colour import DEFAULT_VIEWING, Array, Viewing
+from comparisons.departure.colour import DEFAULT_VIEWING, Array, Floats, Viewing
 from comparisons.departure.metrics import Metric, Pixelwise, checked_pair, log2_luminance_ratio
 from comparisons.departure.noise import VisibleShare, debiased, exactly, roughly
 from reference.records import Amount, Positive, Record
@@ -97,7 +97,7 @@ def summarise(
         distances = metric.against(reference[rows], measured, viewing)
         for place, image in images.items():
             maps[place][rows][measured] = distances(image)
-    values, exposed, noise_alone = (found[mask] for found in maps)
+    values, exposed, noise_alone = (each[mask] for each in maps)
     numbers: dict[str, Any] = _numbers(metric, values)
     after = numbers
     if factor != 1.0:
@@ -159,7 +159,7 @@ def noise_floor(
     return metric.mean(np.concatenate(values))
 
 
-def _numbers(metric: Metric, values: NDArray) -> dict[str, float]:
+def _numbers(metric: Metric, values: Floats) -> dict[str, float]:
     if not values.size:
         return dict.fromkeys(("mean", "p50", "p95", "max"), 0.0)
     p50, p95 = map(float, np.percentile(values, (50, 95)))
@@ -226,8 +226,8 @@ def best_exposure(
     whole_stops = np.arange(-EXPOSURE_STOPS, EXPOSURE_STOPS + 1.0)
     bracketing = 2.0 ** whole_stops[:, None, None] * shown[:_BRACKET_PIXELS]
     some = np.broadcast_to(truth[:_BRACKET_PIXELS], bracketing.shape)
-    found = metric.against(some, ..., viewing)(bracketing)
-    start = whole_stops[np.argmin([metric.mean(each) for each in found])]
+    at_stops = metric.against(some, ..., viewing)(bracketing)
+    start = whole_stops[np.argmin([metric.mean(each) for each in at_stops])]
     bounds = max(start - 1.0, -EXPOSURE_STOPS), min(start + 1.0, EXPOSURE_STOPS)
     finest = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
     least_squares = np.log2(least_squares_factor(shown, truth))

@@ -111,8 +111,8 @@ def fit(
     rendering = perf_counter() - begin
     if heuristic is PHONG:
         with variant(VARIANT):
-            seen = model.see(rendered.ready.heuristic, rendered.seeds)
-            models = [PhongModel(seen, form, rendered.counted.ravel()) for form in forms]
+            surface = model.see(rendered.ready.heuristic, rendered.seeds)
+            models = [PhongModel(surface, form, rendered.counted.ravel()) for form in forms]
             fits = [_best(rendered, each, form_starts, LOSSES[loss]) for each in models]
     else:
         half, seeds = rendered.ready.heuristic, rendered.seeds
@@ -237,7 +237,7 @@ def _best(
         loss=least,
         parameter_error=objective.value_of(rendered.before[counted]) - least,
         departure=by_metric,
-        differ=tuple(share_above(found.visible) for found, _ in judged),
+        differ=tuple(share_above(summary.visible) for summary, _ in judged),
         materials=materials,
         converged=converged,
     )

@@ -130,9 +130,9 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
         for seed in seeds:
             image = np.array(eyes.render(seed), np.float64)
             fixed = fixed + image / len(seeds)
-            seen = {key: np.array(values) for key, values in eye.seen.items()}
-            spp = len(seen["facing"]) // image[..., 0].size
-            passes.append(seen | {"pixel": np.arange(len(seen["facing"])) // spp})
+            arrays = {key: np.array(values) for key, values in eye.seen.items()}
+            spp = len(arrays["facing"]) // image[..., 0].size
+            passes.append(arrays | {"pixel": np.arange(len(arrays["facing"])) // spp})
             samples_per_pixel += spp
         eye.seen = None
         whole = {key: np.concatenate([one[key] for one in passes], axis=-1) for key in passes[0]}

@@ -159,11 +159,11 @@ def search(objective: Objective, starts: Sequence[NDArray]) -> tuple[NDArray, fl
     """
     losses = [objective.value(x) for x in starts]
     followed = {0, *(1 + np.argsort(losses[1:], kind="stable")[:FOLLOWED])}
-    found = [
+    minima = [
         descend(objective, descend(objective.smoothed(), starts[place])[0])
         for place in sorted(followed)
     ]
-    return min(found, key=lambda each: each[1])
+    return min(minima, key=lambda each: each[1])
 
 
 def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, bool]:

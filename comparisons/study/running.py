@@ -103,12 +103,12 @@ def _points(part: StudyPart) -> Iterator[StudyPoint]:
 
 def _check(part: StudyPart, points: list[Point]) -> None:
     """Ensure that a part's scene and heuristic exist, and that paths lead to numbers."""
-    known = {each.name: each for each in named(part.options.heuristic).parameters}
+    parameters = {each.name: each for each in named(part.options.heuristic).parameters}
     for point in points:
         for name, value in split(point)[0].items():
-            if name not in known:
-                raise unknown(f"parameter of {part.options.heuristic}", name, known)
-            known[name].checked(value)
+            if name not in parameters:
+                raise unknown(f"parameter of {part.options.heuristic}", name, parameters)
+            parameters[name].checked(value)
     if part.scene not in SCENES:
         set_values(source_of(part, points[0]).parse(), split(points[0])[1])
 
@@ -128,10 +128,10 @@ def run(
     called elsewhere.
     """
     points = all_points(study) if points is None else points
-    kept = Path(folder) / POINTS
-    kept.mkdir(parents=True, exist_ok=True)
+    store = Path(folder) / POINTS
+    store.mkdir(parents=True, exist_ok=True)
     # Points that parts share are done once.
-    entries = {point.key: Entry(kept / f"{point.key}.json", point.key) for point in points}
+    entries = {point.key: Entry(store / f"{point.key}.json", point.key) for point in points}
     saved = {key: (entry.load() or {}).get("row") for key, entry in entries.items()}
     results = {key: row for key, row in saved.items() if row and row["error"] is None}
     left = {point.key: point for point in points if point.key not in results}
@@ -258,7 +258,7 @@ def set_values(graph: Graph, values: dict[str, float]) -> None:
         identifier, _, key = path.rpartition(".")
         props = [props for props in in_use if props.id() == identifier and key in props]
         if not props:
-            known = sorted(
+            paths = sorted(
                 f"{props.id()}.{name}"
                 for props in in_use
                 for name, present in props.items()
@@ -266,7 +266,7 @@ def set_values(graph: Graph, values: dict[str, float]) -> None:
             )
             raise InputError(
                 f"{graph.name} has no parameter {path!r}. Write <id>.<parameter>, such as one of:"
-                f" {', '.join(known)}."
+                f" {', '.join(paths)}."
             )
         if not _is_number(props[0][key]):
             raise InputError(f"{graph.name}: {path} is not a number or RGB. Vary one that is.")

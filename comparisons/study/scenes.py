@@ -203,7 +203,7 @@ def direction(theta: ArrayLike, phi: ArrayLike) -> np.ndarray:
 def heuristic_radiance(
     phong: Phong, light: np.ndarray, view: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the kernel's radiance (N,), in all and of the specular part alone.
+    """Return the kernel's radiance (N,), in total and of the specular part alone.
 
     Directions (3, N) are of light and viewer. Display-linear: a white diffuse surface that faces
     the light has the value 1.

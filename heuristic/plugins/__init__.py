@@ -15,7 +15,7 @@ Plugin                      Kind        What it is
 ``heuristic_tilt``          texture     the normal from a bump or normal map
 ==========================  ==========  ==========================================================
 
-Each module defines its classes anew for a variant, when a scene first has one of them.
+Each module defines its classes again for each variant, when a scene first has one of them.
 """
 
 from functools import cache, partial
@@ -62,5 +62,5 @@ def _plugin(name: str, module: str, props: Any) -> Any:
 
 
 @cache
-def _classes(module: str, variant: str) -> dict[str, Any]:
+def _classes(module: str, variant: str) -> Any:
     return import_module(f"heuristic.plugins.{module}").define()

@@ -10,12 +10,12 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic import materials
-from heuristic.convention import Array, Colour, Direction, Interaction, Mask, Scene
+from heuristic.convention import Array, Colour, Direction, Interaction, Mask, Properties, Scene
 from heuristic.errors import InputError
 from heuristic.materials import COEFFICIENTS, PHYSICAL, Material, PairedMaterial
 
 
-def coefficient(props: Any, name: str) -> Any:
+def coefficient(props: Properties, name: str) -> Any:
     """Read a reflection coefficient, 0 if omitted.
 
     Up to 1 it is an ordinary reflectance of Mitsuba, with the same spectrum for the same RGB; above
@@ -27,7 +27,7 @@ def coefficient(props: Any, name: str) -> Any:
     return props.get_texture(name, 0.0)
 
 
-def emitted(props: Any, name: str, default: Any) -> Any:
+def emitted(props: Properties, name: str, default: Any) -> Any:
     """Read an emitted spectrum as Mitsuba's emitters do: a plain number is white.
 
     Zero is read as the unbounded kind, because Mitsuba cannot make a white spectrum of zero.
@@ -38,7 +38,7 @@ def emitted(props: Any, name: str, default: Any) -> Any:
     return props.get_emissive_texture(name, default)
 
 
-def _plain(props, name, default):
+def _plain(props: Properties, name: str, default: Any) -> tuple[float, ...] | None:
     """Return a number's or colour's components, None for textures and tabulated spectra."""
     value = props.get(name, default)
     if not isinstance(value, Real | mi.ScalarColor3f | mi.ScalarColor3d):
@@ -53,7 +53,7 @@ def may_be_nonzero(texture: Any) -> bool:
     if texture.is_spatially_varying():
         return True
     try:
-        return dr.max(texture.max()) > 0
+        return bool(dr.max(texture.max()) > 0)
     except RuntimeError:
         return True
 
@@ -120,8 +120,8 @@ class SceneMaterials:
             for form in forms
         ]
 
-    def _read(self, bsdf, present, si, active):
-        material = bsdf.material(si, active, form=self.form, physical=self.physical)
+    def _read(self, bsdf: Any, present: Sequence[str], si: Interaction, active: Mask) -> Any:
+        material = bsdf.material(si, active, True, self.form, self.physical)
         values = {name: mi.Spectrum(getattr(material, name)) for name in present}
         if self.physical:
             values["base_color"] = mi.Spectrum(material.base_color)
@@ -162,7 +162,7 @@ class SceneMaterials:
         return dr.gather(mi.UInt32, self.table, bsdf, active)
 
 
-def _bsdfs(scene):
+def _bsdfs(scene: Scene) -> list[Any]:
     """Return the BSDFs of a scene; only traversal finds those inside shape groups."""
     shapes = scene.shapes()
     if not any(shape.class_name() == "Instance" for shape in shapes):

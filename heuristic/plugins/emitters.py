@@ -43,15 +43,16 @@ shows ``k_i + I_a k_a`` where a camera ray hits the shape, and lights nothing: i
 emission and ambient light do not travel.
 """
 
-from dataclasses import fields
+from collections.abc import Sequence
+from inspect import signature
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import terms
-from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.lights import FAR, INTENSITIES, PLUGINS, UNATTENUATED, DirectionalLight
+from heuristic import convention, terms
+from heuristic.convention import Colour, Interaction, Mask, Number, Properties, Sample
+from heuristic.lights import FAR, INTENSITIES, PLUGINS, UNATTENUATED, DirectionalLight, Light
 from heuristic.plugins.coefficients import coefficient, emitted
 
 
@@ -69,7 +70,7 @@ def define() -> dict[str, Any]:
     class HeuristicLight(mi.Emitter):
         """One of the kinds in :data:`heuristic.lights.PLUGINS`, never hit by a ray."""
 
-        def __init__(self, props):
+        def __init__(self, props: Properties):
             super().__init__(props)
             self.model = PLUGINS[props.plugin_name()]
             self.intensities = {
@@ -77,53 +78,52 @@ def define() -> dict[str, Any]:
                 for name in INTENSITIES
                 if name == "intensity" or name in props
             }
-            self.numbers = []  # names of the parameters that are opaque numbers
-            names = {field.name for field in fields(self.model)}
+            self.numbers: list[str] = []  # names of the parameters that are opaque numbers
+            self.names = signature(self.model).parameters.keys()
             for name, (kind, default) in parameters.items():
-                if name in names or name == "scale":
+                if name in self.names or name == "scale":
                     self._keep(props, name, kind, default)
-            if "attenuation" in names:
+            if "attenuation" in self.names:
                 self.clamped = props.get("clamped", False)
                 self.unattenuated = all(props.get(k, d) == d for k, d in coefficients.items())
                 for name, default in coefficients.items():
                     self._keep(props, name, mi.Float, default)
             self.shell = 0
-            if "shell" in names and props.get("shell", 0.0) > 0:
+            if "shell" in self.names and props.get("shell", 0.0) > 0:
                 self._keep(props, "shell", mi.Float, 0.0)
             self.m_flags = +mi.EmitterFlags.DeltaPosition
             if self.model is DirectionalLight:
                 self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection
 
-        def parameters_changed(self, keys=()):
+        def parameters_changed(self, keys: Sequence[str] = ()) -> None:
             """Make edited numbers opaque, so new values compile nothing."""
             dr.make_opaque(*(getattr(self, name) for name in self.numbers))
             if coefficients.keys() & set(keys):
                 self.unattenuated = False
 
-        def traverse(self, callback):
+        def traverse(self, callback: Any) -> None:
             numbers = {name: getattr(self, name) for name in self.numbers}
             for name, value in (self.intensities | numbers).items():
                 callback.put(name, value, mi.ParamFlags.Differentiable)
 
-        def light(self, it, active=True):
+        def light(self, it: Interaction, active: Mask = True) -> Light:
             """Return the kernel's form of this light, at the wavelengths of an interaction."""
             si = dr.zeros(mi.SurfaceInteraction3f)
             si.wavelengths = it.wavelengths
-            own = {field.name for field in fields(self.model)}.difference(INTENSITIES)
             return self.model(
                 **{
                     name: self.scale * intensity.eval(si, active)
                     for name, intensity in self.intensities.items()
                 },
-                **{name: getattr(self, name) for name in own},
+                **{name: getattr(self, name) for name in self.names - set(INTENSITIES)},
             )
 
         @property
-        def attenuation(self):
+        def attenuation(self) -> tuple[Number, ...]:
             """The coefficients of 6.1; plain numbers if they are 1, 0 and 0."""
             return UNATTENUATED if self.unattenuated else (self.k0, self.k1, self.k2)
 
-        def sample_direction(self, it, sample, active=True):
+        def sample_direction(self, it: Interaction, sample: Any, active: Mask = True) -> Sample:
             toward, intensity, _, distance = self.light(it, active).illuminate(mi.Vector3f(it.p))
             ds = dr.zeros(mi.DirectionSample3f)
             ds.d, ds.dist = toward, FAR if isinstance(distance, float) else distance
@@ -132,27 +132,27 @@ def define() -> dict[str, Any]:
             ds.pdf = 1.0
             ds.delta = True
             ds.emitter = mi.EmitterPtr(self)
-            return ds, IRRADIANCE_PER_INTENSITY * mi.Spectrum(intensity) & active
+            return ds, convention.IRRADIANCE_PER_INTENSITY * mi.Spectrum(intensity) & active
 
-        def eval(self, si, active=True):
+        def eval(self, si: Interaction, active: Mask = True) -> Colour:
             return mi.Spectrum(0)
 
-        def pdf_direction(self, it, ds, active=True):
+        def pdf_direction(self, it: Interaction, ds: Any, active: Mask = True) -> Number:
             return mi.Float(0)
 
-        def eval_direction(self, it, ds, active=True):
+        def eval_direction(self, it: Interaction, ds: Any, active: Mask = True) -> Colour:
             return self.sample_direction(it, None, active)[1]  # Mitsuba takes derivatives here
 
-        def bbox(self):
+        def bbox(self) -> Any:
             if self.model is DirectionalLight:
                 return mi.ScalarBoundingBox3f()
             return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(*(c[0] for c in self.position)))
 
-        def to_string(self):
+        def to_string(self) -> str:
             shown = ", ".join(f"{name} = {value}" for name, value in self.intensities.items())
             return f"{self.model.__name__}[{shown}]"
 
-        def _keep(self, props, name, kind, default):
+        def _keep(self, props: Properties, name: str, kind: Any, default: Any) -> None:
             """Read a parameter as an opaque number."""
             value = kind(props.get(name, default))
             dr.make_opaque(value)
@@ -162,7 +162,7 @@ def define() -> dict[str, Any]:
     class HeuristicGlow(mi.Emitter):
         """See the module's docstring."""
 
-        def __init__(self, props):
+        def __init__(self, props: Properties):
             super().__init__(props)
             self.k_i = emitted(props, "k_i", 0.0)
             self.k_a = coefficient(props, "k_a")
@@ -170,29 +170,29 @@ def define() -> dict[str, Any]:
             self.twosided = props.get("twosided", False)
             self.m_flags = +mi.EmitterFlags.Surface
 
-        def eval(self, si, active=True):
+        def eval(self, si: Interaction, active: Mask = True) -> Colour:
             glow = terms.emission(self.k_i.eval(si, active)) + terms.ambient(
                 self.ambient.eval(si, active), self.k_a.eval(si, active)
             )
             return dr.select(active & (self.twosided | (si.wi.z > 0)), glow, 0)
 
-        def sample_direction(self, it, sample, active=True):
+        def sample_direction(self, it: Interaction, sample: Any, active: Mask = True) -> Sample:
             return dr.zeros(mi.DirectionSample3f), mi.Spectrum(0)
 
-        def pdf_direction(self, it, ds, active=True):
+        def pdf_direction(self, it: Interaction, ds: Any, active: Mask = True) -> Number:
             return mi.Float(0)
 
-        def eval_direction(self, it, ds, active=True):
+        def eval_direction(self, it: Interaction, ds: Any, active: Mask = True) -> Colour:
             return mi.Spectrum(0)
 
-        def bbox(self):
+        def bbox(self) -> Any:
             return self.get_shape().bbox()
 
-        def traverse(self, callback):
+        def traverse(self, callback: Any) -> None:
             for name in ("k_i", "k_a", "ambient"):
                 callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
 
-        def to_string(self):
+        def to_string(self) -> str:
             return f"HeuristicGlow[k_i = {self.k_i}, k_a = {self.k_a}, ambient = {self.ambient}]"
 
     return dict.fromkeys(PLUGINS, HeuristicLight) | {"heuristic_glow": HeuristicGlow}

@@ -26,17 +26,19 @@ equal rays. Python::
     {'type': 'heuristic', 'ambient': 1.0}
 """
 
+from collections.abc import Callable, Sequence
 from operator import is_
 from time import perf_counter
-from typing import Any
+from typing import Any, Self
 
 import drjit as dr
 import mitsuba as mi
 
 from heuristic import heuristics
+from heuristic.convention import Colour, Direction, Interaction, Mask, Properties, Scene, Visibility
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import Interpolation, ShadingArguments
-from heuristic.lights import FAR
+from heuristic.lights import FAR, Light
 from heuristic.plugins.coefficients import SceneMaterials, emitted, may_be_nonzero
 
 LAYERS = 64
@@ -49,22 +51,28 @@ def define() -> dict[str, Any]:
     class HeuristicIntegrator(mi.SamplingIntegrator):
         """See the module's docstring."""
 
-        def __init__(self, props):
+        def __init__(self, props: Properties):
             super().__init__(props)
             self.ambient = emitted(props, "ambient", 0.0)
             self.model = heuristics.named(props.get("model", heuristics.PHONG.name))
             self.parameters = {
-                known.name: mi.Float(known.checked(props.get(known.name, known.default)))
-                for known in self.model.parameters
+                parameter.name: mi.Float(
+                    parameter.checked(props.get(parameter.name, parameter.default))
+                )
+                for parameter in self.model.parameters
             }
             self.parameters_changed()
-            self.parts, self.values, self.preparation = None, None, 0.0
+            self.parts: Any = None
+            self.values: Any = None
+            self.preparation = 0.0
             self.occlusion = props.get("occlusion", False) or "visible" in self.model.needs
             # A user's heuristic gets only arrays: a plain 0 has no components.
             self.prune = props.get("prune", True) and self.model.is_own
             self.interpolation = Interpolation(props.get("interpolation", "phong"))
 
-        def sample(self, scene, sampler, ray, medium=None, active=True):
+        def sample(
+            self, scene: Scene, sampler: Any, ray: Any, medium: Any = None, active: Mask = True
+        ) -> tuple[Colour, Mask, list[Any]]:
             materials = self.known(scene).materials  # a symbolic loop could not make them
             if any(bsdf.is_clear for bsdf in materials.bsdfs):
                 recorded = self.model.traced and dr.flag(dr.JitFlag.SymbolicLoops)
@@ -75,7 +83,7 @@ def define() -> dict[str, Any]:
             sees_all = scene.environment() is not None and not self.hide_emitters
             return colour, active if sees_all else hit, []
 
-        def layer(self, scene, ray, active):
+        def layer(self, scene: Scene, ray: Any, active: Mask) -> tuple[Colour, Mask, Interaction]:
             """Return the value where a ray first hits, or else the background; and the hit."""
             si = scene.ray_intersect(ray, active)
             hit = active & si.is_valid()
@@ -85,13 +93,15 @@ def define() -> dict[str, Any]:
                 colour += dr.select(active & ~hit, environment.eval(si, active & ~hit), 0)
             return colour, hit, si
 
-        def surface_colour(self, scene, si, view, active):
+        def surface_colour(
+            self, scene: Scene, si: Interaction, view: Direction, active: Mask
+        ) -> Colour:
             """Return the value seen where a ray hits, with the normal of 6.37 and 6.38."""
             normal, is_shaded = self.seen_side(scene, si, active)
             colour = self.shaded(scene, si, view, normal, active)
             return dr.select(active & is_shaded, colour, 0)
 
-        def seen_side(self, scene, si, active):
+        def seen_side(self, scene: Scene, si: Interaction, active: Mask) -> tuple[Direction, Mask]:
             """Return the normal of the side that is seen, and whether that side is shaded."""
             materials = self.known(scene).materials
             normal, twosided = materials.normal(si, active), materials.twosided(si, active)
@@ -99,7 +109,9 @@ def define() -> dict[str, Any]:
                 normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
             return normal, twosided | (si.wi.z > 0)
 
-        def shaded(self, scene, si, view, normal, active):
+        def shaded(
+            self, scene: Scene, si: Interaction, view: Direction, normal: Direction, active: Mask
+        ) -> Colour:
             """Shade at a surface interaction, whose material is one of several."""
             model = self.model_at(scene, si)
             lights = self.lights(scene, si, active)
@@ -111,14 +123,14 @@ def define() -> dict[str, Any]:
                 colour += dr.select(is_here, value, 0)
             return colour
 
-        def model_at(self, scene, si):
+        def model_at(self, scene: Scene, si: Interaction) -> Callable[..., Colour]:
             """Return the heuristic as a function of the arguments of :func:`heuristic.shade`."""
             prepared = self.known(scene).prepared
             return lambda *arguments: self.model.evaluate(
                 ShadingArguments(*arguments), si.uv, self.parameters, prepared, si.wavelengths
             )
 
-        def known(self, scene):
+        def known(self, scene: Scene) -> Self:
             """Return the integrator with ``materials`` and ``prepared`` of a scene.
 
             The latter is the heuristic's preparation; it took ``preparation`` seconds.
@@ -137,11 +149,11 @@ def define() -> dict[str, Any]:
                 self.parts, self.values = parts, self.numbers
             return self
 
-        def prepare(self, scene):
+        def prepare(self, scene: Scene) -> None:
             """Collect what a rendering needs; otherwise the first sample does."""
             self.known(scene)
 
-        def lights(self, scene, si, active):
+        def lights(self, scene: Scene, si: Interaction, active: Mask) -> list[Light]:
             """Return the kernel's form of the lights; reject those that it does not know."""
             lights = []
             for emitter in scene.emitters():
@@ -155,41 +167,41 @@ def define() -> dict[str, Any]:
                     )
             return lights
 
-        def ambient_at(self, si, active):
+        def ambient_at(self, si: Interaction, active: Mask) -> Colour:
             """Return ``I_a``, a plain 0 if there is none."""
             is_there = may_be_nonzero(self.ambient) or not self.prune
             return self.ambient.eval(si, active) if is_there else 0
 
-        def visibility(self, scene, si, active):
+        def visibility(self, scene: Scene, si: Interaction, active: Mask) -> Visibility | None:
             """Return the shadow test for :func:`heuristic.shade`, None if there is none."""
             if not self.occlusion:
                 return None
 
-            def visible(toward, distance):
+            def visible(toward: Direction, distance: Any) -> Mask:
                 # Mitsuba aims at a point for parallel light too, which matters for grazing rays.
                 distance = FAR if isinstance(distance, float) else distance
                 return ~scene.ray_test(si.spawn_ray_to(si.p + toward * distance), active)
 
             return visible
 
-        def traverse(self, callback):
+        def traverse(self, callback: Any) -> None:
             for name, value in {"ambient": self.ambient, **self.parameters}.items():
                 callback.put(name, value, mi.ParamFlags.Differentiable)
 
-        def parameters_changed(self, keys=()):
+        def parameters_changed(self, keys: Sequence[str] = ()) -> None:
             """Make edited numbers opaque, so new values compile nothing."""
             dr.make_opaque(self.parameters)
-            prepared = [known.name for known in self.model.parameters if known.prepared]
+            prepared = [parameter.name for parameter in self.model.parameters if parameter.prepared]
             self.numbers = {name: float(self.parameters[name][0]) for name in prepared}
 
-        def to_string(self):
+        def to_string(self) -> str:
             return f"HeuristicIntegrator[model = {self.model.name}, ambient = {self.ambient}]"
 
-    def make(props):
+    def make(props: Properties) -> Any:
         name = props.get("interpolation", "phong")
-        known = [kind.value for kind in Interpolation]
-        if name not in known:
-            raise unknown("interpolation", name, known)
+        names = [kind.value for kind in Interpolation]
+        if name not in names:
+            raise unknown("interpolation", name, names)
         if name == "phong":
             return HeuristicIntegrator(props)
         from heuristic.plugins import interpolated  # loaded late: most scenes have no meshes
@@ -200,7 +212,7 @@ def define() -> dict[str, Any]:
 
 
 @dr.syntax
-def _through_layers(integrator, scene, ray, active):
+def _through_layers(integrator: Any, scene: Scene, ray: Any, active: Mask) -> tuple[Colour, Mask]:
     """Follow rays straight through surfaces that transmit light, at most :data:`LAYERS` of them.
 
     ``C = sum_j c_j prod_(i < j) T_i``: each surface adds its light ``c_j``, which includes its
@@ -210,8 +222,8 @@ def _through_layers(integrator, scene, ray, active):
     hit_any = mi.Bool(False)
     layer = mi.UInt32(0)
     while active & (layer < LAYERS):
-        seen, hit, si = integrator.layer(scene, ray, active)
-        colour += throughput * mi.Spectrum(seen)
+        value, hit, si = integrator.layer(scene, ray, active)
+        colour += throughput * mi.Spectrum(value)
         throughput *= mi.Spectrum(integrator.known(scene).materials.transmittance(si, hit))
         hit_any |= hit
         ray = si.spawn_ray(ray.d)

@@ -20,7 +20,7 @@ import drjit as dr
 import mitsuba as mi
 
 from heuristic import meshes, tessellation
-from heuristic.convention import Colour, Interaction, Mask, Mesh, Position
+from heuristic.convention import Colour, Interaction, Mask, Mesh, Position, Scene, Visibility
 from heuristic.errors import InputError
 from heuristic.heuristics import Interpolation
 from heuristic.kernel import shade
@@ -70,7 +70,7 @@ def shade_mesh(
     material: Material,
     lights: Sequence[Light],
     ambient: Colour = 0,
-    visible: Callable[..., Mask] | None = None,
+    visible: Visibility | None = None,
     twosided: bool = False,
     model: Callable[..., Colour] = shade,
 ) -> None:
@@ -113,11 +113,11 @@ def stored_shade(
     return dr.select(is_front, value, back)
 
 
-def _mean(values, corners):
+def _mean(values: Any, corners: Any) -> Any:
     return sum(dr.gather(type(values), values, corners[i]) for i in range(3)) / 3
 
 
-def _name(interpolation, back):
+def _name(interpolation: Interpolation, back: bool) -> str:
     """Return the name of an attribute: ``vertex_heuristic`` or ``face_heuristic``, and a suffix."""
     element = "face" if interpolation is Interpolation.FLAT else "vertex"
     return f"{element}_heuristic" + ("_back" if back else "")
@@ -134,7 +134,7 @@ def derived(base: type) -> type:
     class InterpolatingIntegrator(base):
         """See :mod:`heuristic.plugins.integrator`."""
 
-        def render(self, scene, sensor=0, seed=0, spp=0, develop=True, evaluate=True):
+        def render(self, scene: Scene, sensor: Any = 0, *others: Any, **named: Any) -> Any:
             viewer = viewpoint(scene.sensors()[sensor] if isinstance(sensor, int) else sensor)
             # Stored for all shapes alike, because reading cannot distinguish them.
             twosided = _is_twosided(scene)
@@ -154,29 +154,30 @@ def derived(base: type) -> type:
                     twosided,
                     model=self.model_at(scene, at),
                 )
-            return super().render(scene, sensor, seed, spp, develop, evaluate)
+            return super().render(scene, sensor, *others, **named)
 
-        def surface_colour(self, scene, si, view, active):
+        def surface_colour(self, scene: Scene, si: Interaction, view: Any, active: Mask) -> Colour:
             value = stored_shade(si, self.interpolation, _is_twosided(scene), active)
             return value if mi.is_rgb else mi.Spectrum(value.x)
 
     return InterpolatingIntegrator
 
 
-def _is_twosided(scene):
+def _is_twosided(scene: Scene) -> bool:
     return any(shape.bsdf().twosided for shape in scene.shapes())
 
 
-def _meshes(scene):
+def _meshes(scene: Scene) -> list[Mesh]:
     """Return the scene's shapes; reject those that are not meshes."""
-    for shape in scene.shapes():
+    shapes: list[Mesh] = scene.shapes()
+    for shape in shapes:
         if not shape.is_mesh():
             raise InputError(
                 f"shape {shape.id()!r} is a {shape.class_name()}: flat and Gouraud shading need"
                 " triangle meshes. Make one with heuristic.tessellation.to_mesh; fotismos does so"
                 " itself."
             )
-    return scene.shapes()
+    return shapes
 
 
 def viewpoint(sensor: Any) -> Position:

@@ -24,10 +24,11 @@ All but ``twosided`` are exposed to ``mitsuba.traverse``. Python::
     {'type': 'phong', 'k_d': {'type': 'rgb', 'value': [0.5, 0.4, 0.3]}, 'k_s': 0.7, 'n': 9}
 
 The reflected radiance for irradiance ``E`` at normal incidence is 8.10's for ``I_p = E / pi``
-(:mod:`heuristic.convention`), hence ``f cos = [k_d (N.L) + k_s (R.V)^n] / pi``. The specular part
+(:mod:`heuristic.convention`): ``f cos = [k_d (N.L) + k_s (R.V)^n] / pi``. The specular part
 has no cosine factor; as in the chapters, it neither conserves energy nor is reciprocal.
 """
 
+from collections.abc import Sequence
 from functools import reduce
 from math import inf
 from numbers import Real
@@ -38,8 +39,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic import numerics, terms, vectors
-from heuristic.convention import RADIANCE_PER_IRRADIANCE
+from heuristic import convention, numerics, terms, vectors
+from heuristic.convention import Colour, Direction, Interaction, Mask, Number, Properties, Sample
 from heuristic.errors import InputError
 from heuristic.materials import COEFFICIENTS, Material, PairedMaterial, check_form
 from heuristic.plugins.coefficients import coefficient, emitted, may_be_nonzero, require_positive
@@ -54,7 +55,7 @@ def define() -> dict[str, Any]:
     class PhongBSDF(mi.BSDF):
         """See the module's docstring."""
 
-        def __init__(self, props):
+        def __init__(self, props: Properties):
             super().__init__(props)
             self.k_i = emitted(props, "k_i", 0.0)
             self.k_a, self.k_d, self.k_s = (coefficient(props, k) for k in ("k_a", "k_d", "k_s"))
@@ -72,7 +73,9 @@ def define() -> dict[str, Any]:
             self.twosided = props.get("twosided", False)
             self.parameters_changed()
 
-        def material(self, si, active=True, prune=True, form=None, physical=False):
+        def material(
+            self, si: Interaction, active: Mask, prune: bool, form: str | None, physical: bool
+        ) -> Material:
             """Return the material at a surface interaction; absent terms are plain zeros.
 
             ``k_s`` is that of a lobe without normalisation, 0 for a mirror. With ``physical`` the
@@ -94,7 +97,7 @@ def define() -> dict[str, Any]:
             kind = PairedMaterial if physical else Material
             return kind(**coefficients, n=n, form=form, n_is_moderate=self.n_is_moderate)
 
-        def exponent(self, si, active=True):
+        def exponent(self, si: Interaction, active: Mask = True) -> Number:
             """Return ``n`` at a surface interaction; 1 for a mirror, which has no lobe."""
             if self.is_mirror:
                 return mi.Float(1)
@@ -102,21 +105,23 @@ def define() -> dict[str, Any]:
                 return dr.maximum(self.n.eval_1(si, active), 0)
             return self.n
 
-        def eval(self, ctx, si, wo, active=True):
+        def eval(self, ctx: Any, si: Interaction, wo: Direction, active: Mask = True) -> Colour:
             wi, wo = self._facing(si.wi, wo)
             above = active & (wi.z > 0) & (wo.z > 0)
             value = mi.Spectrum(0)
             if "k_d" in self.present and ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 1):
                 k_d = self.k_d.eval(si, above)
-                value += terms.diffuse(RADIANCE_PER_IRRADIANCE, k_d, wo.z)
+                value += terms.diffuse(convention.RADIANCE_PER_IRRADIANCE, k_d, wo.z)
             if "k_s" in self.present and ctx.is_enabled(mi.BSDFFlags.GlossyReflection, 0):
                 n = self.exponent(si, above)
-                k_s = self.k_s.eval(si, above) * self._scale(n)
-                cosine = self._lobe_cosine(wi, wo)
-                value += terms.specular(RADIANCE_PER_IRRADIANCE, k_s, cosine, n)
+                k_s = self.k_s.eval(si, above)
+                if self.normalised:
+                    k_s = k_s * terms.normalisation(self.form, n)
+                cosine = vectors.local_lobe(self.form, self.n_is_moderate, wi, wo)
+                value += terms.specular(convention.RADIANCE_PER_IRRADIANCE, k_s, cosine, n)
             return dr.select(above, value, 0)
 
-        def pdf(self, ctx, si, wo, active=True):
+        def pdf(self, ctx: Any, si: Interaction, wo: Direction, active: Mask = True) -> Number:
             wi, wo = self._facing(si.wi, wo)
             above = active & (wi.z > 0) & (wo.z > 0)
             probability = self._specular_probability(ctx, si, above)
@@ -125,7 +130,9 @@ def define() -> dict[str, Any]:
             specular = self._lobe_pdf(wi, wo, self.exponent(si, above))
             return dr.select(above, reflected * dr.lerp(diffuse, specular, probability), 0)
 
-        def sample(self, ctx, si, sample1, sample2, active=True):
+        def sample(
+            self, ctx: Any, si: Interaction, sample1: Number, sample2: Any, active: Mask = True
+        ) -> Sample:
             if not self.is_clear:
                 return self._reflected(ctx, si, sample1, sample2, active)
             probability = self._through_probability(ctx, si, active)
@@ -140,22 +147,26 @@ def define() -> dict[str, Any]:
             passed = self.transmittance.eval(si, passes) / probability
             return dr.select(passes, straight, reflected), dr.select(passes, passed, weight)
 
-        def eval_null_transmission(self, si, active=True):
+        def eval_null_transmission(self, si: Interaction, active: Mask = True) -> Colour:
             return mi.Spectrum(self.transmittance.eval(si, active))
 
-        def shading_normal(self, si, active=True):
+        def shading_normal(self, si: Interaction, active: Mask = True) -> Direction:
             """Return the normal in world space, with a bump or normal map applied."""
             if self.tilt is None:
                 return mi.Vector3f(si.sh_frame.n)
             return mi.Vector3f(si.to_world(mi.Vector3f(self.tilt.eval_3(si, active))))
 
-        def eval_pdf(self, ctx, si, wo, active=True):
+        def eval_pdf(
+            self, ctx: Any, si: Interaction, wo: Direction, active: Mask = True
+        ) -> tuple[Colour, Number]:
             return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
 
-        def eval_diffuse_reflectance(self, si, active=True):
+        def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Colour:
             return self.k_d.eval(si, active)
 
-        def _reflected(self, ctx, si, sample1, sample2, active):
+        def _reflected(
+            self, ctx: Any, si: Interaction, sample1: Number, sample2: Any, active: Mask
+        ) -> Sample:
             """Draw ``wo`` from the diffuse part and the lobe."""
             (wi,) = self._facing(si.wi)
             active = active & (wi.z > 0)
@@ -188,13 +199,13 @@ def define() -> dict[str, Any]:
             active &= bs.pdf > 0
             return bs, dr.select(active, value / bs.pdf, 0)
 
-        def traverse(self, callback):
+        def traverse(self, callback: Any) -> None:
             own = {name: getattr(self, name) for name in (*COEFFICIENTS, "n", "transmittance")}
             partner = {"base_color": self.base_color} | self.partner if self.has_partner else {}
             for name, value in (own | partner).items():
                 callback.put(name, value, mi.ParamFlags.Differentiable)
 
-        def parameters_changed(self, keys=()):
+        def parameters_changed(self, keys: Sequence[str] = ()) -> None:
             """Note which coefficients can be non-zero, if it is a mirror, and make ``n`` opaque.
 
             An opaque exponent can change without a new compilation, unless it crosses the bounds of
@@ -225,17 +236,17 @@ def define() -> dict[str, Any]:
             self.m_components = components  # Mitsuba copies the list
             self.m_flags = reduce(or_, components)
 
-        def to_string(self):
+        def to_string(self) -> str:
             parts = ", ".join(f"{name} = {getattr(self, name)}" for name in (*COEFFICIENTS, "n"))
             return f"PhongBSDF[{parts}, twosided = {self.twosided}]"
 
-        def _facing(self, wi, *directions):
+        def _facing(self, wi: Direction, *directions: Direction) -> tuple[Direction, ...]:
             """Turn directions to the viewer's side if both sides are shaded."""
             if not self.twosided:
                 return wi, *directions
             return tuple(dr.mulsign(direction, wi.z) for direction in (wi, *directions))
 
-        def _specular_probability(self, ctx, si, active):
+        def _specular_probability(self, ctx: Any, si: Interaction, active: Mask) -> Number:
             """Share of samples for the lobe: its part of the albedo at normal incidence."""
             has_specular = "k_s" in self.present or self.is_mirror
             if not (has_specular and ctx.is_enabled(self.specular, 0)):
@@ -246,7 +257,7 @@ def define() -> dict[str, Any]:
             total = diffuse + specular
             return dr.select(total > 0, specular / total, 0.5)
 
-        def _through_probability(self, ctx, si, active):
+        def _through_probability(self, ctx: Any, si: Interaction, active: Mask) -> Number:
             """Share of samples that pass straight through."""
             if not self.is_clear or not ctx.is_enabled(mi.BSDFFlags.Null, 2):
                 return mi.Float(0)
@@ -254,21 +265,14 @@ def define() -> dict[str, Any]:
             total = clear + sum(self._albedos(si, active))
             return dr.select(total > 0, clear / total, 0)
 
-        def _albedos(self, si, active):
+        def _albedos(self, si: Interaction, active: Mask) -> tuple[Number, Number]:
             """Return the albedo of the two parts at normal incidence, the mean over channels."""
             k_d, k_s = (dr.mean(k.eval(si, active)) for k in (self.k_d, self.k_s))
             if self.is_mirror or self.normalised:
                 return k_d, k_s
             return k_d, k_s * (1 / terms.normalisation(self.form, self.exponent(si, active)))
 
-        def _scale(self, n):
-            return terms.normalisation(self.form, n) if self.normalised else 1
-
-        def _lobe_cosine(self, wi, wo):
-            """Return ``R.V`` or ``N.H`` in the local frame."""
-            return vectors.local_lobe(self.form, self.n_is_moderate, wi, wo)
-
-        def _sample_lobe(self, wi, sample2, n):
+        def _sample_lobe(self, wi: Direction, sample2: Any, n: Number) -> Direction:
             """Draw ``wo``: its lobe vector has the density ``(n + 1) / (2 pi) cos^n``.
 
             That vector is ``wo`` itself about the mirror image of ``wi``, or the half vector about
@@ -285,14 +289,15 @@ def define() -> dict[str, Any]:
                 return mi.Vector3f(vectors.normalise(mi.reflect(wi, local)))
             return mi.Vector3f(vectors.normalise(mi.Frame3f(mi.reflect(wi)).to_world(local)))
 
-        def _lobe_pdf(self, wi, wo, n):
+        def _lobe_pdf(self, wi: Direction, wo: Direction, n: Number) -> Number:
             """Density of ``wo``; mirroring at ``H`` spreads solid angle by ``4 (wi.H)``.
 
             ``wi.H = |wi + wo| / 2``, which is 0 only for opposite directions. A mirror has none.
             """
             if self.is_mirror:
                 return mi.Float(0)
-            density = (n + 1) * dr.inv_two_pi * terms.power(self._lobe_cosine(wi, wo), n)
+            cosine = vectors.local_lobe(self.form, self.n_is_moderate, wi, wo)
+            density = (n + 1) * dr.inv_two_pi * numerics.power(cosine, n)
             if self.form == "blinn":
                 density /= numerics.at_least(2 * dr.norm(wi + wo), numerics.smallest(wo))
             return density
@@ -304,13 +309,13 @@ PARTNER = {"alpha": 1.0, "ior": 1.0, "metallic": 0.0}
 """Single numbers of the physical partner, with their defaults."""
 
 
-def _number(props, name, default):
+def _number(props: Properties, name: str, default: float) -> Any:
     """Read a number that may vary over the surface."""
     value = props.get(name, default)
     return mi.Float(value) if isinstance(value, Real) else props.get_unbounded_texture(name)
 
 
-def _exponent(props):
+def _exponent(props: Properties) -> Any:
     """Read ``n``: a number, or a texture."""
     n = props.get("n", 1.0)
     if not isinstance(n, Real):
@@ -319,6 +324,6 @@ def _exponent(props):
     return mi.Float(n)
 
 
-def _require_exponent(n):
+def _require_exponent(n: Number) -> None:
     if not n >= 0:
         raise InputError(f"phong: n = {n} is not allowed: give 0 or more; inf makes a mirror.")

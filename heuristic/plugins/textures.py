@@ -34,25 +34,28 @@ Mitsuba's ``normalmap`` and ``bumpmap`` define it (Blinn 1978): for heights ``h`
 displaced surface is ``(dp/du + dh/du n) x (dp/dv + dh/dv n)``.
 """
 
+from collections.abc import Callable
 from numbers import Real
 from typing import Any
 
 import drjit as dr
 import mitsuba as mi
 
+from heuristic.convention import Colour, Direction, Interaction, Mask, Number, Properties
 from heuristic.materials import SMALLEST_ALPHA
 from heuristic.plugins.coefficients import coefficient
 
 SCALARS = ("weight", "alpha")
+MAPS = ("normals", "heights")
 LARGEST = 1e9
 
 
-def _exponent(si, alpha):
+def _exponent(si: Interaction, alpha: Number) -> Number:
     alpha = dr.maximum(alpha, SMALLEST_ALPHA)
     return dr.maximum((1 / dr.square(alpha) - 1) / 2, 0)
 
 
-OPERATIONS = {
+OPERATIONS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
     "heuristic_product": (("a", "b"), lambda si, a, b: a * b),
     "heuristic_share": (("a", "weight"), lambda si, a, weight: a * dr.clip(weight, 0, 1)),
     "heuristic_rest": (("a", "weight"), lambda si, a, weight: a * (1 - dr.clip(weight, 0, 1))),
@@ -80,7 +83,7 @@ def define() -> dict[str, Any]:
     class Computed(mi.Texture):
         """See the module's docstring."""
 
-        def __init__(self, props):
+        def __init__(self, props: Properties):
             super().__init__(props)
             names, self.operation = OPERATIONS[props.plugin_name()]
             self.operands = {
@@ -88,33 +91,33 @@ def define() -> dict[str, Any]:
                 for name in names
             }
 
-        def eval(self, si, active=True):
+        def eval(self, si: Interaction, active: Mask = True) -> Colour:
             return mi.Spectrum(self._value("eval", si, active))
 
-        def eval_1(self, si, active=True):
+        def eval_1(self, si: Interaction, active: Mask = True) -> Number:
             return mi.Float(self._value("eval_1", si, active))
 
-        def eval_3(self, si, active=True):
+        def eval_3(self, si: Interaction, active: Mask = True) -> Colour:
             return mi.Color3f(self._value("eval_3", si, active))
 
-        def is_spatially_varying(self):
+        def is_spatially_varying(self) -> bool:
             return True
 
-        def mean(self):
+        def mean(self) -> Number:
             return mi.Float(0.5)
 
-        def max(self):
+        def max(self) -> float:
             return LARGEST
 
-        def traverse(self, callback):
+        def traverse(self, callback: Any) -> None:
             for name, operand in self.operands.items():
                 if isinstance(operand, mi.Texture):
                     callback.put(name, operand, mi.ParamFlags.Differentiable)
 
-        def to_string(self):
+        def to_string(self) -> str:
             return f"{type(self).__name__}[{', '.join(map(str, self.operands))}]"
 
-        def _value(self, method, si, active):
+        def _value(self, method: str, si: Interaction, active: Mask) -> Any:
             values = [
                 getattr(operand, "eval_1" if name in SCALARS else method)(si, active)
                 if isinstance(operand, mi.Texture)
@@ -126,36 +129,36 @@ def define() -> dict[str, Any]:
     class Tilt(mi.Texture):
         """See the module's docstring."""
 
-        def __init__(self, props):
+        def __init__(self, props: Properties):
             super().__init__(props)
-            self.normals = props.get_texture("normals") if "normals" in props else None
-            self.heights = props.get_texture("heights") if "heights" in props else None
+            self.maps = {name: props.get_texture(name) for name in MAPS if name in props}
             self.scale = props.get("scale", 1.0)
             self.flip = props.get("flip", True)
 
-        def eval_3(self, si, active=True):
-            normal = self._mapped(si, active) if self.normals else self._displaced(si, active)
+        def eval_3(self, si: Interaction, active: Mask = True) -> Colour:
+            normal = (
+                self._mapped(si, active) if "normals" in self.maps else self._displaced(si, active)
+            )
             if self.flip:
                 mirrored = mi.Vector3f(-normal.x, -normal.y, normal.z)
                 normal = dr.select(dr.dot(normal, si.wi) * si.wi.z > 0, normal, mirrored)
             return mi.Color3f(normal)
 
-        def is_spatially_varying(self):
+        def is_spatially_varying(self) -> bool:
             return True
 
-        def traverse(self, callback):
-            for name in ("normals", "heights"):
-                if getattr(self, name):
-                    callback.put(name, getattr(self, name), mi.ParamFlags.Differentiable)
+        def traverse(self, callback: Any) -> None:
+            for name, value in self.maps.items():
+                callback.put(name, value, mi.ParamFlags.Differentiable)
 
-        def to_string(self):
-            return f"Tilt[normals = {self.normals}, heights = {self.heights}]"
+        def to_string(self) -> str:
+            return f"Tilt[{self.maps}]"
 
-        def _mapped(self, si, active):
-            return dr.normalize(mi.Vector3f(self.normals.eval_3(si, active)) * 2 - 1)
+        def _mapped(self, si: Interaction, active: Mask) -> Direction:
+            return dr.normalize(mi.Vector3f(self.maps["normals"].eval_3(si, active)) * 2 - 1)
 
-        def _displaced(self, si, active):
-            slope = self.scale * self.heights.eval_1_grad(si, active)
+        def _displaced(self, si: Interaction, active: Mask) -> Direction:
+            slope = self.scale * self.maps["heights"].eval_1_grad(si, active)
             n = mi.Vector3f(si.sh_frame.n)
             across = [
                 dp + n * (rise - dr.dot(n, dp))

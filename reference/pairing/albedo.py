@@ -17,7 +17,7 @@ plugin tabulates by Gauss-Legendre rules over visible microfacet normals ``m``
 
 for light that arrives at the cosine ``mu``, with Fresnel's ``F`` and Smith's masking ``G``. The
 rules are coarse: ``1 - R`` is uneven by 1e-4 in the index of refraction. Here the same sums run as
-a kernel, in 8 ms; the plugin takes 70 ms, and a search for an index asks some forty times.
+a kernel, in 8 ms; the plugin takes 70 ms, and a search for an index needs them about forty times.
 
 Two symmetries save work: light arrives in the plane of x and z, so slopes along y count once for
 both signs, and Beckmann's slopes along x and y are independent.
@@ -61,8 +61,8 @@ LITERAL_IOR = 1.5
 SMALLEST_IOR = exp(1e-4)
 """Reflects 2.5e-9 at normal incidence; Mitsuba rejects an IOR of 1."""
 LARGEST_IOR, LARGEST_SMOOTH_IOR = 10.0, 3.8
-"""A larger specular albedo is recorded as missed. Above the second Mitsuba's fit has a smooth coat
-return more from within than arrives."""
+"""A larger specular albedo is recorded as missed. Above the second, by Mitsuba's fit, a smooth coat
+returns more from within than arrives."""
 
 MATCHING_TOLERANCE = 1e-5
 """Relative tolerance; a larger mismatch is recorded as a miss."""

@@ -84,28 +84,21 @@ class NearestPhong:
 
     def properties(self) -> mi.Properties:
         """Return the properties of the node ``phong``, without defaults."""
-        props = properties("phong")
-        for name in (*COEFFICIENTS, "n", "transmittance"):
-            value = getattr(self, name)
-            if name in ("k_d", "n") or not values.is_zero(value):
-                props[name] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
-        for name, default in (("normalised", False), ("twosided", False), ("form", "phong")):
-            if getattr(self, name) != default:
-                props[name] = getattr(self, name)
-        if self.tilt is not None:
-            props["tilt"] = self.tilt
-        for name, value in self.physical.items():
-            props[name] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
-        return props
+        own = {name: getattr(self, name) for name in (*COEFFICIENTS, "n", "transmittance")}
+        own = {k: v for k, v in own.items() if k in ("k_d", "n") or not values.is_zero(v)}
+        for name in ("normalised", "twosided", "form", "tilt"):
+            if getattr(self, name) not in (False, "phong", None):
+                own[name] = getattr(self, name)
+        return properties("phong", **own, **self.physical)
 
     def parameters(self) -> dict[str, Any]:
         """Return the coefficients for records: numbers, or the word ``texture``."""
-        found = {name: getattr(self, name) for name in ("k_a", "k_d", "k_s", "n")}
+        own = {name: getattr(self, name) for name in ("k_a", "k_d", "k_s", "n")}
         if not values.is_zero(self.transmittance):
-            found["transmittance"] = self.transmittance
+            own["transmittance"] = self.transmittance
         return {
             name: "texture" if values.plain(value) is None else values.plain(value)
-            for name, value in found.items()
+            for name, value in own.items()
         }
 
 
@@ -143,8 +136,8 @@ class Context:
 
         They stand for a surface that reflects nothing, without an interface, unless they are given.
         """
-        found = {"base_color": base_color, "alpha": alpha, "ior": ior, "metallic": metallic}
-        return found if self.for_users else {}
+        parameters = {"base_color": base_color, "alpha": alpha, "ior": ior, "metallic": metallic}
+        return parameters if self.for_users else {}
 
     def plugin(self, index: int) -> str:
         """Return a node's plugin."""
@@ -161,8 +154,8 @@ Rule = Callable[[Context, int], NearestPhong]
 def to_heuristic(context: Context, replaced: Replacements) -> None:
     """Replace the BSDFs of all shapes by the nearest ``phong``.
 
-    Those that were not ``phong`` are recorded, also nested ones, but not those around others; and
-    what is lost.
+    Those that were not ``phong`` are recorded, and what is lost; nested ones, too, but not those
+    around them.
     """
     graph = context.graph
     for shape in graph.nodes(mi.ObjectType.Shape):
@@ -184,17 +177,17 @@ def to_heuristic(context: Context, replaced: Replacements) -> None:
 
 def to_physical(graph: Graph, convention: Convention, replaced: Replacements) -> None:
     """Replace every ``phong`` of the graph by its :func:`physical_partner`."""
-    for index in [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]:
-        label, given = graph.label(index), graph.props(index)
+    for index in graph.nodes(BSDF, "phong"):
+        label, before = graph.label(index), graph.props(index)
         plugin, parameters, misses = physical_partner(graph, index, convention)
         replaced.misses += misses
         (low, high), ior = PLASTICS, parameters.get("int_ior", 1.5) / parameters.get("ext_ior", 1.0)
         note = f"no real plastic has the index {ior:.3g}: they have {low:g} to {high:g}"
         note = "" if low <= ior <= high else note
-        recorded = {"reflectance": _base(given)} if plugin == "diffuse" else parameters
+        recorded = {"reflectance": _base(before)} if plugin == "diffuse" else parameters
         replaced.bsdf(label, "phong", plugin, recorded, note)
         props = properties(plugin, **parameters)
-        is_twosided = given.get("twosided", False)
+        is_twosided = before.get("twosided", False)
         graph.replace(index, mi.Properties("twosided") if is_twosided else props)
         if is_twosided:
             graph.attach(index, "bsdf", graph.add(BSDF, props))
@@ -221,12 +214,12 @@ def physical_partner(
             return "roughplastic", parameters, misses
         del parameters["alpha"], parameters["distribution"]
         return "plastic", parameters, misses
-    given = graph.props(index)
-    return "diffuse", {"reflectance": given.get(_base(given), 0.0)}, ()
+    props = graph.props(index)
+    return "diffuse", {"reflectance": props.get(_base(props), 0.0)}, ()
 
 
-def _base(given: mi.Properties) -> str:
-    return "k_d" if "k_d" in given and values.may_be_nonzero(given["k_d"]) else "k_a"
+def _base(props: mi.Properties) -> str:
+    return "k_d" if "k_d" in props and values.may_be_nonzero(props["k_d"]) else "k_a"
 
 
 def phong(graph: Graph, index: int) -> Phong:
@@ -260,9 +253,9 @@ def itself(context: Context, index: int) -> NearestPhong:
             alpha, ior = own.get("alpha", SMALLEST_ALPHA), own["int_ior"] / own["ext_ior"]
             physical = context.physical(own["diffuse_reflectance"], alpha, ior)
     names = ("k_i", "k_a", "k_d", "k_s", "n", "form", "normalised", "twosided", "transmittance")
-    given = {name: props[name] for name in (*names, "tilt") if name in props}
+    fields = {name: props[name] for name in (*names, "tilt") if name in props}
     lost = (UNSEEN,) if is_mirror(props) else ()
-    return NearestPhong(**given, lost=lost, physical=physical)
+    return NearestPhong(**fields, lost=lost, physical=physical)
 
 
 def diffuse(context: Context, index: int) -> NearestPhong:

@@ -62,8 +62,8 @@ def to_heuristic(
         else:
             from reference.pairing import lamps  # loaded late: most scenes have points alone
 
-            found = lamps.to_heuristic(light)
-            ambient = ambient if found is None else found
+            glow = lamps.to_heuristic(light)
+            ambient = ambient if glow is None else glow
     return ambient
 
 
@@ -128,9 +128,9 @@ def add_environment(
     ratio, exact = np.ones(3), True
     if convention is Convention.MATCHED:
         ratio, exact = _ambient_ratio(graph)
-    known = values.plain(ambient)
-    if known is not None and (ratio != 1).any():
-        ambient = tuple((np.multiply(known, ratio)).tolist())
+    level = values.plain(ambient)
+    if level is not None and (ratio != 1).any():
+        ambient = tuple((np.multiply(level, ratio)).tolist())
     light = physical.add(mi.ObjectType.Emitter, properties("constant", radiance=ambient))
     physical.attach(0, "environment", light)
     note = f"radiance I_a k_a / k_d, k_a / k_d = ({', '.join(f'{r:.4g}' for r in ratio)})"
@@ -139,7 +139,7 @@ def add_environment(
 
 def _ambient_ratio(graph: Graph) -> tuple[np.ndarray, bool]:
     """Return ``k_a / k_d`` per channel by least squares, and whether it fits all materials."""
-    phongs = [i for i in graph.nodes(mi.ObjectType.BSDF) if graph.plugin(i) == "phong"]
+    phongs = graph.nodes(mi.ObjectType.BSDF, "phong")
     k_a, k_d, k_s = (
         np.array([values.colour(graph, i, key, 0.0) for i in phongs]).reshape(-1, 3)
         for key in ("k_a", "k_d", "k_s")

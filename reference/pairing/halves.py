@@ -118,11 +118,11 @@ def _paired(
 
         context.rule_of = nearest.rule_of
     bsdfs.to_heuristic(context, replaced)
-    for index in half.nodes(BSDF) if model.form else ():
-        if half.plugin(index) == "phong":
-            half.props(index)["form"] = model.form
+    for index in half.nodes(BSDF, "phong") if model.form else ():
+        half.props(index)["form"] = model.form
     radiance = emitters.to_heuristic(half, geometry, settings.hide_emitters, replaced)
     ambient = settings.ambient if settings.ambient is not None else radiance
+    own = {} if ambient is None else {"ambient": ambient}
     props = properties(
         "heuristic",
         hide_emitters=settings.hide_emitters,
@@ -130,9 +130,8 @@ def _paired(
         interpolation=interpolation.value,
         prune=prune,
         model=model.name,
+        **own,
     )
-    if ambient is not None:
-        props["ambient"] = mi.ScalarColor3f(ambient) if isinstance(ambient, tuple) else ambient
     props.set_id("integrator")  # identifies its parameters
     half.attach(0, "integrator", half.add(INTEGRATOR, props))
     if interpolation is not Interpolation.PHONG or tessellation is not None:
@@ -173,8 +172,7 @@ def _paired(
 
 
 def _energy_warnings(graph):
-    phongs = [index for index in graph.nodes(BSDF) if graph.plugin(index) == "phong"]
-    for index in phongs:
+    for index in graph.nodes(BSDF, "phong"):
         try:
             material = bsdfs.phong(graph, index)
         except InputError:

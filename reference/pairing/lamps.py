@@ -66,11 +66,11 @@ def _area(light: LightNode) -> None:
         props["k_i"] = radiance
         graph.attach(shape, key, graph.add(BSDF, props))
     identifier = graph.props(shape).id()
-    made = next(found for found in light.geometry().shapes() if found.id() == identifier)
-    centroid, area, normal, radius = _extent(made)
+    body = next(each for each in light.geometry().shapes() if each.id() == identifier)
+    centroid, area, normal, radius = _extent(body)
     is_texture = isinstance(radiance, Reference)
     if is_texture and graph.instantiate(radiance.index()).is_spatially_varying():
-        radiance = probe.surface_mean(graph, made)
+        radiance = probe.surface_mean(graph, body)
     flatness = float(np.linalg.norm(normal))
     if flatness > FLATNESS:
         # On its axis L times the projected area, and pi L A in all: I_0 2 pi / (m + 1) of 6.4.
@@ -171,8 +171,8 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
 def _least(function: Callable[[float], float], low: float, high: float) -> float:
     from scipy.optimize import minimize_scalar  # loaded late: a tenth of a command's start
 
-    found = minimize_scalar(function, bounds=(low, high), method="bounded").x
-    return float(min((low, high, found), key=function))
+    inner = minimize_scalar(function, bounds=(low, high), method="bounded").x
+    return float(min((low, high, inner), key=function))
 
 
 def linear_falloff(theta: np.ndarray, cutoff: float, beam_width: float) -> np.ndarray:

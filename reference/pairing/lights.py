@@ -68,8 +68,8 @@ class LightNode:
     def vector(self, key: str, default: tuple, column: int) -> np.ndarray:
         """Return a position or direction (3,), given directly or as a column of ``to_world``."""
         is_moved = "to_world" in self.graph.props(self.index)
-        given = self.column(column) if is_moved else self.value(key, default)
-        return np.ravel(given).astype(float)
+        components = self.column(column) if is_moved else self.value(key, default)
+        return np.ravel(components).astype(float)
 
     def position(self) -> np.ndarray:
         """Return the position of a light that shines from a point, (3,) in world space."""

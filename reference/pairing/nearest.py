@@ -6,8 +6,8 @@ straight or refracted, becomes the transmittance, reflected light a lobe. A clos
 surfaces on each path.
 
 Users' heuristics also read physical parameters: a plugin's own, with ``alpha`` at least 1e-4 and
-``ior`` the index inside over the one outside. Of conductors ``base_color`` is the albedo at normal
-incidence, ``metallic`` 1 and ``ior`` 1; of dielectrics ``base_color`` is 0. What is measured has
+``ior`` the index inside over the one outside. For conductors ``base_color`` is the albedo at normal
+incidence, ``metallic`` 1 and ``ior`` 1; for dielectrics ``base_color`` is 0. A measured BSDF has
 the albedo of its diffuse part, and the index of its lobe's albedo. Index 1 means no interface.
 """
 
@@ -45,33 +45,33 @@ def lobe(context: Context, reflected: Any, alpha: Any) -> dict[str, Any]:
     """
     if values.is_zero(reflected):
         return {}
-    known = values.plain(alpha)
-    if known is None:
+    level = values.plain(alpha)
+    if level is None:
         n = values.node(context.graph, "heuristic_exponent", alpha=alpha)
         return {"k_s": reflected, "n": n, "normalised": True}
-    n = exponent_of(max(float(np.mean(known)), SMOOTH_ALPHA))
+    n = exponent_of(max(float(np.mean(level)), SMOOTH_ALPHA))
     scale = float(normalisation("phong", n))
     return {"k_s": values.product(context.graph, reflected, scale), "n": n}
 
 
 def unknown(context: Context, index: int) -> NearestPhong:
     """The diffuse part as ``k_d``, the rest as a lobe of the same albedo and width."""
-    found = probe.with_values(context.graph, index)
-    if found is None:
+    probed = probe.with_values(context.graph, index)
+    if probed is None:
         lost = (("reflection", "diffuse of 0.5: it cannot be sampled"),)
         return NearestPhong(k_a=0.5, k_d=0.5, lost=lost, physical=context.physical(0.5))
     graph = context.graph
-    known = values.plain(found.specular)
-    root = sqrt(min(float(np.mean(known)) if known is not None else 0.04, 0.99))
+    level = values.plain(probed.specular)
+    root = sqrt(min(float(np.mean(level)) if level is not None else 0.04, 0.99))
     ior = min((1 + root) / (1 - root), LARGEST_IOR)
-    width = min(max(found.alpha, SMALLEST_ALPHA), 1.0)
-    physical = context.physical(found.diffuse, width, ior)
+    width = min(max(probed.alpha, SMALLEST_ALPHA), 1.0)
+    physical = context.physical(probed.diffuse, width, ior)
     rule = "k_d, k_s and n measured at normal incidence, textures averaged"
     all_but = "all but a diffuse part and a lobe"
     if context.plugin(index) == "hair":
         # Light transmitted by a fibre leaves on the other side of the same strand.
-        half = values.total(graph, found.reflected, found.passed)
-        everything = values.total(graph, half, found.scattered)
+        half = values.total(graph, probed.reflected, probed.passed)
+        everything = values.total(graph, half, probed.scattered)
         return NearestPhong(
             k_a=everything,
             k_d=everything,
@@ -79,13 +79,13 @@ def unknown(context: Context, index: int) -> NearestPhong:
             lost=((all_but, "k_d is the whole albedo"),),
             physical=physical,
         )
-    if not values.is_zero(found.scattered):
+    if not values.is_zero(probed.scattered):
         all_but += ", and light scattered through"
     return NearestPhong(
-        k_a=found.reflected,
-        k_d=found.diffuse,
-        **lobe(context, found.specular, found.alpha),
-        transmittance=found.passed,
+        k_a=probed.reflected,
+        k_d=probed.diffuse,
+        **lobe(context, probed.specular, probed.alpha),
+        transmittance=probed.passed,
         lost=((all_but, rule),),
         physical=physical,
     )
@@ -98,8 +98,8 @@ def _alpha(context: Context, index: int) -> Any:
 
 
 def _at_least(alpha: Any) -> Any:
-    known = values.plain(alpha)
-    return alpha if known is None else max(known, SMALLEST_ALPHA)
+    level = values.plain(alpha)
+    return alpha if level is None else max(level, SMALLEST_ALPHA)
 
 
 def _ior(graph: Graph, index: int, inside: str) -> float:
@@ -127,8 +127,8 @@ def roughplastic(context: Context, index: int) -> NearestPhong:
     coat = context.value(index, "specular_reflectance", 1.0)
     physical = _of_plastic(context, index, base)
     if values.plain(base) is not None and values.plain(coat) is not None:
-        found = albedo.to_phong(_roughplastic(graph, index), context.convention)
-        return NearestPhong(k_a=found.k_d, **asdict(found), physical=physical)
+        material = albedo.to_phong(_roughplastic(graph, index), context.convention)
+        return NearestPhong(k_a=material.k_d, **asdict(material), physical=physical)
     white = _roughplastic(graph, index, (1.0,) * 3, (1.0,) * 3)
     unit = albedo.to_phong(white, context.convention)
     k_s = values.product(graph, coat, unit.k_s[0])
@@ -143,16 +143,16 @@ def roughplastic(context: Context, index: int) -> NearestPhong:
 def plastic(context: Context, index: int) -> NearestPhong:
     """``plastic``: ``roughplastic`` in the limit of ``alpha`` to 0.
 
-    The diffuse part is matched likewise; the coat's mirror image becomes a narrow highlight with
-    Fresnel's reflectance at normal incidence.
+    The diffuse part is matched in the same way; the coat's mirror image becomes a narrow highlight
+    with Fresnel's reflectance at normal incidence.
     """
     graph = context.graph
     base = context.value(index, "diffuse_reflectance", 0.5)
     if context.convention is Convention.LITERAL:
         coat = context.value(index, "specular_reflectance", 1.0)
         n = exponent_of(SMOOTH_ALPHA, "blinn")
-        found = NearestPhong(k_a=base, k_d=base, k_s=coat, n=n)
-        return replace(found, lost=(MIRROR,), physical=_of_plastic(context, index, base))
+        nearest = NearestPhong(k_a=base, k_d=base, k_s=coat, n=n)
+        return replace(nearest, lost=(MIRROR,), physical=_of_plastic(context, index, base))
     inside = values.index_of_refraction(graph, index, "int_ior", "polypropylene")
     outside = values.index_of_refraction(graph, index, "ext_ior", "air")
     nonlinear = context.value(index, "nonlinear", False)
@@ -202,7 +202,7 @@ def principled(context: Context, index: int) -> NearestPhong:
     k_d = base = context.value(index, "base_color", 0.5)
     for key in ("metallic", "spec_trans"):
         k_d = values.rest(graph, k_d, context.value(index, key, 0.0))
-    found = probe.measured(context.graph, index)
+    probed = probe.measured(context.graph, index)
     roughness = context.value(index, "roughness", 0.5)
     alpha = values.product(graph, roughness, roughness)
     specular = values.plain(context.value(index, "specular", 0.5))
@@ -210,10 +210,10 @@ def principled(context: Context, index: int) -> NearestPhong:
     ior = 2 / (1 - sqrt(0.08 * specular)) - 1 if isinstance(specular, float) else 1.5
     ior, metallic = context.value(index, "eta", ior), context.value(index, "metallic", 0.0)
     return NearestPhong(
-        k_a=found.reflected if values.plain(k_d) is not None else k_d,
+        k_a=probed.reflected if values.plain(k_d) is not None else k_d,
         k_d=k_d,
-        **lobe(context, found.specular, alpha),
-        transmittance=found.passed,
+        **lobe(context, probed.specular, alpha),
+        transmittance=probed.passed,
         lost=(("sheen, clearcoat, Fresnel reflection", "a diffuse part and one lobe"),),
         physical=context.physical(base, _at_least(alpha), ior, metallic),
     )
@@ -236,8 +236,8 @@ def _of_base(graph: Graph, rho: Any, whole: float, half: float) -> Any:
     level = values.plain(rho)
     if level is not None:
         shares = level if isinstance(level, tuple) else (level,)
-        found = tuple(scale * share / (1 - returned * share) for share in shares)
-        return found if len(found) > 1 else found[0]
+        components = tuple(scale * share / (1 - returned * share) for share in shares)
+        return components if len(components) > 1 else components[0]
     return values.node(
         graph, "heuristic_interior", rho=rho, scale=float(scale), **{"return": float(returned)}
     )
@@ -403,7 +403,7 @@ def normal_map(context: Context, index: int) -> NearestPhong:
 
 
 def bump_map(context: Context, index: int) -> NearestPhong:
-    """``bumpmap``: the nested material, with the displaced surface's normal (exact likewise)."""
+    """``bumpmap``: the nested material, with the displaced surface's normal (exact as above)."""
     ((key, _),) = context.graph.children(index, TEXTURE)
     scale, heights = float(context.value(index, "scale", 1.0)), context.graph.props(index)[key]
     _require(context, index, heights, "eval_1_grad", "slope")
@@ -411,7 +411,7 @@ def bump_map(context: Context, index: int) -> NearestPhong:
 
 
 def _require(context: Context, index: int, texture: Any, ability: str, what: str) -> None:
-    """Reject a texture that lacks what its map evaluates; otherwise only shading would find out.
+    """Reject a texture that lacks what its map evaluates; otherwise only shading would reveal it.
 
     Mitsuba accepts such a texture only with integrators that do not evaluate materials.
     """
@@ -420,9 +420,9 @@ def _require(context: Context, index: int, texture: Any, ability: str, what: str
         return
     si = dr.zeros(mi.SurfaceInteraction3f, 1)
     si.shape = mi.ShapePtr(mi.load_dict({"type": "rectangle"}))
-    made = graph.instantiate(texture.index())
+    instance = graph.instantiate(texture.index())
     try:
-        dr.eval(getattr(made, ability)(si))
+        dr.eval(getattr(instance, ability)(si))
     except RuntimeError as error:
         if f"{ability}()" in str(error):
             raise InputError(

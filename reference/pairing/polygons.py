@@ -28,13 +28,13 @@ def replace_shapes(
     folder = _Folder()
     shapes = {shape.id(): shape for shape in scene.shapes()}
     for index in graph.nodes(mi.ObjectType.Shape):
-        given = graph.props(index)
-        if given.id() not in shapes or graph.plugin(index) == "instance":
+        props = graph.props(index)
+        if props.id() not in shapes or graph.plugin(index) == "instance":
             raise InputError(
                 f"{graph.name}: {graph.label(index)}: instances and their groups cannot become"
                 " separate meshes. Use --interpolation phong."
             )
-        mesh = tessellation.to_mesh(shapes[given.id()], resolution or tessellation.RESOLUTION)
+        mesh = tessellation.to_mesh(shapes[props.id()], resolution or tessellation.RESOLUTION)
         if mesh.has_face_normals():
             if interpolation is Interpolation.GOURAUD:
                 mesh = tessellation.split_faces(mesh)
@@ -47,7 +47,7 @@ def replace_shapes(
             raise OutputError(
                 f"{graph.name}: {error}. Free some space, or set TMPDIR to another folder."
             ) from error
-        children = {key: value for key, value in given.items() if isinstance(value, Reference)}
+        children = {key: value for key, value in props.items() if isinstance(value, Reference)}
         # The file holds world coordinates; a mesh without vertex normals has flat faces.
         derived = properties("ply", filename=str(path), **children)
         if mesh.has_face_normals():

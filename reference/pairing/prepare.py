@@ -77,12 +77,12 @@ def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -
         if not graph.props(shape).id():
             graph.props(shape).set_id(f"shape-{shape}")
     settings = Settings()
-    kept = keep_sensor(graph, sensor)
-    _prepare_film(graph, kept, resolution, settings)
-    for _, index in graph.children(kept, SAMPLER):
+    camera = keep_sensor(graph, sensor)
+    _prepare_film(graph, camera, resolution, settings)
+    for _, index in graph.children(camera, SAMPLER):
         count = graph.props(index).get("sample_count", 4)
-        given = f"{graph.plugin(index)}, {count} samples per pixel"
-        settings.override("sampler", given, "sampler and samples of the plan")
+        before = f"{graph.plugin(index)}, {count} samples per pixel"
+        settings.override("sampler", before, "sampler and samples of the plan")
     _give_weights(graph, settings)
     _take_integrator(graph, settings)
     return settings
@@ -131,22 +131,22 @@ def _prepare_film(graph, sensor, resolution, settings):
     ((_, film),) = films
     if graph.plugin(film) != "hdrfilm":
         settings.override("film", graph.plugin(film), "hdrfilm")
-        given = graph.props(film)
-        sizes = {name: given[name] for name in FILM_SIZES if name in given}
+        before = graph.props(film)
+        sizes = {name: before[name] for name in FILM_SIZES if name in before}
         filters = graph.children(film, mi.ObjectType.ReconstructionFilter)
         graph.replace(film, properties("hdrfilm", **sizes))
         for key, child in filters:
             graph.attach(film, key, child)
     props = graph.props(film)
     pixel_format = "luminance" if mi.is_monochromatic else "rgb"
-    given = props.get("pixel_format", "rgb")
-    if given.lower() not in PIXEL_FORMATS:
+    before = props.get("pixel_format", "rgb")
+    if before.lower() not in PIXEL_FORMATS:
         raise InputError(
-            f"{graph.name}: {graph.label(film)}: pixel_format = {given!r}: choose one of"
+            f"{graph.name}: {graph.label(film)}: pixel_format = {before!r}: choose one of"
             f" {', '.join(PIXEL_FORMATS)}."
         )
-    if given != pixel_format:
-        settings.override("pixel format", given, pixel_format)
+    if before != pixel_format:
+        settings.override("pixel format", before, pixel_format)
     props["pixel_format"] = pixel_format
     props["component_format"] = "float32"
     if resolution is not None:
@@ -167,7 +167,7 @@ def _resize(props, resolution):
 
 
 def _give_weights(graph, settings):
-    """Let lights be sampled that are not: each plan would treat them in another way."""
+    """Sample lights that the scene does not sample: each plan would treat them differently."""
     kind = mi.ObjectType.Emitter
     owners = {
         child: shape for shape in graph.nodes(SHAPE) for _, child in graph.children(shape, kind)

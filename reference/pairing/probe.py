@@ -85,22 +85,22 @@ def with_values(graph: Graph, index: int, **changes: Any) -> Albedos | None:
     for key, value in changes.items():
         if key in props:
             props[key] = value
-    found = probe(part.instantiate())
+    response = probe(part.instantiate())
     names = ("reflected", "diffuse", "specular", "passed", "scattered")
-    return found and replace(
-        found, **{name: as_value(graph, getattr(found, name)) for name in names}
+    return response and replace(
+        response, **{name: as_value(graph, getattr(response, name)) for name in names}
     )
 
 
 def measured(graph: Graph, index: int, **changes: Any) -> Albedos:
     """Same as :func:`with_values`; InputError for a BSDF that cannot be sampled."""
-    found = with_values(graph, index, **changes)
-    if found is None:
+    response = with_values(graph, index, **changes)
+    if response is None:
         raise InputError(
             f"{graph.name}: {graph.label(index)}: its albedo is not a number, or Mitsuba cannot"
             " sample it. Check its parameters."
         )
-    return found
+    return response
 
 
 def as_value(graph: Graph, albedo: np.ndarray, emitted: bool = False) -> Any:

@@ -186,8 +186,8 @@ ONE_INTENSITY = Effect(
     reference="one",
     cost="nothing",
     rule=lambda facts: (
-        bool(found := _of_two_intensities(facts)),
-        f"lights of two intensities: {', '.join(found) or 'none'}",
+        bool(names := _of_two_intensities(facts)),
+        f"lights of two intensities: {', '.join(names) or 'none'}",
     ),
     colour="#332288",
     sites=_of_two_intensities,
@@ -249,9 +249,9 @@ def _put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
             graph.detach(shape, key)
             if facts.pair.hide_emitters:
                 graph.remove(shape)
-    given = dict(facts.pair.physical.children(0, EMITTER))
+    before = dict(facts.pair.physical.children(0, EMITTER))
     own = facts.pair.heuristic.children(0, EMITTER)
-    _put_lights(graph, facts, [key for key, _ in own if key not in given])
+    _put_lights(graph, facts, [key for key, _ in own if key not in before])
 
 
 def _surroundings(facts: Facts) -> list[str]:
@@ -333,15 +333,15 @@ def _inexact_surfaces(opaque: bool) -> Callable[[Facts], list[int]]:
     """Find the opaque shapes, or the others, whose two BSDFs differ; diffuse ones do not."""
 
     def sites(facts: Facts) -> list[int]:
-        graph, found = facts.pair.physical, []
+        graph, surfaces = facts.pair.physical, []
         for shape in graph.nodes(SHAPE):
-            known = facts.by_name.get(graph.props(shape).id())
+            shape_facts = facts.by_name.get(graph.props(shape).id())
             for _, bsdf in graph.children(shape, BSDF):
                 inner = [child for _, child in graph.children(bsdf, BSDF)] or [bsdf]
                 is_exact = all(graph.plugin(index) == "diffuse" for index in inner)
-                if not is_exact and (known is None or known.opaque) is opaque:
-                    found.append(shape)
-        return found
+                if not is_exact and (shape_facts is None or shape_facts.opaque) is opaque:
+                    surfaces.append(shape)
+        return surfaces
 
     return sites
 

@@ -135,8 +135,8 @@ def _mesh(mesh: mi.Mesh, is_rectangle: bool) -> Geometry:
     size = ROUNDING * np.ptp(points, axis=0).max()
     heights = normals @ points.T - np.sum(normals * first, axis=1)[:, None]  # (F, V)
     is_behind = bool(heights.max() <= size)
-    known = is_behind or heights.min() >= -size
-    return Geometry(Form.CONVEX, is_behind) if known else Geometry(Form.OTHER)
+    is_convex = is_behind or heights.min() >= -size
+    return Geometry(Form.CONVEX, is_behind) if is_convex else Geometry(Form.OTHER)
 
 
 def _are_alike(normals: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -170,7 +170,7 @@ class ShapeFacts:
     @classmethod
     def of(cls, graph: Graph, index: int | None, shape: mi.Shape) -> "ShapeFacts":
         """Return the facts of a shape, given its node in the graph (None if it has none)."""
-        box, found = shape.bbox(), geometry(shape)
+        box, own = shape.bbox(), geometry(shape)
         nested = graph.children(index, BSDF) if index is not None else []
         bsdf = nested[0][1] if nested else None  # an instance has its group's
         opaque, front, back = _sides(graph, bsdf)
@@ -178,13 +178,13 @@ class ShapeFacts:
             name=shape.id(),
             low=np.array(box.min, float).ravel(),
             high=np.array(box.max, float).ravel(),
-            form=found.form,
-            outer=front if found.is_outward else back,
-            inner=back if found.is_outward else front,
-            shines_outwards=found.is_outward,
-            plane=found.plane,
+            form=own.form,
+            outer=front if own.is_outward else back,
+            inner=back if own.is_outward else front,
+            shines_outwards=own.is_outward,
+            plane=own.plane,
             opaque=opaque,
-            sampled_as_hit=found.has_true_normals and _is_sampled_as_hit(graph, index, shape),
+            sampled_as_hit=own.has_true_normals and _is_sampled_as_hit(graph, index, shape),
             is_mesh=shape.is_mesh(),
         )
 
@@ -223,7 +223,7 @@ class ShapeFacts:
 
 
 def _is_sampled_as_hit(graph: Graph, index: int | None, shape: mi.Shape) -> bool:
-    """Return whether it is a shape whose samples Mitsuba 3.9 is known to place right.
+    """Return whether Mitsuba 3.9 is known to place its samples on a shape correctly.
 
     On a cylinder that is mirrored they face the other way, and on one that is not round they lie
     beside it.
@@ -232,12 +232,12 @@ def _is_sampled_as_hit(graph: Graph, index: int | None, shape: mi.Shape) -> bool
         round_or_flat = (+mi.ShapeType.Sphere, +mi.ShapeType.Disk)
         return shape.is_mesh() or shape.shape_type() in round_or_flat
     props = graph.props(index) if index is not None else {}
-    given = np.array(props.get("to_world", mi.ScalarTransform4f()).matrix, float)[:3, :3]
-    squares = given.T @ given
+    matrix = np.array(props.get("to_world", mi.ScalarTransform4f()).matrix, float)[:3, :3]
+    squares = matrix.T @ matrix
     if "p0" not in props and "p1" not in props:
         squares[2, 2] = squares[0, 0]  # it may be long
     is_round = np.allclose(squares, squares[0, 0] * np.eye(3), atol=1e-5 * squares[0, 0])
-    return index is not None and is_round and bool(np.linalg.det(given) > 0)
+    return index is not None and is_round and bool(np.linalg.det(matrix) > 0)
 
 
 def _sides(graph: Graph, bsdf: int | None) -> tuple[bool, bool, bool]:
@@ -380,7 +380,7 @@ class Facts:
     def materials(self) -> list[mi.Properties]:
         """The parameters of the heuristic half's materials."""
         graph = self.pair.heuristic
-        return [graph.props(i) for i in graph.nodes(BSDF) if graph.plugin(i) == "phong"]
+        return [graph.props(index) for index in graph.nodes(BSDF, "phong")]
 
     @cached_property
     def kernel_terms(self) -> tuple[str, ...]:

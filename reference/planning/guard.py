@@ -141,12 +141,12 @@ def radiances(scene: mi.Scene, integrators: list, count: int, seeds: Iterator[in
     wavelength = sampler.next_1d() if mi.is_spectral else mi.Float(0.5)
     film, lens = sampler.next_2d(), sampler.next_2d()
     ray, weight = sensor.sample_ray_differential(sensor.shutter_open(), wavelength, film, lens)
-    found = []
+    values = []
     for integrator in integrators:
         sampler.seed(dr.opaque(mi.UInt32, next(seeds)), count)
         radiance, _, _ = integrator.sample(scene, sampler, ray)
         value = dr.mean(mi.unpolarized_spectrum(radiance * weight))
-        found.append(dr.select(dr.isfinite(value), value, 0))
-    dr.eval(found)
+        values.append(dr.select(dr.isfinite(value), value, 0))
+    dr.eval(values)
     # A camera with a single ray, and no other random number, gives one value for all.
-    return np.array([np.broadcast_to(np.array(value, float), count) for value in found])
+    return np.array([np.broadcast_to(np.array(value, float), count) for value in values])

@@ -68,9 +68,9 @@ class PruningRule:
         """Check the premises, once for all callers: some compare every shape with every other."""
         if self.name not in facts.rule_results:
             objections = ((p.sentence, p.against(facts)) for p in self.premises)
-            premise, found = next((pair for pair in objections if pair[1] is not None), ("", None))
-            evidence = self.absent if found is None else found
-            facts.rule_results[self.name] = RuleResult(self.name, found is None, premise, evidence)
+            premise, fault = next((pair for pair in objections if pair[1] is not None), ("", None))
+            evidence = self.absent if fault is None else fault
+            facts.rule_results[self.name] = RuleResult(self.name, fault is None, premise, evidence)
         return facts.rule_results[self.name]
 
     def objection(self, facts: Facts) -> str | None:
@@ -83,8 +83,8 @@ class PruningRule:
 
 
 def _clear(facts: Facts) -> str | None:
-    found = (shape.name for shape in facts.shapes if not shape.opaque)
-    return next((f"{name}: its BSDF may let light through" for name in found), None)
+    names = (shape.name for shape in facts.shapes if not shape.opaque)
+    return next((f"{name}: its BSDF may let light through" for name in names), None)
 
 
 def _seen_from_inside(facts: Facts) -> str | None:
@@ -264,8 +264,8 @@ def occluder(facts: Facts) -> str | None:
         shape = facts.by_name.get(light.shape)
         if light.shape is not None and (shape is None or shape.hides_itself):
             return f"{light.shape}: may hide its own light"
-        if found := boxes.hidden_from(light):
-            obstacle, receiver = found
+        if pair := boxes.hidden_from(light):
+            obstacle, receiver = pair
             return f"{obstacle} may stand between {light.name} and {receiver}"
     return None
 

@@ -78,15 +78,15 @@ def _define(_variant: str) -> None:
                 si = scene.ray_intersect(ray, mi.RayFlags.All, True, active)
             colour = mi.Spectrum(0)
             if others or len(delta) <= UNROLLED:  # rays never hit points or directions
-                seen = active & (si.is_valid() | (not self.hide_emitters))
-                colour = dr.select(seen, si.emitter(scene).eval(si, seen), 0)
+                is_shown = active & (si.is_valid() | (not self.hide_emitters))
+                colour = dr.select(is_shown, si.emitter(scene).eval(si, is_shown), 0)
             hit = active & si.is_valid()
             environment = scene.environment() is not None and not self.hide_emitters
             valid = active if environment else hit
             if self.transports[0].max_depth == 1:
                 return colour, valid, []
             bsdf = si.bsdf(ray)
-            given = scene, si, bsdf, sampler, hit, self.transports
+            arguments = scene, si, bsdf, sampler, hit, self.transports
             extended = []
             for emitter in others:
                 if self.environment_albedo is not None and emitter.is_environment():
@@ -95,7 +95,7 @@ def _define(_variant: str) -> None:
                 else:
                     extended.append(emitter)
             colours = [colour] * len(self.transports)
-            colours = sums(colours, _of_all(delta, True, *given))
+            colours = sums(colours, _of_all(delta, True, *arguments))
             deep = [each for each in self.transports if each.max_depth != 2]
             if deep:  # first, so that paths have the same random numbers whatever lights there are
                 # Loaded late: most plans have direct light alone.
@@ -106,10 +106,10 @@ def _define(_variant: str) -> None:
                 indirect = indirect_light(scene, sampler, si, bsdf, *parameters)
                 added = dict(zip(deep, indirect, strict=True))
                 colours = sums(colours, [added.get(each, 0) for each in self.transports])
-            colours = sums(colours, _of_all(extended, False, *given))
+            colours = sums(colours, _of_all(extended, False, *arguments))
             looks = any(each.bsdf_samples for each in self.transports)
             if extended and (looks or _has_delta(scene)):
-                colours = sums(colours, _from_bsdf(*given))
+                colours = sums(colours, _from_bsdf(*arguments))
             return colours[0], valid, [channel for each in colours[1:] for channel in each]
 
         def aov_names(self):
@@ -128,8 +128,8 @@ def _define(_variant: str) -> None:
 def _beyond_lamps(scene, ray, active):
     """Return the first surface that does not shine.
 
-    Mitsuba's own integrators go on with the first ray after the last one has hit: its origin is
-    another, so on spheres, disks and cylinders they find another point.
+    Mitsuba's own integrators take the point of the last hit from the first ray: its origin differs,
+    so on spheres, disks and cylinders they find another point.
     """
     si = scene.ray_intersect(ray, mi.RayFlags.All, True, active)
     skip = active & si.is_valid() & (si.shape.emitter() != None)  # noqa: E711  lane-wise
@@ -153,22 +153,22 @@ def _of_all(lights, is_delta, scene, si, bsdf, sampler, active, transports):
         sample = mi.Point2f(0.5) if is_delta else sampler.next_2d(active)
         point, direction, density, weight = sample_direction(si, sample, active)
         facing = active & (density > 0)
-        seen = visibility(scene, si, point, facing, transports)
+        reached = visibility(scene, si, point, facing, transports)
         wo, context = si.to_local(direction), mi.BSDFContext()
         is_mixed = len({each.shadows for each in transports}) > 1
-        evaluated = facing if is_mixed else seen[0]
+        evaluated = facing if is_mixed else reached[0]
         if is_weighted:
             value, bsdf_density = bsdf.eval_pdf(context, si, wo, evaluated)
         else:
             value = bsdf.eval(context, si, wo, evaluated)
-        found = []
-        for each, own in zip(transports, seen, strict=True):
+        colours = []
+        for each, own in zip(transports, reached, strict=True):
             term = value * weight
             if is_weighted and each.bsdf_samples:
                 # The balance heuristic: a sample of the BSDF can also find the light.
                 term = term * density / (density + bsdf_density)
-            found.append(dr.select(own, term, 0))
-        return found
+            colours.append(dr.select(own, term, 0))
+        return colours
 
     targets = [partial(_sampled, light) for light in lights]
     nothing = [mi.Spectrum(0)] * len(transports)

@@ -65,8 +65,8 @@ def require_surface(hit: np.ndarray, name: str) -> None:
         raise InputError(
             f"{name}: no pixel sees a surface: the rays through the centres of all"
             f" {width}x{height} pixels hit nothing. Check the camera (to_world, fov, near_clip,"
-            " far_clip, the film's crop) and the shapes in front of it. To"
-            " allow an empty picture, give --allow-empty."
+            " far_clip, the film's crop) and the shapes in front of it. To allow an empty picture,"
+            " give --allow-empty."
         )
 
 
@@ -120,8 +120,8 @@ def _named_apart(materials: ObjectIds, shapes: ObjectIds) -> ObjectIds:
 def _object_ids(pointers, seen):
     """Return the :class:`ObjectIds` of an array of pointers, one per pixel."""
     numbers = np.array(dr.reinterpret_array(mi.UInt32, pointers)).reshape(seen.shape)
-    found, first, places = np.unique(numbers, return_index=True, return_inverse=True)
-    named = zip(found, first, strict=True)
+    ids, first, places = np.unique(numbers, return_index=True, return_inverse=True)
+    named = zip(ids, first, strict=True)
     names = tuple((pointers[int(at)].id() or UNNAMED) if number else "" for number, at in named)
     return ObjectIds(np.where(seen, places.reshape(seen.shape), -1), names)
 

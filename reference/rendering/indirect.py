@@ -28,7 +28,7 @@ def indirect_light(
 
     Paths begin with a sample of the BSDF there. Direct light takes every light in turn; this picks
     one at random at each later vertex, as Mitsuba's ``path`` does everywhere. ``max_depth`` counts
-    like Mitsuba's: 2 is direct light, for which the result is 0; -1 is no limit. Beyond
+    like Mitsuba's: 2 is direct light, for which the result is 0; -1 means no limit. Beyond
     ``rr_depth`` Russian roulette may end a path. Each of ``transports`` has a result.
     """
     context = mi.BSDFContext()
@@ -46,15 +46,15 @@ def indirect_light(
 
     while active:
         si = scene.ray_intersect(ray, active)
-        # The first ray's hit shines directly on the surface that it left, which is not ours.
+        # The first ray's hit shines directly on the surface that it left, which is not indirect.
         emitter = si.emitter(scene, active)
         ds = mi.DirectionSample3f(scene, si, previous)
-        seen = active & (depth > 2)
+        is_indirect = active & (depth > 2)
         # Emitter samples never take the direction that a mirror, glass or a mask needs.
-        emitter_pdf = scene.pdf_emitter_direction(previous, ds, seen & ~previous_delta)
+        emitter_pdf = scene.pdf_emitter_direction(previous, ds, is_indirect & ~previous_delta)
         share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
-        value = throughput * emitter.eval(si, seen) * share
-        light = sums(light, found_by_bsdf(seen, previous_delta, value, transports))
+        value = throughput * emitter.eval(si, is_indirect) * share
+        light = sums(light, found_by_bsdf(is_indirect, previous_delta, value, transports))
 
         active &= si.is_valid() & (depth < limit)
         vertex = si.bsdf(ray)

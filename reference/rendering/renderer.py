@@ -159,18 +159,18 @@ class Renderer:
 
     def _image(self, seed):
         """Render; later passes replay the kernels of the first if Dr.Jit knows all their arrays."""
-        given = self.scene, self.integrator, self.spp, seed
+        arguments = self.scene, self.integrator, self.spp, seed
         if self._replayed is not None:
             try:
                 if hasattr(self.integrator, "prepare"):  # what cannot be recorded
                     self.integrator.prepare(self.scene)
                 with _no_collection():
-                    return self._replayed(*given)
+                    return self._replayed(*arguments)
             except InputError:  # the scene cannot be prepared
                 raise
             except Exception:  # a plugin's message is better when it is traced
                 self._replayed = None
-        return _rendered(*given)
+        return _rendered(*arguments)
 
     def pass_times(self) -> Times:
         """Return the :class:`Times` of the passes so far."""
@@ -214,9 +214,9 @@ def syntax(f: FunctionType | None = None, **options: Any) -> Callable[..., Any]:
     key = f.__code__.co_filename, f.__code__
     if key not in _transformed:
         _transformed[key] = _transform(f).__code__
-    made = FunctionType(_transformed[key], f.__globals__)
-    made.__defaults__ = f.__defaults__
-    return made
+    copy = FunctionType(_transformed[key], f.__globals__)
+    copy.__defaults__ = f.__defaults__
+    return copy
 
 
 dr.syntax = syntax  # for Mitsuba's modules, which look it up when they are loaded
@@ -283,10 +283,10 @@ def passes(
             if progress:
                 progress(stage, number, count)
             own = pass_seed(seed, number, stream)
-            made = Pass(number, own, _images(renderers, own))
+            result = Pass(number, own, _images(renderers, own))
             done = number + 1
-            yield made
-            del made  # else its images would stay alongside the next ones
+            yield result
+            del result  # else its images would stay alongside the next ones
     finally:
         if progress:
             progress(stage, done, done)

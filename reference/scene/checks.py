@@ -134,9 +134,9 @@ def _missing(graph: Graph, index: int) -> Iterator[str]:
         yield f"it has no picture: give one of {', '.join(PICTURES)}."
     if plugin in CHILDREN:
         kind, count = CHILDREN[plugin]
-        found = len(graph.children(index, kind))
-        if found != count:
-            yield f"it needs {count} {kind.name} elements, and has {found}."
+        children = len(graph.children(index, kind))
+        if children != count:
+            yield f"it needs {count} {kind.name} elements, and has {children}."
     if plugin == "cylinder" and "p0" in props and "p1" in props:
         ends = [np.ravel(np.asarray(props[key], float)) for key in ("p0", "p1")]
         if (ends[0] == ends[1]).all():

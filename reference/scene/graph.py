@@ -78,12 +78,12 @@ class Graph:
         """Return a graph of a node, which comes first, and copies of everything it refers to."""
         part = self._of(Parser.ParserState())
         part.state.files = self.state.files
-        given = [index, *(one for one in self.nodes_in_use(index) if one != index)]
-        places = {one: place for place, one in enumerate(given)}
+        indices = [index, *(one for one in self.nodes_in_use(index) if one != index)]
+        places = {one: place for place, one in enumerate(indices)}
         paths = list(self.state.node_paths)  # without files and added nodes
         if paths:
-            part.state.node_paths = [paths[one] if one < len(paths) else "" for one in given]
-        for one in given:
+            part.state.node_paths = [paths[one] if one < len(paths) else "" for one in indices]
+        for one in indices:
             node = Parser.SceneNode(self.state.nodes[one])
             node.props = mi.Properties(node.props)
             part.state.nodes.append(node)
@@ -101,12 +101,12 @@ class Graph:
         if index:
             return self.part(index).instantiate()
         try:
-            made = self._made()
+            instance = self._made()
         except Exception as error:  # plugins may raise anything, in Python or in Mitsuba
             raise InputError(f"{self.name}: {plain_message(error)}") from error
-        if isinstance(made, mi.Scene):
-            self._require_extents(made)
-        return made
+        if isinstance(instance, mi.Scene):
+            self._require_extents(instance)
+        return instance
 
     def _made(self) -> Any:
         state = Parser.ParserState(self.state)
@@ -123,8 +123,8 @@ class Graph:
             for node in state.nodes
         )
         with resolving(self.resolver):
-            made = Parser.instantiate(self.config, state)
-        return made[0] if isinstance(made, list) else made
+            instance = Parser.instantiate(self.config, state)
+        return instance[0] if isinstance(instance, list) else instance
 
     def _require_extents(self, scene):
         for shape in scene.shapes():
@@ -137,9 +137,10 @@ class Graph:
                     " Give it a finite size and place; check its transforms and files."
                 )
 
-    def nodes(self, kind: Any) -> list[int]:
-        """Return the indices of the nodes of a kind (``mitsuba.ObjectType``) that are in use."""
-        return [index for index in self.nodes_in_use() if self.kind(index) == kind]
+    def nodes(self, kind: Any, plugin: str = "") -> list[int]:
+        """Return the indices of the nodes in use of a kind (``mitsuba.ObjectType``) or a plugin."""
+        own = [index for index in self.nodes_in_use() if self.kind(index) == kind]
+        return [index for index in own if plugin in ("", self.plugin(index))]
 
     def kind(self, index: int) -> Any:
         """Return the kind of a node; Mitsuba does not know it for Python plugins."""
@@ -151,9 +152,9 @@ class Graph:
             if plugin in PLUGINS:
                 kind = KINDS[PLUGINS[plugin][0]]
             else:  # a user's plugin has the kind of the object that it makes
-                made = self.instantiate(index)
+                instance = self.instantiate(index)
                 for name in ("BSDF", "Emitter", "Integrator", "Texture", "Shape", "Sensor", "Film"):
-                    if isinstance(made, getattr(mi, name)):
+                    if isinstance(instance, getattr(mi, name)):
                         kind = getattr(mi.ObjectType, name)
                         break
             self.kinds[plugin] = kind

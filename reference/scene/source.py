@@ -52,15 +52,15 @@ class Script:
         try:
             with contained(self.path):
                 scene = runpy.run_path(str(self.path)).get(SCRIPT)
-                made = scene() if callable(scene) else scene
+                content = scene() if callable(scene) else scene
         except (Exception, SystemExit) as error:  # a user's code may raise anything
             raise InputError(f"{self.path}: {type(error).__name__}: {error}") from error
-        if not isinstance(made, Mapping):
+        if not isinstance(content, Mapping):
             raise InputError(
-                f"{self.path}: `{SCRIPT}` is {type(made).__name__}. It must be a dictionary for"
+                f"{self.path}: `{SCRIPT}` is {type(content).__name__}. It must be a dictionary for"
                 " mitsuba.load_dict, or a function that returns one."
             )
-        return made
+        return content
 
 
 @dataclass(eq=False)
@@ -106,15 +106,15 @@ class Source:
         The tables of a ``<spectrum filename=...>`` are in the graph as soon as it is parsed.
         """
         graph = self.parse()
-        found = {self.content.path.resolve()} if isinstance(self.content, Script) else set()
+        paths = {self.content.path.resolve()} if isinstance(self.content, Script) else set()
         if isinstance(self.content, (str, PathLike)):
-            found |= {Path(str(file)).resolve() for file in graph.state.files}
+            paths |= {Path(str(file)).resolve() for file in graph.state.files}
         for index in graph.nodes_in_use():
             for _, value in graph.props(index).items():
                 path = find_file(graph.resolver, value) if isinstance(value, str) else None
                 if path is not None and path.is_file():
-                    found.add(path.resolve())
-        return tuple(sorted(found))
+                    paths.add(path.resolve())
+        return tuple(sorted(paths))
 
     def _parsed(self, variant: str) -> Graph:
         config = Parser.ParserConfig(variant)
@@ -127,7 +127,7 @@ class Source:
                 state = Parser.parse_dict(config, dict(content))
             else:
                 path = Path(content)
-                text_of(path)  # Mitsuba takes any bytes, which later are no names
+                text_of(path)  # Mitsuba takes any bytes, which later cannot be names
                 resolver = mi.FileResolver(mi.file_resolver())
                 resolver.prepend(str(path.resolve().parent))  # first, as for Mitsuba's command
                 with resolving(resolver):
@@ -202,24 +202,24 @@ def count_messages(messages: Iterable[str]) -> tuple[str, ...]:
 
 def digest(source: Source) -> str:
     """Return a digest of a scene's graph in the current variant, and of every file it reads."""
-    found = hashlib.sha256()
+    whole = hashlib.sha256()
     graph = source.parse()
     for index in graph.nodes_in_use():
         props = graph.props(index)
-        found.update(f"{index} {props.plugin_name()} {props.id()}\0".encode())
+        whole.update(f"{index} {props.plugin_name()} {props.id()}\0".encode())
         for key, value in props.items():
             for part in _parts(value):
-                found.update(f"{key} {len(part)} ".encode() + part)
+                whole.update(f"{key} {len(part)} ".encode() + part)
     for path in source.files():
         try:
             with path.open("rb") as file:
-                found.update(hashlib.file_digest(file, "sha256").digest())
+                whole.update(hashlib.file_digest(file, "sha256").digest())
         except OSError as error:
             raise InputError(
                 f"{source.name}: {path}: {error.strerror or error}. The scene names this file:"
                 " ensure that it can be read."
             ) from error
-    return found.hexdigest()
+    return whole.hexdigest()
 
 
 def _parts(value: Any) -> Iterator[bytes]:

@@ -36,13 +36,13 @@ def colour(graph: Graph, index: int, key: str, default: Any) -> tuple[float, flo
     Textures and tabulated spectra have none; negative and infinite ones are not allowed.
     """
     props = graph.props(index)
-    known = plain(props.get(key, default))
-    if known is None:
+    value = plain(props.get(key, default))
+    if value is None:
         raise InputError(
             f"{graph.name}: {graph.label(index)}: {key} is a texture or a tabulated spectrum,"
             f" which {props.plugin_name()} does not support yet. Give a number or RGB."
         )
-    red, green, blue = known if isinstance(known, tuple) else (known,) * 3
+    red, green, blue = value if isinstance(value, tuple) else (value,) * 3
     components = red, green, blue
     if not all(np.isfinite(components)) or min(components) < 0:
         shown = f"{components[0]:g}" if len(set(components)) == 1 else str(components)
@@ -81,8 +81,8 @@ def index_of_refraction(graph: Graph, index: int, key: str, default: Any) -> flo
 
 def is_zero(value: Any) -> bool:
     """Return whether a value is plain and 0."""
-    known = plain(value)
-    return known is not None and not np.any(known)
+    number = plain(value)
+    return number is not None and not np.any(number)
 
 
 def may_be_nonzero(value: Any) -> bool:
@@ -148,10 +148,10 @@ def node(graph: Graph, plugin: str, **values: Any) -> Reference:
 
 
 def _combined(graph: Graph, plugin: str, function: Callable, **operands: Any) -> Any:
-    known = [plain(value) for value in operands.values()]
-    if all(value is not None for value in known):
-        found = np.asarray(function(*(np.asarray(value) for value in known)), float)
-        return tuple(found.tolist()) if found.ndim else float(found)
+    numbers = [plain(value) for value in operands.values()]
+    if all(value is not None for value in numbers):
+        result = np.asarray(function(*(np.asarray(value) for value in numbers)), float)
+        return tuple(result.tolist()) if result.ndim else float(result)
     return node(graph, plugin, **operands)
 
 

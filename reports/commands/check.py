@@ -72,12 +72,12 @@ def check(
       fotismos check baselines
       fotismos check baselines/cornell-box.json --update
     """  # noqa: D301 click reads the \b as: keep these lines
-    given = {
+    changes = {
         name: value
         for name, value in rendering.items()
         if context.get_parameter_source(name) is not ParameterSource.DEFAULT
     }
-    wanting = [f"--{name.replace('_', '-')}" for name in given if name != "seed"]
+    wanting = [f"--{name.replace('_', '-')}" for name in changes if name != "seed"]
     wanting += ["--scene"] * bool(scenes) + ["--images"] * images
     if wanting and not update:
         raise InputError(
@@ -97,14 +97,14 @@ def check(
 
         views: list[Any] = []
         if update:
-            found = checks.update_all(pool, baseline, scenes, images, significance, given)
+            outcomes = checks.update_all(pool, baseline, scenes, images, significance, changes)
         else:
             with results.hold(output, jobs.command_line()) as top:
                 folder = results.own(top / "check")
-                found, views = checks.examine_all(
-                    pool, baseline, significance, given.get("seed"), folder
+                outcomes, views = checks.examine_all(
+                    pool, baseline, significance, changes.get("seed"), folder
                 )
-                title = f"fotismos check: {summaries.outcome(found, significance)}"
+                title = f"fotismos check: {summaries.outcome(outcomes, significance)}"
                 if views:
                     records = [view.record for view in views]
                     details = page.details(len(views), records=records)
@@ -113,19 +113,19 @@ def check(
                 else:
                     results.clear(folder, (results.PAGE, page.DETAILS))
     place = str(folder / results.PAGE) if views else ""
-    for made in found:
-        if made.status == "error":
-            echo(f"fotismos: error: {made.message}", err=True)
-    summaries.write_junit(junit, lambda: summaries.junit_of_checks(found))
-    summaries.append(summary, lambda: summaries.of_checks(found, significance, place))
-    code = max(made.exit_code for made in found)
+    for each in outcomes:
+        if each.status == "error":
+            echo(f"fotismos: error: {each.message}", err=True)
+    summaries.write_junit(junit, lambda: summaries.junit_of_checks(outcomes))
+    summaries.append(summary, lambda: summaries.of_checks(outcomes, significance, place))
+    code = max(each.exit_code for each in outcomes)
     if as_json:
-        record = checks.Checks(passed=not code, significance=significance, checks=tuple(found))
+        record = checks.Checks(passed=not code, significance=significance, checks=tuple(outcomes))
         click.echo(to_json(record), nl=False)
     elif not is_quiet():
-        tell(summaries.lines(found, significance))
+        tell(summaries.lines(outcomes, significance))
         if place:
             click.echo(f"page: {place}")
     elif code:
-        click.echo(summaries.outcome(found, significance))
+        click.echo(summaries.outcome(outcomes, significance))
     context.exit(code)

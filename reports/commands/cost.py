@@ -54,12 +54,12 @@ def cost(
     if is_measured and at is None:
         raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
     words = (jobs.request(rendering), rounds, at, is_measured)
-    found = jobs.results_of(output, "cost", timeout, [scene], measured, *words)
+    records = jobs.results_of(output, "cost", timeout, [scene], measured, *words)
     from reference.records import to_json
     from reports.files.results import PAGE
     from reports.terminal import cost_tables
 
-    ((folder, record),) = found.items()
+    ((folder, record),) = records.items()
     if as_json:
         click.echo(to_json(record), nl=False)
         return

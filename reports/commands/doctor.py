@@ -107,8 +107,8 @@ def pinned() -> dict[str, str]:
     except metadata.PackageNotFoundError:
         project = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
         required = project["dependencies"]
-    found = (re.fullmatch(r"([\w-]+) *== *([\w.]+)", text) for text in required)
-    return {match[1]: match[2] for match in found if match}
+    matches = (re.fullmatch(r"([\w-]+) *== *([\w.]+)", text) for text in required)
+    return {match[1]: match[2] for match in matches if match}
 
 
 def version_lines() -> Iterator[str]:

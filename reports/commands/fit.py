@@ -58,18 +58,18 @@ def fit(
       fotismos fit fig-8-9
       fotismos fit my_scene.xml --loss linear --form phong
     """  # noqa: D301 click reads the \b as: keep these lines
-    given = {"loss": loss, "form": form}
-    found = jobs.results_of(output, "fit", timeout, scenes, fitted, jobs.request(words), given)
+    choices = {"loss": loss, "form": form}
+    records = jobs.results_of(output, "fit", timeout, scenes, fitted, jobs.request(words), choices)
     from reference.records import plain
     from reports.files.results import PAGE
     from reports.run import fit_files
 
     if as_json:
-        click.echo(json.dumps(plain([*found.values()]), indent=2, ensure_ascii=False))
+        click.echo(json.dumps(plain([*records.values()]), indent=2, ensure_ascii=False))
         return
-    for record in found.values():
+    for record in records.values():
         tell(fit_files.lines(record))
-    folder, *others = found
+    folder, *others = records
     tell_where(folder.parent if others else folder / PAGE)
 
 

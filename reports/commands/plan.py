@@ -57,17 +57,17 @@ def plan(
         if within is not None:
             with progress.shown() as bar:
                 words = (scene, request, within)
-                found = pool.do(Task(scene, chosen, words, bar.of(scene)))
-            lines, code = cost_tables.choice_lines(found), int(found.chosen is None)
+                result = pool.do(Task(scene, chosen, words, bar.of(scene)))
+            lines, code = cost_tables.choice_lines(result), int(result.chosen is None)
         elif verify:
             with progress.shown() as bar:
-                found = pool.do(Task(scene, verified, (scene, request, None), bar.of(scene)))
-            lines = plan_lines.verification_lines([found])
+                result = pool.do(Task(scene, verified, (scene, request, None), bar.of(scene)))
+            lines = plan_lines.verification_lines([result])
         else:
-            found = pool.do(Task(scene, planned, (scene, request)))
-            lines = plan_lines.plan_lines(found)
+            result = pool.do(Task(scene, planned, (scene, request)))
+            lines = plan_lines.plan_lines(result)
     if as_json:
-        click.echo(to_json(found).rstrip())
+        click.echo(to_json(result).rstrip())
     else:
         tell(lines)
     if code:

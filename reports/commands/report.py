@@ -95,9 +95,9 @@ def _verified(folder: Path, names: Sequence[str], request: Options, quick: bool)
     ]
     cases = Task(HARD, timed, (folder, hard_cases))
 
-    def content(found: Mapping[str, Any]) -> dict[str, Any]:
+    def content(by_name: Mapping[str, Any]) -> dict[str, Any]:
         """Return the page's content of the results of tasks."""
-        return {"verifications": [found[name] for name in names], "hard_cases": found[HARD]}
+        return {"verifications": [by_name[name] for name in names], "hard_cases": by_name[HARD]}
 
     return batch.Further("verification and hard cases", [cases, *tasks], content)
 

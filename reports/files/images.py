@@ -18,7 +18,7 @@ from PIL import Image
 from comparisons import atomic
 from comparisons.comparison import Images
 from comparisons.departure import marks
-from comparisons.departure.colour import to_srgb
+from comparisons.departure.colour import CHROMATICITIES, to_srgb
 from comparisons.departure.metrics import LEADING, RATIO, drawn
 
 Bytes = NDArray[np.uint8]
@@ -81,26 +81,26 @@ def png(picture: Image.Image) -> bytes:
 
 def pictures(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
     """The named PNG files of a comparison, each map over the fixed range of its metric."""
-    made = {
+    panels = {
         "heuristic": tonemap(shown.heuristic, exposure),
         "reference": tonemap(shown.reference, exposure),
         "significant": mask_map(shown.significant, shown.counted),
         RATIO.name: signed_map(shown.maps[RATIO.name], RATIO.limit),
     }
     for name, metric in drawn().items():
-        made[name] = error_map(shown.maps[name], metric.map_range[1])
-    return {name: png(picture) for name, picture in made.items()}
+        panels[name] = error_map(shown.maps[name], metric.map_range[1])
+    return {name: png(picture) for name, picture in panels.items()}
 
 
 def thumbnails(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
     """Small WebP files: both halves, the leading metric's map, and terms that are not black."""
-    made = {
+    panels = {
         "heuristic": tonemap(shown.heuristic, exposure),
         "reference": tonemap(shown.reference, exposure),
         LEADING.name: error_map(shown.maps[LEADING.name], LEADING.map_range[1]),
     }
-    made |= {name: tonemap(term, exposure) for name, term in shown.terms.items() if term.any()}
-    return {name: webp(_small(picture)) for name, picture in made.items()}
+    panels |= {name: tonemap(term, exposure) for name, term in shown.terms.items() if term.any()}
+    return {name: webp(_small(picture)) for name, picture in panels.items()}
 
 
 def _small(picture: Image.Image) -> Image.Image:
@@ -153,15 +153,12 @@ FULL_PRECISION = frozenset({"heuristic", "reference", "reference_stderr", "P", "
 #: Layers with X, Y, Z instead of R, G, B.
 VECTORS = frozenset({"P", "N"})
 
-#: CIE x, y of red, green, blue and white of ITU-R BT.709.
-BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-
 #: The largest finite half.
 HALF_MAX = 65_504.0
 
 
 def write_exr(path: Path, layers: Mapping[str, ArrayLike], header: Mapping[str, object]) -> None:
-    """Write images by name to a file atomically, as one scanline part, ZIP-compressed.
+    """Write named images to a file atomically, as one scanline part, ZIP-compressed.
 
     See :func:`channels`. The header is metadata, e.g. seed, samples and versions; BT.709's
     chromaticities are added.
@@ -172,7 +169,7 @@ def write_exr(path: Path, layers: Mapping[str, ArrayLike], header: Mapping[str, 
         **{name: str(value) for name, value in header.items()},
         "type": OpenEXR.scanlineimage,
         "compression": OpenEXR.ZIP_COMPRESSION,
-        "chromaticities": BT709,
+        "chromaticities": CHROMATICITIES,
     }
     file = OpenEXR.File(attributes, channels(layers))
     # Given a path, the bindings do not report that its end could not be written.

@@ -209,8 +209,8 @@ def clear(folder: Path, names: Iterable[str]) -> None:
 def places(folder: Path, scenes: Iterable[str]) -> dict[str, str]:
     """Return the names of the scenes' folders, with the words that name the scenes."""
     scenes = list(scenes)
-    found = assigned(folder, [(name_of(scene), file_of(scene)) for scene in scenes])
-    return dict(zip(found, scenes, strict=True))
+    folders = assigned(folder, [(name_of(scene), file_of(scene)) for scene in scenes])
+    return dict(zip(folders, scenes, strict=True))
 
 
 def assigned(folder: Path, subjects: Iterable[tuple[str, Path | None]]) -> list[str]:
@@ -218,20 +218,20 @@ def assigned(folder: Path, subjects: Iterable[tuple[str, Path | None]]) -> list[
 
     A folder belongs to one subject, which its mark names, also in later commands.
     """
-    known = {path.name: _subject_of(path) for path in sorted(folder.iterdir()) if is_own(path)}
-    found: list[str] = []
+    owners = {path.name: _subject_of(path) for path in sorted(folder.iterdir()) if is_own(path)}
+    chosen: list[str] = []
     for name, file in subjects:
         # Relative, so that the folder and the file may move together.
         path = file and os.path.relpath(file.resolve(), folder.resolve())
         subject = f"of: {path or f'built-in {name}'}"
-        places = [place for place, of in known.items() if of == subject]
+        places = [place for place, of in owners.items() if of == subject]
         free = (place for place in _candidates(name) if not _subject_of(folder / place))
-        place = next(one for one in chain(places, free) if one not in found)
+        place = next(one for one in chain(places, free) if one not in chosen)
         own(folder / place)
-        if known.get(place) != subject:
+        if owners.get(place) != subject:
             atomic.write(folder / place / MARK, os.fsencode(subject))
-        found.append(place)
-    return found
+        chosen.append(place)
+    return chosen
 
 
 def _candidates(name: str) -> Iterator[str]:

@@ -37,10 +37,10 @@ def text(name: str) -> str:
 
 def schema(kind: type) -> dict[str, Any]:
     """Return the JSON Schema of a type of record."""
-    made = msgspec.json.schema(kind)
-    for definition in made["$defs"].values():
+    content = msgspec.json.schema(kind)
+    for definition in content["$defs"].values():
         _describe(definition)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **made}
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **content}
 
 
 def _describe(definition: dict[str, Any]) -> None:

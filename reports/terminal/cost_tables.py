@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 from comparisons.cost.front import Reach, reach, sufficient
@@ -42,10 +42,8 @@ def lines(record: Cost) -> Iterator[str]:
     for method in record.methods:
         if abs(method.bend) > BENT:
             yield f"{method.name}: a third count is {method.bend:+.0%} off the straight line"
-    known = meanings()
-    for method in record.methods:  # the names of the others say what they are
-        if method.family == "physical" and method.name in known:
-            yield f"{method.name}: {known[method.name]}"
+    # The names of the others say what they are.
+    yield from _explained(method.name for method in record.methods if method.family == "physical")
     for name, reason in record.left_out.items():
         yield f"left out: {name}: {reason}"
     yield from _section(f"Error and time of one image at {size}", _points(record.points))
@@ -95,8 +93,8 @@ def unreached(record: Cost) -> str:
     points = record.predicted or record.points
     if sufficient(points, TOLERANCE):
         return ""
-    found = beyond(reach(points, TOLERANCE))
-    return f"No measured method passes at {LEADING.label} {TOLERANCE:g}. {found}"
+    advice = beyond(reach(points, TOLERANCE))
+    return f"No measured method passes at {LEADING.label} {TOLERANCE:g}. {advice}"
 
 
 def closure(record: Cost) -> str:
@@ -131,23 +129,25 @@ def choice_lines(choice: Choice) -> Iterator[str]:
         yield f"Too close to call: {', '.join(chosen.ties)}."
     if choice.measured != choice.resolution:
         yield f"Errors were measured at {sized(choice.measured)}."
+    yield from _explained(dict.fromkeys(((chosen or choice.best).method, full.method)))
+
+
+def _explained(methods: Iterable[str]) -> Iterator[str]:
     known = meanings()
-    for method in dict.fromkeys(((chosen or choice.best).method, full.method)):
-        if method in known:
-            yield f"{method}: {known[method]}"
+    return (f"{method}: {known[method]}" for method in methods if method in known)
 
 
-def beyond(found: Reach | None) -> str:
+def beyond(need: Reach | None) -> str:
     """Return what more samples than measured would do at a tolerance that no method passes at."""
-    if found is None:
+    if need is None:
         return "More samples (--spp) decide."
-    if found.spp is None:
+    if need.spp is None:
         return (
-            f"No sample count would: with {found.method}, the nearest, 5 % of the pixels exceed"
-            f" {LEADING.label} {number(found.left)} without its noise: bias, or the"
+            f"No sample count would: with {need.method}, the nearest, 5 % of the pixels exceed"
+            f" {LEADING.label} {number(need.left)} without its noise: bias, or the"
             " reference's own noise, remains."
         )
-    return f"About {found.spp:,} samples per pixel of {found.method} would; --spp measures more."
+    return f"About {need.spp:,} samples per pixel of {need.method} would; --spp measures more."
 
 
 def _offer(point: Point) -> str:
@@ -189,18 +189,18 @@ def _points(points: Sequence[Point]) -> Rows:
 def _off(record: Cost) -> Rows:
     """Yield how far off the predictions are."""
     yield "method", "time", "predicted", "off", "mean ΔE2000", "predicted", "off"
-    known = {(point.method, point.spp): point for point in record.predicted}
-    for found in record.measured:
-        said = known[found.method, found.spp]
-        time, error = found.seconds.value, found.error.mean
+    forecasts = {(point.method, point.spp): point for point in record.predicted}
+    for point in record.measured:
+        forecast = forecasts[point.method, point.spp]
+        time, error = point.seconds.value, point.error.mean
         yield (
-            found.method,
+            point.method,
             seconds(time),
-            seconds(said.seconds.value),
-            f"{said.seconds.value / time - 1:+.0%}",
+            seconds(forecast.seconds.value),
+            f"{forecast.seconds.value / time - 1:+.0%}",
             f"{error:.3f}",
-            f"{said.error.mean:.3f}",
-            f"{said.error.mean / error - 1:+.0%}" if error else "",
+            f"{forecast.error.mean:.3f}",
+            f"{forecast.error.mean / error - 1:+.0%}" if error else "",
         )
 
 

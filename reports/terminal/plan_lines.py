@@ -42,13 +42,13 @@ class PlanReport(Plan, kw_only=True):
 
 def plan_report(scene: str, ready: Prepared, variant: str) -> PlanReport:
     """Return the plan of a prepared comparison."""
-    made = ready.plan_record(ready.passes)
+    plan = ready.plan_record(ready.passes)
     return PlanReport(
         scene=scene,
         variant=variant,
         shading=ready.pair.shading,
         planning_s=ready.planning_seconds,
-        **asdict(made) | {"effects": tuple(map(_planned, made.effects))},
+        **asdict(plan) | {"effects": tuple(map(_planned, plan.effects))},
     )
 
 
