@@ -28,8 +28,8 @@ QUICKLY_VERIFIED_AT = (32, 32)
 
 HARD = "hard cases"
 
-LADDERS = frozenset({"fig-8-9", "fig-6-10", "plastic-spheres", "cornell-box"})
-"""Scenes of which methods are measured: an analytic lobe, meshes, shadows, and interreflection."""
+LADDERS = frozenset({"fig-6-10", "plastic-spheres", "cornell-box"})
+"""Scenes of which methods are measured: a lobe on a mesh, shadows, and interreflection."""
 
 VERIFIED_QUICKLY = slice(3, None, 4)
 """``--quick`` verifies one scene in four, from each group."""
