@@ -86,9 +86,11 @@ class NearestPhong:
         """Return the properties of the node ``phong``, without defaults."""
         own = {name: getattr(self, name) for name in (*COEFFICIENTS, "n", "transmittance")}
         own = {k: v for k, v in own.items() if k in ("k_d", "n") or not values.is_zero(v)}
-        for name in ("normalised", "twosided", "form", "tilt"):
-            if getattr(self, name) not in (False, "phong", None):
+        for name in ("normalised", "twosided", "form"):
+            if getattr(self, name) not in (False, "phong"):
                 own[name] = getattr(self, name)
+        if self.tilt is not None:
+            own["tilt"] = self.tilt
         return properties("phong", **own, **self.physical)
 
     def parameters(self) -> dict[str, Any]:
