@@ -1,0 +1,87 @@
+"""Checks of pictures from any renderer tell noise from drift, by command and over many runs."""
+
+import json
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from scipy import stats
+
+from tests.benchmarks import gates
+from tests.schemas import schema
+from tests.test_pictures import write
+
+TRUTH = gates.TRUTH[..., 0]
+
+
+@pytest.fixture
+def check(run, tmp_path, monkeypatch):
+    """A function that checks repeats, of the truth times something, against a baseline of four."""
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(8)
+
+    def checked(count, factor, *words):
+        for path in tmp_path.glob("*.exr"):
+            path.unlink()
+        for number in range(count):
+            noise = 1 + 0.02 * rng.standard_normal((*TRUTH.shape[:2], 1))
+            write(tmp_path / f"{number}.exr", TRUTH * noise * factor)
+        return run("check", "b", "--picture", "hall=?.exr", *words)
+
+    code, printed, _ = checked(4, 1, "--update")
+    assert (code, "smaller ones may be missed" in printed) == (0, True)
+    return checked
+
+
+@pytest.mark.guarantee("checks", "A constant change of a picture is named, with its factor.")
+def test_repeats_pass_and_a_factor_fails_by_name(check):
+    jsonschema.validate(json.loads(Path("b/hall.json").read_text()), schema("pictures"))
+    assert [check(count, 1)[0] for count in (1, 2, 4)] == [0, 0, 0]
+    code, printed, _ = check(2, 1.01322, "--json", "--junit", "j.xml")
+    jsonschema.validate(json.loads(printed), schema("check"))
+    cause = json.loads(printed)["checks"][0]["causes"][0]
+    value, half = map(float, cause.split("factor of ")[1].split(",")[0].split(" ± "))
+    assert (code, abs(value - 1.01322) < 2 * half < 0.004) == (1, True)
+    for path in ("out/check/index.html", "j.xml"):
+        assert cause in Path(path).read_text()
+    local = np.ones((*TRUTH.shape[:2], 1))
+    local[16:32, 32:48] = 1.1
+    assert "in 1 of 12 blocks, most in row 2, column 3" in check(3, local)[1]
+
+
+def test_what_cannot_be_checked_ends_with_2(run, check, tmp_path):
+    check(4, 1)
+    write(tmp_path / "wide.exr", np.ones((8, 9, 3)))
+    write(tmp_path / "nan.exr", np.full((48, 64, 3), np.nan))
+    for place, factor in enumerate((1, 1.5, 1.5)):
+        write(tmp_path / f"twin{place}.exr", TRUTH * factor)
+    (tmp_path / "text.exr").write_text("no picture")
+    for words, expected in {
+        "--picture hall=wide.exr": "pictures of 9x8, 64x48",
+        "--picture hall=nan.exr": "NaN or infinite",
+        "--picture hall=twin?.exr": "give each its own seed",
+        "--picture hall=text.exr": "not a readable EXR",
+        "--picture hall=gone*.exr": "no file matches",
+        "--picture hall=?.exr --picture roof=?.exr": "roof.json: No such file",
+        "--picture hall=0.exr --update": "two repeats or more",
+        "--picture hall=?.exr --update --spp 4": "--spp: pictures are not rendered",
+        "": "Give --picture hall",
+    }.items():
+        code, printed, messages = run("check", "b", *words.split())
+        assert (code, expected in printed + messages) == (2, True), messages
+        assert "Traceback" not in messages
+    (tmp_path / "b/hall.exr").write_bytes((tmp_path / "0.exr").read_bytes())
+    assert check(4, 1)[0] == 2
+
+
+@pytest.mark.guarantee(
+    "checks", "Pictures of any noise alarm no more often than stated; power is as printed."
+)
+@pytest.mark.parametrize("noise", gates.NOISES)
+@pytest.mark.parametrize("rounds", [2, pytest.param(20, marks=pytest.mark.slow)])
+def test_alarms_and_power_are_as_stated(noise, rounds):
+    for count in gates.COUNTS if rounds > 2 else (2,):
+        alarms, power, _ = gates.measured(gates.drawn(noise), count, 100 * rounds, gates.ours)
+        assert alarms[0, 0] * 100 * rounds <= stats.binom.ppf(0.999, 100 * rounds, gates.LEVEL)
+        assert (np.abs(power[:, 0] - 0.95) <= 0.05).all()
