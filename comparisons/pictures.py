@@ -10,7 +10,7 @@ at all shifts up to :data:`REACH`, and the better agreement counts; a parabola t
 values gives the fraction of a pixel.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import permutations
 from math import pi
@@ -68,10 +68,7 @@ class PictureHalf:
 def read_all(options: Options) -> list[np.ndarray]:
     """Return the pictures that options name: all of one size, and one or an even number."""
     images = [read(word, options.transfer) for word in options.image]
-    sizes = {image.shape[:2] for image in images}
-    if len(sizes) > 1:
-        shown = ", ".join(f"{width}x{height}" for height, width in sorted(sizes))
-        raise InputError(f"pictures of {shown}: give repeats of one size.")
+    require_one_size(images)
     if len(images) > 1 and options.noise is not None:
         raise InputError(
             f"noise = {options.noise:g} and {len(images)} repeats: a noise target may need more"
@@ -82,6 +79,14 @@ def read_all(options: Options) -> list[np.ndarray]:
             f"{len(images)} repeats: give one, or an even number, whose halves give the noise."
         )
     return images
+
+
+def require_one_size(images: Iterable[np.ndarray]) -> None:
+    """Ensure that pictures are of one size."""
+    sizes = {image.shape[:2] for image in images}
+    if len(sizes) > 1:
+        shown = ", ".join(f"{width}x{height}" for height, width in sorted(sizes))
+        raise InputError(f"pictures of {shown}: give repeats of one size.")
 
 
 def at_size_of_pictures(source: Source, options: Options) -> Options:

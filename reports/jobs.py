@@ -36,8 +36,8 @@ def resolution(text: str) -> tuple[int, int]:
     return int(sides[1]), int(sides[2])
 
 
-def _definition(text: str) -> tuple[str, str]:
-    """Parse ``NAME=VALUE`` for a placeholder ``$NAME`` of a scene file."""
+def definition(text: str) -> tuple[str, str]:
+    """Parse ``NAME=VALUE``, such as for a placeholder ``$NAME`` of a scene file."""
     name, separator, value = text.partition("=")
     if not (separator and name):
         raise click.BadParameter(f"{text!r} is not a definition; write it like name=value.")
@@ -189,7 +189,7 @@ def _kind(name: str, kind: Any) -> dict[str, Any]:
         case inspect.TupleType():
             return {"type": resolution}
         case inspect.DictType():
-            return {"type": _definition, "multiple": True}
+            return {"type": definition, "multiple": True}
         case inspect.VarTupleType():
             return {"multiple": True}
     return {}

@@ -164,6 +164,16 @@ def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
     return sorted((move for move in moves if not move.p_corrected >= level), key=order)
 
 
+def where_moved(before: Array, after: Array, count: int) -> str:
+    """Return how many blocks (rows, columns, 3) moved, ``count``, and where most."""
+    if not count:
+        return "moved in the mean of the image, but in no single block"
+    change = np.abs(after - before).sum(axis=-1)
+    row, column = np.unravel_index(change.argmax(), change.shape)
+    most = f"most in row {row + 1}, column {column + 1}"
+    return f"moved in {count} of {change.size} blocks, {most}"
+
+
 @dataclass(frozen=True)
 class Check:
     """A scene compared with its baseline: every quantity tested, and those that moved.
@@ -204,13 +214,7 @@ class Check:
         is_one = ratios.size and np.ptp(ratios) <= ALIKE * abs(ratios.mean())
         if is_one and abs(ratios.mean() - 1) > ALIKE:
             return f"has {ratios.mean():.3g} times the light everywhere: its level moved"
-        blocks = {move.block for move in moves if move.block}
-        if not blocks:
-            return "moved in the mean of the image, but in no single block"
-        change = np.abs(new - old).sum(axis=-1)
-        row, column = np.unravel_index(change.argmax(), change.shape)
-        most = f"most in row {row + 1}, column {column + 1}"
-        return f"moved in {len(blocks)} of {change.size} blocks, {most}"
+        return where_moved(old, new, len({move.block for move in moves if move.block}))
 
 
 def check(

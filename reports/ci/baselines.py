@@ -1,7 +1,7 @@
 """Baselines as files: finding them, reading and writing them, and the scenes that they name."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -62,16 +62,23 @@ LARGEST = 2**24
 LONGEST_KEPT = 128
 """Pixels of the longer side of the pictures that a baseline keeps."""
 
-_HOW = f"Make one with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`."
+_HOW = (
+    f"Make one with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`, or"
+    " with `--picture NAME=PATTERN` in place of the scene."
+)
 
 
 def read(path: Path) -> BaselineFile:
     """Read a baseline."""
+    return BaselineFile(path, read_baseline(read_text(path), str(path)))
+
+
+def read_text(path: Path) -> str:
+    """Read the text of a baseline, of a scene or of pictures."""
     try:
-        text = content(path, LARGEST).decode()
+        return content(path, LARGEST).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}. {_HOW}") from error
-    return BaselineFile(path, read_baseline(text, str(path)))
 
 
 def require_own_pictures(path: Path) -> None:
@@ -82,39 +89,48 @@ def require_own_pictures(path: Path) -> None:
     import OpenEXR
 
     try:
-        content(images, LARGEST)
+        require_regular(images)
         with OpenEXR.File(str(images), separate_channels=True, header_only=True) as file:
             is_own = all(name.startswith("baseline.") for name in file.channels())
     except Exception:  # the library has many for a file that is not EXR
         is_own = False
     if not is_own:
         raise InputError(
-            f"{images}: fotismos did not make this file, which --images would replace. Move it"
-            " away, or give another baseline."
+            f"{images}: fotismos did not make this file, which the baseline's would replace. Move"
+            " it away, or give another baseline."
         )
 
 
 def write(path: Path, baseline: Baseline, pictures: Kept | None = None) -> None:
     """Write a baseline atomically, with its small pictures if given."""
+    layers = {}
+    if pictures is not None:
+        # "baseline." keeps the layers at half precision, which is enough for pictures.
+        layers = {f"baseline.{half}": small(pictures[half]) for half in HALVES}
+        baseline = structs.replace(baseline, images=path.with_suffix(".exr").name)
+    put(path, baseline.text(), layers, baseline.scene)
+
+
+def put(path: Path, text: str, layers: Kept, subject: str) -> None:
+    """Write the text of a baseline, and the layers of its EXR if there are any."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists():
             require_regular(path)
-        if pictures is not None:
-            place = path.with_suffix(".exr")
+        if layers:
             require_own_pictures(path)
-            # "baseline." keeps the layers at half precision, which is enough for pictures.
-            size = pictures[HALVES[0]].shape
-            scale = min(1.0, LONGEST_KEPT / max(size[:2]))
-            small = [max(1, round(side * scale)) for side in size[:2]]
-            layers = {f"baseline.{half}": averaged(pictures[half], small) for half in HALVES}
-            images.write_exr(place, layers, {"scene": baseline.scene})
-            baseline = structs.replace(baseline, images=place.name)
-        atomic.write(path, baseline.text())
+            images.write_exr(path.with_suffix(".exr"), layers, {"scene": subject})
+        atomic.write(path, text)
     except OSError as error:
         raise InputError(
             f"baseline {path}: {error.strerror or error}. Name another place for it."
         ) from error
+
+
+def small(image: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Average an image (H, W, 3) down to sides of at most `LONGEST_KEPT`."""
+    scale = min(1.0, LONGEST_KEPT / max(image.shape[:2]))
+    return averaged(image, [max(1, round(side * scale)) for side in image.shape[:2]])
 
 
 def scene_from(scene: str, path: Path) -> str:
@@ -154,19 +170,30 @@ def name_of(scene: str | Path) -> str:
 
 
 def _read_pictures(path: Path) -> Kept:
+    how = program.command("check", "BASELINE", "--update", "--images")
+    return read_layers(path, HALVES, LONGEST_KEPT, how)
+
+
+def read_layers(
+    path: Path, names: Sequence[str], longest: int, how: str
+) -> dict[str, NDArray[np.float64]]:
+    """Read layers ``baseline.NAME`` of a baseline's EXR, of at most so many pixels per side.
+
+    ``how`` is the command that makes the file.
+    """
     import OpenEXR
 
     try:
-        content(path, LARGEST)  # rejects all but regular files, before one is opened
+        require_regular(path, atomic.LARGEST)  # before one is opened
         with OpenEXR.File(str(path), separate_channels=True) as file:
             channels = file.channels()
             pictures = {
-                half: np.stack(
-                    [channels[f"baseline.{half}.{c}"].pixels.astype(float) for c in "RGB"], axis=-1
+                name: np.stack(
+                    [channels[f"baseline.{name}.{c}"].pixels.astype(float) for c in "RGB"], axis=-1
                 )
-                for half in HALVES
+                for name in names
             }
-            if max(max(each.shape) for each in pictures.values()) > LONGEST_KEPT:
+            if max(max(each.shape) for each in pictures.values()) > longest:
                 raise ValueError("they are too large")
             if not all(np.isfinite(each).all() for each in pictures.values()):
                 raise ValueError("they are not finite")
@@ -174,5 +201,5 @@ def _read_pictures(path: Path) -> Kept:
     except Exception as error:  # the library has many for a file that is not EXR
         raise InputError(
             f"{path}: the baseline's pictures cannot be read: {error}. Write them again with"
-            f" `{program.command('check', 'BASELINE', '--update', '--images')}`."
+            f" `{how}`."
         ) from error

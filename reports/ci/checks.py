@@ -10,6 +10,7 @@ from msgspec import Meta, field, structs
 from comparisons.case import Case, open_case
 from comparisons.check.measurement import baseline_of, made_small, measure_scene
 from comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
+from comparisons.check.pictures import PictureCheck, Unseen, check_pictures
 from comparisons.compare import compare
 from comparisons.comparison import versions
 from comparisons.departure.blocks import averaged
@@ -21,7 +22,7 @@ from heuristic.errors import FotismosError, InputError
 from reference.records import VERSION, Amount, Count, Record, Share, to_json
 from reference.rendering.renderer import Progress
 from reference.scene.graph import set_variant
-from reports.ci import baselines
+from reports.ci import baselines, pictures
 from reports.ci.baselines import BaselineFile
 from reports.files import images, results
 from reports.page.scene_view import Before, SceneView
@@ -30,7 +31,7 @@ from reports.terminal import progress
 
 RECORD = "check.json"
 
-Judging = Callable[..., tuple["CheckRecord", SceneView | None]]
+Judging = Callable[..., tuple["CheckRecord", SceneView | Before | None]]
 """A function that checks or writes the baseline at a path."""
 
 LARGEST_ERROR = 2.0
@@ -71,6 +72,7 @@ class CheckRecord(Record, kw_only=True, omit_defaults=True):
         tuple[str, ...], Meta(description="Why, as far as the numbers tell, in sentences.")
     ] = ()
     pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
+    unseen: Unseen | None = None
 
     @property
     def name(self) -> str:
@@ -81,6 +83,12 @@ class CheckRecord(Record, kw_only=True, omit_defaults=True):
     def exit_code(self) -> int:
         """1 if something moved, 2 if the baseline could not be checked, else 0."""
         return {"failed": 1, "error": 2}.get(self.status, 0)
+
+    @property
+    def accepting(self) -> str:
+        """The command that writes what moved to the baseline."""
+        picture = ("--picture", f"{self.name}={self.scene}") if self.unseen else ()
+        return program.command("check", self.baseline, "--update", *picture)
 
     @property
     def versions_line(self) -> str:
@@ -115,7 +123,7 @@ def examine(
     compared as ``fotismos compare`` does, its files and ``check.json`` are written to ``folder``,
     and its part of the page is returned; else those of an earlier failure are deleted.
     """
-    begin, pictures = perf_counter(), file.pictures()
+    begin, kept = perf_counter(), file.pictures()
     found = _checked(file, case, level, progress)
     if folder is not None:
         scene.remove(folder)
@@ -131,7 +139,7 @@ def examine(
     comparison = compare(case.source, case.options, progress, case.command())
     view = scene.write(folder.parent, folder.name, comparison)
     results.write(folder / RECORD, to_json(made))
-    return made, structs.replace(view, before=_before(made, found, pictures))
+    return made, structs.replace(view, before=_before(made, kept or {}, found.now.pictures))
 
 
 def update(
@@ -208,20 +216,67 @@ def _record(file: BaselineFile, status: Any, found: Check, begin: float) -> Chec
     )
 
 
-def _before(made: CheckRecord, found: Check, pictures: baselines.Kept | None) -> Before:
-    """Return the section of the page on what moved."""
+def _before(made: CheckRecord, before: baselines.Kept, after: baselines.Kept) -> Before:
+    """Return the section of the page on what moved, with images before and now by their names."""
     shown = {}
-    for half, old in (pictures or {}).items():
-        now = averaged(found.now.pictures[half], old.shape)
+    for name, old in before.items():
+        now = averaged(after[name], old.shape)
         error = images.error_map(LEADING(now, old), LARGEST_ERROR)
-        for name, picture in ((half, images.tonemap(old)), (f"{half}-error", error)):
-            shown[name] = images.webp(picture, lossless=True)
+        shown[f"{name}, before"], shown[f"{name}, now"] = images.tonemap(old), images.tonemap(now)
+        shown[f"{name}, {LEADING.label} between them"] = error
     return Before(
+        name=made.name,
         sentences=tuple(filter(None, (*made.causes, made.versions_line))),
         moved=tuple(move.cells() for move in made.moved or ()),
         tested=made.tested or 0,
-        pictures=shown,
-        command=program.command("check", made.baseline, "--update"),
+        pictures={name: images.webp(each, lossless=True) for name, each in shown.items()},
+        command=made.accepting,
+    )
+
+
+# --- Pictures --------------------------------------------------------------------------------
+
+
+def examine_pictures(path: Path, pattern: str, level: float) -> tuple[CheckRecord, Before | None]:
+    """Check the pictures that match a pattern against their baseline."""
+    begin = perf_counter()
+    baseline, before = pictures.read(path)
+    found = check_pictures(before, pictures.read_repeats(pattern, baseline.transfer), level)
+    if not found.moved:
+        return _of_pictures(path, pattern, "passed", found, begin), None
+    made = _of_pictures(path, pattern, "failed", found, begin)
+    made = structs.replace(made, passed=False, causes=(found.cause(),))
+    old = {"picture": baselines.small(before.mean), "blocks": found.blocks.before}
+    return made, _before(made, old, {"picture": found.after.mean, "blocks": found.blocks.after})
+
+
+def update_pictures(
+    path: Path, pattern: str, transfer: Any, level: float, progress: Progress | None = None
+) -> tuple[CheckRecord, None]:
+    """Write or replace the baseline of the pictures that match a pattern."""
+    begin, status = perf_counter(), "updated" if path.exists() else "created"
+    if path.exists() and not pictures.is_of_pictures(baselines.read_text(path)):
+        raise InputError(f"{path}: this is not of pictures. Move it away, or give another file.")
+    repeats = pictures.read_repeats(pattern, transfer)
+    pictures.write(path, repeats, transfer)
+    found = check_pictures(repeats, repeats, level)
+    return _of_pictures(path, pattern, status, found, begin), None
+
+
+def _of_pictures(
+    path: Path, pattern: str, status: Any, found: PictureCheck, begin: float
+) -> CheckRecord:
+    unseen = found.unseen()
+    return CheckRecord(
+        baseline=path.as_posix(),
+        scene=pattern,
+        status=status,
+        seconds=round(perf_counter() - begin, 3),
+        message=pictures.sentence(unseen, found.picture.before),
+        tested=found.picture.before.size + found.blocks.before.size,
+        significance=found.level,
+        moved=found.moved,
+        unseen=unseen,
     )
 
 
@@ -229,17 +284,24 @@ def _before(made: CheckRecord, found: Check, pictures: baselines.Kept | None) ->
 
 
 def examine_all(
-    pool: Pool, path: Path, significance: float, seed: int | None, folder: Path
-) -> tuple[list[CheckRecord], list[SceneView]]:
+    pool: Pool,
+    path: Path,
+    significance: float,
+    seed: int | None,
+    folder: Path,
+    patterns: Mapping[Path, str],
+) -> tuple[list[CheckRecord], list[SceneView], list[Before]]:
     """Check one baseline or a folder of them in a pool; the significance is shared.
 
-    ``seed`` replaces the baselines' unless it is None; failures go to ``folder``.
+    ``seed`` replaces the baselines' unless it is None; failures go to ``folder``; ``patterns``
+    name the new pictures of baselines.
     """
-    paths = baselines.find(path)
+    paths = sorted({*baselines.find(path), *patterns})
     level = level_of_each(significance, len(paths))
-    calls = [(one, level, seed, folder / one.stem) for one in paths]
+    calls = [(one, level, seed, folder / one.stem, patterns.get(one)) for one in paths]
     found = _each(pool, examine_one, calls)
-    return [made for made, _ in found], [view for _, view in found if view]
+    scenes = [view for _, view in found if isinstance(view, SceneView)]
+    return [made for made, _ in found], scenes, [v for _, v in found if isinstance(v, Before)]
 
 
 def update_all(
@@ -249,11 +311,17 @@ def update_all(
     with_pictures: bool,
     significance: float,
     options: Mapping[str, Any],
+    patterns: Mapping[Path, str],
 ) -> list[CheckRecord]:
     """Write one baseline or several, except those with the same options of which nothing moved.
 
-    Without ``scenes``, the files name them; ``options`` replace theirs.
+    Without ``scenes``, the files name them; ``options`` replace theirs. With ``patterns``, only
+    baselines of pictures are written.
     """
+    if patterns:
+        transfer = options.get("transfer")
+        shots = [(place, word, transfer, significance) for place, word in patterns.items()]
+        return [made for made, _ in _each(pool, update_pictures, shots)]
     calls = [
         (one, scene, with_pictures, significance, options) for one, scene in _targets(path, scenes)
     ]
@@ -262,7 +330,7 @@ def update_all(
 
 def _each(
     pool: Pool, function: Judging, calls: Sequence[tuple[Any, ...]]
-) -> list[tuple[CheckRecord, SceneView | None]]:
+) -> list[tuple[CheckRecord, SceneView | Before | None]]:
     """Return the result of each baseline, in order; its path is the first argument."""
     results = {}
     with progress.shown() as bar:
@@ -288,9 +356,20 @@ def failed(path: Path, error: BaseException) -> CheckRecord:
 
 
 def examine_one(
-    path: Path, level: float, seed: int | None, folder: Path, progress: Progress | None = None
-) -> tuple[CheckRecord, SceneView | None]:
-    """Check one baseline."""
+    path: Path,
+    level: float,
+    seed: int | None,
+    folder: Path,
+    pattern: str | None,
+    progress: Progress | None = None,
+) -> tuple[CheckRecord, SceneView | Before | None]:
+    """Check one baseline, of a scene or of the pictures that match a pattern."""
+    is_of_pictures = pictures.is_of_pictures(baselines.read_text(path))
+    if is_of_pictures != (pattern is not None):
+        hint = "pictures. Give" if is_of_pictures else "a scene. Omit"
+        raise InputError(f"{path}: this is a baseline of {hint} --picture {path.stem}=PATTERN.")
+    if pattern is not None:
+        return examine_pictures(path, pattern, level)
     file = baselines.read(path)
     return examine(file, file.open(seed), level, folder, progress)
 

@@ -15,7 +15,6 @@ from comparisons.comparison import ComparisonRecord
 from comparisons.departure.criterion import TOLERANCE, Verdict, decide
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import VisibleShare
-from heuristic import program
 from heuristic.errors import InputError, OutputError
 from reports import verdict
 from reports.terminal.tables import escaped, markdown, printed
@@ -245,6 +244,7 @@ def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
             cells = (f"{what} ({len(made.moved)} in all)", *numbers)
         rows.append((made.name, made.status, *cells))
     parts = ["### fotismos check", outcome(checks, level), _marked_down(rows, right=3)]
+    parts += [escaped(f"{made.name}: {' '.join(made.causes)}") for made in checks if made.causes]
     return "\n\n".join([*parts, *([_where(page)] if page else ())]) + "\n\n"
 
 
@@ -293,7 +293,7 @@ def headline(made: CheckRecord) -> str:
 
 
 def moved_lines(made: CheckRecord) -> Iterator[str]:
-    """Yield the table of what moved: from, to, by how many standard errors, and the p-value."""
+    """Yield the table of what moved: from, to, by how many standard errors, p-value; and causes."""
     moved = made.moved or ()
     rows: list[tuple[str, ...]] = [
         ("what moved", "baseline", "now", "change", "standard errors", "p")
@@ -306,6 +306,7 @@ def moved_lines(made: CheckRecord) -> Iterator[str]:
     yield from printed(rows, right=2)
     if len(moved) > SHOWN:
         yield f"and {len(moved) - SHOWN} more; {made.tested} quantities were tested"
+    yield from made.causes
 
 
 def _details(made: CheckRecord) -> Iterator[str]:
@@ -320,7 +321,7 @@ def _details(made: CheckRecord) -> Iterator[str]:
     if made.pictures is not None:
         yield f"  pictures: {made.pictures}"
     if made.status == "failed":
-        yield f"  if this is meant: {program.command('check', made.baseline, '--update')}"
+        yield f"  if this is meant: {made.accepting}"
     yield ""
 
 
@@ -328,8 +329,9 @@ def _table(checks: Sequence[CheckRecord]) -> Iterator[Sequence[str]]:
     yield "baseline", "result", "moved", "of", "mean ΔE2000", "now", "time"
     for made in checks:
         cells = [""] * 4
+        if made.tested is not None:
+            cells[:2] = f"{len(made.moved or ())}", f"{made.tested}"
         if made.metrics is not None:
             lead = made.metrics["dE2000"]
-            moved = f"{len(made.moved or ())}", f"{made.tested}"
-            cells = [*moved, f"{lead.before:.3f}", f"{lead.after:.3f}"]
+            cells[2:] = f"{lead.before:.3f}", f"{lead.after:.3f}"
         yield made.name, made.status, *cells, f"{made.seconds:.1f} s"

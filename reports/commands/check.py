@@ -1,11 +1,13 @@
 """``fotismos check``: whether a change moved anything that was measured before."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 from click.core import ParameterSource
 
+from comparisons.atomic import file_name
 from heuristic.errors import InputError
 from reports import jobs
 from reports.terminal.words import echo, is_quiet, tell
@@ -21,6 +23,15 @@ from reports.terminal.words import echo, is_quiet, tell
     metavar="SCENE",
     help="With --update: the scene of BASELINE; several for a folder, whose baselines are named"
     " after their scenes.",
+)
+@click.option(
+    "--picture",
+    "pictures",
+    multiple=True,
+    type=jobs.definition,
+    metavar="NAME=PATTERN",
+    help="Repeats of a picture from any renderer, each with its own seed, such as"
+    " 'hall=render_*.exr'; several for a folder, whose baselines have these names.",
 )
 @click.option(
     "--images",
@@ -39,6 +50,7 @@ from reports.terminal.words import echo, is_quiet, tell
 @jobs.output_option("out", "check")
 @jobs.process_options
 @jobs.scene_options
+@jobs.option("transfer")
 @jobs.verbosity_options
 @click.pass_context
 def check(
@@ -46,6 +58,7 @@ def check(
     baseline: Path,
     update: bool,
     scenes: tuple[str, ...],
+    pictures: tuple[tuple[str, str], ...],
     images: bool,
     significance: float,
     as_json: bool,
@@ -64,6 +77,8 @@ def check(
     exit code is 1, and OUTPUT/check/index.html shows what moved and where. If a baseline could not
     be checked, it is 2; the others are checked nevertheless.
 
+    With --picture nothing is rendered: repeats of pictures are compared with earlier ones.
+
     A scene or heuristic in Python is code, and so is a baseline that names one: it is executed.
 
     \b
@@ -71,6 +86,8 @@ def check(
       fotismos check baselines --update --scene cornell-box --scene my_scene.xml
       fotismos check baselines
       fotismos check baselines/cornell-box.json --update
+      fotismos check baselines --update --picture hall='render_*.exr'
+      fotismos check baselines --picture hall='new_*.exr'
     """  # noqa: D301 click reads the \b as: keep these lines
     changes = {
         name: value
@@ -84,6 +101,9 @@ def check(
             f"{', '.join(wanting)}: a check renders its baseline's scene and options. Add --update"
             " to write another baseline."
         )
+    if pictures and update and (others := [word for word in wanting if word != "--transfer"]):
+        raise InputError(f"{', '.join(others)}: pictures are not rendered. Omit it, or --picture.")
+    patterns = _places(baseline, pictures)
     inputs = list(baseline.glob("*")) if baseline.is_dir() else [baseline]
     from reports.ci import summary as summaries  # loaded late: --help needs no metrics
 
@@ -95,24 +115,26 @@ def check(
         from reports.files import results
         from reports.page import page
 
-        views: list[Any] = []
+        place = ""
         if update:
-            outcomes = checks.update_all(pool, baseline, scenes, images, significance, changes)
+            outcomes = checks.update_all(
+                pool, baseline, scenes, images, significance, changes, patterns
+            )
         else:
             with results.hold(output, jobs.command_line()) as top:
                 folder = results.own(top / "check")
-                outcomes, views = checks.examine_all(
-                    pool, baseline, significance, changes.get("seed"), folder
+                outcomes, views, moved = checks.examine_all(
+                    pool, baseline, significance, changes.get("seed"), folder, patterns
                 )
                 title = f"fotismos check: {summaries.outcome(outcomes, significance)}"
-                if views:
+                if views or moved:
                     records = [view.record for view in views]
                     details = page.details(len(views), records=records)
                     results.write(folder / page.DETAILS, details)
-                    results.write(folder / results.PAGE, page.render(views, title))
+                    results.write(folder / results.PAGE, page.render(views, title, moved=moved))
+                    place = str(folder / results.PAGE)
                 else:
                     results.clear(folder, (results.PAGE, page.DETAILS))
-    place = str(folder / results.PAGE) if views else ""
     for each in outcomes:
         if each.status == "error":
             echo(f"fotismos: error: {each.message}", err=True)
@@ -129,3 +151,15 @@ def check(
     elif code:
         click.echo(summaries.outcome(outcomes, significance))
     context.exit(code)
+
+
+def _places(baseline: Path, pictures: Sequence[tuple[str, str]]) -> dict[Path, str]:
+    """Return the patterns of pictures by the files of their baselines."""
+    is_file = baseline.suffix == ".json"
+    places = {
+        baseline if is_file else baseline / f"{file_name(name, '--picture')}.json": pattern
+        for name, pattern in pictures
+    }
+    if len(places) < len(pictures):
+        raise InputError("--picture: give each name once, and a folder for several pictures.")
+    return places

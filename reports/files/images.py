@@ -148,7 +148,9 @@ def webp_uri(file: bytes) -> str:
 # --- OpenEXR ----------------------------------------------------------------------------------
 
 #: Layers that keep float32, as terms do; the others are maps, for which half's 11 bits are enough.
-FULL_PRECISION = frozenset({"heuristic", "reference", "reference_stderr", "P", "N"})
+FULL_PRECISION = frozenset(
+    {"heuristic", "reference", "reference_stderr", "P", "N", "baseline.mean", "baseline.variance"}
+)
 
 #: Layers with X, Y, Z instead of R, G, B.
 VECTORS = frozenset({"P", "N"})

@@ -25,7 +25,7 @@ from reports import glossary, verdict
 from reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT
 from reports.files import images
 from reports.files.results import Failure, RunRecord
-from reports.page.scene_view import SceneView, WhyView
+from reports.page.scene_view import Before, SceneView, WhyView
 from reports.page.templating import HELP, rendered
 from reports.terminal.words import difference
 
@@ -68,11 +68,12 @@ def render(
     failures: Sequence[Failure] = (),
     state: str = "",
     threshold: float = TOLERANCE,
+    moved: Sequence[Before] = (),
 ) -> str:
     """One HTML page of all scenes, worst first, that begins at a threshold.
 
     `failures` are the scenes that could not be compared; `state` is a sentence on an unfinished
-    run.
+    run; `moved` are pictures without a scene that moved.
     """
     taken: set[str] = set()
     usual = THRESHOLDS.index(threshold)
@@ -87,7 +88,9 @@ def render(
         ],
         "thresholds": THRESHOLDS,
         "usual": threshold,
-        "headlines": _runs(lambda t: verdict.headline(records, t)),
+        "headlines": _runs(
+            lambda t: verdict.headline(records, t) if records or not moved else title
+        ),
         "missing": _runs(lambda t: verdict.most_missing(records, t)),
         "find": verdict.FIND,
         "terms": glossary.meanings(),
@@ -108,6 +111,7 @@ def render(
         leading=LEADING,
         details=DETAILS,
         state=state,
+        moved=moved,
     )
 
 

@@ -82,12 +82,13 @@ class CostView(Record):
 
 
 class Before(Record):
-    """What moved in a scene since its baseline.
+    """What moved in a scene or picture since its baseline.
 
-    ``moved`` has a name, before, now, standard errors and p. ``pictures`` are WebP files: the
-    halves as they were, and ΔE2000 between then and now.
+    ``moved`` has a name, before, now, standard errors and p. ``pictures`` are WebP files by their
+    captions: how it was, and maps of the change.
     """
 
+    name: str
     sentences: tuple[str, ...]
     moved: tuple[tuple[str, ...], ...]
     tested: int

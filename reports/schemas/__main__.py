@@ -10,6 +10,7 @@ import msgspec
 
 from comparisons.audit.checks import Audit
 from comparisons.check.measurement import Baseline, laid_out
+from comparisons.check.pictures import PictureBaseline
 from comparisons.comparison import ComparisonRecord
 from comparisons.cost.cost_record import Cost
 from comparisons.fit.fit_record import FitRecord
@@ -25,6 +26,7 @@ PUBLISHED: dict[str, Any] = {
     "comparison": ComparisonRecord,
     "cost": Cost,
     "fit": FitRecord,
+    "pictures": PictureBaseline,
     "run": RunRecord,
 }
 """The type of each record that is written to a file, by the name of its schema."""

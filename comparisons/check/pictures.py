@@ -1,0 +1,299 @@
+"""Compare repeats of a picture with earlier ones: tell drift from their noise.
+
+Repeats are renderings of one picture, by any renderer, each with its own random numbers. A baseline
+keeps the mean and the variance of each pixel over m of them; n new ones are compared with it. With
+the differences d of the pixels' means, tested is their mean over the picture and over each block of
+`SIDE` by `SIDE` pixels, N pixels in all, in each channel::
+
+    t = Σ d / √(r max(P, Q))
+    P = (1/m + 1/n) Σ s²      s² the pooled variance of a pixel over the repeats
+    Q = Σ (d − Σ d / N)²
+    r = the mean over tiles of (variance of the tile's sum / sum of its pixels' variances), ≥ 1
+
+P pools all pixels of a sum, so that two repeats are enough. P can be too small by chance: where
+noise has few values (edges in a PNG, fireflies cut off at 1), or is skewed and m ≠ n. Then Q, the
+spread of the differences themselves, is larger. If nothing changed and m = n, each d is symmetric
+about 0, and the tails of ``Σ d / √Σ d²`` are no heavier than a normal variable's, however the noise
+is distributed (Efron, J. Am. Stat. Assoc. 64, 1969): a firefly raises both sums. It also means
+that a change of fewer than about 30 pixels in a block counts as fireflies.
+
+r is 1 for independent pixels; a reconstruction filter, which correlates neighbours, raises it. With
+f degrees of freedom of r, t has ``1 / (1/f + r/N)``. Noise that is correlated over more than a tile
+is underestimated.
+
+Half of the significance is for the means of the picture, half for the blocks, each half corrected
+for its number of tests (Šidák). If no pixel varies at all, any change beyond rounding is a drift.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from math import ceil, floor, log10
+from typing import Annotated, Literal
+
+import numpy as np
+from msgspec import Meta
+from numpy.typing import ArrayLike, NDArray
+
+from comparisons.check.measurement import LINEAR_ROUNDING, Colour, Errors
+from comparisons.check.moved import (
+    RELATIVE_ROUNDING,
+    Move,
+    level_of_each,
+    moved,
+    sidak,
+    where_moved,
+)
+from comparisons.departure.blocks import block_sums, ratio
+from comparisons.departure.colour import Array
+from comparisons.pictures import require_one_size
+from heuristic.errors import InputError
+from reference.records import VERSION, Amount, Record, Resolution, Share
+
+SIDE, TILES = 16, 8
+"""Side in pixels of the blocks that are tested; tiles of whole blocks along the longer side of the
+picture, at most."""
+
+POWER, QUANTILE = 0.95, 1.645
+"""The chance with which the smallest visible change is caught, and its quantile."""
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """Repeats of a picture: how many, mean and variance of each pixel, correlation r of its noise.
+
+    Images are linear, (H, W, 3, ...): further axes hold further pictures, r is (...).
+    """
+
+    count: int
+    mean: Array
+    variance: Array
+    correlation: Array
+
+    @classmethod
+    def of(cls, images: Iterable[ArrayLike]) -> "Repeats":
+        """Return the statistics of images (H, W, 3, ...) of one size, in one pass over them."""
+        mean, squares, known = np.zeros(()), np.zeros(()), set()
+        sums: list[Array] = []
+        for count, image in enumerate(images, start=1):
+            values = np.asarray(image, np.float64)
+            if sums:
+                require_one_size((mean, values))
+            step = values - mean
+            mean = mean + step / count
+            squares = squares + step * (values - mean)
+            sums.append(_tiles(values))
+            known.add(hash(values.tobytes()))
+        if 1 < len(known) < len(sums):
+            raise InputError("some repeats are equal: give each its own seed.")
+        freedom = max(len(sums) - 1, 1)
+        variance = squares / freedom
+        alone = _tiles(variance)
+        r = ratio(np.var(sums, axis=0) * len(sums) / freedom, alone)
+        return cls(len(sums), mean, variance, ratio(_total(r), _total(alone > 0)))
+
+
+@dataclass(frozen=True)
+class Means:
+    """Means over blocks (rows, columns, 3, ...) before and now, and the difference's uncertainty.
+
+    ``error`` is its standard error, with so many degrees of ``freedom``.
+    """
+
+    before: Array
+    after: Array
+    error: Array
+    freedom: Array
+
+    @property
+    def tests(self) -> int:
+        """The number of tests to correct for: twice that of the means, for half the level."""
+        return 2 * int(np.prod(self.before.shape[:3]))
+
+    @property
+    def rounding(self) -> Array:
+        """The difference that rounding can make."""
+        size = np.maximum(np.abs(self.before), np.abs(self.after))
+        return np.maximum(LINEAR_ROUNDING, RELATIVE_ROUNDING * size)
+
+    def p(self) -> Array:
+        """Return the chance of a difference at least as large if nothing changed."""
+        from scipy.special import stdtr  # loaded late: half a second
+
+        size = np.abs(self.after - self.before)
+        with np.errstate(divide="ignore", invalid="ignore"):  # no noise
+            p = 2.0 * stdtr(self.freedom, -size / self.error)
+        return np.where(size <= self.rounding, 1.0, p)
+
+    def moved(self, level: float) -> NDArray[np.bool_]:
+        """Return which means moved, at this level together with the other half of the tests."""
+        return ~(sidak(self.p(), self.tests) >= level)  # a NaN does not pass
+
+    def limit(self, level: float) -> Array:
+        """Return the smallest change of each mean that is caught with the chance `POWER`.
+
+        With the critical value c and ν degrees of freedom, the change is this many errors (Johnson
+        and Welch 1940): ``c (1 − 1/4ν) + z √(1 + c²/2ν)``.
+        """
+        from scipy.special import stdtrit
+
+        c = -stdtrit(self.freedom, level_of_each(level, self.tests) / 2.0)
+        errors = c * (1.0 - 0.25 / self.freedom)
+        errors += QUANTILE * np.sqrt(1.0 + c**2 / (2.0 * self.freedom))
+        return np.maximum(errors * self.error, self.rounding)
+
+
+def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
+    """Return the means over the picture, and over its blocks.
+
+    The baseline has at least two repeats; ``after`` may be one, whose noise is taken for equal.
+    """
+    m, n = before.count, after.count
+    first, second = (m - 1) / (m + n - 2), (n - 1) / (m + n - 2)
+    d = after.mean - before.mean
+    noise = (1.0 / m + 1.0 / n) * (first * before.variance + second * after.variance)
+    r = np.maximum(first * before.correlation + second * after.correlation, 1.0)
+    # The channels' noise may be one.
+    f = np.maximum(_total(_tiles(noise) > 0) * (m + n - 2) / 3.0, 1.0)
+
+    def over(side: int) -> Means:
+        pixels = block_sums(np.ones_like(d[:, :, :1]), side)
+        total = block_sums(d, side)
+        spread = np.maximum(block_sums(d * d, side) - total**2 / pixels, 0.0)
+        square = r * np.maximum(block_sums(noise, side), spread * noise.any(axis=(0, 1, 2)))
+        old, new = (block_sums(each.mean, side) / pixels for each in (before, after))
+        return Means(old, new, np.sqrt(square) / pixels, 1.0 / (1.0 / f + r / pixels))
+
+    return over(max(d.shape[:2])), over(SIDE)
+
+
+def _tiles(image: Array) -> Array:
+    """Return sums over whole tiles (rows, columns, ...); of a smaller picture, over itself."""
+    side = SIDE * ceil(max(image.shape[:2]) / TILES / SIDE)
+    height, width = (max(length // side * side, side) for length in image.shape[:2])
+    return block_sums(image[:height, :width], side)
+
+
+def _total(values: NDArray) -> Array:
+    return values.sum(axis=(0, 1, 2))
+
+
+# --- Baselines -----------------------------------------------------------------------------------
+
+
+class PictureBaseline(Record, kw_only=True):
+    """Repeats of a picture; the mean and the variance of each pixel are in an EXR beside it.
+
+    Attributes
+    ----------
+    mean, error
+        Mean linear RGB of the picture, and its standard errors.
+    correlation
+        Variance of sums over tiles, over that of independent pixels.
+    """
+
+    record_version: int = VERSION
+    repeats: Annotated[int, Meta(ge=2)]
+    resolution: Resolution
+    transfer: Literal["linear", "srgb"] | None
+    mean: Colour
+    error: Errors
+    correlation: Amount
+    images: str
+
+
+class Unseen(Record):
+    """The smallest changes that a check catches with the chance `power`, in linear R, G, B.
+
+    Attributes
+    ----------
+    mean
+        Of the mean of the picture.
+    block, noisiest
+        Of the mean of a block of 16 by 16 pixels: the median of the blocks, and the largest.
+    """
+
+    power: Share
+    mean: Colour
+    block: Colour
+    noisiest: Colour
+
+
+# --- What moved, and what could not be seen ------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class PictureCheck:
+    """Repeats compared with earlier ones: what was tested, and what moved.
+
+    ``level`` is the chance of a false alarm.
+    """
+
+    before: Repeats
+    after: Repeats
+    picture: Means
+    blocks: Means
+    moved: tuple[Move, ...]
+    level: float
+
+    def unseen(self) -> Unseen:
+        """Return the smallest changes that the check catches."""
+        mean, blocks = (each.limit(self.level) for each in (self.picture, self.blocks))
+        changes = mean[0, 0], np.median(blocks, axis=(0, 1)), blocks.max(axis=(0, 1))
+        return Unseen(POWER, *(colour(each) for each in changes))
+
+    def cause(self) -> str:
+        """Return the sentence on factors or offsets that leave nothing moved, or else on where.
+
+        Over the blocks' means x before and y now, with weights w of 1 / error², the offset of a
+        channel is ``Σ w (y − x) / Σ w``, and its factor ``1 + Σ w z (y − x) / Σ w z x``, where z is
+        the mean of all repeats.
+        """
+        m, n = self.before.count, self.after.count
+        old, new = self.blocks.before, self.blocks.after
+        weight = 1.0 / np.maximum(self.blocks.error, self.blocks.rounding) ** 2
+        level = weight * (m * old + n * new) / (m + n)
+        found = []
+        for name, start, weights, base, image in (
+            ("factor", 1.0, level, old, self.before.mean),
+            ("offset", 0.0, weight, np.ones_like(old), np.ones(3)),
+        ):
+            size = np.maximum((weights * base).sum(axis=(0, 1)), 1e-30)
+            value = (weights * (new - old)).sum(axis=(0, 1)) / size
+            shifted = replace(self.before, mean=self.before.mean + value * image)
+            if not any(each.moved(self.level).any() for each in means(shifted, self.after)):
+                shown = map(_interval, start + value, 2.0 / np.sqrt(size))
+                found.append(f"a constant {name} of {', '.join(shown)} in R, G, B")
+        if found:
+            return f"The whole picture moved by {' or by '.join(found)}. Nothing else moved."
+        count = int(self.blocks.moved(self.level).any(axis=-1).sum())
+        return f"No factor or offset explains it: the picture {where_moved(old, new, count)}."
+
+
+def check_pictures(before: Repeats, after: Repeats, level: float) -> PictureCheck:
+    """Compare repeats with earlier ones; ``level`` is the chance of a false alarm."""
+    require_one_size((before.mean, after.mean))
+    picture, blocks = means(before, after)
+    moves = moved([*_moves(picture, level), *_moves(blocks, level, is_block=True)], level)
+    return PictureCheck(before, after, picture, blocks, tuple(moves), level)
+
+
+def colour(values: Array) -> Colour:
+    """Return an array (3,) as a colour."""
+    red, green, blue = (float(f"{value:.8g}") for value in values)
+    return red, green, blue
+
+
+def _moves(tested: Means, level: float, is_block: bool = False) -> Iterator[Move]:
+    p = tested.p()
+    corrected = sidak(p, tested.tests)
+    arrays = tested.before, tested.after, tested.error, p, corrected
+    for row, column, channel in np.argwhere(tested.moved(level)).tolist():
+        before, after, error, *chances = (float(each[row, column, channel]) for each in arrays)
+        block = (row + 1, column + 1) if is_block else None
+        name = f"mean {'RGB'[channel]}" + (f", block {row + 1},{column + 1}" if block else "")
+        errors = (after - before) / error if error > 0 else None
+        yield Move(name, None, block, before, after, error, errors, *chances)
+
+
+def _interval(value: float, half: float) -> str:
+    return f"{value:.{min(7, max(2, 1 - floor(log10(half))))}f} ± {half:.1g}"

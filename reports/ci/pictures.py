@@ -1,0 +1,90 @@
+"""Baselines of pictures as files, and repeats that match a pattern."""
+
+from glob import glob
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from comparisons import pictures
+from comparisons.check.measurement import laid_out
+from comparisons.check.pictures import (
+    SIDE,
+    PictureBaseline,
+    Repeats,
+    Unseen,
+    colour,
+    means,
+)
+from comparisons.departure.colour import Array
+from heuristic import program
+from heuristic.errors import InputError
+from reference import records
+from reports.ci import baselines
+
+LAYERS = ("mean", "variance")
+
+LONGEST = 2**15
+"""Pixels of the longer side of a baseline that is read, at most."""
+
+
+def is_of_pictures(text: str) -> bool:
+    """Return whether the text of a baseline is that of pictures."""
+    return '"repeats":' in text
+
+
+def read_repeats(pattern: str, transfer: str | None) -> Repeats:
+    """Read the repeats that match a pattern, ``render_*.exr`` or ``render_*.exr:LAYER``."""
+    path, layer = pictures.parts(pattern)
+    found = [str(path)] if path.is_file() else sorted(glob(str(path), recursive=True))
+    if not found:
+        raise InputError(f"{pattern}: no file matches. Give repeats, such as 'render_*.exr'.")
+
+    words = (f"{file}:{layer}" if layer else file for file in found)
+    return Repeats.of(pictures.read(word, transfer) for word in words)
+
+
+def write(path: Path, repeats: Repeats, transfer: Literal["linear", "srgb"] | None) -> None:
+    """Write a baseline, and its EXR with the mean and variance of each pixel."""
+    if repeats.count < 2:
+        raise InputError(f"{path}: one picture does not show its noise. Give two repeats or more.")
+    whole, _ = means(repeats, repeats)
+    height, width = repeats.mean.shape[:2]
+    baseline = PictureBaseline(
+        repeats=repeats.count,
+        resolution=(width, height),
+        transfer=transfer,
+        mean=colour(whole.before[0, 0]),
+        error=colour(whole.error[0, 0] / np.sqrt(2.0)),
+        correlation=float(repeats.correlation),
+        images=path.with_suffix(".exr").name,
+    )
+    layers = {f"baseline.{name}": getattr(repeats, name) for name in LAYERS}
+    baselines.put(path, laid_out(records.plain(baseline)) + "\n", layers, path.stem)
+
+
+def read(path: Path) -> tuple[PictureBaseline, Repeats]:
+    """Read a baseline, and the statistics of its repeats from the EXR beside it."""
+    baseline = records.read(PictureBaseline, baselines.read_text(path), str(path))
+    place = path.parent / Path(baseline.images).name
+    how = program.command("check", path, "--update", "--picture", f"{path.stem}=PATTERN")
+    found = baselines.read_layers(place, LAYERS, LONGEST, how)
+    repeats = Repeats(baseline.repeats, **found, correlation=np.array(baseline.correlation))
+    is_same = np.allclose(repeats.mean.mean(axis=(0, 1)), baseline.mean, rtol=1e-5, atol=1e-9)
+    if not is_same or (repeats.variance < 0).any():
+        raise InputError(f"{place}: this is not of {path.name}. Write both again: `{how}`.")
+    return baseline, repeats
+
+
+def sentence(unseen: Unseen, mean: Array) -> str:
+    """Return the sentence on what could not be seen, relative to the mean of the picture."""
+    whole = max(float(np.mean(mean)), 1e-30)
+    picture, block, noisiest = (
+        f"{max(change):.2g} ({100 * max(change) / whole:.2g} %)"
+        for change in (unseen.mean, unseen.block, unseen.noisiest)
+    )
+    return (
+        f"a change of the mean by {picture} is caught in {100 * unseen.power:g} % of cases, of a"
+        f" block of {SIDE} x {SIDE} pixels by {block}, of the noisiest by {noisiest} of the mean;"
+        " smaller ones may be missed"
+    )
