@@ -14,6 +14,8 @@ Parameter                 Type (default)      Meaning
 ``cutoff``                float (30)          spot: half angle of the cone, degrees
 ``exponent``              float (0)           spot: ``m`` of 6.4
 ``shell``                 float (0)           point and spot: radius in which nothing casts a shadow
+``radius``                float (0)           point and spot: radius of the lamp, a sphere or disc
+``half_u``, ``half_v``    vector (0, 0, 0)    point and spot: half the edges of a rectangular lamp
 ========================  ==================  =====================================================
 
 Position, direction, the given intensities and the coefficients are exposed to
@@ -51,7 +53,7 @@ import mitsuba as mi
 
 from heuristic import terms
 from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.lights import FAR, INTENSITIES, PLUGINS, UNATTENUATED, DirectionalLight
+from heuristic.lights import FAR, INTENSITIES, PLUGINS, UNATTENUATED, DirectionalLight, Extent
 from heuristic.plugins.coefficients import coefficient, emitted
 
 
@@ -64,6 +66,7 @@ def define() -> dict[str, Any]:
         "cutoff": (mi.Float, 30.0),
         "exponent": (mi.Float, 0.0),
     }
+    sizes = {"radius": mi.Float, "half_u": mi.Vector3f, "half_v": mi.Vector3f}
     coefficients = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
 
     class HeuristicLight(mi.Emitter):
@@ -90,6 +93,9 @@ def define() -> dict[str, Any]:
             self.shell = 0
             if "shell" in names and props.get("shell", 0.0) > 0:
                 self._keep(props, "shell", mi.Float, 0.0)
+            if "extent" in names:
+                self.extent = Extent(*(kind(props.get(name, 0.0)) for name, kind in sizes.items()))
+                dr.make_opaque(self.extent)
             self.m_flags = +mi.EmitterFlags.DeltaPosition
             if self.model is DirectionalLight:
                 self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection
