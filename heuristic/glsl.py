@@ -9,6 +9,7 @@ import re
 import threading
 from dataclasses import replace
 from hashlib import sha256
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,7 @@ MATERIAL = {
     "k_i": 3, "k_a": 3, "k_d": 3, "k_s": 3, "n": 1, "base_color": 3,
     "alpha": 1, "ior": 1, "metallic": 1,
 }  # fmt: skip
+EXTENT = {"radius": 1, "u": 3, "v": 3}
 LIGHT = {
     "toward": 3, "distance": 1, "intensity": 3, "diffuse_intensity": 3, "specular_intensity": 3,
     "visible": 1,
@@ -191,7 +193,8 @@ class Shader:
         They are such as ``lights[0].toward``, each with the number of its floats.
         """
         owners = [("", POINT), ("material.", MATERIAL)]
-        owners += [(f"lights[{number}].", LIGHT) for number in range(lights)]
+        for number in range(lights):
+            owners += [(f"lights[{number}].", LIGHT), (f"lights[{number}].extent.", EXTENT)]
         return {
             owner + name: size
             for owner, fields in owners
@@ -236,7 +239,8 @@ layout(std430, binding = 0) readonly buffer fotismos_In {{ float fotismos_values
 layout(std430, binding = 1) writeonly buffer fotismos_Out {{ float fotismos_colours[]; }};
 uniform int fotismos_count;
 {_structure("Material", MATERIAL)}
-{_structure("Light", LIGHT).replace("float visible", "bool visible")}
+{_structure("Extent", EXTENT)}
+{_structure("Light", LIGHT, "Extent extent;").replace("float visible", "bool visible")}
 {_structure("Point", POINT, f"Material material; Light lights[{lights}];")}
 #line 1
 {whole}
@@ -258,14 +262,12 @@ void main() {{
 
 def _value(point: Point, lights: tuple[LightAtPoint, ...], name: str) -> Any:
     """Return a field of the record as a Dr.Jit value; a scene without lights gets a dark one."""
-    owner, _, field = name.rpartition(".")
+    owner, _, field = name.rpartition("].")
     if not owner:
-        return getattr(point, field)
-    if owner == "material":
-        return getattr(point.material, field)
+        return attrgetter(field)(point)
     if not lights:
         return mi.Float(0)
-    value = getattr(lights[int(owner[len("lights[") : -1])], field)
+    value = attrgetter(field)(lights[int(owner[len("lights[") :])])
     return dr.select(value(), mi.Float(1), 0) if field == "visible" else value
 
 

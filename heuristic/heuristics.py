@@ -25,6 +25,7 @@ from heuristic import kernel, vectors
 from heuristic.convention import Array, Visibility
 from heuristic.declared import Declared
 from heuristic.errors import InputError
+from heuristic.lights import Extent
 from heuristic.materials import Material, check_form
 
 GROUP = "fotismos.heuristics"
@@ -74,13 +75,15 @@ class LightAtPoint:
     light has this value. ``specular_intensity`` is ``L_s`` of a light that has its own, otherwise
     the same; ``diffuse_intensity`` is another name of ``intensity``. If the integrator has
     ``occlusion``, and the heuristic does not need ``visible``, all are 0 at points that the light
-    does not reach.
+    does not reach. ``extent`` is the size of the lamp in whose place the light is, 0 for others.
     """
 
     toward: Array
     distance: Array
     intensity: Array
     specular_intensity: Array
+    extent: Extent
+    _reach: Array
     _point: "Point"
 
     @property
@@ -92,7 +95,7 @@ class LightAtPoint:
         """Return the mask of points that the light reaches, by a shadow ray (a need)."""
         self._point.require("visible")
         ray: Any = self._point.arguments.visible  # there is one, since it was declared
-        return ray(self.toward, self.distance)
+        return ray(self.toward, self._reach)
 
 
 def _input(read: Callable[["Point"], Any]) -> cached_property[Any]:
@@ -169,8 +172,11 @@ class Point:
 
     def _light(self, light: Any) -> LightAtPoint:
         visible = None if "visible" in self.needs else self.arguments.visible
-        toward, diffuse, specular, distance = light.illuminate(self.arguments.position, visible)
-        return LightAtPoint(toward, distance, diffuse, specular, self)
+        toward, diffuse, specular, reach = light.illuminate(self.arguments.position, visible)
+        none = type(self.arguments.position)(0)
+        extent = light.extent or Extent(none.x, none, none)
+        distance = reach + getattr(light, "shell", 0)
+        return LightAtPoint(toward, distance, diffuse, specular, extent, reach, self)
 
     def require(self, name: str) -> None:
         """Raise InputError for an input that is not among the heuristic's needs."""

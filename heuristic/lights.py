@@ -31,6 +31,18 @@ FAR = 1e8
 size of the scene from Mitsuba, and rays of this length still keep their direction to 1e-7."""
 
 
+class Extent(NamedTuple):
+    """The size of a lamp about its position, in world space and units of the scene.
+
+    ``radius`` is that of a sphere or a disc, ``u`` and ``v`` are half the edges of a rectangle, as
+    vectors. What a lamp does not have is 0.
+    """
+
+    radius: Number
+    u: Vector
+    v: Vector
+
+
 class Arrival(NamedTuple):
     """How light arrives at a point: ``L``, ``L_d f_att``, ``L_s f_att`` and ``d``.
 
@@ -61,6 +73,7 @@ class Light:
     attenuation: tuple[Number, Number, Number]
     clamped: bool
     shell: Number
+    extent: Extent | None = None
 
     def __post_init__(self) -> None:
         for name, check in CHECKS.items():
@@ -106,8 +119,9 @@ class Light:
         return vectors.wide_light_vector(type(position)(self.position), position)
 
     def given(self) -> dict[str, Any]:
-        """Return the fields that are not omitted, with their values."""
-        return {name: value for name, value in vars(self).items() if value is not None}
+        """Return the fields that the kernel reads and that are not omitted, with their values."""
+        known = {name: value for name, value in vars(self).items() if name != "extent"}
+        return {name: value for name, value in known.items() if value is not None}
 
     def compiled(self) -> dict[str, Any]:
         """Return the fields that are part of the kernel's code, with their values."""
@@ -175,7 +189,8 @@ class PointLight(Light):
     display-linear. ``attenuation`` is ``(k0, k1, k2)`` of 6.1, each 0 or more and not all 0: ``(1,
     0, 0)`` means none, ``(0, 0, 1)`` the inverse square of 8.6. ``clamped`` is the other
     form of 8.6, ``min(1 / (c1 + c2 d + c3 d^2), 1)``. Within the radius ``shell`` about the
-    position, the body of the lamp, nothing casts a shadow.
+    position, the body of the lamp, nothing casts a shadow. ``extent`` is for users' shaders: this
+    light is a point.
     """
 
     plugin: ClassVar[str] = "heuristic_point"
@@ -187,6 +202,7 @@ class PointLight(Light):
     shell: Number = 0
     diffuse_intensity: Colour = None
     specular_intensity: Colour = None
+    extent: Extent | None = None
 
 
 @dataclass(frozen=True)
@@ -210,6 +226,7 @@ class SpotLight(Light):
     shell: Number = 0
     diffuse_intensity: Colour = None
     specular_intensity: Colour = None
+    extent: Extent | None = None
 
     def cone(self, toward: Direction) -> Number:
         """Equation 6.3: 1 within the cone, else 0; times the fall-off of 6.4 where ``m > 0``."""

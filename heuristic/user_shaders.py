@@ -77,19 +77,19 @@ def from_file(word: str) -> Heuristic:
     return known
 
 
-def _read(word: str, path: Path, function: str) -> Heuristic:
+def names_of(path: Path, content: str) -> dict[str, Any]:
+    """Run a user's file and return its names; InputError tells the ``content`` that it needs."""
     if not path.is_file():
-        raise InputError(
-            f"{path}: there is no such file. Give a Python file with a function `{FUNCTION}(point)`"
-            " that returns a colour, as FILE.py, or FILE.py:FUNCTION for another name."
-        )
+        raise InputError(f"{path}: there is no such file. Give a Python file {content}.")
+    try:
+        return runpy.run_path(str(path.resolve()), run_name=MODULE)
+    except (Exception, SystemExit) as error:  # a user's code may raise anything
+        raise InputError(f"{error_text(error)}. Correct {path}, a file {content}.") from error
+
+
+def _read(word: str, path: Path, function: str) -> Heuristic:
     with contained(path) as modules:
-        try:
-            names = runpy.run_path(str(path.resolve()), run_name=MODULE)
-        except (Exception, SystemExit) as error:  # a user's code may raise anything
-            raise InputError(
-                f"{error_text(error)}. Correct {path}, which is to define a heuristic."
-            ) from error
+        names = names_of(path, f"with a function `{FUNCTION}(point)`, as FILE.py, or FILE.py:NAME")
         if function not in names:
             raise _missing(names, function, path)
         label = path.stem if function == FUNCTION else function

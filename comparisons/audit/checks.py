@@ -13,6 +13,8 @@ from comparisons.audit import diagnosis, furnace
 from comparisons.audit.subjects import INCIDENT, LEVEL, ScatteringSubject, ShadingSubject, Subject
 from comparisons.comparison import versions
 from heuristic import heuristics
+from heuristic.errors import FotismosError, InputError
+from heuristic.user_code import error_text
 from reference.records import VERSION, Amount, Record, Versions
 
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 89.0)
@@ -64,6 +66,10 @@ class MaterialCurves(Record):
         tuple[tuple[Amount, ...], ...],
         Meta(description="``pi f`` in the plane of incidence, by light and view; often empty."),
     ] = ()
+    single_scattering: Annotated[
+        tuple[float, ...],
+        Meta(description="Seen of a white metal by GGX of this ``alpha``; empty without one."),
+    ] = ()
 
 
 class Audit(Record, kw_only=True):
@@ -74,7 +80,9 @@ class Audit(Record, kw_only=True):
     kind: Kind
     parameters: Annotated[dict[str, float | str], Meta(description="The parameters that were set.")]
     variant: str
-    angles: Annotated[tuple[Amount, ...], Meta(description="From the normal, in degrees.")]
+    angles: Annotated[
+        tuple[Amount, ...], Meta(description="From the normal, in degrees; above 90 from behind.")
+    ]
     curves: tuple[MaterialCurves, ...]
     lights: Annotated[tuple[Amount, ...], Meta(description="Of lobes, in degrees.")]
     views: Annotated[tuple[float, ...], Meta(description="Of lobes, in degrees; the light's < 0.")]
@@ -105,6 +113,17 @@ def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "
 
     In the current variant. ``command`` is the one that was run, for the record.
     """
+    try:
+        return _audited(kind, name, parameters, command)
+    except FotismosError:
+        raise
+    except Exception as error:
+        if kind == "bsdf" and heuristics.in_file(name):  # a user's code may raise anything
+            raise InputError(f"{error_text(error)} (BSDF {name}).") from error
+        raise
+
+
+def _audited(kind: Kind, name: str, parameters: Mapping[str, Any], command: str) -> Audit:
     subject: Subject
     if kind == "bsdf":
         subject = ScatteringSubject(name, parameters)
@@ -117,10 +136,10 @@ def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "
         kind=kind,
         parameters=dict(parameters),
         variant=mi.variant(),
-        angles=ANGLES,
+        angles=furnace.both_sides(ANGLES, subject.eta),
         curves=curves,
         lights=LIGHTS,
-        views=VIEWS,
+        views=furnace.both_sides(VIEWS, subject.eta),
         derivatives=derivatives,
         checks=all_checks(subject, curves, derivatives),
         faults=tuple(subject.faults),
@@ -134,9 +153,10 @@ def all_checks(
     subject: Subject, curves: tuple[MaterialCurves, ...], derivatives: Mapping[str, float]
 ) -> tuple[Checked, ...]:
     """Make every check."""
+    angles = furnace.both_sides(ANGLES, subject.eta)
     return (
-        white_furnace(curves),
-        energy(curves),
+        white_furnace(angles, curves),
+        energy(angles, curves),
         reciprocity(subject),
         horizon(subject),
         light_from_below(subject),
@@ -147,14 +167,18 @@ def all_checks(
 
 
 def curve(subject: Subject, material: str) -> MaterialCurves:
-    """Return the two albedos of a white material over :data:`ANGLES`, and its lobes."""
+    """Return the albedos of a white material over the angles, and its lobes."""
     response, alpha = partial(subject.response, material), subject.materials[material]
     lights = LIGHTS if alpha in (None, PICTURED) else ()
+    angles, by = furnace.both_sides(ANGLES, subject.eta), (subject.grid, subject.eta)
     return MaterialCurves(
         material=material,
         alpha=alpha,
-        seen=tuple(furnace.seen(response, angle, subject.grid) for angle in ANGLES),
-        returned=tuple(furnace.returned(response, angle, subject.grid) for angle in ANGLES),
+        seen=tuple(furnace.seen(response, angle, *by) for angle in angles),
+        returned=tuple(furnace.returned(response, angle, *by) for angle in angles),
+        single_scattering=tuple(
+            furnace.single_scattering(alpha, min(angle, 180 - angle)) for angle in angles if alpha
+        ),
         lobes=tuple(lobe(subject, material, angle) for angle in lights),
     )
 
@@ -162,34 +186,34 @@ def curve(subject: Subject, material: str) -> MaterialCurves:
 def lobe(subject: Subject, material: str, degrees: float) -> tuple[float, ...]:
     """Return ``pi f`` at :data:`VIEWS`."""
     light = furnace.direction(np.deg2rad(-degrees), 0.0)
-    view = furnace.direction(np.deg2rad(VIEWS), 0.0)
+    view = furnace.direction(np.deg2rad(furnace.both_sides(VIEWS, subject.eta)), 0.0)
     return tuple((subject.response(material, light, view) / light[2]).max(axis=0).tolist())
 
 
-def white_furnace(curves: tuple[MaterialCurves, ...]) -> Checked:
+def white_furnace(angles: tuple[float, ...], curves: tuple[MaterialCurves, ...]) -> Checked:
     """Check that a white surface is as bright as its surroundings at every angle."""
     value, worst = max(
         ((value, f"{each.material}, viewer at {angle:g}°")
-         for each in curves for angle, value in zip(ANGLES, each.seen, strict=True)),
+         for each in curves for angle, value in zip(angles, each.seen, strict=True)),
         key=lambda pair: abs(pair[0] - 1),
     )  # fmt: skip
     return _checked("white furnace", abs(value - 1) <= TOLERANCE, value, f"1 ± {TOLERANCE}", worst)
 
 
-def energy(curves: tuple[MaterialCurves, ...]) -> Checked:
-    """Check that no more light is returned than arrives, at the worst angle."""
+def energy(angles: tuple[float, ...], curves: tuple[MaterialCurves, ...]) -> Checked:
+    """Check that no more light leaves than arrives, at the worst angle."""
     value, worst = max(
         (value, f"{each.material}, light at {angle:g}°")
-        for each in curves for angle, value in zip(ANGLES, each.returned, strict=True)
+        for each in curves for angle, value in zip(angles, each.returned, strict=True)
     )  # fmt: skip
     return _checked("energy", value <= 1 + TOLERANCE, value, f"at most {1 + TOLERANCE}", worst)
 
 
 def reciprocity(subject: Subject) -> Checked:
-    """Check that ``f(i, o) = f(o, i)`` for random pairs of directions."""
-    a, b = furnace.random_pairs(PAIRS)
+    """Check that ``f(i, o) = f(o, i)``, over the squares of indices, for random directions."""
+    a, b = furnace.random_pairs(PAIRS, subject.eta)
     differences = {
-        material: furnace.asymmetries(partial(subject.response, material), a, b)
+        material: furnace.asymmetries(partial(subject.response, material), a, b, subject.eta)
         for material in subject.materials
     }
     value, worst = _largest(differences, a, b)
@@ -213,7 +237,9 @@ def horizon(subject: Subject) -> Checked:
 
 
 def light_from_below(subject: Subject) -> Checked:
-    """Check that light from behind the surface is not seen."""
+    """Check that light from behind the surface is not seen, unless it is to be transmitted."""
+    if subject.eta:
+        return _checked("light from below", None, None, "0", "it transmits light")
     degrees = np.linspace(91, 180, 90), np.arange(0, 181, 20.0), np.array([0.0, 30, 60, 80])
     polar, azimuth, viewer = (np.deg2rad(each.ravel()) for each in np.meshgrid(*degrees))
     light, view = furnace.direction(polar, azimuth), furnace.direction(viewer, 0 * viewer)
@@ -224,12 +250,12 @@ def light_from_below(subject: Subject) -> Checked:
 
 def sampling(subject: Subject) -> Checked:
     """Check the density of samples against ``pdf``, of BSDFs."""
-    bound = 1 - (1 - LEVEL) ** (1 / len(INCIDENT))  # Šidák
+    bound = 1 - (1 - LEVEL) ** (1 / len(furnace.both_sides(INCIDENT, subject.eta)))  # Šidák
     expected = f"p of χ² at least {bound:.2g}"
     if not isinstance(subject, ScatteringSubject):
         return _checked("sampling", None, None, expected, "a heuristic is not sampled")
     if (least := subject.sampling()) is None:
-        return _checked("sampling", None, None, expected, "it reflects nothing")
+        return _checked("sampling", None, None, expected, "it scatters nothing")
     return _checked("sampling", least[0] >= bound, least[0], expected, least[1])
 
 

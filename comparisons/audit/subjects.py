@@ -1,12 +1,14 @@
 """What can be audited: a heuristic, or a Mitsuba BSDF, by its response to a light.
 
 A heuristic has one white material, one light and one viewer at a time; a BSDF is known by its
-``eval``, ``sample`` and ``pdf``.
+``eval``, ``sample`` and ``pdf``. One in a user's file, ``FILE.py:NAME``, is the plugin that the
+file registers by this name.
 """
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import drjit as dr
@@ -15,18 +17,16 @@ import numpy as np
 
 from comparisons.audit import furnace
 from comparisons.audit.furnace import UP
-from heuristic import heuristics, terms
+from heuristic import heuristics, terms, user_shaders
 from heuristic.errors import InputError, unknown
 from heuristic.heuristics import Heuristic, ShadingArguments
 from heuristic.lights import DirectionalLight, PointLight
 from heuristic.materials import PairedMaterial
+from heuristic.user_code import contained
 from reference.pairing import albedo, factors
 
-ALPHAS = (0.1, 0.3, 0.6, 1.0)
+ALPHAS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
 """Roughness of the materials; the quadrature resolves their lobes at every angle."""
-
-ROUNDING = 1e-5
-"""A value below 0 by less than this, in units of display white, is a rounding error."""
 
 CaseValues = tuple[str, np.ndarray, tuple[np.ndarray, np.ndarray] | None]
 """Words, the values (C, N), and directions to light and viewer if they identify a value."""
@@ -39,12 +39,14 @@ class Subject(ABC):
     """A heuristic or a BSDF, with white materials and the roughness of those that have several.
 
     ``untuned`` is why no derivative can be checked, if so; ``faults`` are values that light cannot
-    have, in words, from any check.
+    have, in words, from any check. ``eta`` is the relative index of refraction below what transmits
+    light, None for others.
     """
 
     materials: dict[str, float | None]
     grid = furnace.GRID
     untuned = "it depends on no number"
+    eta: float | None = None
 
     def __init__(self) -> None:
         self.faults: list[str] = []
@@ -76,7 +78,7 @@ class Subject(ABC):
         self, words: str, values: np.ndarray, pairs: tuple[np.ndarray, np.ndarray] | None
     ) -> None:
         """Note the first value (C, N) that is not finite, or negative."""
-        is_wrong = ~(np.isfinite(values) & (values >= -ROUNDING))
+        is_wrong = ~(np.isfinite(values) & (values >= -user_shaders.ROUNDING))
         if is_wrong.any():
             channel, place = np.argwhere(is_wrong)[0]
             where = f"{words}, {furnace.describe(*pairs, place)}" if pairs else words
@@ -105,10 +107,10 @@ DISTANCES = (0.0, 1e-30, 1e-6, 1e6, 1e15, 1e30)
 
 
 def white(form: str) -> dict[str, dict[str, float]]:
-    """Return the white materials matte, glossy and metal by their names, as pairing makes them.
+    """Return the white materials matte, glossy, metal and mixed, as pairing makes them.
 
     Glossy ones are the counterparts of white rough plastic. A metal's lobe returns all light at
-    normal incidence.
+    normal incidence. Mixed ones are half glossy, half metal.
     """
     materials = {"matte": {"k_a": 1.0, "k_d": 1.0, "base_color": 1.0}}
     for alpha in ALPHAS:
@@ -117,9 +119,11 @@ def white(form: str) -> dict[str, dict[str, float]]:
         plastic = albedo.of_roughplastic(albedo.RoughPlastic((1.0, 1.0, 1.0), alpha, 1.5))
         diffuse, specular = float(plastic.diffuse[0]), float(plastic.specular[0])
         rough = {"base_color": 1.0, "n": n, "alpha": alpha, "ior": 1.5}
-        glossy = {"k_a": diffuse, "k_d": diffuse, "k_s": specular * lobe, **rough}
-        materials[f"glossy, alpha {alpha:g}"] = glossy
-        materials[f"metal, alpha {alpha:g}"] = {"k_s": lobe, "metallic": 1.0, **rough}
+        glossy = {"k_a": diffuse, "k_d": diffuse, "k_s": specular * lobe, "metallic": 0.0, **rough}
+        metal = {"k_a": 1.0, "k_d": 0.0, "k_s": lobe, "metallic": 1.0, **rough}
+        mixed = {name: (glossy[name] + metal[name]) / 2 for name in glossy}
+        for name, made in (("glossy", glossy), ("mixed", mixed), ("metal", metal)):
+            materials[f"{name}, alpha {alpha:g}"] = made
     return materials
 
 
@@ -282,6 +286,7 @@ WHITE: dict[str, dict[str, Any]] = {
     "diffuse": {"reflectance": 1.0},
     "roughplastic": {"diffuse_reflectance": 1.0},
     "principled": {"base_color": {"type": "rgb", "value": 1.0}},
+    "principledthin": {"base_color": {"type": "rgb", "value": 1.0}},
     "roughconductor": {"material": "none"},
     "phong": {"k_d": 1.0},
 }
@@ -297,17 +302,44 @@ LEVEL = 0.001
 INCIDENT = (0.0, 45.0, 75.0)
 """Degrees at which samples are compared with the density."""
 
+LEAST_BEND = 0.08
+"""Least ``|1 - 1 / eta|`` of an interface whose transmitted lobes the quadrature resolves."""
+
+
+def registered(word: str) -> str:
+    """Return the name of a plugin; run the file of one that is named ``FILE.py:NAME``."""
+    if (place := heuristics.in_file(word)) is None:
+        return word
+    path, name, variant = Path(place[0]), place[1], mi.variant()
+    content = f"that calls mitsuba.register_bsdf(NAME, class) in variant {variant}, as FILE.py:NAME"
+    with contained(path):
+        user_shaders.names_of(path, content)
+    if mi.variant() != variant or not name:
+        mi.set_variant(variant)
+        raise InputError(f"{path}: give a file {content}.")
+    return name
+
+
+def _index(bsdf: Any) -> float:
+    """Return the relative index of refraction below a BSDF, as its samples report it, or 1."""
+    one, *two = (mi.Float(each) for each in np.random.default_rng(0).random((3, 256)))
+    si = dr.zeros(mi.SurfaceInteraction3f, 256)
+    si.wi = mi.Vector3f(0, 0, 1)
+    found, _ = bsdf.sample(mi.BSDFContext(), si, one, mi.Point2f(*two))
+    return dr.max(dr.select(found.wo.z < 0, found.eta, 0))[0] or 1.0
+
 
 class ScatteringSubject(Subject):
     """A BSDF of some type; parameters that are omitted are of :data:`WHITE`.
 
     If no roughness is given, and it has one, it is evaluated at each of :data:`ALPHAS`. BSDFs that
-    transmit light or reflect it as a mirror are refused: no quadrature covers them.
+    reflect or pass light in one direction alone are refused: no quadrature covers them.
     """
 
-    def __init__(self, plugin: str, parameters: Mapping[str, Any]) -> None:
+    def __init__(self, word: str, parameters: Mapping[str, Any]) -> None:
         super().__init__()
-        self.plugin, self.parameters = plugin, dict(parameters)
+        self.plugin = plugin = registered(word)
+        self.parameters = dict(parameters)
         for name, (least, most) in RESOLVED.items():
             value = self.parameters.get(name)
             if isinstance(value, float) and not least <= value <= most:
@@ -316,12 +348,18 @@ class ScatteringSubject(Subject):
                     f" too wide: give {least:g} to {most:g}."
                 )
         self.bsdf = self._made()
-        refused = mi.BSDFFlags.Transmission, mi.BSDFFlags.Delta
-        if any(mi.has_flag(self.bsdf.flags(), flag) for flag in refused):
+        if mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Delta):
             raise InputError(
-                f"BSDF {plugin!r} transmits light or reflects it as a mirror; an audit needs"
-                " reflection with a density: give roughplastic, roughconductor or the like."
+                f"BSDF {plugin!r} reflects light as a mirror, or passes it in one direction: it has"
+                " no density to audit. Give a rough one, such as roughconductor or roughdielectric."
             )
+        if mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Transmission):
+            eta = self.eta = _index(self.bsdf)
+            if 0 < abs(1 - 1 / eta) < LEAST_BEND:
+                raise InputError(
+                    f"BSDF {plugin!r}: an index of refraction of {eta:.3g} makes a lobe too narrow"
+                    f" for the audit: give one above {1 / (1 - LEAST_BEND):.2f}."
+                )
         self.bsdfs = {plugin: self.bsdf}
         self.materials: dict[str, float | None] = {plugin: None}
         self.keys = {key.partition(".")[0] for key, _ in mi.traverse(self.bsdf)}
@@ -347,7 +385,7 @@ class ScatteringSubject(Subject):
             yield f"alpha = {alpha:g}", furnace.of_bsdf(self._made(alpha=alpha))(light, view), pairs
 
     def numbers(self) -> Iterator[Number]:
-        light, view = furnace.random_pairs(512)
+        light, view = furnace.random_pairs(512, self.eta)
         parameters = mi.traverse(self.bsdf)
         for key in parameters.keys():  # noqa: SIM118 not a mapping
             value = parameters[key]
@@ -355,32 +393,40 @@ class ScatteringSubject(Subject):
             is_one = isinstance(value, (mi.Float, mi.Color3f)) and dr.width(value) == 1
             if is_smooth and is_one and (centre := float(np.array(value, float).ravel()[0])):
                 # Leave room for differences: reflectances must not exceed 1.
-                centre = min(max(centre, 0.1), 0.9) if "reflectance" in key else centre
+                is_share = "reflectance" in key or centre == 1
+                centre = min(max(centre, 0.1), 0.9) if is_share else centre
                 yield key, centre, partial(self._changed, key, type(value), light, view)
 
     def sampling(self) -> tuple[float, str] | None:
         """Return the least p of χ² between samples and ``pdf`` (Mitsuba's test), and its angle.
 
-        It is None for a BSDF that reflects nothing.
+        It is None for a BSDF that scatters nothing.
         """
-        if not furnace.of_bsdf(self.bsdf)(*furnace.random_pairs(256)).any():
+        if not furnace.of_bsdf(self.bsdf)(*furnace.random_pairs(256, self.eta)).any():
             return None
-        return min((self._p_value(angle), f"viewer at {angle:g}°") for angle in INCIDENT)
+        angles = furnace.both_sides(INCIDENT, self.eta)
+        return min((self._p_value(angle), f"viewer at {angle:g}°") for angle in angles)
 
     def _p_value(self, degrees: float) -> float:
         wi = mi.Vector3f(furnace.direction(np.deg2rad(degrees), 0.3))
         parameters = {"type": self.plugin} | WHITE.get(self.plugin, {}) | self.parameters
         sample, density = mi.chi2.BSDFAdapter(self.plugin, parameters, wi=wi)
 
-        def above(wo: Any) -> Any:
+        def turned(sample1: Any) -> Any:
+            # Cells are fine at the equator: transmitted lobes about the normal are narrow.
+            wo, weight = sample(sample1)
+            return mi.Vector3f(wo.y, wo.z, wo.x), weight
+
+        def counted(wo: Any) -> Any:
+            wo = mi.Vector3f(wo.z, wo.x, wo.y)
             # Samples below the horizon weigh nothing: roughplastic's density there is irrelevant.
-            return dr.select(wo.z > 0, density(wo), 0)
+            return dr.select((wo.z > 0) | (self.eta is not None), density(wo), 0)
 
         test = mi.chi2.ChiSquareTest(
-            mi.chi2.SphericalDomain(), sample, above, sample_dim=3,
+            mi.chi2.SphericalDomain(), turned, counted, sample_dim=3,
             sample_count=200_000, ires=32, res=100,
         )  # fmt: skip
-        test.run(LEVEL, len(INCIDENT), quiet=True)
+        test.run(quiet=True)
         p = 0.0 if test.fail else float(np.array(test.p_value).ravel()[0])
         return p if np.isfinite(p) else 0.0
 
@@ -389,10 +435,12 @@ class ScatteringSubject(Subject):
         try:
             return mi.load_dict({"type": self.plugin} | parameters)
         except RuntimeError as error:
-            reason = " ".join(str(error).split())
+            said = str(error).strip().splitlines()
+            reason = " ".join(" ".join(said[-2:] if "Traceback" in str(error) else said).split())
             raise InputError(
-                f"BSDF {self.plugin!r} with {self.parameters} cannot be made: give a Mitsuba BSDF"
-                f" type, and its parameters as -p name=value. Mitsuba reports: {reason}"
+                f"BSDF {self.plugin!r} with {self.parameters} cannot be made: give a BSDF type of"
+                " Mitsuba or of a file, FILE.py:NAME, and its parameters as -p name=value. Mitsuba"
+                f" reports: {reason}"
             ) from error
 
     def _changed(

@@ -14,6 +14,8 @@ Parameter                 Type (default)      Meaning
 ``cutoff``                float (30)          spot: half angle of the cone, degrees
 ``exponent``              float (0)           spot: ``m`` of 6.4
 ``shell``                 float (0)           point and spot: radius in which nothing casts a shadow
+``radius``                float (0)           point and spot: radius of the lamp, a sphere or disc
+``half_u``, ``half_v``    vector (0, 0, 0)    point and spot: half the edges of a rectangular lamp
 ========================  ==================  =====================================================
 
 Position, direction, the given intensities and the coefficients are exposed to
@@ -52,7 +54,15 @@ import mitsuba as mi
 
 from heuristic import convention, terms
 from heuristic.convention import Colour, Interaction, Mask, Number, Properties, Sample
-from heuristic.lights import FAR, INTENSITIES, PLUGINS, UNATTENUATED, DirectionalLight, Light
+from heuristic.lights import (
+    FAR,
+    INTENSITIES,
+    PLUGINS,
+    UNATTENUATED,
+    DirectionalLight,
+    Extent,
+    Light,
+)
 from heuristic.plugins.coefficients import coefficient, emitted
 
 
@@ -65,6 +75,7 @@ def define() -> dict[str, Any]:
         "cutoff": (mi.Float, 30.0),
         "exponent": (mi.Float, 0.0),
     }
+    sizes = {"radius": mi.Float, "half_u": mi.Vector3f, "half_v": mi.Vector3f}
     coefficients = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
 
     class HeuristicLight(mi.Emitter):
@@ -91,6 +102,9 @@ def define() -> dict[str, Any]:
             self.shell = 0
             if "shell" in self.names and props.get("shell", 0.0) > 0:
                 self._keep(props, "shell", mi.Float, 0.0)
+            if "extent" in self.names:
+                self.extent = Extent(*(kind(props.get(name, 0.0)) for name, kind in sizes.items()))
+                dr.make_opaque(self.extent)
             self.m_flags = +mi.EmitterFlags.DeltaPosition
             if self.model is DirectionalLight:
                 self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection

@@ -82,6 +82,11 @@ def _area(light: LightNode) -> None:
         plugin, factor, form, cone = "heuristic_point", CLOSED_LIGHT_FACTOR * area, "closed, ", {}
     if flatness < 1:  # its light leaves through the shape
         cone["shell"] = radius
+    match graph.plugin(shape):
+        case "sphere" | "disk" as kind:
+            cone["radius"] = np.sqrt(area / np.pi) / (2 if kind == "sphere" else 1)
+        case "rectangle":
+            cone["half_u"], cone["half_v"] = _half_edges(body)
     position = mi.ScalarPoint3f(*centroid)
     derived = heuristic(plugin, factor, **cone, position=position, intensity=radiance)
     derived.set_id(f"lamp ‘{graph.label(shape)}’")
@@ -92,6 +97,13 @@ def _area(light: LightNode) -> None:
 
 ROOM = 1.02
 """Factor on the radius of a lamp: the grid's places lie up to a 64th inside its edges."""
+
+
+def _half_edges(rectangle: mi.Shape) -> list[Any]:
+    """Return the vectors from a rectangle's middle to the middles of two edges."""
+    places = mi.Point2f([0.5, 1.0, 0.5], [0.5, 0.5, 1.0])
+    middle, *ends = np.array(rectangle.sample_position(0.0, places).p, float).T
+    return [mi.ScalarVector3f(*(end - middle)) for end in ends]
 
 
 def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float], float]:

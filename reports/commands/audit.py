@@ -29,7 +29,8 @@ def _parameter(text: str) -> tuple[str, float | bool | str]:
 @jobs.command()
 @click.option("--heuristic", metavar="NAME|FILE.py[:FUNCTION]",
               help="What `compare --heuristic` takes.")  # fmt: skip
-@click.option("--bsdf", metavar="TYPE", help="A BSDF plugin of Mitsuba, such as roughplastic.")
+@click.option("--bsdf", metavar="TYPE|FILE.py:NAME",
+              help="A BSDF plugin of Mitsuba, or one that a file registers.")  # fmt: skip
 @click.option("-p", "parameters", type=_parameter, multiple=True, metavar="NAME=VALUE",
               help="A parameter of the heuristic or the BSDF; may be repeated.")  # fmt: skip
 @jobs.output_option("out", "audit/NAME")
@@ -56,7 +57,8 @@ def audit(
     Examples:
       fotismos audit --heuristic blinn
       fotismos audit --heuristic my_shader.py:toon
-      fotismos audit --bsdf roughplastic -p alpha=0.1
+      fotismos audit --bsdf roughdielectric -p alpha=0.1
+      fotismos audit --bsdf my_bsdf.py:my_name
     """  # noqa: D301 click reads the \b as: keep these lines
     name = heuristic or bsdf
     if not name or (heuristic and bsdf):

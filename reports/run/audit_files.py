@@ -20,9 +20,37 @@ from reports.terminal.words import number
 WIDTH = 270
 """Pixels of a plot: with its axis it fits a phone."""
 
-INKS = ("#7a6fd0", "#2b93b8", "#3f9e5f")
-DASHES = ([1, 0], [6, 3], [2, 2])
-"""Colours and dashes of the lobes by light, visible on light and dark grounds."""
+INKS = ("#7a6fd0", "#2b93b8", "#3f9e5f", "#b8862b", "#d06f6f")
+DASHES = ([1, 0], [6, 3], [2, 2], [9, 2, 2, 2], [4, 1])
+"""Colours and dashes of lines by light or viewer, visible on light and dark grounds."""
+
+
+SHOWN = (0.0, 60.0, 80.0, 120.0, 180.0)
+"""Angles from which the furnace is drawn over roughness; above 90 from behind."""
+
+
+def furnace(record: Audit) -> Spec:
+    """Return the chart of the white furnace: over ``alpha`` if it was varied, else over the angle.
+
+    The faint lines are single-scattering GGX, white, of the same ``alpha``.
+    """
+    varied = [curve for curve in record.curves if curve.alpha]
+    rows = [
+        {"x": curve.alpha or angle, "y": seen, "single": single,
+         "of": f"{angle:g}°" if varied else "", "kind": curve.material.partition(",")[0]}
+        for curve in varied or record.curves
+        for angle, seen, single in zip(
+            record.angles, curve.seen, curve.single_scattering or curve.seen, strict=True
+        )
+        if angle in SHOWN or not varied
+    ]  # fmt: skip
+    x = alt.X("x:Q").title("alpha" if varied else "viewer’s angle").scale(nice=False)
+    lines = alt.Chart().encode(x=x, **_styled(rows, "viewer at"))
+    faint = lines.mark_line(strokeWidth=1).encode(y="single:Q", color=alt.value(FAINT))
+    layers = [faint, lines.mark_line().encode(y=alt.Y("y:Q").title("seen"))]
+    chart = alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH // 2, data=alt.Data(values=rows))
+    kinds = alt.Row("kind:N", sort=None, title=None, header=alt.Header(labelAnchor="start"))
+    return vega.specification(chart.facet(row=kinds).resolve_scale(y="independent"))
 
 
 def lobes(record: Audit) -> Spec:
@@ -41,28 +69,36 @@ def lobes(record: Audit) -> Spec:
 
 
 def _chart(rows: list[dict[str, Any]]) -> alt.LayerChart:
-    reach = 1.05 * max(1.0, *(max(abs(row["x"]), row["y"]) for row in rows))
-    names = list(dict.fromkeys(row["of"] for row in rows))
+    reach = 1.05 * max(1.0, *(max(abs(row["x"]), abs(row["y"])) for row in rows))
+    low = -reach if min(row["y"] for row in rows) < 0 else 0
 
     def axis(channel: Any, low: float) -> Any:
         scale = alt.Scale(domain=[low, reach], nice=False, zero=False)
         return channel.title(None).scale(scale).axis(tickCount=4)
 
-    def style(channel: Any, styles: Any) -> Any:
-        legend = alt.Legend(orient="top", symbolSize=300, symbolType="stroke")
-        scale = alt.Scale(domain=names, range=list(styles))
-        return channel("of:N", title="light at", sort=names, legend=legend, scale=scale)
-
     angles = [radians(step) for step in range(-90, 91, 5)]
     circle = [{"x": sin(angle), "y": cos(angle), "angle": angle} for angle in angles]
     diffuse = alt.Chart(alt.Data(values=circle)).mark_line(color=FAINT, strokeWidth=1)
     lines = alt.Chart(alt.Data(values=rows)).mark_line(clip=True, strokeWidth=2)
-    lines = lines.encode(color=style(alt.Color, INKS), strokeDash=style(alt.StrokeDash, DASHES))
+    lines = lines.encode(**_styled(rows, "light at"))
     layers = [
-        each.encode(x=axis(alt.X("x:Q"), -reach), y=axis(alt.Y("y:Q"), 0), order="angle:Q")
+        each.encode(x=axis(alt.X("x:Q"), -reach), y=axis(alt.Y("y:Q"), low), order="angle:Q")
         for each in (diffuse, lines)
     ]
-    return alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH // 2)
+    return alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH if low else WIDTH // 2)
+
+
+def _styled(rows: list[dict[str, Any]], title: str) -> dict[str, Any]:
+    """Return colour and dashes of lines by what they are ``of``."""
+    names = list(dict.fromkeys(row["of"] for row in rows))
+    legend = alt.Legend(orient="top", symbolSize=300, symbolType="stroke")
+
+    def style(channel: Any, styles: Any) -> Any:
+        scale = alt.Scale(domain=names, range=list(styles))
+        shown = legend if len(names) > 1 else None
+        return channel("of:N", title=title, sort=names, legend=shown, scale=scale)
+
+    return {"color": style(alt.Color, INKS), "strokeDash": style(alt.StrokeDash, DASHES)}
 
 
 def write(place: Path, record: Audit) -> None:
@@ -75,9 +111,14 @@ def write(place: Path, record: Audit) -> None:
 
 def render(record: Audit) -> str:
     """Return the page of an audit: one file, without scripts."""
-    chart = vega.figure("Lobes", lobes(record))
-    title = headline(record)
-    return rendered("audit.html.j2", title=title, record=record, found=value_of, lobes=chart)
+    return rendered(
+        "audit.html.j2",
+        title=headline(record),
+        record=record,
+        found=value_of,
+        lobes=vega.figure("Lobes", lobes(record)),
+        furnace=vega.figure("White furnace", furnace(record)),
+    )
 
 
 # --- On a terminal ---------------------------------------------------------------------------
