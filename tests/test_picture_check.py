@@ -67,6 +67,7 @@ def test_what_cannot_be_checked_ends_with_2(run, check, tmp_path):
         "--picture hall=0.exr --update": "two repeats or more",
         "--picture hall=?.exr --update --spp 4": "--spp: pictures are not rendered",
         "": "Give --picture hall",
+        "--update": "Give --picture hall",
     }.items():
         code, printed, messages = run("check", "b", *words.split())
         assert (code, expected in printed + messages) == (2, True), messages

@@ -73,12 +73,16 @@ def read(path: Path) -> BaselineFile:
     return BaselineFile(path, read_baseline(read_text(path), str(path)))
 
 
-def read_text(path: Path) -> str:
-    """Read the text of a baseline, of a scene or of pictures."""
+def read_text(path: Path, of_pictures: bool = False) -> str:
+    """Read the text of a baseline: of a scene, or of pictures."""
     try:
-        return content(path, LARGEST).decode()
+        text = content(path, LARGEST).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}. {_HOW}") from error
+    if ('"repeats":' in text) != of_pictures:
+        hint = "not of pictures. Omit" if of_pictures else "of pictures. Give"
+        raise InputError(f"{path}: this baseline is {hint} --picture {path.stem}=PATTERN.")
+    return text
 
 
 def require_own_pictures(path: Path) -> None:

@@ -255,8 +255,8 @@ def update_pictures(
 ) -> tuple[CheckRecord, None]:
     """Write or replace the baseline of the pictures that match a pattern."""
     begin, status = perf_counter(), "updated" if path.exists() else "created"
-    if path.exists() and not pictures.is_of_pictures(baselines.read_text(path)):
-        raise InputError(f"{path}: this is not of pictures. Move it away, or give another file.")
+    if path.exists():
+        baselines.read_text(path, of_pictures=True)  # another baseline stays
     repeats = pictures.read_repeats(pattern, transfer)
     pictures.write(path, repeats, transfer)
     found = check_pictures(repeats, repeats, level)
@@ -364,10 +364,6 @@ def examine_one(
     progress: Progress | None = None,
 ) -> tuple[CheckRecord, SceneView | Before | None]:
     """Check one baseline, of a scene or of the pictures that match a pattern."""
-    is_of_pictures = pictures.is_of_pictures(baselines.read_text(path))
-    if is_of_pictures != (pattern is not None):
-        hint = "pictures. Give" if is_of_pictures else "a scene. Omit"
-        raise InputError(f"{path}: this is a baseline of {hint} --picture {path.stem}=PATTERN.")
     if pattern is not None:
         return examine_pictures(path, pattern, level)
     file = baselines.read(path)

@@ -7,15 +7,8 @@ from typing import Literal
 import numpy as np
 
 from comparisons import pictures
-from comparisons.check.measurement import laid_out
-from comparisons.check.pictures import (
-    SIDE,
-    PictureBaseline,
-    Repeats,
-    Unseen,
-    colour,
-    means,
-)
+from comparisons.check.measurement import LINEAR_ROUNDING, laid_out
+from comparisons.check.pictures import SIDE, PictureBaseline, Repeats, Unseen, colour, means
 from comparisons.departure.colour import Array
 from heuristic import program
 from heuristic.errors import InputError
@@ -28,18 +21,12 @@ LONGEST = 2**15
 """Pixels of the longer side of a baseline that is read, at most."""
 
 
-def is_of_pictures(text: str) -> bool:
-    """Return whether the text of a baseline is that of pictures."""
-    return '"repeats":' in text
-
-
 def read_repeats(pattern: str, transfer: str | None) -> Repeats:
     """Read the repeats that match a pattern, ``render_*.exr`` or ``render_*.exr:LAYER``."""
     path, layer = pictures.parts(pattern)
     found = [str(path)] if path.is_file() else sorted(glob(str(path), recursive=True))
     if not found:
         raise InputError(f"{pattern}: no file matches. Give repeats, such as 'render_*.exr'.")
-
     words = (f"{file}:{layer}" if layer else file for file in found)
     return Repeats.of(pictures.read(word, transfer) for word in words)
 
@@ -65,26 +52,26 @@ def write(path: Path, repeats: Repeats, transfer: Literal["linear", "srgb"] | No
 
 def read(path: Path) -> tuple[PictureBaseline, Repeats]:
     """Read a baseline, and the statistics of its repeats from the EXR beside it."""
-    baseline = records.read(PictureBaseline, baselines.read_text(path), str(path))
+    baseline = records.read(PictureBaseline, baselines.read_text(path, of_pictures=True), str(path))
     place = path.parent / Path(baseline.images).name
     how = program.command("check", path, "--update", "--picture", f"{path.stem}=PATTERN")
     found = baselines.read_layers(place, LAYERS, LONGEST, how)
     repeats = Repeats(baseline.repeats, **found, correlation=np.array(baseline.correlation))
     is_same = np.allclose(repeats.mean.mean(axis=(0, 1)), baseline.mean, rtol=1e-5, atol=1e-9)
-    if not is_same or (repeats.variance < 0).any():
+    if not (is_same and (repeats.variance >= 0).all() and baseline.correlation < np.inf):
         raise InputError(f"{place}: this is not of {path.name}. Write both again: `{how}`.")
     return baseline, repeats
 
 
 def sentence(unseen: Unseen, mean: Array) -> str:
     """Return the sentence on what could not be seen, relative to the mean of the picture."""
-    whole = max(float(np.mean(mean)), 1e-30)
+    whole = max(float(np.mean(mean)), LINEAR_ROUNDING)
     picture, block, noisiest = (
-        f"{max(change):.2g} ({100 * max(change) / whole:.2g} %)"
+        f"{100 * max(change) / whole:.2g} %"
         for change in (unseen.mean, unseen.block, unseen.noisiest)
     )
     return (
-        f"a change of the mean by {picture} is caught in {100 * unseen.power:g} % of cases, of a"
-        f" block of {SIDE} x {SIDE} pixels by {block}, of the noisiest by {noisiest} of the mean;"
-        " smaller ones may be missed"
+        f"caught in {100 * unseen.power:g} % of cases: a change of the mean by {picture}, of a block"
+        f" of {SIDE} x {SIDE} pixels by {block} of it, of the noisiest block by {noisiest}; smaller"
+        " ones may be missed"
     )
