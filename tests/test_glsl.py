@@ -18,7 +18,7 @@ from heuristic.errors import InputError, InstallationError
 from heuristic.heuristics import INPUTS, Heuristic, named
 from reports.commands import doctor
 from tests.parts import camera
-from tests.test_user_heuristics import SHADERS, SMALL, image
+from tests.test_user_heuristics import SHADERS, SIZES, SMALL, image, sizes
 
 PHONG = str(SHADERS / "phong.glsl")
 
@@ -64,6 +64,14 @@ def test_phong_in_glsl_is_phong():
         own, theirs = (image(scene, name, **more) for name in ("phong", PHONG))
         assert own.max() > 0.1
         np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5, err_msg=f"{scene} {more}")
+
+
+@opengl
+def test_a_light_has_the_size_of_its_lamp(rgb, written):
+    size = "point.lights[0].extent"
+    text = returning(f"{size}.radius, length({size}.u), length({size}.v)")
+    shown = list(sizes(written(text, "mine.glsl")))
+    np.testing.assert_allclose(shown, [size for _, size in SIZES], atol=1e-5)
 
 
 def room(lights, **bsdf):
