@@ -250,7 +250,9 @@ def _audits():
     found = audits.audits()
     replace("audit.md", "audits", audits.table(found))
     atomic.write(DOCS / "audit.svg", vega.paper(audit_files.lobes(found[audits.PICTURED])))
-    replace("audit.md", "engines", audits.argued(audits.engines()))
+    engines = audits.engines()
+    replace("audit.md", "engines", audits.argued(engines))
+    replace("audit.md", "threads", audits.threads(engines, found))
 
 
 def _shaders():
@@ -259,6 +261,7 @@ def _shaders():
 
     found = examples.comparisons()
     replace("shaders.md", "shaders", examples.table(found))
+    replace("shaders.md", "lamp", examples.lamp())
     replace("shaders.md", "mistakes", examples.mistakes())
     shown = examples.pictures(found)
     _sheet("shaders.png", list(shown), [list(shown.values())])

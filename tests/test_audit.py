@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from comparisons.audit import checks
+from comparisons.audit import checks, furnace
 from comparisons.audit.subjects import DISTANCES, EXTREMES, ScatteringSubject, ShadingSubject
 from heuristic import Range, heuristics
 from heuristic.errors import InputError
@@ -126,6 +126,57 @@ def test_roughplastic_loses_light_is_reciprocal_and_has_a_wrong_derivative(rgb):
     assert found["gradient"].worst == "by alpha"
 
 
+def facets(alpha, eta, degrees):
+    """The light that GGX of an interface scatters once, over its facets (Walter et al. 2007)."""
+    cosine, eta = abs(np.cos(np.deg2rad(degrees))), eta if degrees < 90 else 1 / eta
+    nodes, weights = np.polynomial.legendre.leggauss(600)
+    x = (nodes + 1) / 2
+    share, weight = x**3 * (10 - 15 * x + 6 * x * x), 15 * weights * (x * (1 - x)) ** 2
+    tangent = alpha * np.sqrt(share / np.maximum(1 - share, 1e-15))[:, None]
+    top = 1 / np.sqrt(1 + tangent**2)
+    facing = (np.sqrt(1 - cosine**2) * tangent * np.cos(np.pi * (nodes + 1)) + cosine) * top
+    met = np.maximum(facing, 1e-9)
+    inside = np.sqrt(np.maximum(1 - (1 - met**2) / eta**2, 0))
+    parts = (met - eta * inside) / (met + eta * inside), (eta * met - inside) / (eta * met + inside)
+    fresnel = sum(part**2 for part in parts) / 2
+
+    def lit(z):
+        slope = alpha**2 * (1 / np.maximum(z, 1e-9) ** 2 - 1)
+        return np.where(z > 0, 2 / (1 + np.sqrt(1 + slope)), 0)
+
+    refracted = cosine / eta - (met / eta - inside) * top
+    scattered = fresnel * lit(2 * met * top - cosine) + (1 - fresnel) * lit(refracted)
+    seen = np.maximum(facing, 0) / top * lit(cosine) / cosine
+    return weight @ (scattered * seen) @ weights / 2
+
+
+def test_rough_glass_passes_what_a_quadrature_over_its_facets_finds(rgb):
+    for alpha, ior in ((0.1, 1.5), (0.3, 1.1), (1.0, 2.0)):
+        given = {"alpha": alpha, "int_ior": ior, "ext_ior": 1.0, "distribution": "ggx"}
+        subject = ScatteringSubject("roughdielectric", given)
+        curve = checks.curve(subject, "roughdielectric")
+        angles = furnace.both_sides(checks.ANGLES, subject.eta)
+        expected = [facets(alpha, subject.eta, degrees) for degrees in angles]
+        np.testing.assert_allclose([curve.seen, curve.returned], [expected] * 2, rtol=1e-3)
+    found, _ = checked(small(subject, (48, 36)))
+    assert failing(found) == {"white furnace"}
+    assert found["sampling"].verdict == "holds"
+    subject.eta = 1.9  # not its own
+    expected = 2 * (4 - 1.9**2) / (4 + 1.9**2)
+    assert checks.reciprocity(subject).value == pytest.approx(expected, rel=0.02)
+
+
+def test_principled_glass_keeps_a_share_of_spec_trans_inside(rgb):
+    """mitsuba3#465: light that leaves is scaled by ``spec_trans``, though nothing else takes it."""
+    whole, half = (
+        ScatteringSubject("principled", {"roughness": 0.5, "spec_trans": share})
+        for share in (1, 0.5)
+    )
+    whole, half = (checks.curve(each, "principled").returned[-1] for each in (whole, half))
+    assert half == pytest.approx(whole / 2, rel=1e-4)
+    assert whole > 0.92
+
+
 # --- Each check can fail -------------------------------------------------------------------------
 
 
@@ -188,32 +239,41 @@ def test_each_check_can_fail(rgb):
         assert expected <= found <= expected | allowed, number
 
 
-def test_a_density_that_is_wrong_is_found(rgb):
-    class Wrong(mi.BSDF):
-        """Diffuse, with samples even over the hemisphere and the density of the cosine."""
+MATTE = """
+import drjit as dr
+import mitsuba as mi
 
-        def __init__(self, properties):
-            super().__init__(properties)
-            flags = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide
-            self.m_components, self.m_flags = [flags], flags
+class Matte(mi.BSDF):
+    def __init__(self, properties):
+        super().__init__(properties)
+        self.m_flags = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide
 
-        def sample(self, context, si, sample1, sample2, active=True):
-            bs = dr.zeros(mi.BSDFSample3f)
-            bs.wo = mi.warp.square_to_uniform_hemisphere(sample2)
-            return bs, mi.Spectrum(1)
+    def sample(self, context, si, sample1, sample2, active=True):
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo = mi.warp.square_to_cosine_hemisphere(sample2)
+        return bs, mi.Spectrum(1)
 
-        def eval(self, context, si, wo, active=True):
-            return mi.Spectrum(dr.maximum(wo.z, 0) / dr.pi) & (si.wi.z > 0)
+    def eval(self, context, si, wo, active=True):
+        return mi.Spectrum(dr.maximum(wo.z, 0) / dr.pi) & (si.wi.z > 0)
 
-        def pdf(self, context, si, wo, active=True):
-            return mi.warp.square_to_cosine_hemisphere_pdf(wo)
+    def pdf(self, context, si, wo, active=True):
+        return mi.warp.square_to_cosine_hemisphere_pdf(wo)
 
-        def to_string(self):
-            return "Wrong[]"
+mi.register_bsdf("matte", Matte)
+"""
 
-    mi.register_bsdf("densely_wrong", Wrong)
-    assert checks.sampling(ScatteringSubject("densely_wrong", {})).verdict == "does not hold"
-    assert checks.sampling(ScatteringSubject("diffuse", {})).verdict == "holds"
+
+def test_a_bsdf_in_a_file_has_its_density_checked(rgb, written):
+    for text, verdict in (
+        (MATTE, "holds"),
+        (MATTE.replace("to_cosine_hemisphere(", "to_uniform_hemisphere("), "does not hold"),
+    ):
+        found, _ = checked(small(ScatteringSubject(f"{written(text)}:matte", {}), (24, 18)))
+        assert found["sampling"].verdict == verdict
+        assert failing(found) <= {"sampling"}
+    written(MATTE.replace("wo.z, 0)", "wo.w, 0)"))
+    with pytest.raises(InputError, match=r"^mine.py, line 16: .* 'w' .*BSDF mine.py:matte"):
+        checks.audit("bsdf", "mine.py:matte", {})
 
 
 # --- Hard cases ----------------------------------------------------------------------------------
@@ -284,7 +344,8 @@ def test_only_values_that_no_light_has_fail_the_command(run, tmp_path):
     assert all(check["worst"] in html for check in record["checks"])
 
 
-def test_mistakes_in_words_are_refused(run, tmp_path, rgb):
+def test_mistakes_in_words_are_refused(run, tmp_path, rgb, written):
+    scalar = written("import mitsuba as mi\nmi.set_variant('scalar_rgb')\n")
     for words, message in (
         (("--heuristic", "phong", "--bsdf", "diffuse"), "one of --heuristic and --bsdf"),
         (("--bsdf", "diffuse", "-p", "reflectance"), "is not a parameter"),
@@ -295,6 +356,10 @@ def test_mistakes_in_words_are_refused(run, tmp_path, rgb):
         ("heuristic", "phong", {"gloss": 1.0}, "gloss"),
         ("heuristic", "phnog", {}, "phnog"),
         ("bsdf", "plastic", {}, "mirror"),
+        ("bsdf", "dielectric", {}, "passes it in one direction"),
+        ("bsdf", "roughdielectric", {"int_ior": 1.05}, "too narrow"),
+        ("bsdf", "none.py:matte", {}, "^none.py: there is no such file"),
+        ("bsdf", scalar, {}, "in variant llvm_ad_rgb"),
         ("bsdf", "roughplastic", {"alpha": 0.01}, "too narrow"),
         ("bsdf", "phong", {"n": 1000.0}, "too narrow"),
         ("bsdf", "roughplastic", {"alhpa": 1.0}, "alhpa"),

@@ -18,7 +18,7 @@ from heuristic.errors import InputError, InstallationError
 from heuristic.heuristics import INPUTS, Heuristic, named
 from reports.commands import doctor
 from tests.parts import camera
-from tests.test_user_heuristics import SHADERS, SMALL, image
+from tests.test_user_heuristics import SHADERS, SMALL, image, require_sizes
 
 PHONG = str(SHADERS / "phong.glsl")
 
@@ -64,6 +64,13 @@ def test_phong_in_glsl_is_phong():
         own, theirs = (image(scene, name, **more) for name in ("phong", PHONG))
         assert own.max() > 0.1
         np.testing.assert_allclose(theirs, own, rtol=1e-5, atol=1e-5, err_msg=f"{scene} {more}")
+
+
+@opengl
+def test_a_light_has_the_size_of_its_lamp(rgb, written):
+    light = "point.lights[0]"
+    numbers = "{0}.extent.radius + 10 * length({0}.extent.v), abs({0}.extent.u.x), {0}.distance"
+    require_sizes(written(returning(numbers.format(light)), "mine.glsl"))
 
 
 def room(lights, **bsdf):

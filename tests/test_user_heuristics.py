@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from comparisons.case import open_case
+from comparisons.compare import compare
 from comparisons.options import Options
 from comparisons.prepared import prepare
 from heuristic import Range
@@ -16,7 +17,7 @@ from heuristic.heuristics import HEURISTICS, Heuristic, Parameter, known_as, nam
 from reference.pairing import halves
 from reference.scene.source import Source
 from tests import checks, oracle
-from tests.parts import camera, moved, rgb_of, shown_by
+from tests.parts import camera, look_at, moved, rgb_of, shown_by
 
 SHADERS = Path(__file__).parents[1] / "docs/shaders"
 SMALL = {"resolution": (24, 24), "spp": 8}
@@ -174,6 +175,50 @@ def test_the_partners_parameters_are_the_physical_ones(rgb, written):
                 half = halves.pair(Source(name, scene), heuristic=f"mine.py:{one}").heuristic
                 shown = np.array(mi.render(half.instantiate(), spp=1))
                 oracle.require_close(shown.reshape(-1, 3), np.broadcast_to(value, (16, 3)), 2e-3)
+
+
+FACING = look_at((1, 0, 3), (1, 0, 0), (0, 1, 0))
+SIZES = (
+    ({"type": "point", "position": (1, 0, 3)}, (0, 0)),
+    ({"type": "sphere", "center": (1, 0, 3), "radius": 0.5}, (0.5, 0)),
+    ({"type": "disk", "to_world": FACING.scale(0.3)}, (0.3, 0)),
+    ({"type": "rectangle", "to_world": FACING.scale((2, 0.7, 1))}, (7, 2)),
+    ({"type": "cube", "to_world": moved((1, 0, 3), 0.2)}, (0, 0)),
+)
+"""Lamps, with the radius, or ten times the length of v; and how far u extends along x."""
+
+
+def require_sizes(name):
+    """Require a shader that returns these numbers, and the distance to a lamp's middle."""
+    for lamp, size in SIZES:
+        shines = {} if lamp["type"] == "point" else {"emitter": {"type": "area"}}
+        scene = {
+            "type": "scene", "floor": {"type": "rectangle"}, "lamp": lamp | shines,
+            "sensor": camera((0, 0, 2), up=(0, 1, 0), size=1, fov=0.1),
+        }  # fmt: skip
+        half = halves.pair(Source("lamp", scene), heuristic=name).heuristic
+        shown = np.array(mi.render(half.instantiate(), spp=1))[0, 0]
+        np.testing.assert_allclose(shown, (*size, np.sqrt(10)), atol=2e-3, err_msg=lamp["type"])
+
+
+def test_a_light_has_the_size_of_its_lamp(rgb, written):
+    require_sizes(written(
+        "import drjit as dr, mitsuba as mi\ndef shade(point):\n"
+        "    light = point.lights[0]; size = light.extent\n"
+        "    first = size.radius + 10 * dr.norm(size.v)\n"
+        "    return mi.Color3f(first, dr.abs(size.u.x), light.distance)\n"
+    ))  # fmt: skip
+
+
+def test_a_representative_point_is_nearer_to_a_lamps_highlight():
+    file, found = SHADERS / "representative_point.py", []
+    for name in (f"{file}", f"{file}:center"):
+        asked = Options(heuristic=name, resolution=(96, 64), spp=64)
+        case = open_case(str(file), asked)
+        found.append(compare(case.source, case.options).record.metrics)
+    nearer, without = ([one[name].mean for name in ("dE2000", "rmse")] for one in found)
+    assert nearer[0] < 0.95 * without[0]
+    assert nearer[1] < without[1] / 2
 
 
 MISTAKES = {

@@ -24,9 +24,11 @@ INKS = ("#7a6fd0", "#2b93b8", "#3f9e5f", "#b8862b", "#d06f6f")
 DASHES = ([1, 0], [6, 3], [2, 2], [9, 2, 2, 2], [4, 1])
 """Colours and dashes of lines by light or viewer, visible on light and dark grounds."""
 
-
 SHOWN = (0.0, 60.0, 80.0, 120.0, 180.0)
-"""Angles from which the furnace is drawn over roughness; above 90 from behind."""
+"""Viewer's angles of the furnace over roughness; above 90 from behind."""
+
+Rows = list[dict[str, Any]]
+"""Points of lines, in their order: ``x``, ``y`` and what the line is ``of``."""
 
 
 def furnace(record: Audit) -> Spec:
@@ -35,70 +37,64 @@ def furnace(record: Audit) -> Spec:
     The faint lines are single-scattering GGX, white, of the same ``alpha``.
     """
     varied = [curve for curve in record.curves if curve.alpha]
-    rows = [
-        {"x": curve.alpha or angle, "y": seen, "single": single,
-         "of": f"{angle:g}°" if varied else "", "kind": curve.material.partition(",")[0]}
-        for curve in varied or record.curves
-        for angle, seen, single in zip(
+    kinds: dict[str, tuple[Rows, Rows]] = {}
+    for curve in varied or record.curves:
+        lines = kinds.setdefault(curve.material.partition(",")[0], ([], []))
+        for angle, *values in zip(
             record.angles, curve.seen, curve.single_scattering or curve.seen, strict=True
-        )
-        if angle in SHOWN or not varied
-    ]  # fmt: skip
+        ):
+            x, of = (curve.alpha, f"{angle:g}°") if varied else (angle, "")
+            for rows, value in zip(lines, values, strict=True):
+                rows += [{"x": x, "y": value, "of": of}] * (not varied or angle in SHOWN)
     x = alt.X("x:Q").title("alpha" if varied else "viewer’s angle").scale(nice=False)
-    lines = alt.Chart().encode(x=x, **_styled(rows, "viewer at"))
-    faint = lines.mark_line(strokeWidth=1).encode(y="single:Q", color=alt.value(FAINT))
-    layers = [faint, lines.mark_line().encode(y=alt.Y("y:Q").title("seen"))]
-    chart = alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH // 2, data=alt.Data(values=rows))
-    kinds = alt.Row("kind:N", sort=None, title=None, header=alt.Header(labelAnchor="start"))
-    return vega.specification(chart.facet(row=kinds).resolve_scale(y="independent"))
+    y = alt.Y("y:Q").title("seen")
+    return _charts({kind: _chart(*lines, "viewer at", x, y) for kind, lines in kinds.items()})
 
 
 def lobes(record: Audit) -> Spec:
     """Return the chart: a radius is ``pi f``; the half circle is a white diffuse surface."""
-    charts = []
+    charts = {}
+    circle = [{"x": sin(at), "y": cos(at), "of": ""} for at in map(radians, range(-90, 91, 5))]
     for curve in record.curves:
         rows = [
-            {"x": value * sin(radians(view)), "y": value * cos(radians(view)), "angle": view,
-             "of": f"{light:g}°"}
+            {"x": value * sin(radians(view)), "y": value * cos(radians(view)), "of": f"{light:g}°"}
             for light, lobe in zip(record.lights, curve.lobes, strict=False)
             for view, value in zip(record.views, lobe, strict=True)
-        ]  # fmt: skip
+        ]
         if rows:
-            charts.append(_chart(rows).properties(title=curve.material))
-    return vega.specification(alt.vconcat(*charts))
+            reach = 1.05 * max(1.0, *(max(abs(row["x"]), abs(row["y"])) for row in rows))
+            low = -reach if min(row["y"] for row in rows) < 0 else 0
+            x, y = (
+                channel.title(None).axis(tickCount=4).scale(domain=[least, reach], nice=False)
+                for channel, least in ((alt.X("x:Q"), -reach), (alt.Y("y:Q"), low))
+            )
+            chart = _chart(rows, circle, "light at", x, y)
+            charts[curve.material] = chart.properties(height=WIDTH if low else WIDTH // 2)
+    return _charts(charts)
 
 
-def _chart(rows: list[dict[str, Any]]) -> alt.LayerChart:
-    reach = 1.05 * max(1.0, *(max(abs(row["x"]), abs(row["y"])) for row in rows))
-    low = -reach if min(row["y"] for row in rows) < 0 else 0
-
-    def axis(channel: Any, low: float) -> Any:
-        scale = alt.Scale(domain=[low, reach], nice=False, zero=False)
-        return channel.title(None).scale(scale).axis(tickCount=4)
-
-    angles = [radians(step) for step in range(-90, 91, 5)]
-    circle = [{"x": sin(angle), "y": cos(angle), "angle": angle} for angle in angles]
-    diffuse = alt.Chart(alt.Data(values=circle)).mark_line(color=FAINT, strokeWidth=1)
-    lines = alt.Chart(alt.Data(values=rows)).mark_line(clip=True, strokeWidth=2)
-    lines = lines.encode(**_styled(rows, "light at"))
-    layers = [
-        each.encode(x=axis(alt.X("x:Q"), -reach), y=axis(alt.Y("y:Q"), low), order="angle:Q")
-        for each in (diffuse, lines)
-    ]
-    return alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH if low else WIDTH // 2)
+def _charts(charts: dict[str, Any]) -> Spec:
+    titled = (chart.properties(title=title) for title, chart in charts.items())
+    return vega.specification(alt.vconcat(*titled))
 
 
-def _styled(rows: list[dict[str, Any]], title: str) -> dict[str, Any]:
-    """Return colour and dashes of lines by what they are ``of``."""
+def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerChart:
     names = list(dict.fromkeys(row["of"] for row in rows))
     legend = alt.Legend(orient="top", symbolSize=300, symbolType="stroke")
 
     def style(channel: Any, styles: Any) -> Any:
         scale = alt.Scale(domain=names, range=list(styles))
         shown = legend if len(names) > 1 else None
-        return channel("of:N", title=title, sort=names, legend=shown, scale=scale)
+        return channel("of:N", title=of, sort=names, legend=shown, scale=scale)
 
-    return {"color": style(alt.Color, INKS), "strokeDash": style(alt.StrokeDash, DASHES)}
+    below, above = (
+        alt.Chart(alt.Data(values=[row | {"order": place} for place, row in enumerate(each)]))
+        .mark_line(clip=True, strokeWidth=width)
+        .encode(x=x, y=y, order="order:Q", strokeDash=style(alt.StrokeDash, DASHES))
+        for each, width in ((faint, 1), (rows, 2))
+    )
+    layers = [below.encode(color=alt.value(FAINT)), above.encode(color=style(alt.Color, INKS))]
+    return alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH // 2)
 
 
 def write(place: Path, record: Audit) -> None:
