@@ -71,7 +71,7 @@ def sentence(unseen: Unseen, mean: Array) -> str:
         for change in (unseen.mean, unseen.block, unseen.noisiest)
     )
     return (
-        f"caught in {100 * unseen.power:g} % of cases: a change of the mean by {picture}, of a block"
-        f" of {SIDE} x {SIDE} pixels by {block} of it, of the noisiest block by {noisiest}; smaller"
-        " ones may be missed"
+        f"caught in {100 * unseen.power:g} % of cases: a change of the mean by {picture}, of a"
+        f" block of {SIDE} x {SIDE} pixels by {block} of it, of the noisiest block by {noisiest};"
+        " smaller ones may be missed"
     )

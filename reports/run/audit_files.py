@@ -43,9 +43,9 @@ def furnace(record: Audit) -> Spec:
         for angle, *values in zip(
             record.angles, curve.seen, curve.single_scattering or curve.seen, strict=True
         ):
-            x, of = (curve.alpha, f"{angle:g}°") if varied else (angle, "")
+            at, of = (curve.alpha, f"{angle:g}°") if varied else (angle, "")
             for rows, value in zip(lines, values, strict=True):
-                rows += [{"x": x, "y": value, "of": of}] * (not varied or angle in SHOWN)
+                rows += [{"x": at, "y": value, "of": of}] * (not varied or angle in SHOWN)
     x = alt.X("x:Q").title("alpha" if varied else "viewer’s angle").scale(nice=False)
     y = alt.Y("y:Q").title("seen")
     return _charts({kind: _chart(*lines, "viewer at", x, y) for kind, lines in kinds.items()})
@@ -56,7 +56,7 @@ def lobes(record: Audit) -> Spec:
     charts = {}
     circle = [{"x": sin(at), "y": cos(at), "of": ""} for at in map(radians, range(-90, 91, 5))]
     for curve in record.curves:
-        rows = [
+        rows: Rows = [
             {"x": value * sin(radians(view)), "y": value * cos(radians(view)), "of": f"{light:g}°"}
             for light, lobe in zip(record.lights, curve.lobes, strict=False)
             for view, value in zip(record.views, lobe, strict=True)
@@ -64,10 +64,9 @@ def lobes(record: Audit) -> Spec:
         if rows:
             reach = 1.05 * max(1.0, *(max(abs(row["x"]), abs(row["y"])) for row in rows))
             low = -reach if min(row["y"] for row in rows) < 0 else 0
-            x, y = (
-                channel.title(None).axis(tickCount=4).scale(domain=[least, reach], nice=False)
-                for channel, least in ((alt.X("x:Q"), -reach), (alt.Y("y:Q"), low))
-            )
+            shown = {"tickCount": 4}
+            x = alt.X("x:Q", axis=shown).title(None).scale(domain=[-reach, reach], nice=False)
+            y = alt.Y("y:Q", axis=shown).title(None).scale(domain=[low, reach], nice=False)
             chart = _chart(rows, circle, "light at", x, y)
             charts[curve.material] = chart.properties(height=WIDTH if low else WIDTH // 2)
     return _charts(charts)
