@@ -238,7 +238,7 @@ def _witnesses():
     """Run the cases of docs/witnesses.md, and write their results."""
     plugins.register()
     direct.register()
-    for part in ("closed_forms", "figures"):
+    for part in ("closed_forms", "figures", "whole_scenes"):
         replace("witnesses.md", part.replace("_", " "), getattr(page, part)())
 
 

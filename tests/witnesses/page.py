@@ -7,7 +7,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from comparisons.gallery.builtin import SCENES
-from tests.witnesses import test_closed_forms, test_povray
+from reports.terminal import tables
+from tests.witnesses import test_closed_forms, test_povray, test_radiance
 from tests.witnesses.witness import Witness, deviation
 
 
@@ -25,6 +26,17 @@ def figures() -> Iterator[str]:
         f"In {len(found)} figures both see {min(pixels):,} to {max(pixels):,} pixels, and one alone"
         f" sees {max(alone)} at most. The largest difference is {max(largest):.2f} of a rounding."
     )
+
+
+def whole_scenes() -> Iterator[str]:
+    """Yield how far the reference is from Radiance, in the colour and the block that are worst."""
+    rows = [("Scene", "mean", "worst block")]
+    for name in test_radiance.CASES:
+        found, error = (100 * each for each in test_radiance.deviation(*test_radiance.both(name)))
+        spots = np.argmax(np.abs(found[0])), found[0].size + np.argmax(np.abs(found[1:]))
+        cells = (f"{found.flat[spot]:+.3f}±{1.96 * error.flat[spot]:.3f}" for spot in spots)
+        rows.append((name, *cells))
+    yield from tables.markdown(rows)
 
 
 def _measured(witness: Witness) -> str:

@@ -96,9 +96,9 @@ def deviation(witness: Witness, everything: bool = False, factor: float = 1.0) -
     images, spp = rendered(witness, everything)
     images, expected = factor * images, picture(witness)
     pixels = expected.size / np.array([1, *[BLOCKS**2] * BLOCKS**2])
-    found = _means(images.mean(axis=0) - expected) / expected.mean()
+    found = means(images.mean(axis=0) - expected) / expected.mean()
     # The variance of a pixel is known badly from its passes, that of many together well.
-    variance = _means(images.var(axis=0, ddof=1)) / len(images)
+    variance = means(images.var(axis=0, ddof=1)) / len(images)
     error = np.sqrt(variance / pixels) / expected.mean()
     tests = 1 if witness.mean_only else len(found)
     half_width = stats.norm.isf(CHANCE / tests / 2) * error + witness.form_error
@@ -117,8 +117,8 @@ def picture(witness: Witness) -> np.ndarray:
     return np.einsum("ipjq,p,q->ij", cells, weights / 2, weights / 2)
 
 
-def _means(image):
-    """Return the mean of an image and those of its blocks."""
-    side = len(image) // BLOCKS
-    blocks = image.reshape(BLOCKS, side, BLOCKS, side).mean(axis=(1, 3))
-    return np.array([image.mean(), *blocks.ravel()])
+def means(image):
+    """Return the mean of an image (H, W, ...) and those of its blocks."""
+    side, colours = len(image) // BLOCKS, image.shape[2:]
+    blocks = image.reshape(BLOCKS, side, BLOCKS, side, *colours).mean(axis=(1, 3))
+    return np.array([image.mean(axis=(0, 1)), *blocks.reshape(-1, *colours)])
