@@ -72,6 +72,9 @@ def test_what_cannot_be_checked_ends_with_2(run, check, tmp_path):
         code, printed, messages = run("check", "b", *words.split())
         assert (code, expected in printed + messages) == (2, True), messages
         assert "Traceback" not in messages
+    for name in ("equal0.exr", "equal1.exr"):
+        write(tmp_path / name, TRUTH)
+    assert "its own seed" in run("check", "c", "--update", "--picture", "e=equal?.exr")[1]
     Path("b/mine.json").write_text("{}")
     assert run("check", "b/mine.json", "--update", "--picture", "mine=?.exr")[0] == 2
     assert Path("b/mine.json").read_text() == "{}"

@@ -201,7 +201,7 @@ class PictureBaseline(Record, kw_only=True):
     images: str
 
 
-class Unseen(Record):
+class SmallestChanges(Record):
     """The smallest changes that a check catches with the chance `power`, in linear R, G, B.
 
     Attributes
@@ -235,11 +235,11 @@ class PictureCheck:
     moved: tuple[Move, ...]
     level: float
 
-    def unseen(self) -> Unseen:
+    def smallest_changes(self) -> SmallestChanges:
         """Return the smallest changes that the check catches."""
         mean, blocks = (each.limit(self.level) for each in (self.picture, self.blocks))
         changes = mean[0, 0], np.median(blocks, axis=(0, 1)), blocks.max(axis=(0, 1))
-        return Unseen(POWER, *(colour(each) for each in changes))
+        return SmallestChanges(POWER, *(colour(each) for each in changes))
 
     def cause(self) -> str:
         """Return the sentence on factors or offsets that leave nothing moved, or else on where.

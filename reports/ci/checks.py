@@ -10,7 +10,7 @@ from msgspec import Meta, field, structs
 from comparisons.case import Case, open_case
 from comparisons.check.measurement import baseline_of, made_small, measure_scene
 from comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
-from comparisons.check.pictures import PictureCheck, Unseen, check_pictures
+from comparisons.check.pictures import PictureCheck, SmallestChanges, check_pictures
 from comparisons.compare import compare
 from comparisons.comparison import versions
 from comparisons.departure.blocks import averaged
@@ -72,7 +72,7 @@ class CheckRecord(Record, kw_only=True, omit_defaults=True):
         tuple[str, ...], Meta(description="Why, as far as the numbers tell, in sentences.")
     ] = ()
     pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
-    unseen: Unseen | None = None
+    smallest_changes: SmallestChanges | None = None
 
     @property
     def name(self) -> str:
@@ -85,9 +85,9 @@ class CheckRecord(Record, kw_only=True, omit_defaults=True):
         return {"failed": 1, "error": 2}.get(self.status, 0)
 
     @property
-    def accepting(self) -> str:
+    def update_command(self) -> str:
         """The command that writes what moved to the baseline."""
-        picture = ("--picture", f"{self.name}={self.scene}") if self.unseen else ()
+        picture = ("--picture", f"{self.name}={self.scene}") if self.smallest_changes else ()
         return program.command("check", self.baseline, "--update", *picture)
 
     @property
@@ -230,7 +230,7 @@ def _before(made: CheckRecord, before: baselines.Kept, after: baselines.Kept) ->
         moved=tuple(move.cells() for move in made.moved or ()),
         tested=made.tested or 0,
         pictures={name: images.webp(each, lossless=True) for name, each in shown.items()},
-        command=made.accepting,
+        command=made.update_command,
     )
 
 
@@ -266,17 +266,17 @@ def update_pictures(
 def _of_pictures(
     path: Path, pattern: str, status: Any, found: PictureCheck, begin: float
 ) -> CheckRecord:
-    unseen = found.unseen()
+    changes = found.smallest_changes()
     return CheckRecord(
         baseline=path.as_posix(),
         scene=pattern,
         status=status,
         seconds=round(perf_counter() - begin, 3),
-        message=pictures.sentence(unseen, found.picture.before),
+        message=pictures.sentence(changes, found.before),
         tested=found.picture.before.size + found.blocks.before.size,
         significance=found.level,
         moved=found.moved,
-        unseen=unseen,
+        smallest_changes=changes,
     )
 
 

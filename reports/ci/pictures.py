@@ -8,8 +8,14 @@ import numpy as np
 
 from comparisons import pictures
 from comparisons.check.measurement import LINEAR_ROUNDING, laid_out
-from comparisons.check.pictures import SIDE, PictureBaseline, Repeats, Unseen, colour, means
-from comparisons.departure.colour import Array
+from comparisons.check.pictures import (
+    SIDE,
+    PictureBaseline,
+    Repeats,
+    SmallestChanges,
+    colour,
+    means,
+)
 from heuristic import program
 from heuristic.errors import InputError
 from reference import records
@@ -63,15 +69,16 @@ def read(path: Path) -> tuple[PictureBaseline, Repeats]:
     return baseline, repeats
 
 
-def sentence(unseen: Unseen, mean: Array) -> str:
+def sentence(changes: SmallestChanges, before: Repeats) -> str:
     """Return the sentence on what could not be seen, relative to the mean of the picture."""
-    whole = max(float(np.mean(mean)), LINEAR_ROUNDING)
+    whole = max(before.mean.mean(), LINEAR_ROUNDING)
     picture, block, noisiest = (
         f"{100 * max(change) / whole:.2g} %"
-        for change in (unseen.mean, unseen.block, unseen.noisiest)
+        for change in (changes.mean, changes.block, changes.noisiest)
     )
+    equal = " The repeats are equal: if their renderer is random, give each its own seed."
     return (
-        f"caught in {100 * unseen.power:g} % of cases: a change of the mean by {picture}, of a"
+        f"caught in {100 * changes.power:g} % of cases: a change of the mean by {picture}, of a"
         f" block of {SIDE} x {SIDE} pixels by {block} of it, of the noisiest block by {noisiest};"
-        " smaller ones may be missed"
+        f" smaller ones may be missed.{'' if before.variance.any() else equal}"
     )

@@ -321,7 +321,7 @@ def _details(made: CheckRecord) -> Iterator[str]:
     if made.pictures is not None:
         yield f"  pictures: {made.pictures}"
     if made.status == "failed":
-        yield f"  if this is meant: {made.accepting}"
+        yield f"  if this is meant: {made.update_command}"
     yield ""
 
 

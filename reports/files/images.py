@@ -148,9 +148,10 @@ def webp_uri(file: bytes) -> str:
 # --- OpenEXR ----------------------------------------------------------------------------------
 
 #: Layers that keep float32, as terms do; the others are maps, for which half's 11 bits are enough.
-FULL_PRECISION = frozenset(
-    {"heuristic", "reference", "reference_stderr", "P", "N", "baseline.mean", "baseline.variance"}
-)
+FULL_PRECISION = frozenset({"heuristic", "reference", "reference_stderr", "P", "N"})
+
+#: How further layers begin that keep float32: terms, and statistics of pictures in a baseline.
+FULL_PREFIXES = ("term.", "baseline.mean", "baseline.variance")
 
 #: Layers with X, Y, Z instead of R, G, B.
 VECTORS = frozenset({"P", "N"})
@@ -183,14 +184,14 @@ def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
     """Return images of one size as OpenEXR channels: contiguous (H, W) half or float32.
 
     (H, W, 3) becomes ``name.R``, ``name.G``, ``name.B``, or ``.X``, ``.Y``, ``.Z`` for "P" and "N";
-    (H, W), also boolean, becomes ``name.Y``. `FULL_PRECISION`, terms and values beyond half are
+    (H, W), also boolean, becomes ``name.Y``. `FULL_PRECISION`, `FULL_PREFIXES` and values beyond half are
     float32.
     """
     result: dict[str, np.ndarray] = {}
     for name, values in layers.items():
         image = np.asarray(values)
         is_large = bool(image.size) and np.abs(image).max() > HALF_MAX
-        is_full = is_large or name in FULL_PRECISION or name.startswith("term.")
+        is_full = is_large or name in FULL_PRECISION or name.startswith(FULL_PREFIXES)
         precision = np.float32 if is_full else np.float16
         suffixes = "Y" if image.ndim == 2 else "XYZ" if name in VECTORS else "RGB"
         planes = image[..., None] if image.ndim == 2 else image
