@@ -184,8 +184,8 @@ def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
     """Return images of one size as OpenEXR channels: contiguous (H, W) half or float32.
 
     (H, W, 3) becomes ``name.R``, ``name.G``, ``name.B``, or ``.X``, ``.Y``, ``.Z`` for "P" and "N";
-    (H, W), also boolean, becomes ``name.Y``. `FULL_PRECISION`, `FULL_PREFIXES` and values beyond half are
-    float32.
+    (H, W), also boolean, becomes ``name.Y``. `FULL_PRECISION`, `FULL_PREFIXES` and values beyond
+    half are float32.
     """
     result: dict[str, np.ndarray] = {}
     for name, values in layers.items():
