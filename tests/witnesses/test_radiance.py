@@ -46,7 +46,7 @@ def with_a_window():
 
 CASES = {
     "lambert-sphere": (SCENES["lambert-sphere"].make, 2, 1),
-    "cornell-box": (cornell_box, 8, 4),
+    "cornell-box": (cornell_box, 8, 6),
     "box with a hidden lamp": (with_a_hidden_lamp, 5, 10),
     "box with a window": (with_a_window, 8, 3),
 }
