@@ -13,6 +13,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.departure.blocks import shrunk
 from comparisons.options import Options
 from heuristic import kernel, materials, terms, vectors
 from heuristic.convention import Scene
@@ -261,7 +262,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
         return f"There are more than {LIVE_LIGHTS} lights."
     if not isinstance(sensor, mi.ProjectiveCamera):
         return f"The camera, {sensor.class_name()}, has no plane film."
-    size = _size(image_size(scene), LIVE_SIDE)
+    size = shrunk(image_size(scene), LIVE_SIDE)
     ray = pixel_rays(scene, size, *np.meshgrid(*map(np.arange, size)))
     ahead = sensor.world_transform() @ mi.Vector3f(0, 0, 1)
     film, corners = (ray.o, ray.d / dr.dot(ray.d, ahead)), [0, size[0] - 1, -size[0]]
@@ -321,19 +322,12 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
     return replace(grid, lights=tuple(lights[number] for number in strongest), others=others)
 
 
-def _size(resolution: tuple[int, int], longest: int) -> tuple[int, int]:
-    """Return a width and height of the same shape, with a longest side at most."""
-    scale = min(1.0, longest / max(resolution))
-    width, height = (max(1, round(scale * side)) for side in resolution)
-    return width, height
-
-
 def _pixels(resolution: tuple[int, int], lights: int) -> tuple[NDArray, NDArray]:
     """Return the columns and rows of the pixels in the middles of the cells."""
     longest = min(SIDE, int((VALUES / 2 / lights) ** 0.5) if lights > 2 else SIDE)
     columns, rows = (
         (2 * np.arange(count) + 1) * side // (2 * count)
-        for count, side in zip(_size(resolution, longest), resolution, strict=True)
+        for count, side in zip(shrunk(resolution, longest), resolution, strict=True)
     )
     return columns, rows
 

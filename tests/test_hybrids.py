@@ -243,7 +243,8 @@ def test_a_clean_reference_takes_noise_out_of_previews(rgb):
     runs = [HybridImages(ladder.pairs, ladder.scenes, 4, 16, seed, (24, 24)) for seed in (1, 2)]
     for effects in ({INTERREFLECTION}, {INTERREFLECTION, OCCLUSION}, runs[0].effects):
         plain, quiet = (
-            [each.preview(frozenset(effects), given) for each in runs] for given in (None, clean)
+            [each.previews([frozenset(effects)], given)[0] for each in runs]
+            for given in (None, clean)
         )
         before, after = (np.sqrt(np.mean((one - two) ** 2)) for one, two in (plain, quiet))
         assert after < 0.5 * before

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from comparisons.case import Case
 from comparisons.comparison import versions
+from comparisons.departure.blocks import shrunk
 from comparisons.departure.colour import Array, Viewing
 from comparisons.departure.metrics import LEADING, METRICS, RATIO, log2_luminance_ratio
 from comparisons.departure.statistics import noise_floor
@@ -128,8 +129,7 @@ def made_small(case: Case) -> Case:
     if case.options.resolution is not None:
         return case
     sides = film_size(case.source.parse(), case.options.sensor)
-    scale = min(1.0, LONGEST / max(sides))
-    return case.changed(resolution=tuple(max(1, round(side * scale)) for side in sides))
+    return case.changed(resolution=shrunk(sides, LONGEST))
 
 
 def measure_scene(

@@ -46,6 +46,13 @@ def ratio(above: Array, below: Array) -> Array:
     return np.divide(above, below, out=np.zeros(above.shape), where=below > 0.0)
 
 
+def shrunk(sides: Sequence[int], longest: int) -> tuple[int, int]:
+    """Return two sides of the same shape, of which the longer one is at most ``longest``."""
+    scale = min(1.0, longest / max(sides))
+    first, second = (max(1, round(scale * side)) for side in sides)
+    return first, second
+
+
 def averaged(image: NDArray[np.floating], shape: Sequence[int]) -> Array:
     """Average an image (H, W, 3) down to ``shape``, whose first sides are height and width."""
     height, width = shape[:2]

@@ -248,6 +248,7 @@ def attribute(
         whole[meter.counted] = values
         return whole
 
+    previews = images.previews(errors, clean)
     departure, left = error(nothing), error(everything)
     both = images.plain_kernel, images.plugin(nothing)
     kernel, plugin = (images.pixels(each).mean(axis=0) for each in both)
@@ -269,7 +270,7 @@ def attribute(
         departure=filled(departure[0]),
         left=filled(left[0]),
         counted=meter.counted,
-        previews={labels(effects, each): images.preview(each, clean) for each in errors},
+        previews={one.effects: image for one, image in zip(hybrids, previews, strict=True)},
     )
 
 

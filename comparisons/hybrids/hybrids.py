@@ -329,10 +329,10 @@ class HybridImages:
         blocks = fine.reshape(len(fine), height, self.finer, width, self.finer, 3)
         return blocks.mean(axis=(2, 4))
 
-    def preview(
-        self, effects: Set[Effect], clean: tuple[NDArray, NDArray] | None = None
-    ) -> NDArray[np.float64]:
-        """Return the mean (f H, f W, 3) of an image's replicates, with less noise if possible.
+    def previews(
+        self, sets: Iterable[Set[Effect]], clean: tuple[NDArray, NDArray] | None = None
+    ) -> list[NDArray[np.float64]]:
+        """Return the means (f H, f W, 3) of images' replicates, with less noise if possible.
 
         ``clean`` are the reference (H', W', 3) on a film of at least the preview's size, and its
         standard error. All images share camera rays and paths, so what the full plan's replicates
@@ -344,20 +344,28 @@ class HybridImages:
         """
         from scipy.ndimage import uniform_filter
 
-        own, full = self.simulating(effects), self.simulating(frozenset(self.effects))
-        mean, (height, width) = own.mean(axis=0), own.shape[1:3]
+        images = [self.simulating(each) for each in sets]
+        full = self.simulating(frozenset(self.effects))
+        count, height, width, _ = full.shape
         if clean is None or self.finer == 1 or len(clean[0]) < height:
-            return mean
+            return [each.mean(axis=0) for each in images]
         picture, error = (averaged(each, (height, width)) for each in clean)
-        one, other = (each - each.mean(axis=0) for each in (own, full))
+        error *= np.sqrt(height * width / clean[1][..., 0].size)
 
-        def product(one: NDArray, other: NDArray) -> NDArray[np.float64]:
-            return (one * other).sum(axis=0).mean(axis=-1) / (len(own) * (len(own) - 1))
+        def covariance(one: NDArray, other: NDArray) -> NDArray[np.float64]:
+            return (one * other).sum(axis=0).mean(axis=-1) / (count * (count - 1))
 
-        noise, known = (
-            np.sqrt(np.maximum(uniform_filter(product(each, each), 3), 0)) for each in (one, other)
-        )
-        alike = uniform_filter(ratio(product(one, other), noise * known), NEAR).clip(-1, 1)
-        share = height * width / clean[1][..., 0].size
-        beta = ratio(alike * noise, np.hypot(known, np.sqrt(share) * error.mean(axis=-1)))
-        return mean - beta[..., None] * (full.mean(axis=0) - picture)
+        def deviation(centred: NDArray) -> NDArray[np.float64]:
+            return np.sqrt(np.maximum(uniform_filter(covariance(centred, centred), 3), 0))
+
+        beyond, other = full.mean(axis=0) - picture, full - full.mean(axis=0)
+        known = deviation(other)
+        unknown = np.hypot(known, error.mean(axis=-1))
+        quiet = []
+        for each in images:
+            mean = each.mean(axis=0)
+            noise = deviation(each - mean)
+            alike = ratio(covariance(each - mean, other), noise * known)
+            beta = ratio(uniform_filter(alike, NEAR).clip(-1, 1) * noise, unknown)
+            quiet.append(mean - beta[..., None] * beyond)
+        return quiet

@@ -86,7 +86,8 @@ def _area(light: LightNode) -> None:
         case "sphere" | "disk" as kind:
             cone["radius"] = np.sqrt(area / np.pi) / (2 if kind == "sphere" else 1)
         case "rectangle":
-            cone["half_u"], cone["half_v"] = _half_edges(body)
+            matrix = np.array(mi.traverse(body)["to_world"].matrix, float).reshape(4, 4, -1)
+            cone["half_u"], cone["half_v"] = (mi.ScalarVector3f(*v) for v in matrix[:3, :2, 0].T)
     position = mi.ScalarPoint3f(*centroid)
     derived = heuristic(plugin, factor, **cone, position=position, intensity=radiance)
     derived.set_id(f"lamp ‘{graph.label(shape)}’")
@@ -97,13 +98,6 @@ def _area(light: LightNode) -> None:
 
 ROOM = 1.02
 """Factor on the radius of a lamp: the grid's places lie up to a 64th inside its edges."""
-
-
-def _half_edges(rectangle: mi.Shape) -> list[Any]:
-    """Return the vectors from a rectangle's middle to the middles of two edges."""
-    places = mi.Point2f([0.5, 1.0, 0.5], [0.5, 0.5, 1.0])
-    middle, *ends = np.array(rectangle.sample_position(0.0, places).p, float).T
-    return [mi.ScalarVector3f(*(end - middle)) for end in ends]
 
 
 def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float], float]:

@@ -14,7 +14,7 @@ from comparisons import atomic
 from comparisons.atomic import content, require_regular
 from comparisons.case import SUFFIXES, Case, file_of, open_case
 from comparisons.check.measurement import HALVES, Baseline, read_baseline
-from comparisons.departure.blocks import averaged
+from comparisons.departure.blocks import averaged, shrunk
 from comparisons.options import Options
 from heuristic import program
 from heuristic.errors import InputError
@@ -133,8 +133,7 @@ def put(path: Path, text: str, layers: Kept, subject: str) -> None:
 
 def small(image: NDArray[np.floating]) -> NDArray[np.floating]:
     """Average an image (H, W, 3) down to sides of at most `LONGEST_KEPT`."""
-    scale = min(1.0, LONGEST_KEPT / max(image.shape[:2]))
-    return averaged(image, [max(1, round(side * scale)) for side in image.shape[:2]])
+    return averaged(image, shrunk(image.shape[:2], LONGEST_KEPT))
 
 
 def scene_from(scene: str, path: Path) -> str:

@@ -18,6 +18,7 @@ from PIL import Image
 from comparisons import atomic
 from comparisons.comparison import Images
 from comparisons.departure import marks
+from comparisons.departure.blocks import shrunk
 from comparisons.departure.colour import CHROMATICITIES, to_srgb
 from comparisons.departure.metrics import LEADING, RATIO, drawn
 
@@ -104,9 +105,8 @@ def thumbnails(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
 
 
 def _small(picture: Image.Image) -> Image.Image:
-    scale = min(1.0, THUMBNAIL / max(picture.size))
-    width, height = (max(1, round(side * scale)) for side in picture.size)
-    return picture.convert("RGB").resize((width, height), Image.Resampling.BOX)
+    size = shrunk(picture.size, THUMBNAIL)
+    return picture.convert("RGB").resize(size, Image.Resampling.BOX)
 
 
 def _coloured(fraction: NDArray[np.float64], colormap: str) -> Image.Image:
