@@ -51,15 +51,11 @@ class Verification(Record, kw_only=True):
 
 
 def verify(
-    source: Source,
-    options: Options | None = None,
-    progress: Progress | None = None,
-    level: float = LEVEL,
+    source: Source, options: Options | None = None, progress: Progress | None = None
 ) -> Verification:
     """Render a scene as planned and with everything, and compare both.
 
-    Given samples apply to everything; if omitted, the plan's are used. ``level`` is the chance that
-    any pixel is marked though nothing differs.
+    Given samples apply to everything; if omitted, the plan's are used.
     """
     options = options or Options()
     everything, planned = sides = [
@@ -78,7 +74,7 @@ def verify(
         add_difference((*own, apart), [one.images[0] for one in both])
     mean = sum(total.mean() for total in own) / 2
     distance = leading_distance(options.viewing)
-    marked = marks.find(apart.estimate(), mean, counted, distance, level=level)
+    marked = marks.find(apart.estimate(), mean, counted, distance, level=LEVEL)
     seconds = [side.reference.pass_times().median_s for side in sides]
     depth = "" if planned.plan.max_depth == 2 else f", depth {planned.plan.max_depth}"
     # A plan without noise would divide by zero.

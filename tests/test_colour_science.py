@@ -90,12 +90,12 @@ def test_details_give_the_largest_deviation_of_all_scenes():
         records.record(colour_science=Deviations(pixels=4096, largest=dict.fromkeys(DEFINED, most)))
         for most in (1.25e-6, 3.75e-5)
     )
-    text = page.details(2, records=[one, other])
+    text = page.details(records=[one, other])
     assert "at 8192 pixels" in text
     assert text.count('<data value="3.75e-05">') == len(DEFINED)
     assert "1.25e-06" not in text
     assert "It has no RMSE, LDR-FLIP, HDR-FLIP." in text
-    assert "Colours against" not in page.details(1, records=[records.record()])
+    assert "Colours against" not in page.details(records=[records.record()])
 
 
 def test_it_is_loaded_once_it_is_needed_and_leaves_numpy_as_it_was():

@@ -42,9 +42,9 @@ def test_light_where_there_is_none_is_an_infinite_error():
 
 
 def test_every_case_has_its_row_and_a_violated_bound_is_said(record):
-    assert 'id="hard-cases"' not in page.details(0)
+    assert 'id="hard-cases"' not in page.details()
     lost = replace(CASES[0], name="lost <case>", naive_error=np.inf, our_error=0.5)
-    text = page.details(0, hard_cases=record | {"Lost": [lost]})
+    text = page.details(hard_cases=record | {"Lost": [lost]})
     assert 'id="hard-cases"' in text
     assert text.count("beyond the limit") == 1
     assert "not finite" in text

@@ -129,7 +129,7 @@ def check(
                 title = f"fotismos check: {summaries.outcome(outcomes, significance)}"
                 if views or moved:
                     records = [view.record for view in views]
-                    details = page.details(len(views), records=records)
+                    details = page.details(records=records)
                     results.write(folder / page.DETAILS, details)
                     results.write(folder / results.PAGE, page.render(views, title, moved=moved))
                     place = str(folder / results.PAGE)

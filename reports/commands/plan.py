@@ -61,8 +61,8 @@ def plan(
             lines, code = cost_tables.choice_lines(result), int(result.chosen is None)
         elif verify:
             with progress.shown() as bar:
-                result = pool.do(Task(scene, verified, (scene, request, None), bar.of(scene)))
-            lines = plan_lines.verification_lines([result])
+                result = pool.do(Task(scene, verified, (scene, request), bar.of(scene)))
+            lines = plan_lines.verification_lines(result)
         else:
             result = pool.do(Task(scene, planned, (scene, request)))
             lines = plan_lines.plan_lines(result)
@@ -84,18 +84,13 @@ def planned(name: str, request: Options) -> PlanReport:
     return plan_report(case.name, prepare(case.source, case.options), case.variant)
 
 
-def verified(
-    name: str, request: Options, level: float | None, progress: Any = None
-) -> Verification:
-    """Compare the plan of a scene with everything simulated.
-
-    ``level`` is the chance that a right plan is marked; None takes the default.
-    """
+def verified(name: str, request: Options, progress: Any) -> Verification:
+    """Compare the plan of a scene with everything simulated."""
     from comparisons.case import open_case
-    from comparisons.verification import LEVEL, verify
+    from comparisons.verification import verify
 
     case = open_case(name, request)
-    return verify(case.source, case.options, progress, LEVEL if level is None else level)
+    return verify(case.source, case.options, progress)
 
 
 def chosen(name: str, request: Options, within: float, progress: Any) -> Choice:

@@ -32,7 +32,6 @@ from reports.terminal.words import difference
 if TYPE_CHECKING:  # few pages need these
     from comparisons.comparison import Attribution, ComparisonRecord
     from comparisons.hard_cases import HardCases
-    from comparisons.verification import Verification
 
 TITLE = "Textbook shading against physically based rendering"
 
@@ -116,8 +115,6 @@ def render(
 
 
 def details(
-    scenes: int,
-    verifications: Sequence[Verification] = (),
     hard_cases: HardCases | None = None,
     run: RunRecord | None = None,
     records: Sequence[ComparisonRecord] = (),
@@ -132,10 +129,8 @@ def details(
         HELP,
         title="Details",
         data={"terms": glossary.meanings()},
-        scenes=scenes,
         metrics=METRICS,
         glossary=glossary.GROUPS,
-        verifications=verifications,
         hard_cases=hard_cases,
         run=run,
         compared=[record for record in records if record.colour_science],

@@ -21,28 +21,16 @@ from reports.jobs import Job
 from reports.terminal.words import remark, tell, tell_where
 
 if TYPE_CHECKING:
+    from comparisons.hard_cases import HardCases
     from reports.files.results import Failure, RunRecord
     from reports.page.scene_view import SceneView
     from reports.terminal.progress import Bar
 
-SCENE, FURTHER = 8.0, 1.0
-"""Relative times of a scene and of a further task, to estimate the time left."""
+SCENE, HARD_CASES = 8.0, 1.0
+"""Relative times of a scene and of the hard cases, to estimate the time left."""
 
 SHARE = 0.1
 """Greatest share of the time that writing unfinished pages may take."""
-
-
-@dataclass(frozen=True)
-class Further:
-    """Further content of a page: the tasks that make it, begun while the last scenes are rendered.
-
-    ``tasks`` return a result and the seconds that it took, which count towards ``stage``;
-    ``content`` makes arguments of :func:`reports.page.page.details` from results by task name.
-    """
-
-    stage: str
-    tasks: Sequence[Task]
-    content: Callable[[Mapping[str, Any]], dict[str, Any]]
 
 
 @dataclass
@@ -60,6 +48,7 @@ class Batch:
     stages: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     views: dict[str, SceneView] = field(default_factory=dict)
     errors: dict[str, FotismosError] = field(default_factory=dict)
+    hard_cases: HardCases | None = None
     next_page: float = 0.0
 
     @property
@@ -93,8 +82,8 @@ class Batch:
             versions=versions(),
         )
 
-    def write_page(self, is_interrupted: bool = False, **content: Any) -> None:
-        """Write the page and its details, with further arguments of both."""
+    def write_page(self, is_interrupted: bool = False, run: RunRecord | None = None) -> None:
+        """Write the page and its details, at the end with the record of the run."""
         from reports.files import results
         from reports.page import page
 
@@ -105,7 +94,7 @@ class Batch:
         elif self.done < len(self.places):
             state = f"In progress: {done}; reload to see more."
         records = [view.record for view in self.ordered]
-        details = page.details(len(records), records=records, **content)
+        details = page.details(self.hard_cases, run, records)
         results.write(self.folder / page.DETAILS, details)
         html = page.render(
             self.ordered, failures=self.failures(), state=state, threshold=self.within
@@ -132,14 +121,15 @@ def run(
     folder: Path,
     job: Job,
     pool: Pool,
-    further: Further | None = None,
+    hard_cases: Task | None = None,
     on_page: Callable[[Path], object] | None = None,
     finish: Callable[[Path, Sequence[SceneView]], None] | None = None,
 ) -> None:
     """Compare scenes in a pool, and write the results of each, then the page and tables of all.
 
-    ``on_page`` is called with the page's path once it exists; ``finish`` at the end with the output
-    folder and the views of the compared scenes. The gravest error of a scene is raised at last.
+    The task ``hard_cases`` returns them for the details, and the seconds that it took. ``on_page``
+    is called with the page's path once it exists; ``finish`` at the end with the output folder and
+    the views of the compared scenes. The gravest error of a scene is raised at last.
     """
     with pool as pool:
         pool.start()
@@ -161,18 +151,17 @@ def run(
                 place: (scene, folder, place, replace(job, request=requests[scene]))
                 for place, scene in places.items()
             }
-            content = {}
-            total = SCENE * len(places) + (FURTHER * len(further.tasks) if further else 0.0)
+            total = SCENE * len(places) + (HARD_CASES if hard_cases else 0.0)
             try:
                 with progress.shown(total=total) as bar:
                     stages = ("rendering", *(["causes"] if job.with_causes else ()))
-                    content = _compare(pool, batch, calls, bar, further, stages)
+                    _compare(pool, batch, calls, bar, hard_cases, stages)
             except KeyboardInterrupt:
                 pool.end()
                 if batch.done:
                     _write(batch, is_interrupted=True)
                 raise
-            _write(batch, content)
+            _write(batch)
             if finish is not None:
                 finish(folder, batch.ordered)
     if batch.errors:
@@ -186,25 +175,23 @@ def _compare(
     batch: Batch,
     calls: Mapping[str, tuple[Any, ...]],
     bar: Bar,
-    further: Further | None,
+    hard_cases: Task | None,
     stages: tuple[str, ...],
-) -> dict[str, Any]:
-    """Collect the views and errors of scenes, and return the further content of the page."""
+) -> None:
+    """Collect the views and errors of scenes, and the hard cases."""
     from comparisons.case import name_of
     from reports.run import scene
     from reports.terminal import tables
 
-    others: dict[str, Any] = {}
     tasks = [
         Task(place, scene.compare, call, bar.of(name_of(call[0]), stages))
         for place, call in calls.items()
     ]
     bar.begin("scenes", len(tasks), SCENE)
-    for task, outcome in pool.each([*tasks, *(further.tasks if further else ())]):
-        if further and task.progress is None:
-            others[task.name], seconds = outcome.result()
-            batch.stages[further.stage] += seconds
-            bar.over(None, FURTHER)
+    for task, outcome in pool.each([*tasks, *([hard_cases] if hard_cases else ())]):
+        if task is hard_cases:
+            batch.hard_cases, batch.stages[task.name] = outcome.result()
+            bar.over(None, HARD_CASES)
             continue
         try:
             view, spent = outcome.result()
@@ -222,14 +209,9 @@ def _compare(
         finally:
             bar.over(task.progress)
         batch.grow_page()
-        if further and batch.done == len(calls):
-            bar.begin(further.stage, len(further.tasks), FURTHER)
-    return further.content(others) if further and batch.views else {}
 
 
-def _write(
-    batch: Batch, content: Mapping[str, Any] | None = None, is_interrupted: bool = False
-) -> None:
+def _write(batch: Batch, is_interrupted: bool = False) -> None:
     """Write the page, record and tables of all scenes as far as possible, and print the results."""
     from reference.records import to_json
     from reports import verdict
@@ -240,7 +222,7 @@ def _write(
     records = [view.record for view in views]
     run, errors = batch.record(), []
     steps: list[Callable[[], object]] = [
-        lambda: batch.write_page(is_interrupted, run=run, **(content or {})),
+        lambda: batch.write_page(is_interrupted, run),
         lambda: results.write(folder / results.RUN, to_json(batch.record())),
     ]
     if views:

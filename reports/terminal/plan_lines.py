@@ -89,21 +89,12 @@ def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
         yield effect.name, called, effect.rule, effect.evidence, effect.cost
 
 
-def verification_lines(results: Sequence[Verification]) -> Iterator[str]:
-    """Yield a table of verifications: differences, noise, and time at equal noise."""
+def verification_lines(result: Verification) -> Iterator[str]:
+    """Yield the table of a verification: differences, noise, and time at equal noise."""
     headings = "scene", "planned", "significant", "of pixels", "kernel", "faster"
-    rows = [
-        (
-            result.scene,
-            result.planned,
-            f"{result.significant}",
-            f"{result.pixels}",
-            f"{result.heuristic_largest:.1e}",
-            f"{result.gain:.3g} x",
-        )
-        for result in results
-    ]
-    yield from printed([headings, *rows])
+    row = [result.scene, result.planned, f"{result.significant}", f"{result.pixels}"]
+    row += [f"{result.heuristic_largest:.1e}", f"{result.gain:.3g} x"]
+    yield from printed([headings, row])
     yield "significant: pixels that differ by more than both sides' noise"
     yield "kernel: largest difference from omitting terms from the kernel"
     yield "faster: how many times sooner the plan reaches the same noise"
