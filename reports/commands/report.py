@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from comparisons.processes.pool import Task
+from comparisons.processes.pool import Task, Turn
 from reports import jobs
 from reports.run import batch
 
@@ -64,13 +64,18 @@ def report(
     ladders = frozenset() if quick else LADDERS
     job = jobs.Job(request, figures, with_causes=True, fresh=fresh, within=within, ladders=ladders)
     rendered = jobs.pool(timeout, len(SCENES), workers, scheduler)
-    cases, on_page = Task("hard cases", hard_cases), jobs.open_page if is_opened else None
+    cases, on_page = (
+        Task("hard cases", hard_cases, (output,)),
+        jobs.open_page if is_opened else None,
+    )
     batch.run(tuple(SCENES), output, job, rendered, cases, on_page)
 
 
-def hard_cases() -> tuple[HardCases, float]:
-    """Evaluate the hard cases; return them, and the seconds that it took."""
+def hard_cases(folder: Path) -> tuple[HardCases, float]:
+    """Evaluate the hard cases; return them, and the seconds that it took in its turn."""
     from comparisons.hard_cases import collect
+    from reports.files import results
 
-    begin = perf_counter()
-    return collect(), perf_counter() - begin
+    with Turn(folder, folder / results.TABLES):
+        begin = perf_counter()
+        return collect(), perf_counter() - begin
