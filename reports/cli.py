@@ -17,7 +17,7 @@ from click.shell_completion import get_completion_class
 
 from comparisons.processes import interruption
 from heuristic import llvm
-from heuristic.errors import FotismosError, InputError, suggestion
+from heuristic.errors import FotismosError, suggestion
 from heuristic.program import __version__, program
 from reports import jobs
 from reports.terminal.words import echo
@@ -122,16 +122,6 @@ def cli() -> None:
     Colours and bars appear only on terminals; NO_COLOR=1 switches colours off.
     """  # noqa: D301 click reads the \b as: keep these lines
     llvm.require_libraries()
-    try:
-        os.getcwd()
-    except OSError as error:
-        raise InputError(f"the current folder: {error.strerror}. Enter one that exists.") from error
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
-    if not epoch.isdecimal():  # Matplotlib dates pictures by it, after all else is done
-        raise InputError(
-            f"SOURCE_DATE_EPOCH={epoch!r} is not a number of seconds. Unset the variable, or set"
-            " it to one."
-        )
 
 
 def main() -> None:

@@ -78,15 +78,6 @@ def test_notebook_and_command_line_choose_one_variant(rgb):
     assert open_case(mi.cornell_box(), name="box").variant == "llvm_ad_rgb"
 
 
-def test_options_that_are_not_known_are_refused_with_those_that_are():
-    with pytest.raises(InputError, match=r"unknown options samples: .*spp"):
-        Options.of({"samples": 4})
-    with pytest.raises(InputError, match=r"llvm_mono.*llvm_ad_rgb"):
-        Options(variant="llvm_mono")
-    with pytest.raises(InputError, match=r"pairing None .*literal, matched"):
-        Options(pairing=None)
-
-
 def test_a_command_repeats_what_was_given(rgb, tmp_path):
     case = open_case("fig-6-10", Options(resolution=(12, 10)))
     assert case.command() == (

@@ -2,7 +2,6 @@
 
 import itertools
 import json
-import os
 import re
 import shlex
 import shutil
@@ -132,16 +131,6 @@ def test_plan_prints_a_table_and_json(run):
     assert all(effect["called_for"] for effect in data["effects"])
 
 
-def test_what_mitsuba_says_stands_in_the_record_once(run, tmp_path):
-    out = tmp_path / "out"
-    words = ("compare", "narrow-band-lamp", "--resolution", "16x16", "--spp", 8, "-o", out)
-    assert run(*words)[2] == ""
-    record = read(out / "narrow-band-lamp/comparison.json")
-    told = [warning for warning in record["warnings"] if warning.startswith("Mitsuba: ")]
-    assert len(told) == len(set(told)) > 0
-    assert all("\x1b" not in warning for warning in told)
-
-
 @pytest.mark.thorough
 def test_plan_verifies(run):
     words = ("plan", "--verify", "fig-8-6a", "--resolution", "32x32")
@@ -160,32 +149,6 @@ def test_a_file_with_tabulated_spectra_is_compared_spectrally(run, tmp_path):
     for options, variant in (((), "llvm_ad_spectral"), (asked, "llvm_ad_rgb")):
         run("compare", path, "-o", tmp_path / "out", "--spp", 4, *options)
         assert read(tmp_path / "out/scene/comparison.json")["variant"] == variant
-
-
-def in_shell(script, folder):
-    """Run a bash script in which ``fotismos`` is the program; return what came of it."""
-    program = f'fotismos() {{ exec {shlex.quote(sys.executable)} -P -m reports "$@"; }}\n'
-    return subprocess.run(
-        ["bash", "-c", program + script],
-        cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
-    )  # fmt: skip
-
-
-SURROUNDINGS = (
-    ("fotismos scenes >/dev/full", 2, "output: No space left on device"),
-    ("fotismos scenes >&-", 0, ""),
-    ("cd $(mktemp -d) && rmdir $PWD && fotismos compare fig-8-9", 2, "current folder: No such"),
-    ("SOURCE_DATE_EPOCH=x fotismos compare fig-8-9 --figures", 2, "SOURCE_DATE_EPOCH='x'"),
-)
-
-
-def test_odd_surroundings_are_at_most_one_message(tmp_path):
-    for script, code, expected in SURROUNDINGS:
-        done = in_shell(script, tmp_path)
-        assert done.returncode == code
-        assert expected in done.stderr
-        assert len(done.stderr.splitlines()) == (1 if code else 0)
-        assert not list(tmp_path.iterdir())
 
 
 COMPARE = """
@@ -295,19 +258,3 @@ def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(monkey
         assert re.search(r"about \d+ s", shown)
         assert ("\x1b[38;5;" in shown or "\x1b[3" in shown) is is_coloured
         monkeypatch.setenv("NO_COLOR", "1")
-
-
-def test_bash_completes_scenes(tmp_path):
-    # Under the name of the run script, which the shell calls to complete itself.
-    program = tmp_path / "run"
-    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m reports "$@"\n')
-    program.chmod(0o755)
-    script = (
-        "compopt() { :; }\n"  # a bash that is not interactive refuses it
-        f"source <({program} completion bash)\n"
-        "COMP_WORDS=(run compare fig-8-8) COMP_CWORD=2\n"
-        f"_fotismos_completion {program}\n"
-        'echo "${COMPREPLY[@]}"\n'
-    )
-    done = in_shell(script, tmp_path)
-    assert (done.stdout.split(), done.stderr) == (["fig-8-8a", "fig-8-8b", "fig-8-8c"], "")

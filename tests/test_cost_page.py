@@ -5,7 +5,6 @@ from dataclasses import replace
 from math import ceil
 
 import jsonschema
-import numpy as np
 import pytest
 import vl_convert
 from msgspec import convert, structs
@@ -125,17 +124,6 @@ def test_a_comparison_with_its_study_replaces_an_earlier_one_as_a_whole(tmp_path
 
 
 # -- Charts ----------------------------------------------------------------------------------------
-
-
-def test_names_stand_apart_in_order_and_inside():
-    for seed in range(20):
-        places = np.sort(np.random.default_rng(seed).uniform(0, 380, 3 + seed))
-        moved = cost_charts.spread(list(places), 15, 380)
-        assert np.all(np.diff(moved) >= 15 - 1e-9)
-        assert min(moved) >= 0
-        assert max(moved) <= 380 + 1e-9
-    assert cost_charts.spread([10, 50, 300], 15, 380) == [10, 50, 300]
-    assert cost_charts.spread([100, 102], 15, 380) == [93.5, 108.5]
 
 
 def point(method, spp, time, error, **more):

@@ -150,15 +150,6 @@ def test_each_field_arrives_as_it_is(rgb):
     assert np.all(shown(shader(point)) == 1)
 
 
-@opengl
-def test_points_are_shaded_in_portions(rgb, monkeypatch):
-    shader, point = points(returning("point.position * point.material.n"))
-    whole = shown(shader(point))
-    monkeypatch.setattr(glsl, "POINTS", 100)
-    np.testing.assert_array_equal(shown(shader(point)), whole)
-    assert len(np.unique(whole)) > user_shaders.POINTS
-
-
 MISTAKES = {
     "syntax": (
         "vec3 shade(Point point) {\n    vec3 value = vec3(0)\n    return value;\n}",
@@ -208,23 +199,6 @@ def test_what_is_not_a_shader_file_is_refused(tmp_path, monkeypatch):
 def test_other_colours_than_rgb_are_refused(variant):
     with pytest.raises(InputError, match=rf"needs RGB colours, which {variant} does not have"):
         image("fig-8-9", PHONG, variant=variant)
-
-
-LOGS = {
-    "Mesa": "compute_shader\n====\n0:2(9): error: oops\n0:9(1): error: end\n",
-    "NVIDIA": "0(2) : error C1503: oops\n0(9) : error C0000: end\n",
-    "AMD and Intel": "ERROR: 0:2: oops\nERROR: 0:9: end\nERROR: 2 compilation errors\n",
-}
-
-
-def test_places_of_several_compilers_are_read():
-    for log in LOGS.values():
-        told = glsl.explained(log, "a.glsl", "one\ntwo")
-        assert "a.glsl, line 2: " in told
-        assert "oops" in told
-        assert "a.glsl, at its end: " in told
-    log = "0:1(2): warning: unused\n0:2(9): error: undeclared\n0:2(1): error: no match\n"
-    assert glsl.explained(log, "a.glsl", "one\ntwo") == "a.glsl, line 2: undeclared"
 
 
 @opengl

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from reference.rendering.renderer import Renderer
-from reference.scene.source import Script, Source, digest
+from reference.scene.source import Source, digest
 
 SCENE = """<scene version="3.0.0">
   %s
@@ -160,15 +160,3 @@ def test_a_finished_scene_is_rendered_again_once_a_file_changes(run, folder):
     assert [written(), written()] == [True, False]
     write(texture, 0.9)
     assert [written(), written()] == [True, False]
-
-
-def test_two_scripts_have_modules_of_one_name(folder):
-    colours = []
-    for name, colour in (("a", 0.1), ("b", 0.7)):
-        (folder / name).mkdir()
-        (folder / name / "colours.py").write_text(f"GREY = {colour}\n")
-        (folder / name / "s.py").write_text(
-            "import colours\nscene = {'type': 'scene', 'grey': colours.GREY}\n"
-        )
-        colours.append(Script(folder / name / "s.py")()["grey"])
-    assert colours == [0.1, 0.7]

@@ -1,13 +1,11 @@
 """Lights in scenes with occluders, by the thousands, and against closed forms."""
 
-from dataclasses import replace
-
 import drjit as dr
 import numpy as np
 import pytest
 
 import heuristic
-from heuristic import kernel, terms
+from heuristic import kernel
 from tests import checks, oracle
 from tests.parts import camera, moved, rgb_of
 
@@ -104,25 +102,6 @@ def test_any_number_of_lights_adds_up(count):
         )
 
 
-def test_blocks_of_lights_share_their_kernels(kernel_history):
-    points = checks.random_points(1000)
-    arrays = [dr.llvm.Array3f(v.T) for v in (points.position, points.normal, points.view)]
-    dr.eval(arrays)
-    rng = np.random.default_rng(2)
-    material = heuristic.Material(k_d=0.5, k_s=0.3, n=5)
-
-    def kernels(count):
-        lights = [
-            heuristic.PointLight(tuple(map(float, rng.normal(size=3))), 1.0) for _ in range(count)
-        ]
-        history = kernel_history(lambda: heuristic.shade(*arrays, material, lights))
-        return {kernel["hash"] for kernel in history}
-
-    few, more = kernels(4 * kernel.BLOCK), kernels(16 * kernel.BLOCK)
-    assert few == more
-    assert len(few) <= 4, "the first block, the second, those after them, and the total"
-
-
 def test_many_lights_pass_gradients():
     position = dr.llvm.ad.Array3f([0, 0.5], [0, 0.1], [0, 0.2])
     k_d = dr.llvm.ad.Float(0.5)
@@ -169,18 +148,3 @@ def test_two_intensities_are_those_of_the_equations_in_random_sets(kind, omitted
     away = ~oracle.near_an_edge(points.position, points.normal, [light], 1e-9)
     assert (expected > 0.01).any(axis=1).sum() > 500
     oracle.require_close(checks.as_rows(found), expected, absolute=1e-12, where=away)
-
-
-def test_a_light_of_one_intensity_is_worked_out_once(monkeypatch):
-    """Two equal ones give the same values to the bit."""
-    calls, right = [], terms.attenuation
-    monkeypatch.setattr(terms, "attenuation", lambda *given: calls.append(1) or right(*given))
-    points = checks.random_points(4000)
-    arrays = [dr.llvm.Array3f(v.T) for v in (points.position, points.normal, points.view)]
-    material = heuristic.Material(k_d=0.5, k_s=0.3, n=5)
-    one = heuristic.PointLight((1, 2, 3), (0.9, 0.4, 0.1), (0, 0, 1))
-    two = replace(one, diffuse_intensity=one.intensity, specular_intensity=one.intensity)
-    found = [np.array(heuristic.shade(*arrays, material, [light])) for light in (one, two)]
-    assert len(calls) == 1 + 2
-    assert found[0].max() > 0.01
-    np.testing.assert_array_equal(*found)

@@ -51,11 +51,6 @@ def test_rays_and_depths_lead_to_the_points(rgb, lens):
     np.testing.assert_allclose(found[seen], expected[seen], atol=1e-4)
 
 
-def test_a_long_film_has_fewer_points(rgb):
-    points, _ = points_of(sphere(PLASTIC, lamp(2)), resolution=(320, 200))
-    assert points.planes["material"].shape == (80, 128)
-
-
 def test_a_texture_of_many_colours_gives_factors(rgb):
     rng = np.random.default_rng(0)
     bitmap = mi.Bitmap(rng.random((40, 40, 3), np.float32))

@@ -113,19 +113,6 @@ def test_the_sum_is_that_of_the_closed_form(rgb):
     assert np.abs(found / want - 1).mean() < 2e-6
 
 
-def test_the_kernel_does_not_grow_with_the_lights(rgb):
-    def operations(count):
-        made = mi.load_dict(floor(**lights(point, count // 2), **lights(spot, count // 2)))
-        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
-            dr.kernel_history_clear()
-            radiance(made)
-            return [k["operation_count"] for k in dr.kernel_history([dr.KernelType.JIT])]
-
-    few, many = operations(64), operations(256)
-    assert len(few) == len(many)
-    assert max(few) == max(many)
-
-
 def test_lamps_in_a_loop_have_the_mean_of_mitsubas_direct(rgb):
     made, repeats = mi.load_dict(floor(**lights(lamp, 20))), 256
     ours = radiance(made, repeats)

@@ -4,7 +4,6 @@ import mitsuba as mi
 import numpy as np
 
 from heuristic import meshes
-from reports.commands import doctor
 
 POINTS = [(0, 0, 0), (4, 0, 0), (0, 4, 1), (4, 4, 2)]
 FACES = [(0, 1, 2), (2, 1, 3)]
@@ -38,16 +37,3 @@ def test_attributes_are_added_once_and_overwritten(rgb):
     stored = mi.traverse(mesh)
     np.testing.assert_array_equal(np.ravel(stored["vertex_own"]), 2 * np.float32(NORMALS).ravel())
     np.testing.assert_array_equal(np.ravel(stored["face_own"]), [1, 3, 2, 2, 3, 2])
-
-
-def test_only_versions_other_than_the_pinned_ones_are_explained(monkeypatch):
-    installed = {library: "1.2.3" for library in doctor.LIBRARIES}
-    installed |= doctor.pinned()
-    monkeypatch.setattr(doctor.metadata, "version", installed.get)
-    assert len([*doctor.version_lines()]) == len(doctor.LIBRARIES)
-    assert {"mitsuba", "drjit"} == doctor.CHANGES.keys() == doctor.pinned().keys()
-    pin, installed["mitsuba"] = installed["mitsuba"], "99.0"
-    lines = [*doctor.version_lines()]
-    assert lines[0].split(maxsplit=1) == ["mitsuba", f"99.0; {pin} is pinned"]
-    assert lines[1].strip() == doctor.CHANGES["mitsuba"]
-    assert len(lines) == len(doctor.LIBRARIES) + 1

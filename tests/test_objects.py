@@ -133,27 +133,6 @@ def test_an_instance_is_a_shape_of_its_own():
     np.testing.assert_array_equal(materials == "slate", names == "floor")
 
 
-def test_many_shapes_end_in_a_row_of_the_others():
-    rng = np.random.default_rng(3)
-    count = regions.MOST_OBJECTS + 17
-    places = np.arange(count * 8).reshape(-1, 8) % count
-    error = rng.random(places.shape) * (1 + places)
-    counted = rng.random(places.shape) < 0.8
-    owners = ObjectIds(places, tuple(f"shape {place}" for place in range(count)))
-    found, rows = regions.find_objects(error, counted, owners)
-    assert len(found) == regions.MOST_OBJECTS
-    assert found[-1].name == "18 others"
-    assert sum(each.share for each in found) == pytest.approx(1)
-    listed = [each.share for each in found[:-1]]
-    assert listed == sorted(listed, reverse=True)
-    first = int(found[0].name.split()[1])
-    np.testing.assert_array_equal(rows == 0, counted & (places == first))
-    assert (rows[~counted] == -1).all()
-    assert error[rows == len(found) - 1].sum() == pytest.approx(
-        found[-1].share * error[counted].sum()
-    )
-
-
 def test_effects_are_taken_where_the_pixels_of_a_shape_lie():
     """In maps of half the size, whose left column is bright by shadow, the right one by gloss."""
     owners = ObjectIds(np.repeat([[0, 0, 1, 1]], 4, axis=0), ("left", "right"))

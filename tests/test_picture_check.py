@@ -6,6 +6,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from PIL import Image
 from scipy import stats
 
 from tests.benchmarks import gates
@@ -80,6 +81,16 @@ def test_what_cannot_be_checked_ends_with_2(run, check, tmp_path):
     assert Path("b/mine.json").read_text() == "{}"
     (tmp_path / "b/hall.exr").write_bytes((tmp_path / "0.exr").read_bytes())
     assert check(4, 1)[0] == 2
+
+
+def test_an_update_keeps_the_transfer_function(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for number in range(2):
+        values = np.random.default_rng(number).integers(100, 120, (16, 16, 3), np.uint8)
+        Image.fromarray(values).save(f"{number}.png")
+    for words in (("--transfer", "srgb"), ()):
+        assert run("check", "b", "--update", "--picture", "wall=?.png", *words)[0] == 0
+        assert json.loads(Path("b/wall.json").read_text())["transfer"] == "srgb"
 
 
 QUICK = ("Gaussian, 10 %", "filtered gamma", "two values at 5 pixels")

@@ -161,37 +161,6 @@ def test_what_others_made_is_one_message_and_stays(run, scene_file, tmp_path, na
     assert [path.name for path in other.iterdir()] == ["mine.txt"]
 
 
-@pytest.mark.parametrize("name", [results.MARK, results.LOCK])
-def test_a_mark_or_lock_that_is_no_file_is_refused(name, tmp_path):
-    (tmp_path / "mine").write_text("mine")
-    (tmp_path / name).symlink_to("mine")
-    refused = pytest.raises(OutputError, match=r"File exists\. Move away")
-    with refused, results.hold(tmp_path, "test"):
-        pass
-    assert (tmp_path / "mine").read_text() == "mine"
-
-
-def test_a_command_that_writes_nothing_leaves_nothing(tmp_path):
-    with results.hold(tmp_path / "out", "test") as out:
-        results.own(out / "tables")
-        results.assigned(results.own(out / "cost"), [("a", None)])
-    assert list(out.iterdir()) == []
-
-
-def test_what_killed_commands_left_is_cleared_away(tmp_path):
-    with results.hold(tmp_path, "test") as out:
-        results.write(results.own(out / "a") / "a.png", "whole")
-    ours = [f"{place}.a.png.123{atomic.PARTIAL}" for place in ("", "a/")]
-    (tmp_path / "theirs").mkdir()
-    theirs = f"theirs/.a.png.123{atomic.PARTIAL}"
-    for name in (*ours, theirs):
-        (tmp_path / name).write_text("half")
-    with results.hold(tmp_path, "test"):
-        assert not any((tmp_path / name).exists() for name in ours)
-    assert (tmp_path / theirs).exists()
-    assert (tmp_path / "a/a.png").exists()
-
-
 HOLD = """
 import sys
 from reports.files import results

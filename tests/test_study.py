@@ -11,8 +11,6 @@ from scipy.special import erf
 from comparisons.processes.pool import Pool
 from comparisons.study import dataset, design, running, scenes
 from heuristic.errors import InputError
-from reference.pairing import albedo, factors
-from reference.pairing.albedo import RoughPlastic
 from reports.charts import study_charts
 from tests.programs import ROOT
 from tests.test_engine_lobes import dot, integral
@@ -220,32 +218,6 @@ def failed(table):
     return [row["error"] for row in table.to_pylist() if row["error"]]
 
 
-def test_a_row_names_the_material_that_pairing_derived(finished):
-    """Of either side: by the factors for the values of the row."""
-    (row,) = of_part(finished[2], "sphere")
-    phong = factors.Phong((0.3,) * 3, (0.4,) * 3, 20.0)
-    plastic, _ = albedo.to_roughplastic(phong, factors.Convention.MATCHED)
-    assert row["reflectance"] == pytest.approx(plastic.diffuse_reflectance[0], rel=1e-3)
-    assert (row["alpha"], row["int_ior"]) == pytest.approx((plastic.alpha, plastic.int_ior))
-    row, _ = of_part(finished[2], "enclosure")
-    phong = albedo.to_phong(RoughPlastic((0.5,) * 3, 0.3, 1.5), factors.Convention.MATCHED)
-    derived = phong.n, phong.k_d[0], phong.k_s[0]
-    assert (row["n"], row["k_d"], row["k_s"]) == pytest.approx(derived, rel=1e-3)
-
-
-def test_steps_name_what_changes_the_image(finished):
-    dark, bright = of_part(finished[2], "enclosure")
-    assert (dark["dominant"], bright["dominant"]) == ("form", "interreflection")
-    assert dark["interreflection"] < 0.02 * bright["interreflection"]
-    # The sphere's shadow on white walls, and none where the sphere is alone.
-    assert bright["occlusion"] > 0.02
-    (alone,) = of_part(finished[2], "sphere")
-    assert (alone["occlusion"], alone["interreflection"]) == (0, 0)
-    # All steps together lead from the one half to the other.
-    total = bright["form"] + bright["occlusion"] + bright["interreflection"]
-    assert bright["rmse"] <= total + 1e-9
-
-
 def test_a_scene_of_ones_own_is_varied_by_paths(finished, rgb):
     dark, bright = of_part(finished[2], "cornell-box")
     assert (dark["white.reflectance"], bright["white.reflectance"]) == (0.2, 0.9)
@@ -258,16 +230,6 @@ def test_a_scene_of_ones_own_is_varied_by_paths(finished, rgb):
     ):
         with pytest.raises(InputError, match=f"part '{scene}': .*{expected}"):
             rows(f"'{path}' = 0.5", scene)
-
-
-def test_points_that_two_parts_share_are_done_once(finished):
-    _, folder, table, told = finished
-    assert len(list((folder / "points").glob("*.json"))) == 4 + 2 + 1 + 2
-    assert told[0] == ("points", 2, 11)
-    assert told[-1] == ("points", 11, 11)
-    once, twice = (of_part(table, name) for name in ("lobe", "again"))
-    for old, new, number in zip(once[2:], twice, (0, 1), strict=True):
-        assert new == old | {"part": "again", "point": number}
 
 
 def test_the_dataset_says_units_meanings_and_where_it_comes_from(finished, tmp_path):

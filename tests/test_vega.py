@@ -2,13 +2,7 @@
 
 import re
 
-import pytest
-
-from heuristic.errors import OutputError
 from reports.charts import theme, vega
-from reports.page import page
-from tests import records
-from tests.test_page import HOSTILE, Page
 
 
 def bars(effect="shadow", **extra):
@@ -52,22 +46,5 @@ def test_two_charts_on_a_page_share_no_id(monkeypatch):
     assert ids[0] != ids[1]
 
 
-def test_text_in_a_chart_stays_text():
-    figure = vega.figure(HOSTILE, bars(HOSTILE, title=HOSTILE), HOSTILE)
-    html = page.render([records.view(records.data(), chart=figure)])
-    shown = Page(html)
-    assert not [attrs for tag, attrs in shown.tags if tag == "img"]
-    assert HOSTILE not in html
-
-
 class PanicException(BaseException):
     """What a library in Rust raises when it cannot continue."""
-
-
-def test_a_panic_of_the_library_is_one_message(monkeypatch):
-    def panic(spec):
-        raise PanicException("Too many open files")
-
-    monkeypatch.setattr("vl_convert.vegalite_to_svg", panic)
-    with pytest.raises(OutputError, match="cannot be drawn: Too many open files"):
-        vega.figure("title", {"mark": "point"})

@@ -256,7 +256,7 @@ def update_pictures(
     """Write or replace the baseline of the pictures that match a pattern."""
     begin, status = perf_counter(), "updated" if path.exists() else "created"
     if path.exists():
-        baselines.read_text(path, of_pictures=True)  # another baseline stays
+        transfer = transfer or pictures.record_of(path).transfer
     repeats = pictures.read_repeats(pattern, transfer)
     pictures.write(path, repeats, transfer)
     found = check_pictures(repeats, repeats, level)

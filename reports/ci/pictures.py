@@ -56,9 +56,14 @@ def write(path: Path, repeats: Repeats, transfer: Literal["linear", "srgb"] | No
     baselines.put(path, laid_out(records.plain(baseline)) + "\n", layers, path.stem)
 
 
+def record_of(path: Path) -> PictureBaseline:
+    """Read the record of a baseline."""
+    return records.read(PictureBaseline, baselines.read_text(path, of_pictures=True), str(path))
+
+
 def read(path: Path) -> tuple[PictureBaseline, Repeats]:
     """Read a baseline, and the statistics of its repeats from the EXR beside it."""
-    baseline = records.read(PictureBaseline, baselines.read_text(path, of_pictures=True), str(path))
+    baseline = record_of(path)
     place = path.parent / Path(baseline.images).name
     how = program.command("check", path, "--update", "--picture", f"{path.stem}=PATTERN")
     found = baselines.read_layers(place, LAYERS, LONGEST, how)

@@ -310,7 +310,7 @@ def moved_lines(made: CheckRecord) -> Iterator[str]:
 
 
 def _details(made: CheckRecord) -> Iterator[str]:
-    if made.message:
+    if made.message and made.status != "error":  # an error has its own line
         yield f"{made.name}: {made.message}"
     if not made.moved:
         return
