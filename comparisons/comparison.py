@@ -94,6 +94,12 @@ class TimeSpent(Record):
     stages: dict[str, float]
 
     @property
+    def share_of_causes(self) -> float:
+        """The share of the whole time that finding causes took."""
+        whole = sum(self.stages.values()) + self.heuristic.total_s + self.reference.total_s
+        return self.stages.get(CAUSES, 0.0) / whole if whole else 0.0
+
+    @property
     def sentence(self) -> str:
         """What physics costs here, in words: both halves have the same samples in each pass."""
         ratio = self.reference.median_s / self.heuristic.median_s
