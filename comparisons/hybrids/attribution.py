@@ -114,6 +114,8 @@ def find(
     width, height = image_size(ready.scene)
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
     most = most or (NARROW if is_large else WIDTH)
+    if tuple(ready.scene.sensors()[0].film().size()) != (width, height):
+        most = width  # a smaller crop would lie elsewhere, by parts of a pixel
     size = min(most, width), max(1, round(height * min(1, most / width)))
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
     surface = gbuffer(ready.scene, *size)

@@ -77,12 +77,12 @@ def image_size(scene: Scene) -> tuple[int, int]:
 
 
 def resize(scene: Scene, size: tuple[int, int]) -> None:
-    """Give the film of a scene's first sensor a width and height of the same shape."""
-    if image_size(scene) != tuple(size):
+    """Give images of a scene's first sensor a size of the same shape; a crop keeps its place."""
+    if (before := image_size(scene)) != tuple(size):
         parameters = mi.traverse(scene.sensors()[0])
-        for side in ("film.size", "film.crop_size"):
-            parameters[side] = list(size)
-        parameters["film.crop_offset"] = [0, 0]
+        for name in ("film.size", "film.crop_offset", "film.crop_size"):
+            sides = zip(parameters[name], size, before, strict=True)
+            parameters[name] = [round(int(old) * new / side) for old, new, side in sides]
         parameters.update()
 
 
