@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from comparisons.case import open_case
+from comparisons.compare import compare
 from comparisons.cost.cost_record import Method
 from comparisons.cost.methods import Ladder
 from comparisons.departure.metrics import LEADING
@@ -249,3 +250,13 @@ def test_a_clean_reference_takes_noise_out_of_previews(rgb):
         before, after = (np.sqrt(np.mean((one - two) ** 2)) for one, two in (plain, quiet))
         assert after < 0.5 * before
         assert np.mean(quiet) == pytest.approx(np.mean(plain), rel=0.02)
+
+
+def test_a_crop_keeps_its_place_in_finer_pixels(rgb):
+    parts = shadowed(64)
+    crop = {"crop_width": 24, "crop_height": 32, "crop_offset_x": 21, "crop_offset_y": 17}
+    parts["sensor"]["film"] |= crop
+    case = open_case(parts, Options(), "cropped")
+    record = compare(case.source, case.options, why=True).record
+    assert abs(record.why.closure.mean) < 0.05 < record.why.departure
+    assert record.why.departure == pytest.approx(record.metrics["dE2000"].mean, rel=0.1)

@@ -245,7 +245,6 @@ def departures(
             metric(image, reference, viewing) for image in (rendered.before, after)
         )
         before, after_fit = (metric.mean(values[counted]) for values in (first, maps[name]))
-        p95 = float(np.percentile(maps[name][counted], 95))
         floor = noise_floor(metric, reference, rendered.difference.noise, counted, viewing)
-        by_metric[name] = FitDeparture(before, after_fit, p95, floor)
+        by_metric[name] = FitDeparture(before, after_fit, floor)
     return by_metric, maps

@@ -26,7 +26,6 @@ class FitDeparture(Record):
 
     before: Amount
     after: Amount
-    p95_after: Amount
     noise_floor: Amount
 
 
@@ -38,14 +37,12 @@ class FittedParameter(Record, kw_only=True):
     is_factor: bool = False
     paired: Annotated[float, Meta(description="By the pairing table.")]
     fitted: Annotated[float | None, Meta(description="Null if the image does not determine it.")]
-    stopped_at: Annotated[float, Meta(description="Where the search ended.")]
     interval: Annotated[
         tuple[float, float] | None,
         Meta(description="95 %, by noise; null at a bound, or if not identifiable."),
     ]
     bounds: tuple[float, float]
     at_bound: bool
-    identifiable: bool
     reason: Annotated[str, Meta(description="Why it is not identifiable; otherwise empty.")]
     partners: Annotated[tuple[str, ...], Meta(description="Parameters that make up for it.")] = ()
 
@@ -165,11 +162,9 @@ def parameter_record(
         is_factor=parameter.is_factor,
         paired=paired,
         fitted=None if certainty.reason else fitted,
-        stopped_at=fitted,
         interval=(max(least, low), min(most, high)) if has_interval else None,
         bounds=(low, high),
         at_bound=certainty.at_bound,
-        identifiable=not certainty.reason,
         reason=certainty.reason,
         partners=tuple(
             f"{f'{each.name} {each.channel}'.strip()} of {model.names[each.owner]}"
