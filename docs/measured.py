@@ -21,11 +21,11 @@ from comparisons.departure.metrics import LEADING
 from comparisons.fit.fit_record import FitRecord
 from comparisons.options import Options
 from comparisons.study import dataset, design
-from comparisons.verification import verify
 from reports.charts import vega
 from reports.charts.cost_charts import titled
 from reports.terminal.tables import markdown
 from tests.benchmarks import kernel
+from tests.verification import verify
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"

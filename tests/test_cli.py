@@ -131,16 +131,6 @@ def test_plan_prints_a_table_and_json(run):
     assert all(effect["called_for"] for effect in data["effects"])
 
 
-@pytest.mark.thorough
-def test_plan_verifies(run):
-    words = ("plan", "--verify", "fig-8-6a", "--resolution", "32x32")
-    code, printed, _ = run(*words, "--json")
-    assert code == 0
-    assert json.loads(printed)["significant"] == 0
-    code, printed, _ = run(*words)
-    assert "faster" in printed
-
-
 def test_a_file_with_tabulated_spectra_is_compared_spectrally(run, tmp_path):
     spectrum = '<spectrum name="radiance" value="400:0.1, 700:0.3"/>'
     path = tmp_path / "scene.xml"

@@ -16,11 +16,13 @@ from comparisons.departure.colour import DEFAULT_VIEWING
 from comparisons.departure.metrics import LEADING
 from comparisons.fit import fit as fitting
 from comparisons.fit.fit import fit
-from comparisons.fit.model import PhongModel, bounds, see, start
+from comparisons.fit.model import OwnModel, PhongModel, bounds, see, start
 from comparisons.fit.search import LOSSES, Objective, descend, identify, search
 from comparisons.gallery.builtin import builtin
 from comparisons.options import Options
+from comparisons.prepared import prepare
 from heuristic.errors import InputError
+from heuristic.heuristics import named
 from heuristic.terms import normalisation
 from reference.rendering.gbuffer import gbuffer
 from reference.rendering.renderer import Renderer
@@ -82,7 +84,7 @@ def objective_of(surface, image, form="phong", loss="perceptual", vector=None):
 
 
 def best(objective):
-    return search(objective, fitting.starts(objective))[0]
+    return search(objective, fitting.form_starts(objective))[0]
 
 
 def inside(objective):
@@ -260,6 +262,46 @@ def test_the_errors_are_those_of_the_loss_that_was_minimised(name, rgb):
         assert share.value == pytest.approx(above.mean(), abs=0.01)
 
 
+# --- A heuristic's own parameters -----------------------------------------------------------------
+
+GAIN = """
+import drjit as dr
+from heuristic import Range
+
+def shade(point, gain: Range(0, 4) = 1, tint: Range(-1, 1) = 0.25):
+    cosines = [dr.maximum(dr.dot(point.normal, each.toward), 0) for each in point.lights]
+    lit = sum(c * each.intensity for c, each in zip(cosines, point.lights))
+    return gain * lit * point.material.base_color + 0.1 * dr.square(1 + tint) * point.ambient
+"""
+
+
+def test_derivatives_of_a_users_shader_are_those_of_the_image(rgb, written):
+    """Against differences of images, at another place than the default."""
+    options = Options(heuristic=written(GAIN), resolution=(16, 16), spp=16)
+    ready = prepare(builtin("fig-8-9").source(), options)
+    model = OwnModel(ready.heuristic, named("mine.py"), [1, 2], np.ones((16, 16), bool))
+    x = np.array([1.5, -0.5])
+    slopes = central_differences(model.image, x, 0.05)
+    assert abs(slopes).max(axis=(1, 2)).min() > 0.01
+    np.testing.assert_allclose(model.columns(x), slopes, atol=2e-5 * max(1, abs(slopes).max()))
+
+
+def test_a_gain_is_that_of_least_squares(rgb, written):
+    """In linear RGB the best gain has a closed form: the image is proportional to it."""
+    name = written(GAIN.replace(" + 0.1 * dr.square(1 + tint) * point.ambient", ""))
+    options = Options(resolution=(24, 24), spp=32, heuristic=name)
+    found = fit(builtin("fig-8-9").source(), options, "linear")
+    h, r = found.before, found.reference
+    (nearest,) = found.record.fits
+    gain, tint = nearest.materials[0].parameters
+    assert gain.fitted == pytest.approx(np.sum(h * r) / np.sum(h * h), rel=1e-3)
+    assert gain.fitted != pytest.approx(1, abs=0.02)
+    assert gain.interval[0] <= gain.fitted <= gain.interval[1]
+    assert gain.bounds == (0, 4)
+    assert nearest.parameter_error > 0
+    assert (tint.fitted, tint.reason) == (None, "does not show in the image")
+
+
 # --- The command ----------------------------------------------------------------------------------
 
 CORPUS = Path(__file__).parent / "corpus"
@@ -313,7 +355,7 @@ def test_what_cannot_be_fitted_is_refused(run, rgb, written, tmp_path):
         (("no-such-scene",), "built-in"),
         ((), "Missing argument"),
         (("fig-8-6a", "--variant", "llvm_ad_mono"), "--heuristic-variant llvm_ad_rgb"),
-        (("fig-8-9", "--heuristic", plain), "Omit --heuristic"),
+        (("fig-8-9", "--heuristic", plain), f"heuristic {plain} has no parameters to fit"),
         ((CORPUS / "bsdf-mask.xml",), "material of shape-.* needs opaque materials"),
         ((CORPUS / "bsdf-principled.xml",), "material of shape-.* n varies over the surface"),
     ):

@@ -14,7 +14,6 @@ from scipy import stats
 from comparisons.options import Options
 from comparisons.plain_scene import material_of
 from comparisons.prepared import prepare
-from comparisons.verification import verify
 from heuristic import DirectionalLight, Material, PointLight, shade
 from heuristic.errors import InputError
 from reference import Convention, Source
@@ -23,6 +22,7 @@ from reference.planning.effects import INTERREFLECTION, SPECULAR
 from tests.misplanned import scene as described
 from tests.parts import camera, look_at, moved, rgb_of
 from tests.test_phong_bsdf import direction, interaction, spherical_grid
+from tests.verification import verify
 
 K_S = (0.8, 0.6, 0.3)
 MIRROR = {"type": "phong", "k_s": rgb_of(*K_S), "n": inf}

@@ -2,13 +2,17 @@
 
 The loss at the best parameters is the *model error*: no other values would remove it. The part that
 they removed is the *parameter error* of the pairing table. Both refer to the loss that was
-minimised: by another metric, other parameters may be better. The forms of Phong's lobe are fitted.
+minimised: by another metric, other parameters may be better.
+
+For Phong's model, the forms of its lobe are fitted; for a user's heuristic, the parameters that it
+declares.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import log
 from time import perf_counter
+from typing import Any
 
 import mitsuba as mi
 import numpy as np
@@ -28,7 +32,7 @@ from comparisons.fit.fit_record import (
     parameter_record,
     physical_materials,
 )
-from comparisons.fit.model import PhongModel
+from comparisons.fit.model import OwnModel, PhongModel
 from comparisons.fit.search import LOSSES, Loss, Objective, bounded_minimum, identify, search
 from comparisons.options import Options
 from comparisons.prepared import Prepared, guarded
@@ -49,6 +53,12 @@ VARIANT = "llvm_ad_rgb"
 
 STARTS = (2.0, 8.0, 32.0, 128.0, 512.0)
 """Exponents of the form ``phong`` to start from; ``blinn`` has four times as large ones."""
+
+OWN_STARTS = 6
+"""Places within the bounds to start from for a heuristic's own parameters."""
+
+REACH = 4.0
+"""Starts of a parameter without bounds lie within this many times its default, or its unit."""
 
 
 @dataclass(frozen=True)
@@ -96,12 +106,18 @@ def fit(
     if not forms or not set(forms) <= set(FORMS):
         raise InputError(f"forms {forms}: give one or more of {', '.join(FORMS)}.")
     options = _completed(options or Options())
+    heuristic = named(options.heuristic)
     rendered = render(guarded(source.edited(filter_by_box), options), options, progress)
     rendering = perf_counter() - begin
-    with variant(VARIANT):
-        surface = model.see(rendered.ready.heuristic, rendered.seeds)
-        models = [PhongModel(surface, form, rendered.counted.ravel()) for form in forms]
-        fits = [_best(rendered, each, LOSSES[loss]) for each in models]
+    if heuristic is PHONG:
+        with variant(VARIANT):
+            surface = model.see(rendered.ready.heuristic, rendered.seeds)
+            models = [PhongModel(surface, form, rendered.counted.ravel()) for form in forms]
+            fits = [_best(rendered, each, form_starts, LOSSES[loss]) for each in models]
+    else:
+        half, seeds = rendered.ready.heuristic, rendered.seeds
+        own = OwnModel(half, heuristic, seeds, rendered.counted)
+        fits = [_best(rendered, own, own_starts, LOSSES[loss])]
     best = min(range(len(fits)), key=lambda place: fits[place][0].loss)
     ready = rendered.ready
     record = FitRecord(
@@ -128,7 +144,8 @@ def fit(
 def _completed(options: Options) -> Options:
     """Fill in a fit's own defaults."""
     options.require_model("a fit")
-    if named(options.heuristic) is not PHONG:
+    heuristic = named(options.heuristic)
+    if heuristic is not PHONG and heuristic.is_own:
         raise InputError(
             f"heuristic {options.heuristic} cannot be fitted: --form has the built-in lobes,"
             f" {' and '.join(FORMS)}. Omit --heuristic."
@@ -137,6 +154,17 @@ def _completed(options: Options) -> Options:
         raise InputError(
             f"interpolation {options.polygon_shading.value} cannot be fitted: it shades vertices or"
             " faces. Give --interpolation phong."
+        )
+    advice = "`def shade(point, gloss: Range(0, 1) = 0.5)`"
+    if not heuristic.traced:
+        raise InputError(
+            f"heuristic {heuristic.name} has no derivatives, which a fit needs. Write it in Python:"
+            f" {advice} has a parameter to fit."
+        )
+    if heuristic is not PHONG and not heuristic.parameters:
+        raise InputError(
+            f"heuristic {heuristic.name} has no parameters to fit. Declare one with its bounds:"
+            f" {advice}."
         )
     resolution, spp = options.resolution or RESOLUTION, options.spp or SPP
     return options.changed(resolution=resolution, spp=spp, allow_empty=False)
@@ -174,7 +202,10 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
 
 
 def _best(
-    rendered: RenderedHalves, fitted: PhongModel, loss: Loss
+    rendered: RenderedHalves,
+    fitted: PhongModel | OwnModel,
+    starts: Callable[[Objective], list[NDArray]],
+    loss: Loss,
 ) -> tuple[FormFit, NDArray, dict[str, NDArray]]:
     """Return the record of a fit, its image, and the maps of what it leaves."""
     counted = rendered.counted
@@ -213,16 +244,16 @@ def _best(
     return record, after, maps
 
 
-def starts(objective: Objective) -> list[NDArray]:
+def form_starts(objective: Objective) -> list[NDArray]:
     """Return the paired parameters, and lobes of several widths with coefficients that suit each.
 
     The latter are the best in linear RGB.
     """
-    phong = objective.model
+    phong: Any = objective.model
     paired, (low, high) = model.start(phong.parameters), model.bounds(phong.parameters)
     at_n = np.array([parameter.name == "n" for parameter in phong.parameters])
     linear = phong.linear
-    places = [paired]
+    starts = [paired]
     for n in STARTS:
         x = np.where(at_n, log(n * 4 if phong.form == "blinn" else n), paired)
         columns = phong.columns(x)[linear].reshape(linear.sum(), -1)
@@ -230,8 +261,17 @@ def starts(objective: Objective) -> list[NDArray]:
         x[linear] = bounded_minimum(
             columns @ columns.T, -columns @ target, low[linear], high[linear]
         )
-        places.append(x)
-    return places
+        starts.append(x)
+    return starts
+
+
+def own_starts(objective: Objective) -> list[NDArray]:
+    """Return the defaults of a heuristic's parameters, and places within their bounds."""
+    parameters = objective.model.parameters
+    default = np.array([each.paired for each in parameters])
+    reach, (low, high) = REACH * np.maximum(np.abs(default), 1.0), model.bounds(parameters)
+    low, high = np.maximum(low, default - reach), np.minimum(high, default + reach)
+    return [default, *np.random.default_rng(0).uniform(low, high, (OWN_STARTS, len(default)))]
 
 
 def departures(

@@ -1,6 +1,6 @@
 """The record of a fit, ``fit.json``, and the parameters in it, in the chapters' units."""
 
-from math import exp, sqrt
+from math import exp, isfinite, sqrt
 from typing import Annotated, Any, Literal
 
 import mitsuba as mi
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from comparisons.departure.colour import Viewing
 from comparisons.departure.noise import VisibleShare
-from comparisons.fit.model import PhongModel
+from comparisons.fit.model import OwnModel, PhongModel
 from comparisons.fit.search import AT_BOUND, COVERAGE, Certainty
 from heuristic.terms import normalisation
 from reference.records import VERSION, Amount, Count, Pixels, Record, Resolution, Size, Versions
@@ -30,7 +30,7 @@ class FitDeparture(Record):
 
 
 class FittedParameter(Record, kw_only=True):
-    """A parameter as the chapters name it; of a texture, factors on it."""
+    """A parameter as the chapters name it, or of a heuristic's own; of a texture, factors on it."""
 
     name: str
     channel: Literal["", "R", "G", "B"] = ""
@@ -41,7 +41,7 @@ class FittedParameter(Record, kw_only=True):
         tuple[float, float] | None,
         Meta(description="95 %, by noise; null at a bound, or if not identifiable."),
     ]
-    bounds: tuple[float, float]
+    bounds: tuple[float | None, float | None]
     at_bound: bool
     reason: Annotated[str, Meta(description="Why it is not identifiable; otherwise empty.")]
     partners: Annotated[tuple[str, ...], Meta(description="Parameters that make up for it.")] = ()
@@ -59,9 +59,9 @@ class FittedMaterial(Record):
 
 
 class FormFit(Record, kw_only=True):
-    """The best fit of one form of the lobe."""
+    """The best fit of one form of the lobe, or of the parameters of a heuristic."""
 
-    form: Annotated[str, Meta(description="``phong`` or ``blinn``.")]
+    form: Annotated[str, Meta(description="``phong`` or ``blinn``, or the heuristic.")]
     loss: Annotated[
         float, Meta(ge=0, description="At the best parameters, in its unit: the model error.")
     ]
@@ -125,7 +125,7 @@ def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
 
 
 def parameter_record(
-    model: PhongModel,
+    model: PhongModel | OwnModel,
     place: int,
     x: NDArray,
     certainties: list[Certainty],
@@ -136,17 +136,22 @@ def parameter_record(
     value, spread = float(x[place]), COVERAGE * sqrt(covariance[place, place])
     raw: tuple[float, ...] = (parameter.paired, value, value - spread, value + spread)
     limits: tuple[float, ...] = (parameter.low, parameter.high)
-    if parameter.name == "n":
+    phong = model if isinstance(model, PhongModel) else None
+    if phong and parameter.name == "n":
         raw, limits = tuple(map(exp, raw)), tuple(map(exp, limits))
-    elif parameter.name == "k_s" and not model.surface.materials[parameter.owner].normalised:
-        at_n, step = model.place_of_exponent(parameter.owner), 1e-5
+    elif (
+        phong
+        and parameter.name == "k_s"
+        and not phong.surface.materials[parameter.owner].normalised
+    ):
+        at_n, step = phong.place_of_exponent(parameter.owner), 1e-5
         per_albedo, below, above = (
-            normalisation(model.form, exp(x[at_n] + shift)) for shift in (0, -step, step)
+            normalisation(phong.form, exp(x[at_n] + shift)) for shift in (0, -step, step)
         )
         slopes = np.zeros(len(x))
         slopes[[place, at_n]] = per_albedo, value * (above - below) / (2 * step)
         spread = COVERAGE * sqrt(max(slopes @ covariance @ slopes, 0))
-        at_pairing = normalisation(model.form, exp(model.parameters[at_n].paired))
+        at_pairing = normalisation(phong.form, exp(phong.parameters[at_n].paired))
         k_s, limits = value * per_albedo, (0.0, per_albedo)
         raw = parameter.paired * at_pairing, k_s, k_s - spread, k_s + spread
         if not certainty.reason and certainties[at_n].reason and value > AT_BOUND:
@@ -163,7 +168,7 @@ def parameter_record(
         paired=paired,
         fitted=None if certainty.reason else fitted,
         interval=(max(least, low), min(most, high)) if has_interval else None,
-        bounds=(low, high),
+        bounds=(low if isfinite(low) else None, high if isfinite(high) else None),
         at_bound=certainty.at_bound,
         reason=certainty.reason,
         partners=tuple(

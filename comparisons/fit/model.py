@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 
 from heuristic.convention import Colour
 from heuristic.errors import InputError
+from heuristic.heuristics import Heuristic
 from heuristic.kernel import shade
 from heuristic.materials import Material
 from heuristic.plugins.coefficients import SceneMaterials
@@ -55,7 +56,7 @@ LARGEST_FACTOR = 4.0
 
 @dataclass(frozen=True)
 class FitParameter:
-    """One number to be fitted: ``k_a``, ``k_d``, ``k_s`` or ``n``.
+    """One number to be fitted: ``k_a``, ``k_d``, ``k_s`` or ``n``, or a heuristic's own.
 
     ``owner`` is the index of its material. The value by the pairing table and the bounds are as in
     the vector. A coefficient is a multiple of ``tint``, in one ``channel`` if it has three numbers.
@@ -371,3 +372,62 @@ class PhongModel:
         textures = {key: mi.Color3f(samples[key]) for key in COEFFICIENTS if key in samples}
         lights = (f"light {number}" for number in range(len(self.surface.lights)))
         return *place, textures, [mi.Bool(samples[key]) for key in lights if key in samples]
+
+
+# --- A heuristic's own parameters --------------------------------------------------------------
+
+
+class OwnModel:
+    """The heuristic half of a scene as a function of the parameters that a heuristic declares.
+
+    An image is a rendering: the passes of the heuristic half, with the reference's seeds, over the
+    pixels of a mask (H, W). Dr.Jit differentiates it in forward mode, through the user's code. A
+    step function has no derivative; that is one more reason for several starts.
+    """
+
+    def __init__(
+        self, renderer: Renderer, heuristic: Heuristic, seeds: Sequence[int], counted: NDArray
+    ) -> None:
+        self.parameters = tuple(
+            FitParameter(each.name, 0, each.default, each.low, each.high)
+            for each in heuristic.parameters
+        )
+        self.form, self.names = heuristic.name, (heuristic.name,)
+        self.reached = [int(counted.sum())]
+        self._renderer, self._seeds, self._counted = renderer, seeds, counted
+        self._kept = lru_cache(maxsize=2 + len(self.parameters))(self._rendered)
+
+    def whole(self, x: NDArray) -> NDArray:
+        """Return the whole image, (H, W, 3)."""
+        return self._kept(tuple(x))
+
+    def image(self, x: NDArray) -> NDArray:
+        """Return the image (N, 3) of the counted pixels."""
+        return self.whole(x)[self._counted]
+
+    def columns(self, x: NDArray) -> NDArray:
+        """Return the derivatives (number of parameters, N, 3) of the image."""
+        images = (self._kept(tuple(x), place) for place in range(len(x)))
+        return np.stack([image[self._counted] for image in images])
+
+    def _rendered(self, x: tuple[float, ...], by: int | None = None) -> NDArray:
+        """Return the mean of the passes, or of their derivatives by one parameter."""
+        integrator, scene = self._renderer.integrator, self._renderer.scene
+        total = np.zeros(())
+        with variant(self._renderer.variant):
+            values = {one.name: mi.Float(v) for one, v in zip(self.parameters, x, strict=True)}
+            dr.make_opaque(values)
+            integrator.parameters = values
+            if by is not None:
+                varied = values[self.parameters[by].name]
+                dr.enable_grad(varied)
+            for seed in self._seeds:
+                image = integrator.render(scene, seed=dr.opaque(mi.UInt32, seed),
+                                          spp=self._renderer.spp)  # fmt: skip
+                if by is not None:
+                    dr.set_grad(varied, 1)
+                    dr.enqueue(dr.ADMode.Forward, varied)
+                    dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearInterior)
+                    image = dr.grad(image)
+                total = total + np.array(image, float)
+        return total / len(self._seeds)

@@ -14,14 +14,12 @@ from reports.terminal.words import tell, verbose_option
 if TYPE_CHECKING:
     from comparisons.cost.cost import Choice
     from comparisons.options import Options
-    from comparisons.verification import Verification
     from reports.terminal.plan_lines import PlanReport
 
 
 @jobs.command()
 @jobs.scene_argument
 @jobs.json_option
-@click.option("--verify", is_flag=True, help="Render as planned and with everything, and compare.")
 @click.option(
     "--within",
     type=jobs.Within(min=0, min_open=True),
@@ -32,9 +30,7 @@ if TYPE_CHECKING:
 @jobs.timeout_option
 @jobs.scene_options
 @verbose_option
-def plan(
-    scene: str, as_json: bool, verify: bool, within: float | None, timeout: float, **rendering: Any
-) -> None:
+def plan(scene: str, as_json: bool, within: float | None, timeout: float, **rendering: Any) -> None:
     """List the effects that a scene calls for, by which rule, and what will be simulated.
 
     With --within, the exit code is 1 if no measured method passes.
@@ -42,11 +38,8 @@ def plan(
     \b
     Examples:
       fotismos plan cornell-box
-      fotismos plan --verify fig-8-9 --resolution 128x128
       fotismos plan --within 5 cornell-box
     """  # noqa: D301 click reads the \b as: keep these lines
-    if verify and within is not None:
-        raise click.UsageError("--verify and --within exclude each other: give one.")
     with jobs.pool(timeout) as pool:
         pool.start()
         from reference.records import to_json
@@ -59,10 +52,6 @@ def plan(
                 words = (scene, request, within)
                 result = pool.do(Task(scene, chosen, words, bar.of(scene)))
             lines, code = cost_tables.choice_lines(result), int(result.chosen is None)
-        elif verify:
-            with progress.shown() as bar:
-                result = pool.do(Task(scene, verified, (scene, request), bar.of(scene)))
-            lines = plan_lines.verification_lines(result)
         else:
             result = pool.do(Task(scene, planned, (scene, request)))
             lines = plan_lines.plan_lines(result)
@@ -82,15 +71,6 @@ def planned(name: str, request: Options) -> PlanReport:
 
     case = open_case(name, request)
     return plan_report(case.name, prepare(case.source, case.options), case.variant)
-
-
-def verified(name: str, request: Options, progress: Any) -> Verification:
-    """Compare the plan of a scene with everything simulated."""
-    from comparisons.case import open_case
-    from comparisons.verification import verify
-
-    case = open_case(name, request)
-    return verify(case.source, case.options, progress)
 
 
 def chosen(name: str, request: Options, within: float, progress: Any) -> Choice:

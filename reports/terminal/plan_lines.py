@@ -1,9 +1,8 @@
-"""The plan of a scene, as ``fotismos plan`` prints it, and its verification."""
+"""The plan of a scene, as ``fotismos plan`` prints it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
 
 from msgspec.structs import asdict
 
@@ -12,9 +11,6 @@ from reference.planning.effects import Decision, labelled
 from reference.planning.plan import Plan
 from reference.records import VERSION, Amount, Record
 from reports.terminal.tables import printed
-
-if TYPE_CHECKING:
-    from comparisons.verification import Verification
 
 
 class PlannedEffect(Record):
@@ -87,14 +83,3 @@ def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
     for effect in plan.effects:
         called = "yes" if effect.called_for else "no"
         yield effect.name, called, effect.rule, effect.evidence, effect.cost
-
-
-def verification_lines(result: Verification) -> Iterator[str]:
-    """Yield the table of a verification: differences, noise, and time at equal noise."""
-    headings = "scene", "planned", "significant", "of pixels", "kernel", "faster"
-    row = [result.scene, result.planned, f"{result.significant}", f"{result.pixels}"]
-    row += [f"{result.heuristic_largest:.1e}", f"{result.gain:.3g} x"]
-    yield from printed([headings, row])
-    yield "significant: pixels that differ by more than both sides' noise"
-    yield "kernel: largest difference from omitting terms from the kernel"
-    yield "faster: how many times sooner the plan reaches the same noise"

@@ -1,21 +1,21 @@
-"""Verifying that pruning is right, and what it saves: a planned scene against everything.
+"""Plans against everything: a planned scene has the image of all simulated, and what that saves.
 
 Both references are rendered in turn, pass by pass. The difference is compared with the noise of
 both, and the times at equal noise: the variance of an independent mean falls with the time spent,
 so a method costs ``variance x time``.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from comparisons.departure import marks
 from comparisons.departure.metrics import leading_distance
 from comparisons.options import Options
-from comparisons.prepared import Prepared, prepare
-from reference.records import VERSION, Record
-from reference.rendering.renderer import Progress, Renderer, Stream, pass_seed, passes
+from comparisons.prepared import prepare
+from reference.rendering.renderer import Renderer, Stream, pass_seed, passes
 from reference.rendering.sampler import with_sampler
 from reference.rendering.sums import DEVIATION, Accumulator, DifferenceSums, add_difference
-from reference.scene.source import Source
 
 LEVEL = 0.01
 """Chance that any pixel is marked though nothing differs."""
@@ -25,37 +25,22 @@ PASSES_WITH_PATHS = 4
 measure itself."""
 
 
-class Verification(Record, kw_only=True):
-    """A planned scene against everything simulated.
+@dataclass(frozen=True)
+class Verification:
+    """How many pixels are shown to differ, and how many times sooner the plan is as quiet.
 
-    ``significant`` of ``pixels`` that see a surface are shown to differ
-    (:mod:`comparisons.departure.marks`). ``heuristic_largest`` is the largest difference of the two
-    heuristic images, linear, whose kernels differ in terms that are 0. Times are medians per pass,
-    noise the root mean square over the pixels of the standard error of one pass. ``gain`` is
-    ``everything_s everything_noise^2 / (planned_s planned_noise^2)``: how many times faster the
-    planned reference reaches the same noise.
+    ``noise`` is the plan's per pass, over that with everything.
     """
 
-    scene: str
-    planned: str
-    resolution: tuple[int, int]
     significant: int
-    pixels: int
-    heuristic_largest: float
-    planned_s: float
-    everything_s: float
-    planned_noise: float
-    everything_noise: float
+    noise: float
     gain: float
-    record_version: int = VERSION
 
 
-def verify(
-    source: Source, options: Options | None = None, progress: Progress | None = None
-) -> Verification:
+def verify(source, options=None):
     """Render a scene as planned and with everything, and compare both.
 
-    Given samples apply to everything; if omitted, the plan's are used.
+    ``gain`` is ``everything_s everything_noise^2 / (planned_s planned_noise^2)``.
     """
     options = options or Options()
     everything, planned = sides = [
@@ -67,7 +52,7 @@ def verify(
     # The sides have different seeds: equal ones would hide shared noise.
     streams = (
         passes([everything.reference], options.seed, count, stream=Stream.OTHER_SIDE),
-        passes([planned.reference], options.seed, count, progress=progress, stage="verifying"),
+        passes([planned.reference], options.seed, count),
     )
     own, apart = (Accumulator(DEVIATION), Accumulator(DEVIATION)), DifferenceSums(counted)
     for both in zip(*streams, strict=True):
@@ -76,31 +61,23 @@ def verify(
     distance = leading_distance(options.viewing)
     marked = marks.find(apart.estimate(), mean, counted, distance, level=LEVEL)
     seconds = [side.reference.pass_times().median_s for side in sides]
-    depth = "" if planned.plan.max_depth == 2 else f", depth {planned.plan.max_depth}"
     # A plan without noise would divide by zero.
     noise = [
         max(np.sqrt(count * np.mean(total.standard_error()[counted] ** 2)), 1e-7) for total in own
     ]
-    return Verification(
-        scene=source.name,
-        planned=f"{planned.plan.simulation}{depth}, {planned.plan.sampler}",
-        resolution=counted.shape[::-1],
-        significant=int((marked == marks.MARKED).sum()),
-        pixels=int(counted.sum()),
-        heuristic_largest=_kernel_difference(planned, everything, options.seed),
-        planned_s=seconds[1],
-        everything_s=seconds[0],
-        planned_noise=float(noise[1]),
-        everything_noise=float(noise[0]),
-        gain=float(seconds[0] * noise[0] ** 2 / (seconds[1] * noise[1] ** 2)),
-    )
+    ratio = noise[1] / noise[0]
+    gain = seconds[0] / (seconds[1] * ratio**2)
+    return Verification(int((marked == marks.MARKED).sum()), float(ratio), float(gain))
 
 
-def _kernel_difference(planned: Prepared, everything: Prepared, seed: int) -> float:
+def kernel_difference(source, options):
     """Return the largest effect of the terms left out of the kernel, with equal rays."""
     images = []
+    everything, planned = (
+        prepare(source, options.changed(everything=choice)) for choice in (True, False)
+    )
     for side in (planned, everything):
         scene = with_sampler(side.pair.heuristic, planned.plan.sampler).instantiate()
         renderer = Renderer(scene, None, planned.heuristic.spp, "heuristic image")
-        images.append(np.array(renderer.render(pass_seed(seed, 0))))
+        images.append(np.array(renderer.render(pass_seed(options.seed, 0))))
     return float(np.abs(images[0] - images[1]).max())
