@@ -172,7 +172,10 @@ def _compare(
 
         picture = pictures.picture_record(heuristic, ready.scene, options, images)
     done("metrics")
-    traced: tuple[TermGrid | None, str] = None, "Terms are traced with --why."
+    traced: tuple[TermGrid | None, str] = (
+        None,
+        "Terms are traced with --why, in Python with why=True.",
+    )
     live: LivePoints | str = "It needs --why."
     if why:
         from comparisons import pixel_terms  # loaded late: --no-why traces none

@@ -389,10 +389,13 @@ def ratios(picture: np.ndarray, reference: np.ndarray) -> tuple[float, float, fl
 def describe(
     record: PictureRecord, picture: np.ndarray, reference: np.ndarray, counted: np.ndarray
 ) -> Iterator[str]:
-    """Yield what is odd about a picture, its position first.
+    """Yield what is odd about a picture: how it is read, else its position first.
 
     Images are linear, (H, W, 3); ``counted`` (H, W) is where the scene has a surface.
     """
+    if reading := _other_reading(picture, reference, counted):
+        yield f"The picture is misread. {reading}"
+        return
     if record.shift is None:
         yield "The picture's edges do not show whether it is aligned with the scene's camera."
     elif max(map(abs, record.shift)) >= SHIFT:
@@ -408,9 +411,6 @@ def describe(
             "The picture is one file, so its noise is unknown and counts as departure. Give"
             " repeats of other seeds to separate the two."
         )
-    if reading := _other_reading(picture, reference, counted):
-        yield f"The picture is misread. {reading}"
-        return
     level = float(np.mean(record.ratio))
     if (mistake := factor_of_pi(level)) or not 1 / LEVEL < level < LEVEL:
         yield (

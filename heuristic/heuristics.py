@@ -349,7 +349,7 @@ def named(name: str) -> Heuristic:
             f"heuristic {name!r} is not declared: choose one of {', '.join(sorted(HEURISTICS))}, or"
             " give a file with a function `shade(point)`, as FILE.py, FILE.py:FUNCTION or"
             " FILE.glsl. A package declares its own by an entry point of the group"
-            f" {GROUP}, a program by heuristic.heuristics.declare."
+            f" {GROUP}, a program by fotismos.declare."
         )
     return HEURISTICS[name]
 

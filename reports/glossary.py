@@ -28,7 +28,10 @@ RESULTS: Terms = {
         "Pixels whose linear difference is more than noise, however small. At most 5 % of these"
         " marks are expected to be wrong; more samples show more of them."
     ),
-    ("undetermined",): "Not shown to differ, but noise might hide a visible difference there.",
+    ("undetermined",): (
+        "Not shown to differ, but noise might hide a visible difference there: rare bright paths"
+        " may be missing, even where the standard error is small."
+    ),
     ("not counted",): "Pixels that see no surface are left out of all numbers.",
     ("unchanged",): "Both images as rendered, with one exposure.",
     ("median",): "Half of the values are below it.",

@@ -106,9 +106,10 @@ def sentence(
         case "pass":
             return "Exact, as far as can be seen." if lead.high <= EXACT else "Nothing to do."
         case "undecided":
+            more = "repeats of the picture" if record.picture else "samples (--spp, --noise)"
             return (
                 f"Too close to call: {percent(found.low)} to {percent(found.high)} of the pixels"
-                f" differ, and {percent(LIMIT)} may. More samples (--spp, --noise) decide."
+                f" differ, and {percent(LIMIT)} may. More {more} decide."
             )
     if lead.after_exposure.p95 + NOISE * lead.noise_floor <= threshold:
         factor = lead.after_exposure.exposure

@@ -148,7 +148,6 @@ SPECULAR = Effect(
 
 POLYGONS = Effect(
     label="polygon interpolation",
-    noun="normals between the vertices",
     heuristic="flat, Gouraud (6.35-6.38)",
     reference="none",
     cost="a lookup",

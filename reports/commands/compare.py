@@ -10,7 +10,7 @@ import click
 
 from reports import jobs
 from reports.run import batch
-from reports.terminal.words import tell
+from reports.terminal.words import echo, is_quiet
 
 if TYPE_CHECKING:
     from reports.page.scene_view import SceneView
@@ -101,9 +101,10 @@ def compare(
         nonlocal code
         studied = [view.studied for view in views]
         gates = ci.gates([record for record, _ in studied], max_visible, within)
-        if gates:
-            tell(ci.gate_lines(gates))
         code = int(any(gate.state != "pass" for gate in gates))
+        for line in ci.gate_lines(gates) if gates else ():
+            if code or not is_quiet():  # the reason of a failure is never lost
+                echo(line, err=is_quiet())
         ci.write_junit(junit, lambda: ci.junit_of_gates(gates))
         page = str(folder / "index.html")
         ci.append(summary, lambda: ci.of_comparison(studied, gates, page, within))

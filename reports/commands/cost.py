@@ -23,9 +23,7 @@ if TYPE_CHECKING:
 @jobs.scene_options
 @jobs.verbosity_options
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
-@click.option(
-    "--at", type=jobs.resolution, metavar="WxH", help="Predict time and error at this size."
-)
+@click.option("--at", type=jobs.resolution, metavar="WxH", help="Predict the times at this size.")
 @click.option("--measure", "is_measured", is_flag=True, help="With --at: measure at it, too.")
 @jobs.json_option
 def cost(

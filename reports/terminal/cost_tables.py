@@ -143,9 +143,9 @@ def beyond(need: Reach | None) -> str:
         return "More samples (--spp) decide."
     if need.spp is None:
         return (
-            f"No sample count would: with {need.method}, the nearest, 5 % of the pixels exceed"
-            f" {LEADING.label} {number(need.left)} without its noise: bias, or the"
-            " reference's own noise, remains."
+            f"No number of samples is sure to: with {need.method}, the nearest, 5 % of the pixels"
+            f" exceed {LEADING.label} {number(need.left)} without its noise. What remains is bias,"
+            " or the noise of the study's own reference; a larger --spp tells them apart."
         )
     return f"About {need.spp:,} samples per pixel of {need.method} would; --spp measures more."
 

@@ -125,24 +125,22 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
     for record in records:
         if record.picture:
             yield from _picture(record, record.picture)
-    headings = "differ", f"mean {LEADING.label}", "noise", "shape", "heuristic", "reference"
+    headings = "differ", f"mean {LEADING.label}", "noise", "shape", "time"
     rows: list[tuple[str, ...]] = [("scene", *headings)]
     for record in records:
         metric = record.metrics[LEADING.name]
         means = (metric.mean, metric.noise_floor, metric.after_exposure.mean)
-        halves = record.time.heuristic, record.time.reference
         rows.append(
             (
                 record.scene,
                 percent(share_above(metric.visible, threshold).value),
                 *(number(mean) for mean in means),
-                *(seconds(half.total_s) for half in halves),
+                "" if record.picture else f"x {record.time.ratio}",
             )
         )
     yield from printed(rows, right=1)
     yield f"differ: above {LEADING.label} {threshold:g}; shape: the mean at the best exposure"
-    if len(records) == 1 and not records[0].picture:
-        yield records[0].time.sentence
+    yield "time: what a sample of the physical half takes, over one of the textbook's"
     for record in records:
         if record.heuristic != PHONG.name and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"

@@ -151,7 +151,7 @@ class Viewer {
     if (!none) return `${share} ${visibly} ${scene.mean}; ${size}`;
     const [before, after] = [none, added].map(({ painter }) => percentText(summarise(painter, null, view.t).visible));
     const { width, height } = none.painter.images;
-    return `${before} → ${after} ${visibly} ${none.mean} → ${added.mean}; at ${width} × ${height} (${size}: ${share}, mean ${scene.mean})`;
+    return `${before} → ${after} ${visibly} ${none.mean} → ${added.mean}; at ${width} × ${height} (whole comparison, ${size}: ${share}, mean ${scene.mean})`;
   }
 
   /** @param {number[] | null} place */
