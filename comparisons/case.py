@@ -93,7 +93,7 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
 def file_of(scene: str | Path) -> Path | None:
     """Return the path of a scene file, None for a built-in scene."""
     path = Path(scene)
-    if not str(scene) or (path.suffix not in SUFFIXES and not path.exists()):
+    if not str(scene) or (path.suffix not in SUFFIXES and (path.is_dir() or not path.exists())):
         return None
     if not path.is_file():
         siblings = map(str, path.parent.glob("*")) if path.parent.is_dir() else ()

@@ -11,6 +11,7 @@ from random import Random
 import jsonschema
 import pytest
 
+from comparisons.case import file_of
 from tests.outputs import results
 from tests.programs import ROOT
 from tests.schemas import schema
@@ -122,12 +123,15 @@ def test_a_hostile_scene_is_refused_in_one_message(run, tmp_path):
         assert not list((tmp_path / "out").iterdir())
 
 
-def test_a_pipe_and_a_folder_are_no_scenes(run, tmp_path):
+def test_a_pipe_and_a_folder_are_no_scenes(run, tmp_path, monkeypatch):
+    """A folder of results named as a built-in scene does not hide it."""
     os.mkfifo(tmp_path / "pipe.xml")
-    for path in (tmp_path / "pipe.xml", tmp_path):
+    for path, reason in ((tmp_path / "pipe.xml", "no such file"), (tmp_path, "neither a file")):
         code, _, messages = run("compare", path, "-o", tmp_path / "out")
-        assert code == 2
-        assert "there is no" in messages
+        assert (code, reason in messages) == (2, True)
+    (tmp_path / "fig-8-9").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert file_of("fig-8-9") is None
 
 
 def _start(folder, out):
