@@ -116,7 +116,7 @@ def _images(name, interpolation=None):
     options = Options(
         spp=SAMPLES,
         resolution=(SIDE, SIDE),
-        interpolation=interpolation or Interpolation(scene.interpolation),
+        interpolation=(interpolation or Interpolation(scene.interpolation)).value,
         tessellation=scene.tessellation,
     )
     return compare(scene.source(), options).images
