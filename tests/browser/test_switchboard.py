@@ -133,9 +133,8 @@ def test_numbers_of_two_sizes_are_told_apart(visitor):
     page = visitor.open(SCENE)
     share, mean = re.fullmatch(r"(\S+ %) .* mean (\S+); at 48 × 32", numbers(page)).groups()
     press(visitor, "occlusion")
-    assert numbers(page).endswith(
-        f"; at 24 × 16 (whole comparison, at 48 × 32: {share}, mean {mean})"
-    )
+    words = f"; at 24 × 16 (whole comparison, at 48 × 32: {share}, mean {mean})"
+    assert numbers(page).endswith(words)
 
 
 def test_the_divide_parts_the_picture_with_effects_from_the_physical_one(visitor, report):
