@@ -24,7 +24,7 @@ Student's, by the jackknife over the groups. With too few groups, or for a metri
 the triangle inequality gives a wider one: the error of a mean distance is at most the distance of
 the reference from the truth, the noise floor.
 
-**Shares above a threshold.** Differences of colour are shrunk (:func:`_draws`) towards their
+**Shares above a threshold.** Differences of colour are shrunk (``_draws``) towards their
 block's mean, as far as noise explains their spread, and given noise of the remaining size. So each
 pixel has a chance p of being above. The share is the mean of p; pixels with p between 0 and 1 are
 undecided, and the mean of ``p (1 − p)``, twice, widens the interval. It would include the truth if

@@ -31,6 +31,8 @@ extensions = [
     "website.typeset",
 ]
 nitpicky = True
+# Names in signatures of click, which its own pages do not list.
+nitpick_ignore_regex = [("py:class", r"t\.(Any|Callable)|_AnyCallable|CmdType|Command")]
 default_role = "code"
 highlight_language = "text"  # of blocks that name none: commands
 myst_heading_anchors = 4
