@@ -47,7 +47,7 @@ SURE = NormalDist().inv_cdf(0.975)
 LARGEST_CERTAIN = 16
 """Most samples per pixel of methods without random numbers: only the pixel filter needs them."""
 
-MEASURED_ROUNDS = 3
+MEASURED_ROUNDS = 7
 """Rounds at the size of a prediction."""
 
 WIDTH, QUICK_WIDTH = 128, 64
