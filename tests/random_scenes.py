@@ -267,7 +267,7 @@ def _camera(draw, shapes):
 
 @dataclass(frozen=True)
 class Examined:
-    """What became of a seed: ``same`` needs no rendering, since the plan is the scene's own."""
+    """What became of a seed: ``same`` is the scene's own plan, ``unjudged`` no integrator's."""
 
     seed: int
     plan: str
@@ -291,10 +291,12 @@ def examine(seed, folder):
         return Examined(seed, str(error)[:200], "refused")
     chosen, scene = ready.plan, meant(scene, {entry.what for entry in ready.pair.overridden})
     own = scene["integrator"]
+    state = "unjudged" if own["type"] == "volpath" and in_mirrors(scene) else "same"
     tags = (chosen.shadows, chosen.tabulated_environment, len(ready.pair.pairing.emitters))
     word = f"{chosen.integrator} {chosen.max_depth} {tags} own {own['type']}"
-    if (chosen.integrator, chosen.max_depth) == (own["type"], own.get("max_depth", 2)):
-        return Examined(seed, word, "same")
+    same = (chosen.integrator, chosen.max_depth) == (own["type"], own.get("max_depth", 2))
+    if same or state == "unjudged":
+        return Examined(seed, word, state)
     stock = mi.load_dict(scene, optimize=False)
     if seed % BOTH == 0 and not is_sound(np.array(ready.heuristic.render(seed))):
         return Examined(seed, f"{word}, the heuristic half", "not finite or negative")
@@ -325,6 +327,16 @@ def meant(scene, overridden):
             ways = {key: value for key, value in own.items() if key not in WAYS}
             own = {"max_depth": 2} | ways | {"type": "volpath"}
     return scene | {"integrator": own}
+
+
+def in_mirrors(scene):
+    """Tell whether a hidden lamp may be seen in a smooth surface, where `volpath` is wrong."""
+    words = str(scene)
+    hidden = scene["integrator"]["hide_emitters"] and "'area'" in words
+    return hidden and any(f"'{it}'" in words for it in SMOOTH)
+
+
+SMOOTH = ("conductor", "plastic", "dielectric")
 
 
 def _judged(seed, word, ready, stock, spp):

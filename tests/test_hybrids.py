@@ -122,7 +122,7 @@ def test_intervals_of_attributions_hold_the_converged_value(rgb, capsys, monkeyp
         return {one.effect: one.removes for one in record.effects}
 
     runs = [effects(seed) for seed in range(40)]
-    monkeypatch.setattr(attribution, "SPP", 8 * attribution.SPP)
+    monkeypatch.setattr(attribution, "SPP", 64 * attribution.SPP)
     for effect, exact in effects(1_000).items():
         held = sum(one[effect].low <= exact.value <= one[effect].high for one in runs)
         width = np.median([one[effect].high - one[effect].low for one in runs])

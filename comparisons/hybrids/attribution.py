@@ -62,6 +62,10 @@ where plans are exact: only the pixel filter needs them. With 16 instead of 64, 
 EXACT_EFFECTS, ORDERS = 4, 8
 """Largest number of effects for which every subset is rendered, and orders drawn for more."""
 
+BIAS = 0.005
+"""Half an interval of what an effect removes, at least, as a share of the departure: some noise is
+not taken away (:meth:`ErrorMeter.without_noise`)."""
+
 LEAST = 1.0
 """ΔE2000: an effect that removes less cannot be seen, and does not dominate."""
 
@@ -230,17 +234,19 @@ def attribute(
 
     gains, sampling_errors, drawn = shares(effects, error, seed, EXACT_EFFECTS, ORDERS)
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
+    departure, left = error(nothing), error(everything)
+    bias = BIAS * float(departure[0].mean())
     contributions = tuple(
         Contribution(
             effect=effect.label,
-            removes=jackknifed(removed[effect.label].mean(axis=1)),
+            removes=jackknifed(removed[effect.label].mean(axis=1), bias),
             alone=float((error(nothing) - error(frozenset({effect})))[0].mean()),
             last=float((error(everything - {effect}) - error(everything))[0].mean()),
             sampling_error=sampling_error,
         )
         for effect, sampling_error in zip(effects, sampling_errors, strict=True)
     )
-    closure = jackknifed(error(everything).mean(axis=1))
+    closure = jackknifed(left.mean(axis=1), bias)
     hybrids = [
         Hybrid(labels(effects, each), float(found[0].mean())) for each, found in errors.items()
     ]
@@ -251,7 +257,6 @@ def attribute(
         return whole
 
     previews = images.previews(errors, clean)
-    departure, left = error(nothing), error(everything)
     both = images.plain_kernel, images.plugin(nothing)
     kernel, plugin = (images.pixels(each).mean(axis=0) for each in both)
     rounding = LEADING(plugin, kernel, meter.viewing)[meter.counted]
@@ -294,7 +299,7 @@ def by_object(
             pixels=one.pixels,
             share=one.share,
             departure=one.mean_dE2000,
-            removes=tuple(jackknifed(each[:, row]) for each in gains),
+            removes=tuple(jackknifed(each[:, row], BIAS * one.mean_dE2000) for each in gains),
             left=float(remaining[row]),
         )
         for row, one in enumerate(found)

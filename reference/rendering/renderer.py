@@ -112,6 +112,7 @@ class Renderer:
                 " Give fewer with --spp, or a smaller image with --resolution."
             )
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            _reset(self.scene)
             dr.kernel_history_clear()
             begin, used = perf_counter(), process_time()
             try:
@@ -128,8 +129,6 @@ class Renderer:
             self.times.append(perf_counter() - begin)
             self.processor_times.append(process_time() - used)
             kernels = dr.kernel_history([dr.KernelType.JIT])
-        # The film keeps its developed image.
-        self.scene.sensors()[0].film().clear()
         self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
         if image.shape[2] == 1:
             image = dr.repeat(image, 3, axis=2)
@@ -223,7 +222,17 @@ dr.syntax = syntax  # for Mitsuba's modules, which look it up when they are load
 
 
 def _rendered(scene, integrator, spp, seed):
-    return mi.render(scene, integrator=integrator, spp=spp, seed=seed)
+    image = mi.render(scene, integrator=integrator, spp=spp, seed=seed)
+    _reset(scene)
+    return image
+
+
+def _reset(scene):
+    """Release what film and sampler keep: if they begin with another state, a pass is traced."""
+    sensor = scene.sensors()[0]
+    sensor.film().prepare([])
+    if hasattr(sensor.sampler(), "forget"):
+        sensor.sampler().forget()
 
 
 def _chain(error):

@@ -64,7 +64,10 @@ def _define(_variant: str) -> None:
 
         def __init__(self, props):
             super().__init__(props)
-            # Nothing is computed yet: Mitsuba may make a scene's plugins in several threads.
+            self.forget()
+
+        def forget(self):
+            # Nothing is computed: Mitsuba may make a scene's plugins in several threads.
             self.dimension = self.index = self.pixel = self.jitter = None
 
         def seed(self, seed, wavefront_size=0xFFFFFFFF):

@@ -8,6 +8,7 @@ groups of passes show how any number computed from the image scatters.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import hypot
 from typing import Any
 
 import drjit as dr
@@ -221,18 +222,18 @@ def jackknife_error(left_out: ArrayLike) -> NDArray[np.float64]:
     return np.sqrt((len(left_out) - 1) * left_out.var(axis=0))
 
 
-def student(value: float, error: float, count: int) -> Estimated:
+def student(value: float, error: float, count: int, bias: float = 0.0) -> Estimated:
     """Return the interval around a value whose standard error comes from ``count`` repeats."""
     from scipy.special import stdtrit  # scipy.stats takes a second to import
 
-    half = float(stdtrit(count - 1, 0.5 + LEVEL / 2)) * error
+    half = hypot(float(stdtrit(count - 1, 0.5 + LEVEL / 2)) * error, bias)
     return Estimated(value, value - half, value + half)
 
 
-def jackknifed(values: ArrayLike) -> Estimated:
+def jackknifed(values: ArrayLike, bias: float = 0.0) -> Estimated:
     """Return the first of values (1 + n), with an interval from the others.
 
-    The first is of all repeats, each other one leaves out one of them.
+    The first is of all repeats, each other one leaves out one of them. ``bias`` is what all share.
     """
     value, *others = np.asarray(values, float)
-    return student(float(value), float(jackknife_error(others)), len(others))
+    return student(float(value), float(jackknife_error(others)), len(others), bias)
