@@ -291,7 +291,7 @@ def examine(seed, folder):
         return Examined(seed, str(error)[:200], "refused")
     chosen, scene = ready.plan, meant(scene, {entry.what for entry in ready.pair.overridden})
     own = scene["integrator"]
-    state = "unjudged" if own["type"] == "volpath" and in_mirrors(scene) else "same"
+    state = "unjudged" if own["type"] == "volpath" and misleads(scene) else "same"
     tags = (chosen.shadows, chosen.tabulated_environment, len(ready.pair.pairing.emitters))
     word = f"{chosen.integrator} {chosen.max_depth} {tags} own {own['type']}"
     same = (chosen.integrator, chosen.max_depth) == (own["type"], own.get("max_depth", 2))
@@ -329,11 +329,11 @@ def meant(scene, overridden):
     return scene | {"integrator": own}
 
 
-def in_mirrors(scene):
-    """Tell whether a hidden lamp may be seen in a smooth surface, where `volpath` is wrong."""
-    words = str(scene)
-    hidden = scene["integrator"]["hide_emitters"] and "'area'" in words
-    return hidden and any(f"'{it}'" in words for it in SMOOTH)
+def misleads(scene):
+    """Tell whether `volpath` may be wrong: hidden lamps in mirrors, or two of their surfaces."""
+    lamps = [part["type"] for part in scene.values() if "emitter" in part]
+    hidden = scene["integrator"]["hide_emitters"] and lamps
+    return hidden and ("cube" in lamps or any(f"'{it}'" in str(scene) for it in SMOOTH))
 
 
 SMOOTH = ("conductor", "plastic", "dielectric")
@@ -363,7 +363,7 @@ def _judged(seed, word, ready, stock, spp):
 
 def is_sound(image):
     """Tell whether all values are finite, and none negative but for colours beyond RGB."""
-    lowest = -1e-6 if not mi.is_spectral else -0.1
+    lowest = -1e-6 if not mi.is_spectral else -0.15
     return bool(np.isfinite(image).all() and image.min() >= lowest * max(image.max(), 1.0))
 
 
