@@ -98,7 +98,7 @@ class Renderer:
         self.processor_times: list[float] = []
         self.compilation = 0.0
         # A user's code may be impossible to record: NumPy ends the process.
-        self._replayed = None if self._is_users else dr.freeze(_rendered)
+        self._replayed = None if self._is_users else dr.freeze(_rendered, warn_after=100)
 
     def render(self, seed: int) -> Any:
         """Render one pass and return it as a tensor (H, W, 3), noting the time."""
