@@ -14,7 +14,7 @@ examines the seeds from FIRST on, a line each, in processes of :data:`BATCH` sce
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import heuristic  # noqa: F401  isort: skip
@@ -267,7 +267,7 @@ def _camera(draw, shapes):
 
 @dataclass(frozen=True)
 class Examined:
-    """What became of a seed: ``same`` is the scene's own plan, ``unjudged`` no integrator's."""
+    """What became of a seed: ``same`` is the scene's own plan; of ``unjudged`` none is right."""
 
     seed: int
     plan: str
@@ -291,18 +291,19 @@ def examine(seed, folder):
         return Examined(seed, str(error)[:200], "refused")
     chosen, scene = ready.plan, meant(scene, {entry.what for entry in ready.pair.overridden})
     own = scene["integrator"]
-    state = "unjudged" if own["type"] == "volpath" and misleads(scene) else "same"
     tags = (chosen.shadows, chosen.tabulated_environment, len(ready.pair.pairing.emitters))
     word = f"{chosen.integrator} {chosen.max_depth} {tags} own {own['type']}"
-    same = (chosen.integrator, chosen.max_depth) == (own["type"], own.get("max_depth", 2))
-    if same or state == "unjudged":
-        return Examined(seed, word, state)
+    if (chosen.integrator, chosen.max_depth) == (own["type"], own.get("max_depth", 2)):
+        return Examined(seed, word, "same")
     stock = mi.load_dict(scene, optimize=False)
     if seed % BOTH == 0 and not is_sound(np.array(ready.heuristic.render(seed))):
         return Examined(seed, f"{word}, the heuristic half", "not finite or negative")
     found = _judged(seed, word, ready, stock, SPP)
     doubtful = abs(found.departure) > TOLERANCE and found.errors > DOUBT
-    return _judged(seed, word, ready, stock, MORE * SPP) if doubtful else found
+    if doubtful:
+        found = _judged(seed, word, ready, stock, MORE * SPP)
+    misled = found.state == "wrong" and own["type"] == "volpath" and misleads(scene)
+    return replace(found, state="unjudged") if misled else found
 
 
 CURVED = ("sphere", "disk", "cylinder")

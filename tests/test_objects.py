@@ -9,7 +9,7 @@ import pytest
 from comparisons.case import open_case
 from comparisons.compare import compare
 from comparisons.departure import regions
-from comparisons.hybrids.attribution import by_object, named
+from comparisons.hybrids.attribution import BIAS, by_object, named
 from comparisons.options import Options
 from reference.rendering import sums
 from reference.rendering.gbuffer import ObjectIds, gbuffer
@@ -87,9 +87,9 @@ def test_intervals_on_shapes_tell_the_spread_of_replicates():
     found = {row.name: row for row in rows}
     still, noisy = found["still"], found["noisy"]
     assert (still.pixels, noisy.pixels) == (3, 2)
-    assert still.removes[0].low == still.removes[0].high == 2.0
+    assert still.removes[0] == sums.Estimated(2.0, 2.0 - 3 * BIAS, 2.0 + 3 * BIAS)
     error = spread.std(ddof=1) / np.sqrt(len(spread))
-    expected = sums.student(spread.mean(), error, len(spread))
+    expected = sums.student(spread.mean(), error, len(spread), 3 * BIAS)
     assert noisy.removes[0].value == pytest.approx(expected.value)
     assert noisy.removes[0].high == pytest.approx(expected.high)
 
