@@ -364,7 +364,7 @@ def _judged(seed, word, ready, stock, spp):
 
 def is_sound(image):
     """Tell whether all values are finite, and none negative but for colours beyond RGB."""
-    lowest = -1e-6 if not mi.is_spectral else -0.15
+    lowest = -1e-6 if not mi.is_spectral else -0.1
     return bool(np.isfinite(image).all() and image.min() >= lowest * max(image.max(), 1.0))
 
 

@@ -223,7 +223,10 @@ def jackknife_error(left_out: ArrayLike) -> NDArray[np.float64]:
 
 
 def student(value: float, error: float, count: int, bias: float = 0.0) -> Estimated:
-    """Return the interval around a value whose standard error comes from ``count`` repeats."""
+    """Return the interval around a value whose standard error comes from ``count`` repeats.
+
+    ``bias`` is an error that all repeats share, which widens it: ``half = hypot(t error, bias)``.
+    """
     from scipy.special import stdtrit  # scipy.stats takes a second to import
 
     half = hypot(float(stdtrit(count - 1, 0.5 + LEVEL / 2)) * error, bias)
