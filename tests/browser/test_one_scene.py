@@ -1,6 +1,7 @@
 """A page of one scene, from disk and in a notebook's frame."""
 
 import pytest
+from playwright.sync_api import expect
 
 from reports.notebook import HEIGHT, Shown
 from reports.page import page
@@ -55,7 +56,7 @@ def test_in_a_frame_all_fits_and_works_and_the_address_of_the_notebook_stays(tab
     button.click()
     assert button.get_attribute("aria-pressed") == "true"
     frame.locator(".scene.open .regions a").first.click()
-    assert "selection" in frame.locator("#distribution h3").text_content()
+    expect(frame.locator("#distribution h3")).to_contain_text("selection")  # drawn in the next frame
     frame.get_by_role("link", name="all scenes").click()
     assert frame.evaluate(SEEN) == "overview"
     frame.get_by_role("link", name=EXACT).first.click()
