@@ -56,7 +56,7 @@ def test_in_a_frame_all_fits_and_works_and_the_address_of_the_notebook_stays(tab
     button.click()
     assert button.get_attribute("aria-pressed") == "true"
     frame.locator(".scene.open .regions a").first.click()
-    expect(frame.locator("#distribution h3")).to_contain_text("selection")  # drawn in the next frame
+    expect(frame.locator("#distribution h3")).to_contain_text("selection")  # one frame later
     frame.get_by_role("link", name="all scenes").click()
     assert frame.evaluate(SEEN) == "overview"
     frame.get_by_role("link", name=EXACT).first.click()
