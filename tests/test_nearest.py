@@ -153,6 +153,15 @@ def test_metal_and_glass_reflect_at_normal_incidence_what_fresnel_says(rgb):
     assert found.transmittance == pytest.approx(0.96, abs=2e-4)
 
 
+def test_a_tint_has_the_colour_that_rays_see_in_it(spectral):
+    """Mitsuba divides tints by the luminance of the four wavelengths of a ray."""
+    tinted = {"type": "principled", "base_color": rgb_of(0.1, 0.5, 0.8), "spec_tint": 1.0}
+    plate = {"s": {"type": "rectangle", "b": tinted | {"specular": 0.8}}}
+    under_a_sky = scene(plate, {"type": "constant", "radiance": 1.0})
+    shown, expected = (image.mean((0, 1)) for image in images(under_a_sky, spp=64))
+    np.testing.assert_allclose(shown, expected, rtol=0.03)
+
+
 @pytest.mark.parametrize("nonlinear", [False, True])
 def test_a_textured_plastic_is_at_each_point_what_its_colour_alone_is(rgb, nonlinear):
     """White light on two reflectances: each texel shows the value of one plain material."""

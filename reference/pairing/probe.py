@@ -62,13 +62,15 @@ class Albedos:
 
 def probe(bsdf: mi.BSDF) -> Albedos | None:
     """Return a BSDF's :class:`Albedos` as arrays; None if it cannot be sampled."""
+    drawn = _of_rays() if mi.is_spectral else None
     try:
-        parts = [_parts(bsdf, chosen) for chosen in _wavelengths()]
+        parts = [_parts(bsdf, four) for four in ((None,) if drawn is None else drawn)]
     except RuntimeError:
         return None
-    reflected, diffuse, passed, scattered = (
-        np.concatenate(column) for column in zip(*(part[:4] for part in parts), strict=True)
-    )
+    columns = [np.stack(column, 1) for column in zip(*(part[:4] for part in parts), strict=True)]
+    if drawn is not None:
+        columns = [np.interp(WAVELENGTHS, drawn.T.ravel(), column.ravel()) for column in columns]
+    reflected, diffuse, passed, scattered = (column.ravel() for column in columns)
     alpha = float(np.mean([part[4] for part in parts]))
     if not np.isfinite([*reflected, *diffuse, *passed, *scattered, alpha]).all():
         return None
@@ -131,6 +133,13 @@ def lattice(size: int, generator: Sequence[int] = LATTICE) -> np.ndarray:
 
 def _wavelengths():
     return WAVELENGTHS.reshape(-1, 4) if mi.is_spectral else (None,)
+
+
+def _of_rays() -> np.ndarray:
+    """Return wavelengths as a ray has them, (n, 4): tints of `principled` depend on all four."""
+    places = (np.arange(WAVELENGTHS.size) + 0.5) / WAVELENGTHS.size
+    wavelengths, _ = mi.sample_rgb_spectrum(mi.Spectrum(mi.Float(places)))
+    return np.array(wavelengths[0]).reshape(4, -1).T
 
 
 def _at(si, wavelengths):
