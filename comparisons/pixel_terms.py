@@ -429,15 +429,18 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
         bsdfs = integrator.known(scene).materials.bsdfs
         there = {*(k for bsdf in bsdfs for k in bsdf.present), *["k_i"] * bool(scene.environment())}
         names = [name for name, k in TERMS.items() if k in there]
+        renderers: dict[bool, Renderer] = {}
+        integrator.model_at = lambda *_: partial(_shade, integrator.shares)
         try:
             for name in names:
-                model = partial(_shade, dict.fromkeys({*COEFFICIENTS} - {TERMS[name]}, 0.0))
-                integrator.model_at = lambda *_, model=model: model
-                integrator.hide_emitters = hidden or name != "emission"
-                own = Renderer(scene, integrator, half.spp, name)
+                kept = TERMS[name]
+                # Opaque, so all terms have one kernel.
+                integrator.shares = {k: dr.opaque(mi.Float, k == kept) for k in COEFFICIENTS}
+                integrator.hide_emitters = hides = hidden or name != "emission"
+                own = renderers.setdefault(hides, Renderer(scene, integrator, half.spp, "terms"))
                 images[name] = np.array(own.render(pass_seed(options.seed, 0)))
         finally:
-            vars(integrator).pop("model_at", None)
+            del integrator.model_at, integrator.shares
             integrator.hide_emitters = hidden
     together, rest = sum(images.values()), whole
     for name in names[:-1]:
@@ -448,7 +451,8 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
     return {f"term.{name}": image for name, image in images.items()}
 
 
-def _shade(changes: dict[str, float], *given: Any) -> Any:
-    """Return the kernel's value of a material with changes."""
+def _shade(shares: dict[str, Any], *given: Any) -> Any:
+    """Return the kernel's value of a material with shares of its coefficients."""
     position, normal, view, material, *lit = given
-    return kernel.shade(position, normal, view, replace(material, **changes), *lit)
+    changed = {k: getattr(material, k) * share for k, share in shares.items()}
+    return kernel.shade(position, normal, view, replace(material, **changed), *lit)

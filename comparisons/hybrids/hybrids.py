@@ -131,9 +131,6 @@ class HybridScenes:
 
     def of(self, simulated: Set[Effect]) -> Scene:
         """Return the scene of some effects, without its emission pass."""
-        key = self.key(simulated)
-        if key == self.key(set(self.differences)):
-            return self.scene
         graph = self.pair.physical.copy()
         for effect in REPLACED:
             if effect not in simulated:
@@ -229,6 +226,8 @@ class HybridImages:
         for each in dict.fromkeys(frozenset(one) - OF_KERNEL for one in sets):
             groups.setdefault(self._group(each), []).append(each)
         for (name, _), group in sorted(groups.items(), key=lambda found: found[0][0]):
+            # In one order of transports: scenes that differ only in data share a kernel.
+            group.sort(key=lambda each: [effect in each for effect in EFFECTS if not effect.put])
             with variant(name):
                 self._known |= zip(group, self._rendered(group), strict=True)
 
