@@ -131,6 +131,9 @@ class HybridScenes:
 
     def of(self, simulated: Set[Effect]) -> Scene:
         """Return the scene of some effects, without its emission pass."""
+        key = self.key(simulated)
+        if key == self.key(set(self.differences)):
+            return self.scene
         graph = self.pair.physical.copy()
         for effect in REPLACED:
             if effect not in simulated:
