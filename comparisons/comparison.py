@@ -94,12 +94,6 @@ class TimeSpent(Record):
     stages: dict[str, float]
 
     @property
-    def share_of_causes(self) -> float:
-        """The share of the whole time that finding causes took."""
-        whole = sum(self.stages.values()) + self.heuristic.total_s + self.reference.total_s
-        return self.stages.get(CAUSES, 0.0) / whole if whole else 0.0
-
-    @property
     def ratio(self) -> str:
         """The physical half's time per sample over the textbook's: both have the same samples."""
         return f"{self.reference.median_s / self.heuristic.median_s:.1f}"

@@ -310,16 +310,12 @@ def _vertex(values: np.ndarray, place: int) -> float:
 CHANNELS = ("red", "green", "blue")
 
 
-def _ordered(order: tuple[int, ...], image: np.ndarray) -> np.ndarray:
-    return image[..., list(order)]
-
-
 MISREADINGS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "values look sRGB-encoded": from_srgb,
     "values look decoded twice": to_srgb,
     **{
         f"channels look like {', '.join(CHANNELS[place] for place in order)}": partial(
-            _ordered, order
+            np.take, indices=order, axis=-1
         )
         for order in permutations(range(3))
         if order != (0, 1, 2)

@@ -91,8 +91,7 @@ def missing(record: ComparisonRecord) -> dict[str, float]:
 
 def cause(record: ComparisonRecord) -> str:
     """Return what is mostly missing in a scene, as a sentence; empty if that is unknown."""
-    effects = missing(record)
-    return f"Mostly missing: {_noun(next(iter(effects)))}." if effects else ""
+    return _mostly([*missing(record)][:1])
 
 
 def sentence(
@@ -184,8 +183,10 @@ def about(record: ComparisonRecord, cost: Cost | None = None, threshold: float =
     return " ".join(dict.fromkeys(filter(None, parts)))
 
 
-def _noun(effect: str) -> str:
-    return next((one.noun for one in EFFECTS if one.label == effect), "") or effect
+def _mostly(effects: Sequence[str]) -> str:
+    nouns = {effect.label: effect.noun for effect in EFFECTS}
+    named = [nouns.get(effect) or effect for effect in effects]
+    return f"Mostly missing: {', '.join(named)}." if named else ""
 
 
 # --- A run -----------------------------------------------------------------------------------
@@ -224,8 +225,7 @@ def most_missing(records: Sequence[ComparisonRecord], threshold: float = TOLERAN
         if decision(record, threshold) == "fail":
             wrong = share(record, threshold).value
             pixels.update({effect: wrong * part for effect, part in missing(record).items()})
-    named = [_noun(effect) for effect, _ in pixels.most_common(NAMED)]
-    return f"Mostly missing: {', '.join(named)}." if named else ""
+    return _mostly([effect for effect, _ in pixels.most_common(NAMED)])
 
 
 def advice(scenes: Sequence[Studied], threshold: float = TOLERANCE) -> Iterator[str]:

@@ -232,7 +232,7 @@ def test_vertices_and_faces_are_shaded_too_and_later_passes_replay_the_first(rgb
             smooth = np.array(renderer.render(seed))
             again = mi.render(scene, integrator=renderer.integrator, spp=2, seed=seed)
             np.testing.assert_array_equal(smooth, np.array(again))
-        assert renderer.replays
+        assert renderer._replayed is not None
         for interpolation in ("flat", "gouraud"):
             found = image(polygons, model, interpolation=interpolation)
             assert found.mean() == pytest.approx(smooth.mean(), rel=0.03), (model, interpolation)

@@ -245,6 +245,6 @@ def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(monkey
                 update("rendering", done, 10)
         shown = sys.stderr.getvalue()
         assert "cornell-box: rendering 5 of 10 passes, causes next" in shown
-        assert re.search(r"about \d+ s", shown)
+        assert re.search(r"\d:\d\d:\d\d", shown)
         assert ("\x1b[38;5;" in shown or "\x1b[3" in shown) is is_coloured
         monkeypatch.setenv("NO_COLOR", "1")

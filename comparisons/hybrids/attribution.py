@@ -134,6 +134,7 @@ def find(
     meter = ErrorMeter(groups, surface.hit, options.viewing)
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
+    spp = min(spp, EXACT_SPP) if is_large else spp  # every sample of a hybrid takes every light
     images = HybridImages(pairs, scenes, REPLICATES, spp, options.seed, size)
     if progress:
         progress(CAUSES, 0, 1)

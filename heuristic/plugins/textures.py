@@ -136,9 +136,10 @@ def define() -> dict[str, Any]:
             self.flip = props.get("flip", True)
 
         def eval_3(self, si: Interaction, active: Mask = True) -> Colour:
-            normal = (
-                self._mapped(si, active) if "normals" in self.maps else self._displaced(si, active)
-            )
+            if "normals" in self.maps:
+                normal = dr.normalize(mi.Vector3f(self.maps["normals"].eval_3(si, active)) * 2 - 1)
+            else:
+                normal = self._displaced(si, active)
             if self.flip:
                 mirrored = mi.Vector3f(-normal.x, -normal.y, normal.z)
                 normal = dr.select(dr.dot(normal, si.wi) * si.wi.z > 0, normal, mirrored)
@@ -153,9 +154,6 @@ def define() -> dict[str, Any]:
 
         def to_string(self) -> str:
             return f"Tilt[{self.maps}]"
-
-        def _mapped(self, si: Interaction, active: Mask) -> Direction:
-            return dr.normalize(mi.Vector3f(self.maps["normals"].eval_3(si, active)) * 2 - 1)
 
         def _displaced(self, si: Interaction, active: Mask) -> Direction:
             slope = self.scale * self.maps["heights"].eval_1_grad(si, active)

@@ -145,11 +145,6 @@ class Renderer:
                 )
         return image
 
-    @property
-    def replays(self) -> bool:
-        """Whether passes after the first replay its kernels, without tracing again."""
-        return self._replayed is not None
-
     def sampled(self, spp: int) -> "Renderer":
         """Return the same renderer with another number of samples."""
         other = copy(self)

@@ -40,8 +40,10 @@ class BaselineFile:
 
     def pictures(self) -> Kept | None:
         """Return the small pictures, or None if the baseline has none."""
-        name = self.baseline.images
-        return _read_pictures(self.path.parent / Path(name).name) if name else None
+        if not (name := self.baseline.images):
+            return None
+        how = program.command("check", "BASELINE", "--update", "--images")
+        return read_layers(self.path.parent / Path(name).name, HALVES, LONGEST_KEPT, how)
 
 
 def find(path: Path) -> list[Path]:
@@ -170,11 +172,6 @@ def _with_heuristic(options: Mapping[str, Any], placed: Callable[[str], str]) ->
 def name_of(scene: str | Path) -> str:
     """Return the name of a scene's baseline: the scene's, or its file's."""
     return Path(scene).stem if Path(scene).suffix in SUFFIXES else str(scene)
-
-
-def _read_pictures(path: Path) -> Kept:
-    how = program.command("check", "BASELINE", "--update", "--images")
-    return read_layers(path, HALVES, LONGEST_KEPT, how)
 
 
 def read_layers(

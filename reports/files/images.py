@@ -101,12 +101,11 @@ def thumbnails(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
         LEADING.name: error_map(shown.maps[LEADING.name], LEADING.map_range[1]),
     }
     panels |= {name: tonemap(term, exposure) for name, term in shown.terms.items() if term.any()}
-    return {name: webp(_small(picture)) for name, picture in panels.items()}
-
-
-def _small(picture: Image.Image) -> Image.Image:
-    size = shrunk(picture.size, THUMBNAIL)
-    return picture.convert("RGB").resize(size, Image.Resampling.BOX)
+    size = shrunk(panels["reference"].size, THUMBNAIL)
+    return {
+        name: webp(picture.convert("RGB").resize(size, Image.Resampling.BOX))
+        for name, picture in panels.items()
+    }
 
 
 def _coloured(fraction: NDArray[np.float64], colormap: str) -> Image.Image:

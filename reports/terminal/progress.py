@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID, TextColumn
-from rich.text import Text
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
 from reports.terminal.words import level, visible
 
@@ -67,17 +66,6 @@ class Bar:
             self._progress.update(self._whole, advance=weight, description=words)
 
 
-class TimeLeft(ProgressColumn):
-    """The time that a task still takes, roughly."""
-
-    def render(self, task: Task) -> Text:
-        """Return it in seconds or minutes; nothing while it is unknown."""
-        left = task.time_remaining
-        if left is None or task.finished:
-            return Text("")
-        return Text(f"about {left:.0f} s" if left < 90 else f"about {left / 60:.0f} min")
-
-
 @contextmanager
 def shown(unit: str = "passes", total: float | None = None) -> Iterator[Bar]:
     """Show progress on standard error during the block, if that is a terminal; see :class:`Bar`."""
@@ -85,7 +73,7 @@ def shown(unit: str = "passes", total: float | None = None) -> Iterator[Bar]:
     with Progress(
         TextColumn("{task.description}", markup=False),  # a name may hold brackets
         BarColumn(),
-        TimeLeft(),
+        TimeRemainingColumn(),
         console=console,
         transient=True,
         speed_estimate_period=SPEED_OVER_S,

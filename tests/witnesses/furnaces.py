@@ -72,42 +72,29 @@ WITNESSES = (
         )
         for nonlinear in (False, True)
     ),
-    _witness(
-        "rough mirror, Beckmann, α = 0.3",
-        "∫ D G / (4 cos θ) dω",
-        _metal(distribution="beckmann"),
-        lambda cosine: fresnel.rough_mirror(cosine, 0.3, "beckmann"),
-        SMITH,
-        form_error=3e-4,
+    *(
+        _witness(
+            f"rough mirror, {name}, α = 0.3",
+            "∫ D G / (4 cos θ) dω",
+            _metal(distribution=name.lower()),
+            partial(fresnel.rough_mirror, alpha=0.3, distribution=name.lower()),
+            SMITH,
+            form_error=3e-4,
+        )
+        for name in ("Beckmann", "GGX")
     ),
-    _witness(
-        "rough mirror, GGX, α = 0.3",
-        "∫ D G / (4 cos θ) dω",
-        _metal(distribution="ggx"),
-        lambda cosine: fresnel.rough_mirror(cosine, 0.3, "ggx"),
-        SMITH,
-        form_error=3e-4,
-    ),
-    _witness(
-        "rough plastic, ρ = 0, α = 0.2",
-        "∫ F D G / (4 cos θ) dω",
-        {
-            "type": "roughplastic", "diffuse_reflectance": 0.0, "alpha": 0.2,
-            **COAT,
-        },
-        lambda cosine: fresnel.rough_plastic(cosine, 0.0, 0.2, ETA_OF_COAT),
-        SMITH,
-        form_error=3e-4,
-    ),
-    _witness(
-        "rough plastic, ρ = 0.5, α = 0.2",
-        "the same, and T(θ) T̄ ρ / ((1 − R) η²) of the base",
-        {
-            "type": "roughplastic", "diffuse_reflectance": 0.5, "alpha": 0.2,
-            **COAT,
-        },
-        lambda cosine: fresnel.rough_plastic(cosine, 0.5, 0.2, ETA_OF_COAT),
-        SMITH,
-        form_error=8e-4,
+    *(
+        _witness(
+            f"rough plastic, ρ = {albedo:g}, α = 0.2",
+            formula,
+            {"type": "roughplastic", "diffuse_reflectance": albedo, "alpha": 0.2, **COAT},
+            partial(fresnel.rough_plastic, rho=albedo, alpha=0.2, eta=ETA_OF_COAT),
+            SMITH,
+            form_error=error,
+        )
+        for albedo, error, formula in (
+            (0.0, 3e-4, "∫ F D G / (4 cos θ) dω"),
+            (0.5, 8e-4, "the same, and T(θ) T̄ ρ / ((1 − R) η²) of the base"),
+        )
     ),
 )  # fmt: skip
