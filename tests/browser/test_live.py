@@ -132,7 +132,7 @@ def opened(visitor):
     page = visitor.open(SCENE)
     section = page.locator("#live")
     section.locator("summary").click()
-    page.wait_for_function("document.querySelector('#live [data-part=size]').textContent")
+    page.wait_for_function("() => document.querySelector('#live [data-part=size]').textContent")
     visitor.settle()
     return section
 
