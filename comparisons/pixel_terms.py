@@ -34,7 +34,7 @@ LIGHTS = 4
 """Lights with separate terms: the strongest ones. The others are summed."""
 
 MOST_LIGHTS = 64
-"""With more lights no terms are read: each light is evaluated separately."""
+"""With more lights there are no terms: each of them takes as long as a pass."""
 
 MATERIALS = 256
 """Different sets of coefficients, at most: textures have more."""
@@ -419,11 +419,12 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
 
     Each has its share of the half's first pass, rendered once more: all passes would add a quarter
     to some runs, and AOVs lengthen the passes, whose times are compared. Backgrounds are emission.
-    Other heuristics have no such terms.
+    Other heuristics have no such terms, and more than :data:`MOST_LIGHTS` lights get none.
     """
-    if options.image or options.heuristic not in MODELS:
-        return {}
     integrator, scene = half.integrator, half.scene
+    is_sum = not options.image and options.heuristic in MODELS
+    if not is_sum or len(scene.emitters()) > MOST_LIGHTS:
+        return {}
     hidden, images = integrator.hide_emitters, dict.fromkeys(TERMS, 0 * whole)
     with variant(half.variant):
         bsdfs = integrator.known(scene).materials.bsdfs

@@ -288,8 +288,11 @@ def test_what_shines_behind_a_surface_is_emission(rgb):
     assert abs(sum(layers.values()) - whole).max() <= 1e-5 * whole.max()
 
 
-def test_other_heuristics_have_no_layers(rgb):
+def test_other_heuristics_and_more_than_64_lights_have_no_layers(rgb):
     assert images("fig-8-9", resolution=(8, 8), heuristic="hemisphere-ambient")[0] == {}
+    for count in (64, 65):
+        lights = (lamp(x) for x in range(count))
+        assert bool(images(sphere(PLASTIC, *lights))[0]) is (count == 64)
 
 
 def test_the_layers_are_in_the_file_and_their_sum_on_the_page(tmp_path):
