@@ -44,7 +44,7 @@ def baselines() -> None:
     """Measure all baselines of the tests again, not only those that moved."""
     for file in (ROOT / "tests" / "baselines").glob("*.json"):
         file.unlink()
-    _run("pytest", "-q", "tests/test_baselines.py", "--fotismos-update")
+    _run("pytest", "-q", "-m", "", "tests/test_baselines.py", "--fotismos-update")
 
 
 def fits() -> Iterator[str]:
@@ -56,7 +56,7 @@ def fits() -> Iterator[str]:
         best = record.nearest
         departure = best.departure[LEADING.name]
         errors = departure.before, departure.after, best.parameter_error, best.loss
-        before, after, *parts = (f"{each:.2f}" for each in errors)
+        before, after, *parts = (f"{each:z.2f}" for each in errors)
         rows.append((record.scene, best.form, f"{before}→{after}", *parts))
     head = "scene", "form", LEADING.label, "parameter error", "model error"
     yield from markdown([head, *rows], right=2)
