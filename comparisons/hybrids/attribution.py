@@ -55,9 +55,9 @@ WIDTH, NARROW, MANY = 48, 32, 64
 shapes: each sample takes longer there."""
 
 REPLICATES, SPP, FEW_SPP, EXACT_SPP = 4, 64, 32, 16
-"""Replicates of each image, samples per pixel of each, those of the reference for MANY lights or
-shapes, and those of its hybrids, or where plans are exact: only the pixel filter needs them. With
-16 instead of 64, skewed noise left 2 % of the Cornell box's departure in the closure."""
+"""Replicates of each image, samples per pixel of each, those for MANY lights or shapes, and those
+where plans are exact: only the pixel filter needs them. With 16 instead of 64, skewed noise left
+2 % of the Cornell box's departure in the closure."""
 
 EXACT_EFFECTS, ORDERS = 4, 8
 """Largest number of effects for which every subset is rendered, and orders drawn for more."""
@@ -134,7 +134,6 @@ def find(
     meter = ErrorMeter(groups, surface.hit, options.viewing)
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
-    spp = min(spp, EXACT_SPP) if is_large else spp  # every sample of a hybrid takes every light
     images = HybridImages(pairs, scenes, REPLICATES, spp, options.seed, size)
     if progress:
         progress(CAUSES, 0, 1)
