@@ -237,10 +237,8 @@ def live(half: Renderer, options: Options) -> LivePoints | str:
 
 def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
     """Return why equation 8.10 does not describe a half's shading; empty if it does."""
-    if options.image:
-        return "The heuristic half is a picture, which has no terms."
-    if options.heuristic not in MODELS:
-        return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
+    if reason := _without_sum(half, options):
+        return reason
     if options.polygon_shading not in allowed:
         shading = options.polygon_shading.value.capitalize()
         return f"{shading} shading does not evaluate 8.10 at pixels."
@@ -248,10 +246,19 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
         return "Shadow rays hide lights, and equation 8.10 has no shadows."
     if mi.is_spectral:
         return "The heuristic half is rendered by wavelength, so its terms are not RGB."
-    if len(half.scene.emitters()) > MOST_LIGHTS:
-        return f"There are more than {MOST_LIGHTS} lights."
     if any(bsdf.is_clear for bsdf in half.integrator.known(half.scene).materials.bsdfs):
         return "Some surfaces are transparent, so a pixel shows several of them at once."
+    return ""
+
+
+def _without_sum(half: Renderer, options: Options) -> str:
+    """Return why a half has no terms in any form; empty if it has."""
+    if options.image:
+        return "The heuristic half is a picture, which has no terms."
+    if options.heuristic not in MODELS:
+        return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
+    if len(half.scene.emitters()) > MOST_LIGHTS:
+        return f"There are more than {MOST_LIGHTS} lights."
     return ""
 
 
@@ -421,10 +428,9 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
     to some runs, and AOVs lengthen the passes, whose times are compared. Backgrounds are emission.
     Other heuristics have no such terms, and more than :data:`MOST_LIGHTS` lights get none.
     """
-    integrator, scene = half.integrator, half.scene
-    is_sum = not options.image and options.heuristic in MODELS
-    if not is_sum or len(scene.emitters()) > MOST_LIGHTS:
+    if _without_sum(half, options):
         return {}
+    integrator, scene = half.integrator, half.scene
     hidden, images = integrator.hide_emitters, dict.fromkeys(TERMS, 0 * whole)
     with variant(half.variant):
         bsdfs = integrator.known(scene).materials.bsdfs
