@@ -24,7 +24,7 @@ from reference.scene.source import Source
 from tests.misplanned import BLACK, DIFFUSE
 from tests.misplanned import scene as described
 from tests.noisy import require_equal, whole
-from tests.parts import moved
+from tests.parts import camera, moved
 from tests.test_objects import shadowed
 
 MADE_OF = {
@@ -58,6 +58,23 @@ def found(request):
     images = [whole(half).mean for half in (ready.heuristic, ready.reference)]
     yield SimpleNamespace(name=request.param, causes=causes, images=images)
     set_variant("llvm_ad_rgb")
+
+
+def test_a_clamped_fall_off_is_a_cause(rgb):
+    """A floor 0.4 below the lamp, where 1/d^2 exceeds 1."""
+    lamp = {"type": "heuristic_point", "position": (0, 0, 0.4), "intensity": 0.5}
+    description = {
+        "type": "scene",
+        "sensor": camera((0, -3, 3), size=24),
+        "floor": {"type": "rectangle", "to_world": moved((0, 0, 0), 2), "bsdf": DIFFUSE},
+        "lamp": lamp | {"k0": 0.0, "k2": 1.0, "clamped": True},
+    }
+    source = Source("clamped", description)
+    ready = guarded(source, Options())
+    record = attribution.find(ready, source, Options()).record
+    assert record.departure > 0.5
+    assert [entry.effect for entry in record.effects] == ["distance attenuation"]
+    assert abs(record.closure.mean) < 0.01 * record.departure
 
 
 @pytest.mark.guarantee(

@@ -238,6 +238,17 @@ def test_the_factor_from_heuristic_to_physical_lights_is_pi(rgb):
     assert tuple(only(pair.physical, EMITTER)["irradiance"]) == pytest.approx((pi,) * 3)
 
 
+def test_a_clamped_inverse_square_is_not_exact_below_its_clamp(rgb):
+    """Mitsuba's point light has no limit: near the lamp its fall-off is another."""
+    near = {"type": "heuristic_point", "position": (0, 0, 1.4), "k0": 0.0, "k2": 1.0}
+    (record,) = pair_of({"type": "phong", "k_d": 0.5}, near | {"clamped": True}).pairing.emitters
+    assert not record.exact
+    assert "fall-off" in record.note
+    assert record.factor < 0.9 * pi
+    (record,) = pair_of({"type": "phong", "k_d": 0.5}, near | {"clamped": False}).pairing.emitters
+    assert record.exact
+
+
 TWO_INTENSITIES = """<scene version="3.0.0"><sensor type="perspective"/>
 <shape type="sphere"><bsdf type="phong"><float name="k_d" value="0.5"/>
 <float name="k_s" value="0.4"/></bsdf></shape>

@@ -208,9 +208,9 @@ def level(
     """
     defaults = (("k0", 1.0), ("k1", 0.0), ("k2", 0.0))
     k0, k1, k2 = (light.number(key, default) for key, default in defaults)
-    if (k0, k1, k2) == INVERSE_SQUARE:
-        return IRRADIANCE_PER_INTENSITY * flux_ratio, ""
     clamped = light.value("clamped", False)
+    if (k0, k1, k2) == INVERSE_SQUARE and not clamped:
+        return IRRADIANCE_PER_INTENSITY * flux_ratio, ""
 
     def chapters(distance, travel):
         factor = 1 / np.maximum(k0 + k1 * distance + k2 * distance**2, np.finfo(float).tiny)
