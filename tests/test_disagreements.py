@@ -9,6 +9,7 @@ from comparisons.options import Options
 from comparisons.prepared import prepare
 from reference.planning.facts import Facts
 from reference.planning.rules import LIGHT_BY_LIGHT
+from reference.rendering import direct
 from reference.rendering.renderer import pass_seed
 from reference.scene.source import Source
 from tests.misplanned import BLACK, DIFFUSE, lamp, octahedron, scene
@@ -148,6 +149,20 @@ def test_samples_of_direct_and_weights_that_change_the_light_are_named(rgb):
     assert overridden(mirrored({"type": "direct", "shading_samples": 1})) == {}
     found = overridden(mirrored({"type": "path"}, sampling_weight=0.0))
     assert found["sampling_weight of lamp"] == ("0", "1")
+
+
+def test_the_depth_of_russian_roulette_is_the_one_used(rgb):
+    """`direct_all` ends paths by its own depth, whatever the scene names."""
+    lamps = {"lamp": lamp((0, -3, 0)), "second": lamp((0, -3, 2))}
+    floor = {"type": "rectangle", "to_world": moved((0, 0, -1), 4), "bsdf": DIFFUSE}
+    wall = {"type": "rectangle", "to_world": look_at((0, 1, 0), (0, -4, 0)), "bsdf": DIFFUSE}
+    for given, entry in ((5, ("5", str(direct.RR_DEPTH))), (direct.RR_DEPTH, None)):
+        integrator = {"type": "path", "rr_depth": given}
+        described = scene(integrator=integrator, floor=floor, wall=wall, **lamps)
+        record = compare(Source("a test", described), Options(spp=16)).record
+        assert (record.plan.integrator, record.plan.rr_depth) == ("direct_all", direct.RR_DEPTH)
+        overridden = {one.what: (one.given, one.used) for one in record.overridden}
+        assert overridden.get("rr_depth") == entry
 
 
 @pytest.mark.parametrize("integrator", ["path", "direct"])

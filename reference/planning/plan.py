@@ -169,6 +169,7 @@ class Plan(Record):
         return replace(
             self,
             integrator="direct_all",
+            rr_depth=direct.RR_DEPTH,
             max_depth=self.max_depth if self.calls_for(INTERREFLECTION) else 2,
             shadows=self.calls_for(OCCLUSION),
             bsdf_samples=1,
@@ -238,7 +239,7 @@ def _reference(facts: Facts) -> Plan:
     if stock.calls_for(INTERREFLECTION) and pair.max_depth != 2:
         is_diffuse = all(graph.plugin(i) in ("diffuse", "twosided") for i in graph.nodes(BSDF))
         if sum(kind.exact for kind in kinds) > 1 and is_diffuse:
-            return replace(stock, integrator="direct_all", rr_depth=STOCK_RR_DEPTH)
+            return replace(stock, integrator="direct_all", rr_depth=direct.RR_DEPTH)
         # Behind hidden lamps only the stock integrator is right.
         return stock if facts.sees_through_lamps else replace(stock, integrator="path")
     tabulated = TABULATED_ENVIRONMENT.check(facts).applies
@@ -249,7 +250,6 @@ def _reference(facts: Facts) -> Plan:
     )
     return replace(
         stock.directly(),
-        rr_depth=STOCK_RR_DEPTH,
         spp=SPP if is_random else EXACT_SPP,
         passes=PASSES if is_random else EXACT_PASSES,
         exact=not is_random,
