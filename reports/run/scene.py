@@ -84,15 +84,14 @@ def compare(
 def _stages(record: ComparisonRecord, seconds: float) -> Seconds:
     """Split the seconds of a comparison by its record of time."""
     stages = record.time.stages
-    preparing = sum(stages.get(name, 0.0) for name in ("scene and pairing", "planning", "geometry"))
     rendering = record.time.heuristic.total_s + record.time.reference.total_s
-    causes = stages.get(CAUSES, 0.0)
-    return {
-        "scenes and plans": preparing,
-        "rendering": rendering,
-        CAUSES: causes,
-        "metrics": seconds - preparing - rendering - causes,
+    spent = {
+        "scenes and plans": stages["scene and pairing"] + stages["planning"] + stages["guard"],
+        "rendering": rendering + stages["sums of passes"] + stages["timing"],
+        "terms": stages.get("terms", 0.0),
+        CAUSES: stages.get(CAUSES, 0.0),
     }
+    return spent | {"metrics": seconds - sum(spent.values())}
 
 
 # --- Finished scenes -------------------------------------------------------------------------
