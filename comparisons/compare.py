@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from msgspec import structs
 
+from comparisons import timing
 from comparisons.comparison import (
     Comparison,
     ComparisonRecord,
@@ -35,7 +36,7 @@ from comparisons.prepared import Prepared, guarded, require_light
 from heuristic import heuristics
 from reference.records import Pixels
 from reference.rendering.gbuffer import GBuffer
-from reference.rendering.renderer import Progress, passes
+from reference.rendering.renderer import Progress, Renderer, passes
 from reference.rendering.sums import (
     DEVIATION,
     MEAN,
@@ -160,8 +161,10 @@ def _compare(
     done("scene and pairing", ready.planning_seconds + guard.seconds)
     stages |= {"planning": ready.planning_seconds, "guard": guard.seconds}
     estimates = render(ready, options, ready.counted, progress)
-    _load()  # not beside the passes, whose times are compared
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
+    spent = _times(heuristic, reference, options)
+    done("timing")
+    _load()  # not beside the passes, whose times are compared
     exact = ready.plan.exact and not options.image
     numbers, images = _measure(estimates, ready.surface, options, exact)
     shown = images.heuristic, images.reference, images.counted
@@ -203,9 +206,7 @@ def _compare(
         pixels=Pixels(counted=int(images.counted.sum()), total=images.counted.size),
         regions=regions.find(images.maps[LEADING.name], images.counted),
         pairing=ready.pair.pairing,
-        time=TimeSpent(
-            heuristic=heuristic.pass_times(), reference=reference.pass_times(), stages=stages
-        ),
+        time=structs.replace(spent, stages=stages),
         unrepresentable=ready.pair.unrepresentable,
         integrator_given=ready.pair.integrator,
         overridden=ready.overridden,
@@ -219,6 +220,27 @@ def _compare(
         **numbers,
     )
     return Comparison(record, images, *traced, live), ready
+
+
+def _times(heuristic: Any, reference: Renderer, options: Options) -> TimeSpent:
+    """Return the times of both halves, without stages; the time of a picture is not known."""
+    ratio, reason = None, "a picture's time is not known"
+    if not options.image:
+        ratio, reason = timing.measure(heuristic, reference, options.seed)
+    return TimeSpent(
+        heuristic=heuristic.pass_times(),
+        reference=reference.pass_times(),
+        stages={},
+        ratio=two_digits(ratio.value) if ratio else None,
+        ratio_low=two_digits(ratio.low) if ratio else None,
+        ratio_high=two_digits(ratio.high) if ratio else None,
+        no_ratio=reason,
+    )
+
+
+def two_digits(value: float) -> float:
+    """Return a number rounded to two significant digits."""
+    return float(f"{value:.2g}")
 
 
 def render(

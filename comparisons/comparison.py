@@ -87,16 +87,25 @@ CAUSES = "causes"
 
 
 class TimeSpent(Record):
-    """Times of both renderings, and of other work by stage."""
+    """Times of both renderings, and of other work by stage.
+
+    Attributes
+    ----------
+    ratio
+        The physical half's time per sample over the textbook's, to two digits, as it is shown.
+    ratio_low, ratio_high
+        Its 95 % interval.
+    no_ratio
+        Why there is no ratio; empty if there is one.
+    """
 
     heuristic: Times
     reference: Times
     stages: dict[str, float]
-
-    @property
-    def ratio(self) -> str:
-        """The physical half's time per sample over the textbook's: both have the same samples."""
-        return f"{self.reference.median_s / self.heuristic.median_s:.1f}"
+    ratio: Positive | None = None
+    ratio_low: Positive | None = None
+    ratio_high: Positive | None = None
+    no_ratio: str = ""
 
 
 class NoiseTarget(Record):

@@ -279,6 +279,7 @@ def passes(
 ) -> Generator[Pass, None, None]:
     """Render ``count`` passes of each renderer, in its own variant, and yield each as it is done.
 
+    The order of the renderers alternates, so that none always pays for a pause before a pass.
     ``progress`` is called before each pass, and once more when all are done or the caller stops.
     """
     done = 0
@@ -287,7 +288,7 @@ def passes(
             if progress:
                 progress(stage, number, count)
             own = pass_seed(seed, number, stream)
-            result = Pass(number, own, _images(renderers, own))
+            result = Pass(number, own, _images(renderers, own, backwards=number % 2 == 1))
             done = number + 1
             yield result
             del result  # else its images would stay alongside the next ones
@@ -296,12 +297,15 @@ def passes(
             progress(stage, done, done)
 
 
-def _images(renderers: Sequence[Renderer], seed: int) -> tuple:
+def _images(renderers: Sequence[Renderer], seed: int, backwards: bool) -> tuple:
     """Render one pass, grouped by variant: a change takes as long as a small image."""
     images: dict[int, Any] = {}
-    for name in dict.fromkeys(renderer.variant for renderer in renderers):
+    order = list(enumerate(renderers))
+    if backwards:
+        order.reverse()
+    for name in dict.fromkeys(renderer.variant for _, renderer in order):
         with variant(name):
-            for place, renderer in enumerate(renderers):
+            for place, renderer in order:
                 if renderer.variant == name:
                     images[place] = renderer.render(seed)
     return tuple(images[place] for place in range(len(renderers)))

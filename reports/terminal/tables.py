@@ -135,12 +135,14 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
                 record.scene,
                 percent(share_above(metric.visible, threshold).value),
                 *(number(mean) for mean in means),
-                "" if record.picture else f"x {record.time.ratio}",
+                "" if record.picture else time_ratio(record),
             )
         )
     yield from printed(rows, right=1)
     yield f"differ: above {LEADING.label} {threshold:g}; shape: the mean at the best exposure"
     yield "time: what a sample of the physical half takes, over one of the textbook's"
+    reasons = {record.time.no_ratio for record in records if not record.picture} - {""}
+    yield from (f"time ?: {reason}" for reason in sorted(reasons))
     for record in records:
         if record.heuristic != PHONG.name and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"
@@ -155,6 +157,12 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
                 f"{record.scene}: a probe disagreed with the plan by {guard.departure:+.1%} of the"
                 " light, so everything was simulated. Please report this scene."
             )
+
+
+def time_ratio(record: ComparisonRecord) -> str:
+    """Return the ratio of the times of both halves, or "?"."""
+    ratio = record.time.ratio
+    return "?" if ratio is None else f"x {ratio:g}"
 
 
 def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:

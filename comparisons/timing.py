@@ -1,0 +1,61 @@
+"""How long a sample of the physical half takes, compared with one of the textbook half.
+
+The halves of a pass are rendered one after the other, and the order alternates: after a pause the
+processor's threads are asleep, and whichever half comes first pays for waking them.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from reference.records import Estimated
+from reference.rendering.renderer import Renderer, passes
+from reference.rendering.sums import student
+
+WARM = 1
+"""Passes that do not count: the first one compiles, or wakes the threads."""
+
+FEWEST, MOST = 3, 64
+"""Pairs of passes that make a ratio."""
+
+BATCHES = 8
+"""Groups of pairs, of each of which the shortest passes count: other work only ever adds time."""
+
+BUDGET_S = 1.0
+"""If enough pairs take less, they are timed again without a pause in between."""
+
+WIDEST = 0.3
+"""The widest interval that a ratio may have, over the ratio."""
+
+TOO_FEW = "too few passes to time"
+TOO_WIDE = "passes too short, or the machine too busy, to time within 30 %"
+
+
+def measure(heuristic: Renderer, reference: Renderer, seed: int) -> tuple[Estimated | None, str]:
+    """Return the ratio of the times of both halves, physical over textbook, or why there is none.
+
+    Both have rendered the same passes in turns (:func:`reference.rendering.renderer.passes`).
+    """
+    halves = (heuristic, reference)
+    count = min(MOST, int(BUDGET_S / np.add(heuristic.times, reference.times).min()))
+    if count >= FEWEST:
+        halves = (heuristic.sampled(heuristic.spp), reference.sampled(reference.spp))
+        for _ in passes(halves, seed, WARM + count):
+            pass
+    return ratio(halves[0].times[WARM:], halves[1].times[WARM:])
+
+
+def ratio(heuristic: Sequence[float], reference: Sequence[float]) -> tuple[Estimated | None, str]:
+    """Return the geometric mean of the batches' ratios with its interval, or why there is none."""
+    if len(heuristic) < FEWEST:
+        return None, TOO_FEW
+    count = max(FEWEST, min(BATCHES, len(heuristic) // 2))
+    shortest_h = [batch.min() for batch in np.array_split(np.array(heuristic), count)]
+    shortest_r = [batch.min() for batch in np.array_split(np.array(reference), count)]
+    logarithms = np.log(np.divide(shortest_r, shortest_h))
+    error = float(logarithms.std(ddof=1)) / len(logarithms) ** 0.5
+    interval = student(float(logarithms.mean()), error, len(logarithms))
+    value, low, high = np.exp([interval.value, interval.low, interval.high]).tolist()
+    if high - low > WIDEST * value:
+        return None, TOO_WIDE
+    return Estimated(value=value, low=low, high=high), ""
