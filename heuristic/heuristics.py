@@ -315,6 +315,11 @@ class Heuristic:
         return pkgutil.resolve_name(SHADED)(self.name, self.shade, point)
 
     @property
+    def is_script(self) -> bool:
+        """Whether it is a user's Python code, of which nobody knows what else it reads."""
+        return not self.is_own and not self.name.endswith(".glsl")
+
+    @property
     def inputs(self) -> tuple[str, ...]:
         """What it read on trial, or else its needs."""
         return self.reads or tuple(sorted(self.needs))

@@ -12,6 +12,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import mitsuba as mi
+import numpy as np
+
 from heuristic.errors import suggestion
 from heuristic.program import ROOMS, ROOT
 
@@ -23,8 +26,9 @@ CALLED = {"PairedMaterial": "material", "LightAtPoint": "light"}
 def contained(path: Path) -> Iterator[set[Path]]:
     """Let a file's code run in the block, with its folder first in the search path.
 
-    Its changes to the process are undone: folder, umask, environment, arguments, path, and imported
-    modules, since other code may mean another file by the same name. Yields a set that holds, after
+    Its changes to the process are undone: folder, umask, environment, arguments, path, NumPy's
+    handling of errors, and imported modules, since other code may mean another file by the same
+    name. Yields a set that holds, after
     the block, the files of those modules. A process that the code forks ends here instead of
     continuing alongside its parent.
     """
@@ -32,6 +36,7 @@ def contained(path: Path) -> Iterator[set[Path]]:
     arguments, places, modules = list(sys.argv), list(sys.path), set(sys.modules)
     umask = os.umask(0o022)
     os.umask(umask)
+    numpy_errors = np.geterr()
     files: set[Path] = set()
     try:
         sys.path.insert(0, str(path.resolve().parent))
@@ -41,6 +46,7 @@ def contained(path: Path) -> Iterator[set[Path]]:
             os._exit(0)
         os.chdir(folder)
         os.umask(umask)
+        np.seterr(**numpy_errors)
         os.environ.clear()
         os.environ.update(environment)
         sys.argv[:], sys.path[:] = arguments, places
@@ -51,6 +57,17 @@ def contained(path: Path) -> Iterator[set[Path]]:
             if own and all(is_users(Path(place)) for place in own):
                 files |= {Path(place).resolve() for place in own if Path(place).is_file()}
                 del sys.modules[name]
+
+
+@contextmanager
+def same_variant() -> Iterator[None]:
+    """Let code run that may switch Mitsuba's variant, and switch it back after the block."""
+    variant = mi.variant()
+    try:
+        yield
+    finally:
+        if variant is not None and mi.variant() != variant:
+            mi.set_variant(variant)
 
 
 def is_users(path: Path) -> bool:

@@ -47,7 +47,7 @@ from heuristic.heuristics import (
 )
 from heuristic.lights import DirectionalLight, PointLight
 from heuristic.materials import PairedMaterial
-from heuristic.user_code import contained, error_text, first_error, place_of
+from heuristic.user_code import contained, error_text, first_error, place_of, same_variant
 
 FUNCTION = "shade"
 """Name of the function, if omitted."""
@@ -82,7 +82,8 @@ def names_of(path: Path, content: str) -> dict[str, Any]:
     if not path.is_file():
         raise InputError(f"{path}: there is no such file. Give a Python file {content}.")
     try:
-        return runpy.run_path(str(path.resolve()), run_name=MODULE)
+        with same_variant():
+            return runpy.run_path(str(path.resolve()), run_name=MODULE)
     except (Exception, SystemExit) as error:  # a user's code may raise anything
         raise InputError(f"{error_text(error)}. Correct {path}, a file {content}.") from error
 
@@ -177,13 +178,23 @@ def shaded(name: str, shade: Callable[[Point], Any], point: Point) -> Any:
 
     InputError names file and line if it fails or does not return a colour.
     """
+    variant = mi.variant()
     try:
-        value = shade(point)
+        with np.errstate():
+            value = shade(point)
     except FotismosError as error:
         where, line, _ = error_text(error).partition(f"{type(error).__name__}: ")
         raise type(error)(f"{where if line else ''}{error}") from error
     except (Exception, SystemExit) as error:  # a user's code may raise anything
         raise InputError(f"{error_text(error)} (heuristic {name}).{_advice(error)}") from error
+    if mi.variant() != variant:
+        changed = mi.variant()
+        mi.set_variant(variant)
+        raise InputError(
+            f"{place_of(shade)}: heuristic {name} switched Mitsuba to {changed}, but the comparison"
+            f" is in {variant}. Remove its mitsuba.set_variant: the variant is an option of the"
+            " comparison."
+        )
     if isinstance(value, Real) and not isinstance(value, bool):
         return mi.Spectrum(value)
     components = dr.size_v(mi.Spectrum)

@@ -10,6 +10,7 @@ from scipy.special import erf
 
 from comparisons.processes.pool import Pool
 from comparisons.study import dataset, design, running, scenes
+from heuristic import user_shaders
 from heuristic.errors import InputError
 from reports.charts import study_charts
 from tests.programs import ROOT
@@ -306,6 +307,25 @@ def test_a_study_that_ended_early_goes_on_and_repeats_nothing(rgb, tmp_path):
     assert done == 3  # the damaged one again
     assert table.equals(whole)
     assert running.run(study, tmp_path / "cut")[1] == 0
+
+
+@pytest.mark.guarantee("runs", "A study with a Python shader is never continued, but done again.")
+def test_a_study_with_a_python_shader_is_done_again(rgb, tmp_path):
+    (tmp_path / "level").write_text("0.25")
+    shader = tmp_path / "mine.py"
+    shader.write_text(
+        f"import numpy as np\nlevel = float(np.loadtxt({str(tmp_path / 'level')!r}))\n"
+        "def shade(point): return point.ambient * 0 + level\n"
+    )
+    text = part("alpha = [0.1, 0.2]", "sphere", f"{SMALL}\nheuristic = '{shader}'")
+    study = design.parse(text, folder=tmp_path)
+    first, done = running.run(study, tmp_path / "out")
+    assert (done, failed(first)) == (2, [])
+    (tmp_path / "level").write_text("0.75")
+    user_shaders._known.clear()  # as in a new process
+    second, done = running.run(study, tmp_path / "out")
+    assert done == 2
+    assert first["heuristic"].to_pylist() != second["heuristic"].to_pylist()
 
 
 def test_a_point_that_fails_is_a_row_that_says_why(rgb, tmp_path, monkeypatch):

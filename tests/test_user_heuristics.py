@@ -11,7 +11,7 @@ from comparisons.case import open_case
 from comparisons.compare import compare
 from comparisons.options import Options
 from comparisons.prepared import prepare
-from heuristic import Range
+from heuristic import Range, user_shaders
 from heuristic.errors import FotismosError, InputError
 from heuristic.heuristics import HEURISTICS, Heuristic, Parameter, known_as, named
 from reference.pairing import halves
@@ -314,9 +314,8 @@ def record_of(folder):
 
 
 @pytest.mark.thorough
-@pytest.mark.guarantee("runs", "A result is not reused if a file of its heuristic has changed.")
 def test_a_process_apart_reads_the_file_and_a_changed_one_again(run, apart, written, tmp_path):
-    """Finished results are found again as long as no file changes that the heuristic is made of."""
+    """A shader in Python is rendered each time: what it reads is not known."""
     written("LEVEL = 0.25\n", "level.py")
     name = written("import level\ndef shade(point): return point.ambient * 0 + level.LEVEL\n")
     words = ("compare", "lambert-sphere", "--heuristic", name, "--resolution", "8x8", "--spp", 4)
@@ -330,7 +329,69 @@ def test_a_process_apart_reads_the_file_and_a_changed_one_again(run, apart, writ
         (path,) = (tmp_path / "out").glob("*/comparison.json")
         stamps.append(path.stat().st_mtime_ns)
     assert means[0] == means[1] != means[2]
-    assert stamps[0] == stamps[1] != stamps[2]
+    assert len(set(stamps)) == 3
+
+
+READING = {
+    "read_text": "from pathlib import Path\nlevel = float(Path('level').read_text())",
+    "open": "with open('level') as f:\n    level = float(f.read())",
+    "loadtxt": "import numpy as np\nlevel = float(np.loadtxt('level'))",
+    "fromfile": "import numpy as np\nlevel = float(np.fromfile('level', sep=' ')[0])",
+    "exec": "with open('level') as f:\n    exec('level = ' + f.read())",
+    "eval": "with open('level') as f:\n    level = eval(f.read())",
+    "os.open": "import os\nlevel = float(os.read(os.open('level', os.O_RDONLY), 9))",
+    "mmap": "import mmap\nwith open('level') as f:\n"
+    "    level = float(mmap.mmap(f.fileno(), 0, access=mmap.ACCESS_READ)[:])",
+    "environment": "import os\nlevel = float(os.environ['LEVEL'])",
+    "import": "import importlib\nlevel = importlib.import_module('level_module').LEVEL",
+    "subprocess": "import subprocess\nlevel = float(subprocess.check_output(['cat', 'level']))",
+    "late": "def level_of():\n    with open('level') as f:\n        return float(f.read())",
+}
+
+
+@pytest.mark.guarantee("runs", "No result of a Python shader is reused, whatever it reads.")
+@pytest.mark.parametrize("way", READING)
+def test_a_shader_that_reads_something_is_rendered_again(way, rgb, run, written, monkeypatch):
+    level = "level_of()" if way == "late" else "level"
+    name = written(f"{READING[way]}\ndef shade(point): return point.ambient * 0 + {level}\n")
+    words = ("compare", "lambert-sphere", "--heuristic", name, "--resolution", "8x8", "--spp", 4)
+    means = []
+    for text in ("0.25", "0.75"):
+        written(text, "level")
+        written(f"LEVEL = {text}\n", "level_module.py")
+        monkeypatch.setenv("LEVEL", text)
+        user_shaders._known.clear()  # as in a new process
+        code, _, messages = run(*words, "-o", "out")
+        assert (code, messages) == (0, "")
+        means.append(record_of(Path("out"))["metrics"]["rmse"]["mean"])
+    assert means[0] != means[1]
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "scalar_rgb"])
+def test_a_shader_does_not_change_the_variant(rgb, run, written, variant):
+    switch = f"import mitsuba as mi\nmi.set_variant('{variant}')\n"
+    words = ("compare", "lambert-sphere", "--resolution", "8x8", "--spp", 4, "-o", "out")
+    for options in ((), ("--variant", "llvm_ad_rgb")):
+        name = written(f"{switch}def shade(point): return point.ambient\n")
+        assert run(*words, "--heuristic", name, *options)[0] == 0
+        assert record_of(Path("out"))["variant"] == "llvm_ad_rgb"
+    inside = f"import mitsuba as mi\ndef shade(point):\n    mi.set_variant('{variant}')\n"
+    name = written(f"{inside}    return 1.0\n", "inside.py")
+    code, _, messages = run(*words, "--heuristic", name)
+    assert code == 2
+    assert f"inside.py switched Mitsuba to {variant}, but the comparison is in" in messages
+    assert mi.variant() == "llvm_ad_rgb"
+
+
+def test_a_shader_does_not_change_how_numpy_handles_errors(rgb, run, written):
+    before = np.geterr()
+    raising = "import numpy as np\nnp.seterr(all='raise')\n"
+    name = written(
+        f"{raising}def shade(point):\n    np.seterr(all='raise')\n    return point.ambient\n"
+    )
+    words = ("compare", "fig-8-9", "--resolution", "8x8", "--spp", 4, "-o", "out")
+    assert run(*words, "--heuristic", name)[0] == 0
+    assert np.geterr() == before
 
 
 def test_an_object_in_a_file_keeps_its_declaration(rgb, written):

@@ -54,13 +54,15 @@ class StudyPoint:
     """A point of a part, and its number there.
 
     ``identity`` is a digest of the part's scene and heuristic, with every file that they read, and
-    of the versions in use.
+    of the versions in use. A point is ``reusable`` unless its heuristic is a script, of which
+    nobody knows what else it reads.
     """
 
     part: StudyPart
     number: int
     values: Point
     identity: str
+    reusable: bool
 
     @property
     def key(self) -> str:
@@ -95,10 +97,11 @@ def _points(part: StudyPart) -> Iterator[StudyPoint]:
     except InputError as error:
         raise InputError(f"part {part.name!r}: {error}") from error
     own = "" if part.scene in SCENES else digest(source_of(part, points[0]))
-    content = [own, named(part.options.heuristic).digest(), versions()]
+    heuristic = named(part.options.heuristic)
+    content = [own, heuristic.digest(), versions()]
     identity = sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
     for number, values in enumerate(points):
-        yield StudyPoint(part, number, values, identity)
+        yield StudyPoint(part, number, values, identity, not heuristic.is_script)
 
 
 def _check(part: StudyPart, points: list[Point]) -> None:
@@ -131,7 +134,8 @@ def run(
     store = Path(folder) / POINTS
     store.mkdir(parents=True, exist_ok=True)
     # Points that parts share are done once.
-    entries = {point.key: Entry(store / f"{point.key}.json", point.key) for point in points}
+    kept = {point.key for point in points if point.reusable}
+    entries = {key: Entry(store / f"{key}.json", key) for key in kept}
     saved = {key: (entry.load() or {}).get("row") for key, entry in entries.items()}
     results = {key: row for key, row in saved.items() if row and row["error"] is None}
     left = {point.key: point for point in points if point.key not in results}
@@ -143,7 +147,8 @@ def run(
         (point,) = task.arguments
         error = outcome.exception()
         results[point.key] = point.row({"error": str(error)}) if error else outcome.result()
-        entries[point.key].save({"row": results[point.key]})
+        if point.reusable:
+            entries[point.key].save({"row": results[point.key]})
         report("points", done, total)
     # A row that parts share gets the name and number of each.
     return dataset.table(study, [point.row(results[point.key]) for point in points]), len(left)

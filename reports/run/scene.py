@@ -98,7 +98,7 @@ def _stages(record: ComparisonRecord, seconds: float) -> Seconds:
 
 
 def key_of(case: Case, job: Job) -> str | None:
-    """Return a digest of all that a result depends on; None for a scene in Python.
+    """Return a digest of all that a result depends on; None for a scene or shader in Python.
 
     That is the scene with each file that it reads, the code of the heuristic or the pictures in its
     place, options, versions, and the sources of fotismos where it runs from a checkout. What a
@@ -107,7 +107,8 @@ def key_of(case: Case, job: Job) -> str | None:
     from comparisons.comparison import versions
     from reference.scene.source import digest
 
-    if Path(case.word).suffix == ".py":
+    shading = named(case.options.heuristic)
+    if Path(case.word).suffix == ".py" or shading.is_script:
         return None
     files = []
     if case.options.image:
@@ -122,7 +123,7 @@ def key_of(case: Case, job: Job) -> str | None:
         "variant": case.variant,
         "versions": versions(),
         "sources": program.source_digest(),
-        "heuristic": named(case.options.heuristic).digest(),
+        "heuristic": shading.digest(),
         "pictures": [_digest_of(path) for path in files if path.is_file()],
         "scene": digest(case.source),
     }
