@@ -86,6 +86,12 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
         }
         changes = {key: value for key, value in own.items() if getattr(options, key) is None}
         return _complete(entry.source(), options.changed(**changes), entry.name)
+    if not isinstance(scene, Mapping) and not callable(scene):
+        raise InputError(
+            f"a scene of type {type(scene).__name__} is not allowed. Give the name of a built-in"
+            " scene, the path of one (.xml or .py), a dictionary for mitsuba.load_dict, or a"
+            " function that returns one."
+        )
     own_name = name or str(getattr(scene, "__name__", "scene"))
     return _complete(Source(own_name, scene), options, own_name)
 

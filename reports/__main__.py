@@ -12,6 +12,8 @@ def main() -> None:
     """Run the command line, which a signal may end at any moment."""
     interruption.listen()
     _open_standard_streams()
+    # Jupyter names a backend that need not be installed here; charts need none.
+    os.environ["MPLBACKEND"] = "agg"
     if Path(sys.argv[0]).name == "__main__.py":
         os.environ.setdefault(VARIABLE, "python -m reports")
     try:

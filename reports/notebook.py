@@ -6,14 +6,17 @@
 
     fotismos.compare(mitsuba.cornell_box(), spp=64, resolution=(128, 128))
 
-Programs use the same functions, which return records.
+Programs use the same functions, which return records. One runs at a time, others wait in their
+threads. Each leaves Mitsuba's variant as it was.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import wraps
 from html import escape
 from pathlib import Path
-from typing import Any
+from threading import RLock
+from typing import Any, ParamSpec, TypeVar
 
 import comparisons.compare
 from comparisons.audit.checks import Audit, Kind
@@ -35,6 +38,7 @@ from heuristic.errors import InputError
 from heuristic.heuristics import Heuristic
 from heuristic.heuristics import declare as declare_heuristic
 from heuristic.plugins import register
+from heuristic.user_code import same_variant
 from reference.scene.graph import set_variant
 from reports import verdict
 from reports.charts import figures
@@ -49,6 +53,23 @@ HEIGHT = 900
 
 DENSITY = 130
 """Dots per inch of the picture for notebooks that cannot show the frame."""
+
+
+_running = RLock()
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+
+def _alone(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """Let a function run in one thread at a time, and switch Mitsuba's variant back after it."""
+
+    @wraps(function)
+    def call(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
+        with _running, same_variant():
+            return function(*arguments, **options)
+
+    return call
 
 
 @dataclass(frozen=True)
@@ -86,6 +107,7 @@ class Shown:
         return terms
 
 
+@_alone
 def compare(scene: Scene, name: str | None = None, why: bool = True, **options: Any) -> Shown:
     """Compare a scene as ``fotismos compare`` does.
 
@@ -100,12 +122,14 @@ def compare(scene: Scene, name: str | None = None, why: bool = True, **options: 
     return Shown(comparison, page.render([view_of(comparison)]))
 
 
+@_alone
 def plan(scene: Scene, name: str | None = None, **options: Any) -> PlanReport:
     """Return which effects a scene calls for, and what will be simulated; see :func:`compare`."""
     case = open_case(scene, Options.of(options), name)
     return plan_report(case.name, prepare(case.source, case.options), case.variant)
 
 
+@_alone
 def cost(
     scene: Scene,
     name: str | None = None,
@@ -122,6 +146,7 @@ def cost(
     return study(case.source, case.options, None, None, command, at, measure).record
 
 
+@_alone
 def fit(
     scene: Scene, name: str | None = None, loss: str = "perceptual", **options: Any
 ) -> FitRecord:
@@ -131,13 +156,23 @@ def fit(
     return fit_parameters(case.source, case.options, loss, command=command).record
 
 
+@_alone
 def check(baseline: str | Path, significance: float = LEVEL) -> CheckRecord:
-    """Return whether the scene of a baseline's file moved from what was measured before."""
+    """Return whether the scene of a baseline's file moved from what was measured before.
+
+    ``significance`` is the chance of a false alarm, above 0 and below 1.
+    """
+    if not isinstance(significance, (int, float)) or not 0 < significance < 1:
+        raise InputError(
+            f"significance = {significance!r} is not allowed. Give the chance of a false alarm: a"
+            f" number above 0 and below 1, such as {LEVEL:g}."
+        )
     file = baselines.read(Path(baseline))
     result, _ = checks.examine(file, file.open(), significance)
     return result
 
 
+@_alone
 def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: Any) -> Audit:
     """Return the checks of a heuristic, or of a type of BSDF, by itself."""
     if (heuristic is None) == (bsdf is None):
@@ -149,10 +184,16 @@ def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: A
 
 
 def declare(entry: Heuristic | Metric | Method) -> Any:
-    """Declare a heuristic, a metric or a method of one's own for this process, and return it."""
+    """Declare a heuristic, a metric or a method for this process, and return it."""
     registries: dict[type, Callable[[Any], Any]] = {
         Heuristic: declare_heuristic,
         Metric: declare_metric,
         Method: declare_method,
     }
-    return registries[type(entry)](entry)
+    for kind, registry in registries.items():
+        if isinstance(entry, kind):
+            return registry(entry)
+    raise InputError(
+        f"{entry!r} of type {type(entry).__name__} cannot be declared. Give a Heuristic, a Metric or"
+        " a Method."
+    )

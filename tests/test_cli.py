@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import os
 import re
 import shlex
 import shutil
@@ -248,3 +249,13 @@ def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(monkey
         assert re.search(r"\d:\d\d:\d\d", shown)
         assert ("\x1b[38;5;" in shown or "\x1b[3" in shown) is is_coloured
         monkeypatch.setenv("NO_COLOR", "1")
+
+
+def test_a_backend_of_jupyter_that_is_not_installed_does_not_matter(tmp_path):
+    """As in a cell ``!fotismos doctor``: the kernel passes its backend on."""
+    surroundings = os.environ | {"PYTHONPATH": str(ROOT)}
+    surroundings["MPLBACKEND"] = "module://not_installed.backend"
+    words = [sys.executable, "-P", "-m", "reports", "compare", "lambert-sphere", "--no-why"]
+    sizes = ["--resolution", "8x8", "--spp", "4", "-o", str(tmp_path / "out")]
+    ended = subprocess.run([*words, *sizes], env=surroundings, capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")

@@ -172,6 +172,18 @@ def test_known_parameters_are_recovered_from_an_image_made_with_them(form, loss,
             np.testing.assert_allclose(found * scale, expected, rtol=1e-3, err_msg=name)
 
 
+def test_an_orthographic_camera_has_one_view_for_all_pixels(rgb):
+    """The kernel's view has width 1 there."""
+    kept = described(
+        lens={"type": "orthographic"},
+        ball={"type": "sphere", "bsdf": {"type": "phong", "k_d": 0.5, "k_s": 0.4, "n": 9}},
+        lamp={"type": "heuristic_directional", "direction": [1, 1, -1], "intensity": 0.8},
+    )
+    record = fit(Source("orthographic", kept), Options(spp=16)).record
+    departure = record.nearest.departure[LEADING.name]
+    assert departure.after <= departure.before
+
+
 # --- What an image determines ---------------------------------------------------------------------
 
 

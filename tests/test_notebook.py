@@ -1,18 +1,22 @@
 """A comparison in a notebook."""
 
 from base64 import b64decode
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from html.parser import HTMLParser
 from io import BytesIO
 
+import mitsuba as mi
 import nbformat
 import numpy as np
 import pytest
 from nbclient import NotebookClient
 from PIL import Image
 
+import fotismos
 from comparisons.case import open_case
 from comparisons.compare import compare
+from comparisons.departure.metrics import METRICS
 from comparisons.options import Options
 from heuristic.errors import InputError
 from reports.notebook import Shown
@@ -82,3 +86,47 @@ def test_pixels_without_terms_say_why(shown):
     flat = replace(shown.comparison, terms=None, no_terms="Flat shading has none.")
     with pytest.raises(InputError, match=r"there are no terms. Flat shading has none"):
         Shown(flat, shown.page).at(12, 8)
+
+
+def small(name="box"):
+    return fotismos.compare(mi.cornell_box(), name, why=False, spp=4, resolution=(16, 16))
+
+
+def test_the_users_variant_is_given_back_after_success_and_error(spectral):
+    scene = mi.load_dict({"type": "scene", "ball": {"type": "sphere"}})
+    small()
+    assert mi.variant() == "llvm_ad_spectral"
+    with pytest.raises(InputError):
+        fotismos.fit("no such scene")
+    assert mi.variant() == "llvm_ad_spectral"
+    assert scene.ray_intersect(mi.Ray3f((0, 0, -3), (0, 0, 1))).is_valid()
+
+
+def test_comparisons_in_threads_are_those_of_one_thread(rgb):
+    alone = small().comparison.images.reference
+    with ThreadPoolExecutor(4) as threads:
+        together = list(threads.map(small, ["a", "b", "c", "d"]))
+    for shown in together:
+        np.testing.assert_array_equal(shown.comparison.images.reference, alone)
+
+
+@pytest.mark.parametrize("significance", [0, -1, 1, 2, float("nan"), "x", None])
+def test_an_impossible_significance_is_refused(rgb, baselines_folder, significance):
+    (path, *_) = baselines_folder.glob("*.json")
+    with pytest.raises(InputError, match=r"significance = .* above 0 and below 1"):
+        fotismos.check(path, significance)
+
+
+def test_a_scene_of_another_type_is_refused(rgb):
+    for scene in (None, 5, [1], mi.load_dict({"type": "scene"})):
+        with pytest.raises(InputError, match=f"a scene of type {type(scene).__name__} is not"):
+            fotismos.compare(scene)
+
+
+def test_a_pixelwise_metric_can_be_declared_and_other_things_cannot(monkeypatch):
+    monkeypatch.setattr(METRICS, "added", {})
+    metric = replace(METRICS["dE2000"], name="dE2000_again")
+    assert fotismos.declare(metric) is metric
+    assert METRICS["dE2000_again"] is metric
+    with pytest.raises(InputError, match="'phong' of type str cannot be declared"):
+        fotismos.declare("phong")

@@ -131,8 +131,11 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
             image = np.array(eyes.render(seed), np.float64)
             fixed = fixed + image / len(seeds)
             arrays = {key: np.array(values) for key, values in eye.seen.items()}
-            spp = len(arrays["facing"]) // image[..., 0].size
-            passes.append(arrays | {"pixel": np.arange(len(arrays["facing"])) // spp})
+            count = len(arrays["material"])
+            for key, values in arrays.items():  # an orthographic camera has one view for all
+                arrays[key] = np.broadcast_to(values, (*values.shape[:-1], count))
+            spp = count // image[..., 0].size
+            passes.append(arrays | {"pixel": np.arange(count) // spp})
             samples_per_pixel += spp
         eye.seen = None
         whole = {key: np.concatenate([one[key] for one in passes], axis=-1) for key in passes[0]}
