@@ -194,6 +194,6 @@ def declare(entry: Heuristic | Metric | Method) -> Any:
         if isinstance(entry, kind):
             return registry(entry)
     raise InputError(
-        f"{entry!r} of type {type(entry).__name__} cannot be declared. Give a Heuristic, a Metric or"
-        " a Method."
+        f"{entry!r} of type {type(entry).__name__} cannot be declared. Give a Heuristic, a Metric"
+        " or a Method."
     )
