@@ -63,7 +63,7 @@ class Options(
     seed: Annotated[Seed, _help("Seed of the run, from which each pass derives its own.")] = 0
     spp: Annotated[
         Samples | None,
-        _help("Samples per pixel, over all passes; with --noise, their limit.", "the plan's"),
+        _help("Samples per pixel, over all passes.", "the plan's"),
     ] = None
     noise: Annotated[
         Error | None,

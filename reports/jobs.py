@@ -157,12 +157,15 @@ METAVARS = {
 }  # fmt: skip
 
 
-def option(name: str) -> Decorator:
-    """Return the command line's form of a field of :class:`comparisons.options.Options`."""
+def option(name: str, command_default: str = "") -> Decorator:
+    """Return the command line's form of a field of :class:`comparisons.options.Options`.
+
+    ``command_default`` is what a command does without the option, if that is its own.
+    """
     field = next(each for each in FIELDS if each.name == name)
     assert isinstance(field.type, inspect.Metadata), "each field has its help"
     description = (field.type.extra_json_schema or {})["description"]
-    default = (field.type.extra or {}).get("default")
+    default = command_default or (field.type.extra or {}).get("default")
     is_stated = default is None and isinstance(field.default, (int, str))
     return click.option(
         *(("-D", name) if name == "define" else (f"--{name.replace('_', '-')}",)),
@@ -195,17 +198,20 @@ def _kind(name: str, kind: Any) -> dict[str, Any]:
     return {}
 
 
-rendering_options = with_options(
-    *map(
-        option,
-        (
-            "variant", "heuristic_variant", "seed", "spp", "resolution", "heuristic",
-            "interpolation", "tessellation", "everything", "pairing", "pixels_per_degree",
-            "allow_empty",
-        ),
-    )
+RENDERING = (
+    "variant", "heuristic_variant", "seed", "spp", "resolution", "heuristic", "interpolation",
+    "tessellation", "everything", "pairing", "pixels_per_degree", "allow_empty",
 )  # fmt: skip
-scene_options = with_options(rendering_options, option("define"), option("sensor"))
+
+
+def options_of_scenes(without: Sequence[str] = (), **defaults: str) -> Decorator:
+    """Return the options of a scene, some left out, with a command's own defaults."""
+    names = [name for name in (*RENDERING, "define", "sensor") if name not in without]
+    return with_options(*(option(name, defaults.get(name, "")) for name in names))
+
+
+rendering_options = with_options(*map(option, RENDERING))
+scene_options = options_of_scenes()
 
 timeout_option = click.option(
     "--timeout",

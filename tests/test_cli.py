@@ -13,6 +13,8 @@ from io import StringIO
 import jsonschema
 import pytest
 
+from comparisons.cost import measure
+from comparisons.fit import fit as fitting
 from heuristic.errors import InputError
 from reports import cli
 from reports.terminal import progress
@@ -259,3 +261,24 @@ def test_a_backend_of_jupyter_that_is_not_installed_does_not_matter(tmp_path):
     sizes = ["--resolution", "8x8", "--spp", "4", "-o", str(tmp_path / "out")]
     ended = subprocess.run([*words, *sizes], env=surroundings, capture_output=True, text=True)
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("name", sorted(cli.cli.list_commands(None)))
+def test_help_names_only_options_that_the_command_has(name, run):
+    _, printed, _ = run(name, "--help")
+    without_examples, *_ = printed.partition("Examples:")
+    after_examples = printed[len(without_examples) :].partition("Options:")[2]
+    text = re.sub(r"`[^`]*`", "", f"{without_examples} {after_examples}")
+    parameters = cli.cli.get_command(None, name).params
+    has = {option for one in parameters for option in (*one.opts, *one.secondary_opts)}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", text)) <= has | {"--help"}
+
+
+def test_help_of_costs_and_fits_states_their_own_defaults(run):
+    texts = {name: " ".join(run(name, "--help")[1].split()) for name in ("cost", "fit", "export")}
+    assert f"reduced to a width of {measure.WIDTH}]" in texts["cost"]
+    assert f"[default: up to {measure.Effort().largest}]" in texts["cost"]
+    assert "[default: {}x{}]".format(*fitting.RESOLUTION) in texts["fit"]
+    assert f"[default: {fitting.SPP}]" in texts["fit"]
+    for option in ("--spp", "--seed", "--pixels-per-degree"):
+        assert option not in texts["export"]

@@ -219,6 +219,10 @@ def test_without_moderngl_it_says_what_to_install(monkeypatch):
     with pytest.raises(InstallationError, match=re.escape(program.installation("moderngl"))):
         glsl.opengl()
     assert "pip install" in doctor.shaded()
+    monkeypatch.setattr(doctor, "rendered", lambda _: "renders")
+    monkeypatch.setattr(doctor, "compared", lambda: 0.0)
+    *_, last = doctor.examine(["llvm_ad_rgb"])
+    assert last == "fotismos works here."
 
 
 def test_without_a_driver_it_says_what_to_install(monkeypatch):

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @jobs.scene_argument
 @jobs.output_option("out", "cost/SCENE")
 @jobs.timeout_option
-@jobs.scene_options
+@jobs.options_of_scenes(resolution="the film's, reduced to a width of 128", spp="up to 64")
 @jobs.verbosity_options
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
 @click.option("--at", type=jobs.resolution, metavar="WxH", help="Predict the times at this size.")

@@ -5,6 +5,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Iterator
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 
 import click
@@ -12,7 +13,7 @@ import click
 from comparisons.processes.pool import Task
 from heuristic import llvm
 from heuristic.errors import InstallationError
-from heuristic.program import __version__
+from heuristic.program import __version__, installation
 from reports import jobs
 
 TIMEOUT_S = 300
@@ -76,8 +77,15 @@ def rendered(variant: str) -> str:
 
 
 def shaded() -> str:
-    """Compile and run a small shader, and return on which device, or what to install."""
+    """Compile and run a small shader, and return on which device, or what to install.
+
+    The extra that this needs may be absent: the rest works without it.
+    """
     from heuristic import glsl
+
+    if find_spec("moderngl") is None:
+        command = installation("moderngl")
+        return f"is an extra, which only --heuristic FILE.glsl needs. To install it: {command}"
 
     try:
         renderer, is_software = glsl.device()

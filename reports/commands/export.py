@@ -12,7 +12,7 @@ from reports.terminal.words import tell_where
 @jobs.scene_argument
 @jobs.output_option("out", "export/SCENE")
 @jobs.timeout_option
-@jobs.scene_options
+@jobs.options_of_scenes(without=("spp", "seed", "pixels_per_degree"))
 @jobs.verbosity_options
 def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
     """Write a scene for another program to render, for `compare --image`.

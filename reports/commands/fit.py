@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 )
 @jobs.json_option
 @jobs.timeout_option
-@jobs.scene_options
+@jobs.options_of_scenes(resolution="96x96", spp="64")
 @jobs.verbosity_options
 def fit(
     scenes: tuple[str, ...],
