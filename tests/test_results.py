@@ -11,6 +11,7 @@ import pytest
 
 import heuristic.program
 from comparisons import atomic
+from comparisons.study import running
 from heuristic.errors import InputError, OutputError
 from reports.files import results
 from reports.run import scene
@@ -159,6 +160,35 @@ def test_what_others_made_is_one_message_and_stays(run, scene_file, tmp_path, na
     assert [path.name for path in place.parent.iterdir()] == [name]
     assert make != "folder" or (place / "mine.txt").read_text() == "mine"
     assert [path.name for path in other.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.guarantee(
+    "runs", "A command deletes nothing of another one in a folder below its own."
+)
+def test_a_command_leaves_the_folder_of_another_one_alone(tmp_path):
+    """README's first two commands in two terminals: a report in `out/report`, a compare in `out`."""
+    with results.hold(tmp_path / "out/report", "report") as inner:
+        scene = results.own(results.own(inner) / "cornell-box")
+        with results.hold(tmp_path / "out", "compare"):
+            assert results.is_own(scene)
+        assert results.is_own(scene)
+        partial = inner / f"picture{atomic.PARTIAL}"
+        partial.touch()
+        with results.hold(tmp_path / "out", "compare"):
+            pass
+        assert partial.exists()
+    with results.hold(tmp_path / "out/report", "report"):
+        assert not partial.exists()
+
+
+def test_a_study_is_refused_before_it_computes(run, tmp_path, monkeypatch):
+    study = tmp_path / "s.toml"
+    study.write_text("[[part]]\nscene = 'lobe'\n[part.parameters]\nalpha = [0.1]\n")
+    monkeypatch.setattr(running, "all_points", None)  # not to be called
+    with results.hold(tmp_path / "out", "another"):
+        code, _, messages = run("study", study, "-o", tmp_path / "out")
+    assert code == 2
+    assert "another command writes there" in messages
 
 
 HOLD = """

@@ -36,10 +36,10 @@ def study(
     from reports.terminal import progress
 
     chosen = design.read(file)
-    with jobs.pool(timeout) as pool:
-        points = pool.do(Task(chosen.name, running.all_points, (chosen,)))
-    tasks = len(points) // running.WORTH_A_PROCESS + 1
     with hold(output, jobs.command_line()) as top:
+        with jobs.pool(timeout) as pool:
+            points = pool.do(Task(chosen.name, running.all_points, (chosen,)))
+        tasks = len(points) // running.WORTH_A_PROCESS + 1
         studies = own(top / "study")
         (place,) = assigned(studies, [(chosen.name, file)])
         folder = studies / place

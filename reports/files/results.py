@@ -123,11 +123,14 @@ def _held_by_another(folder: Path) -> str:
 
 
 def _tidy(folder: Path) -> None:
-    """Delete partial files of killed commands, and folders in which only a mark is left."""
+    """Delete partial files of killed commands, and folders in which only a mark is left.
+
+    A folder with a lock belongs to another command, which may be running.
+    """
     for path in folder.iterdir():
         if path.name.endswith(atomic.PARTIAL):
             path.unlink()
-        elif not path.is_symlink() and is_own(path):
+        elif not path.is_symlink() and is_own(path) and not os.path.lexists(path / LOCK):
             with suppress(OSError):  # an inaccessible folder does not hinder the others
                 _tidy(path)
                 if os.listdir(path) == [MARK]:
