@@ -156,7 +156,8 @@ def test_what_others_made_is_one_message_and_stays(run, scene_file, tmp_path, na
     code, printed, messages = run("compare", scene_file, "-o", place.parent, *SMALL, "--figures")
     assert (code, printed) == (2, "")
     assert messages.startswith(f"fotismos: error: {place}: this ")
-    assert "was not made by fotismos" in messages
+    fault = f"is a symbolic link, to '{other}'" if make == "link" else "was not made by fotismos"
+    assert fault in messages
     assert [path.name for path in place.parent.iterdir()] == [name]
     assert make != "folder" or (place / "mine.txt").read_text() == "mine"
     assert [path.name for path in other.iterdir()] == ["mine.txt"]
@@ -166,7 +167,7 @@ def test_what_others_made_is_one_message_and_stays(run, scene_file, tmp_path, na
     "runs", "A command deletes nothing of another one in a folder below its own."
 )
 def test_a_command_leaves_the_folder_of_another_one_alone(tmp_path):
-    """README's first two commands in two terminals: a report in `out/report`, a compare in `out`."""
+    """README's first two commands in two terminals: `report` in `out/report`, `compare` in `out`."""
     with results.hold(tmp_path / "out/report", "report") as inner:
         scene = results.own(results.own(inner) / "cornell-box")
         with results.hold(tmp_path / "out", "compare"):
@@ -189,6 +190,16 @@ def test_a_study_is_refused_before_it_computes(run, tmp_path, monkeypatch):
         code, _, messages = run("study", study, "-o", tmp_path / "out")
     assert code == 2
     assert "another command writes there" in messages
+
+
+def test_a_link_as_the_output_folder_is_called_a_link(run, scene_file, tmp_path):
+    (tmp_path / "folder").mkdir()
+    link = tmp_path / "link"
+    link.symlink_to("folder")
+    code, printed, messages = run("compare", scene_file, "-o", link, *SMALL)
+    assert (code, printed) == (2, "")
+    assert messages.startswith(f"fotismos: error: {link}: this is a symbolic link, to 'folder'")
+    assert not list((tmp_path / "folder").iterdir())
 
 
 HOLD = """

@@ -168,6 +168,11 @@ def own(folder: Path, *names: str) -> Path:
 
 
 def _not_ours(path: Path) -> InputError:
+    if path.is_symlink():
+        return InputError(
+            f"{atomic.printable(path)}: this is a symbolic link, to {os.readlink(path)!r}, and is"
+            " not followed. Give the folder itself with -o, or move the link away."
+        )
     kind = "folder" if path.is_dir() else "file"
     return InputError(
         f"{atomic.printable(path)}: this {kind} was not made by fotismos. Move it away, or choose"
