@@ -117,7 +117,8 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
     """
     path, layer = parts(word)
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file. Give a {' or '.join(SUFFIXES)} picture.")
+        fault = "it is not a regular file" if path.exists() else "there is no such file"
+        raise InputError(f"{path}: {fault}. Give a {' or '.join(SUFFIXES)} picture.")
     image = _exr(path, layer) if path.suffix.lower() == ".exr" else _png(path, transfer)
     wrong = ~np.isfinite(image).all(axis=-1)
     if wrong.any():
@@ -148,10 +149,16 @@ def _exr(path: Path, layer: str) -> np.ndarray:
 
     try:
         with OpenEXR.File(str(path), separate_channels=True) as file:
+            parts = [part.name() for part in file.parts]
             header = dict(file.header())
             channels = {name: np.array(c.pixels) for name, c in file.channels().items()}
     except Exception as error:  # the library raises many types for a file that is not EXR
         raise InputError(f"{path}: not a readable EXR file: {error}.") from error
+    if len(parts) > 1:
+        raise InputError(
+            f"{path}: it has {len(parts)} parts, {', '.join(map(repr, parts))}. Save the picture"
+            " as a file of one part; several layers are allowed."
+        )
     _require_plain(path, header)
     prefix = f"{layer}." if layer else ""
     if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):

@@ -1,7 +1,9 @@
 """Pictures of other renderers: read, placed, doubted in words, and compared."""
 
 import json
+import os
 import re
+from pathlib import Path
 
 import mitsuba as mi
 import numpy as np
@@ -197,6 +199,15 @@ def layered(path, *names):
     return str(path)
 
 
+def in_parts(path, *names):
+    """Write an EXR of several parts, each with R, G and B."""
+    grey = {c: np.full((8, 8), 0.5, np.float32) for c in "RGB"}
+    parts = [OpenEXR.Part({"type": OpenEXR.scanlineimage}, dict(grey), name) for name in names]
+    with OpenEXR.File(parts) as file:
+        file.write(str(path))
+    return str(path)
+
+
 BAD = (
     (lambda path: write(path, NAN), r"8 of 64 pixels, the first at .* = \(3, 0\), are NaN"),
     (lambda path: write(path, GREY - 0.6), "64 of 64 pixels, .* are negative. Colours outside"),
@@ -214,6 +225,8 @@ BAD = (
      r"no layer 'beuty' \(did you mean beauty\?\)"),
     (lambda path: layered(path, "Z", "Y", "beauty.G") + ":beauty",
      r"its channels are Y, Z, beauty.G. Give R, G and B"),
+    (lambda path: in_parts(path, "left", "right"), "it has 2 parts, 'left', 'right'. Save the"),
+    (lambda path: in_parts(path, "left", "right") + ":right", "it has 2 parts, 'left', 'right'"),
 )  # fmt: skip
 
 
@@ -221,6 +234,10 @@ def test_what_is_no_picture_is_refused(rgb, tmp_path):
     for make, message in BAD:
         with pytest.raises((InputError, NonFiniteError), match=f"(?s){message}"):
             pictures.read(make(tmp_path / "x.exr"))
+    for name, make in (("folder.png", Path.mkdir), ("pipe.exr", os.mkfifo)):
+        make(tmp_path / name)
+        with pytest.raises(InputError, match=f"{name}: it is not a regular file. Give a .exr or"):
+            pictures.read(str(tmp_path / name), "srgb")
     path = tmp_path / "x.png"
     path.write_bytes(b"no picture")
     with pytest.raises(InputError, match=r"x.png: not a readable PNG file"):
