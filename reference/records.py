@@ -23,6 +23,9 @@ CHANGES = (
 )
 """What changed since version 2; records in which nothing changed are still read."""
 
+CHANGED = ("rung", "method", "price", "attribution", "visible")
+"""Parts of the names of these fields, which are in the message of a record that holds the old."""
+
 Kind = TypeVar("Kind")
 
 
@@ -82,10 +85,10 @@ def read(kind: type[Kind], text: str, where: str) -> Kind:
         if isinstance(content, dict):
             version = content.get("record_version")
             if version not in (2, VERSION):
-                origin = "of fotismos 0.1" if version is None else f"version {version}"
-                raise InputError(
-                    f"{where}: this record is {origin}, not version {VERSION}. Make it again."
-                )
+                fault = f"its `record_version` is {json.dumps(version)}, not the number {VERSION}"
+                if version is None:
+                    fault = f"this record is of fotismos 0.1, not version {VERSION}"
+                raise InputError(f"{where}: {fault}. Make it again.")
             content["record_version"] = VERSION
         return msgspec.convert(content, kind)
     except json.JSONDecodeError as error:
@@ -93,7 +96,8 @@ def read(kind: type[Kind], text: str, where: str) -> Kind:
     except RecursionError as error:
         raise InputError(f"{where}: it is nested too deep. Make it again.") from error
     except (ValueError, msgspec.ValidationError) as error:
-        reason = f"this record is version 2; {CHANGES} ({error})" if version == 2 else error
+        is_old = version == 2 and any(name in str(error) for name in CHANGED)
+        reason = f"this record is version 2; {CHANGES} ({error})" if is_old else error
         raise InputError(f"{where}: {reason}. Make it again.") from error
 
 
