@@ -167,7 +167,7 @@ def test_what_others_made_is_one_message_and_stays(run, scene_file, tmp_path, na
     "runs", "A command deletes nothing of another one in a folder below its own."
 )
 def test_a_command_leaves_the_folder_of_another_one_alone(tmp_path):
-    """README's first two commands in two terminals: `report` in `out/report`, `compare` in `out`."""
+    """A report in `out/report` and a compare in `out`: README's first two commands at once."""
     with results.hold(tmp_path / "out/report", "report") as inner:
         scene = results.own(results.own(inner) / "cornell-box")
         with results.hold(tmp_path / "out", "compare"):
