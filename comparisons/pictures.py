@@ -28,7 +28,7 @@ from comparisons.options import Options
 from heuristic.errors import InputError, NonFiniteError, suggestion
 from reference.pairing.prepare import film_size
 from reference.rendering.gbuffer import gbuffer
-from reference.rendering.renderer import Renderer, Times
+from reference.rendering.renderer import LARGEST_VALUE, Renderer, Times
 from reference.scene.source import Source
 
 SUFFIXES = (".exr", ".png")
@@ -125,6 +125,12 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
         raise NonFiniteError(f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture.")
     if transfer == "srgb":
         image = from_srgb(image)
+    wrong = np.any(image > LARGEST_VALUE, axis=-1)
+    if wrong.any():
+        raise InputError(
+            f"{word}: {_counted(wrong)} above {LARGEST_VALUE:g}, which is too bright. Divide the"
+            " picture and all lights by the same number."
+        )
     wrong = np.any(image < MOST_NEGATIVE, axis=-1)
     if wrong.any():
         raise InputError(

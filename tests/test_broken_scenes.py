@@ -157,6 +157,8 @@ MESHES = (
     (b"", "mesh.ply"),
     (np.random.default_rng(0).bytes(500), "mesh.ply"),
     (ply(vertices=10**12), "read"),
+    (ply(corners=CORNERS[:0]), "mesh.ply: it has no faces, .* Write the file again"),
+    (ply(POINTS[:0], CORNERS[:0]), "mesh.ply: it has no faces"),
 )
 
 
@@ -167,6 +169,9 @@ def test_a_damaged_mesh_is_named_and_a_sound_one_compared(rgb, tmp_path):
         with pytest.raises(InputError, match=message) as refusal:
             compared(tmp_path, text)
         assert "mesh.ply" in str(refusal.value)
+    (tmp_path / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n", encoding="utf-8")
+    with pytest.raises(InputError, match="mesh.obj: it has no faces"):
+        compared(tmp_path, text.replace("ply", "obj"))
     for content in (ply(), ply_in_words()):
         (tmp_path / "mesh.ply").write_bytes(content)
         assert compared(tmp_path, text).record.pixels.counted

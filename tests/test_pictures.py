@@ -210,6 +210,7 @@ def in_parts(path, *names):
 
 BAD = (
     (lambda path: write(path, NAN), r"8 of 64 pixels, the first at .* = \(3, 0\), are NaN"),
+    (lambda path: write(path, GREY * 4e30), "64 of 64 pixels, .* are above 1e.18, .* too bright"),
     (lambda path: write(path, GREY - 0.6), "64 of 64 pixels, .* are negative. Colours outside"),
     (lambda path: write(path, GREY, alpha=np.full((8, 8), 0.5)), "alpha below 1"),
     (lambda path: write(path, GREY, {"chromaticities": BT2020}),

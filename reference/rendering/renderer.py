@@ -36,6 +36,9 @@ BASE = 200 * 2**20
 """Memory that a comparison of any size takes, in addition to the process before it."""
 
 
+LARGEST_VALUE = 1e18
+"""In units of display white: squares of differences must not overflow in single precision."""
+
 ROUNDING = 1e-5
 """A value below 0 by less than this is a rounding error, in units of display white."""
 
@@ -133,8 +136,13 @@ class Renderer:
         if image.shape[2] == 1:
             image = dr.repeat(image, 3, axis=2)
         layer = f"{self.label}, pass with seed {seed}"
-        if not dr.all(dr.isfinite(image.array)):
-            require_finite(np.array(image), layer)
+        if not dr.all(dr.abs(image.array) <= LARGEST_VALUE):
+            pixels = np.array(image)
+            require_finite(pixels, layer)
+            raise InputError(
+                f"{layer}: {_wrong(pixels, np.abs(pixels) <= LARGEST_VALUE, 'too bright')}. At most"
+                f" {LARGEST_VALUE:g} is allowed: divide all lights by the same number."
+            )
         if self._is_users and dr.any(image.array < -ROUNDING):
             plugin = self.scene.sensors()[0].film().rfilter().class_name()
             if any(kind in plugin for kind in ("Box", "Tent", "Gaussian")):  # no negative lobes

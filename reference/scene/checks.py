@@ -42,6 +42,7 @@ RANGES = (
         ANY,
         "a vector of any length but 0",
     ),
+    ("sample_count", "", (1, 2**32 - 1), "1 or more samples per pixel"),
     ("width height crop_width crop_height", "hdrfilm specfilm", (1, INFINITY), "1 or more pixels"),
 )
 """Parameters, the plugins that have them (all if empty), their range, or ANY but 0, and its words.
@@ -54,7 +55,7 @@ def check(graph: Graph) -> None:
     """Reject values that make no sense, and damaged files, in all elements in use."""
     for index in graph.nodes_in_use():
         check_node(graph, index)
-        is_mesh = graph.plugin(index) in ("ply", "serialized")
+        is_mesh = graph.plugin(index) in ("obj", "ply", "serialized")
         if is_mesh and (objection := damage(graph, index)):
             raise _refusal(graph, index, objection)
 
@@ -175,8 +176,10 @@ def _wrong_mesh(plugin: str, path: str, number: int, stamp: tuple) -> str:
         mesh = mi.load_dict(description)
     except Exception:  # making the scene raises it again
         return ""
+    if not mesh.face_count():
+        return "it has no faces, which a shape must have."
     faces, count = meshes.rows(mesh, meshes.FACES), mesh.vertex_count()
-    if len(faces) and faces.max() >= count:
+    if faces.max() >= count:
         return f"a face names vertex {faces.max()}, and there are {count}, numbered from 0."
     lost = ~np.isfinite(meshes.rows(mesh, meshes.POSITIONS)).all(axis=1)
     if lost.any():
