@@ -49,6 +49,9 @@ def changed(before, after):
 )
 def test_what_cannot_be_meant_is_refused_by_name(rgb, tmp_path):
     odd = [("point", "p\0int", "parsing"), ("point", "p\udce9int", "in UTF-8")]
+    odd += [(f'"{word}"', f'"a&#x{half};b"', r"a(\\x..){3}b' is not text in UTF-8")
+            for word, half in (("sphere", "D800"), ("alpha", "DFFF"))]  # fmt: skip
+    odd += [('<shape type="sphere">', '<shape type="sphere" id="a&#xD800;b">', "is not text")]
     wrong = []
     for before, after, message in [*TABLE["broken"], *odd]:
         is_film = any(word in message for word in ("crop", "width", "height"))
@@ -170,7 +173,7 @@ def test_a_damaged_mesh_is_named_and_a_sound_one_compared(rgb, tmp_path):
             compared(tmp_path, text)
         assert "mesh.ply" in str(refusal.value)
     (tmp_path / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n", encoding="utf-8")
-    with pytest.raises(InputError, match="mesh.obj: it has no faces"):
+    with pytest.raises(InputError, match=r"mesh\.obj: it has no faces"):
         compared(tmp_path, text.replace("ply", "obj"))
     for content in (ply(), ply_in_words()):
         (tmp_path / "mesh.ply").write_bytes(content)

@@ -132,6 +132,7 @@ class Source:
                 resolver.prepend(str(path.resolve().parent))  # first, as for Mitsuba's command
                 with resolving(resolver):
                     state = Parser.parse_file(config, str(path), **self.parameters)
+                _require_text(self.name, state)
             Parser.transform_upgrade(config, state)
             Parser.transform_resolve_references(config, state)
         except (RuntimeError, ValueError) as error:
@@ -141,6 +142,19 @@ class Source:
         graph = Graph(self.name, config, state)
         graph.resolver = resolver
         return graph
+
+
+def _require_text(name: str, state: Any) -> None:
+    """Require characters that Python can read: an XML file may hold half a one, ``&#xD800;``."""
+    for node in state.nodes:
+        try:
+            _ = node.props.id(), node.props.plugin_name(), list(node.props.items())
+        except UnicodeDecodeError as error:
+            shown = error.object[:80].decode(errors="backslashreplace")
+            raise InputError(
+                f"{name}: '{shown}' is not text in UTF-8. Correct the id, name or value: a"
+                " reference such as &#xD800; is no character."
+            ) from error
 
 
 class _Listener(mi.Appender):
