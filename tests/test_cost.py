@@ -264,6 +264,11 @@ def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does
     code, said, _ = run(*words, "--within", 10, "--json")
     assert code == 0
     made = json.loads(said)
+    _, said, _ = run("plan", "lambert-sphere", "--resolution", "64x64", "--within", 10)
+    sentence, *_ = said.splitlines()
+    assert sentence.startswith("At 64x64: ")
+    assert sentence.count(": measured at 12x12, 5 % of the pixels exceed ΔE2000") >= 1
+    assert sentence.count("5 % of the pixels exceed") == sentence.count("measured at 12x12, 5 %")
     best, full, chosen = (made[name]["tolerance"]["mean"] for name in ("best", "full", "chosen"))
     assert 0 < best <= full < 10 > chosen
     assert made["chosen"]["seconds"]["low"] <= made["full"]["seconds"]["high"]

@@ -116,19 +116,19 @@ def choice_lines(choice: Choice) -> Iterator[str]:
     """
     size, within = sized(choice.resolution), f"{LEADING.label} {parameter(choice.within)}"
     chosen, full = choice.chosen, choice.full
+    is_smaller = choice.measured != choice.resolution
+    measured = f"measured at {sized(choice.measured)}, " if is_smaller else ""
     if chosen is None:
         yield (
             f"At {size} no measured method passes at {within}. The nearest is"
-            f" {_offer(choice.best)}. {beyond(choice.reach)}"
+            f" {_offer(choice.best, measured)}. {beyond(choice.reach)}"
         )
     elif chosen.method == full.method:
-        yield f"At {size}: {_offer(chosen)}. Nothing faster passes at {within}."
+        yield f"At {size}: {_offer(chosen, measured)}. Nothing faster passes at {within}."
     else:
-        yield f"At {size}: {_offer(chosen)}, in place of {_offer(full)}."
+        yield f"At {size}: {_offer(chosen, measured)}, in place of {_offer(full, measured)}."
     if chosen and chosen.ties:
         yield f"Too close to call: {', '.join(chosen.ties)}."
-    if choice.measured != choice.resolution:
-        yield f"Errors were measured at {sized(choice.measured)}."
     yield from _explained(dict.fromkeys(((chosen or choice.best).method, full.method)))
 
 
@@ -150,10 +150,11 @@ def beyond(need: Reach | None) -> str:
     return f"About {need.spp:,} samples per pixel of {need.method} would; --spp measures more."
 
 
-def _offer(point: Point) -> str:
+def _offer(point: Point, measured: str) -> str:
+    """Return a method, its time, and the error that 5 % exceed, at the size ``measured``."""
     return (
         f"{point.method} with {point.spp} samples per pixel in {seconds(point.seconds.value)}:"
-        f" 5 % of the pixels exceed {LEADING.label} {number(point.tolerance.mean)}"
+        f" {measured}5 % of the pixels exceed {LEADING.label} {number(point.tolerance.mean)}"
     )
 
 
