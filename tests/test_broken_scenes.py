@@ -45,7 +45,8 @@ def changed(before, after):
 
 
 @pytest.mark.guarantee(
-    "runs", "A scene with impossible values, or nothing in view, is rejected with a message."
+    "runs",
+    "Impossible values (roughness, shares, indices, `sigma_t`, sizes) are refused with a message.",
 )
 def test_what_cannot_be_meant_is_refused_by_name(rgb, tmp_path):
     odd = [("point", "p\0int", "parsing"), ("point", "p\udce9int", "in UTF-8")]
@@ -75,6 +76,7 @@ def test_what_mitsuba_renders_is_not_refused(rgb, tmp_path):
 AWAY = SCENE.replace('target="0, 0, 0"', 'target="0, -9, 3"')
 
 
+@pytest.mark.guarantee("runs", "A picture in which nothing is in view is refused, unless allowed.")
 def test_every_command_refuses_an_empty_picture_unless_it_is_allowed(rgb, tmp_path):
     case = case_of(tmp_path, AWAY)
     for work in (compare, measure_scene, cost, fit):

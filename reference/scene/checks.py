@@ -35,7 +35,19 @@ RANGES = (
     ("int_ior ext_ior", "", (ABOVE_0, INFINITY), "an index of refraction above 0"),
     ("eta", "principled principledthin", (ABOVE_0, INFINITY), "an index of refraction above 0"),
     ("eta k", "conductor roughconductor", (0, INFINITY), "values of 0 or more"),
-    ("alpha alpha_u alpha_v", "", (-INFINITY, 1000), "a roughness up to 1000"),
+    ("alpha alpha_u alpha_v", "", (0, 10), "a roughness from 0 to 10"),
+    (
+        "roughness metallic spec_trans spec_tint sheen sheen_tint clearcoat clearcoat_gloss"
+        " flatness anisotropic",
+        "principled principledthin",
+        (0, 1),
+        "a share from 0 to 1",
+    ),
+    ("diff_trans", "principledthin", (0, 2), "a number from 0 to 2"),
+    ("opacity", "mask", (0, 1), "a share from 0 to 1"),
+    ("weight", "blendbsdf", (0, 1), "a share from 0 to 1"),
+    ("sigma_t scale", "homogeneous heterogeneous", (0, INFINITY), "0 or more"),
+    ("albedo", "homogeneous heterogeneous", (0, 1), "a share from 0 to 1"),
     (
         "direction sun_direction",
         "directional distant sunsky timed_sunsky heuristic_directional",
@@ -47,7 +59,7 @@ RANGES = (
 )
 """Parameters, the plugins that have them (all if empty), their range, or ANY but 0, and its words.
 
-Arithmetic overflows far above a roughness of 1000, and all light is lost far below it.
+A roughness is the root mean square slope of facets: at 10 these lean by 84 degrees.
 """
 
 
