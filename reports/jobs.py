@@ -101,6 +101,16 @@ scenes_argument = click.argument(
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
 
+class OutputFolder(click.Path):
+    """A folder's path, which is not empty: that would be the current folder."""
+
+    def convert(self, value: Any, *context: Any) -> Any:
+        """Return the path of a folder."""
+        if value == "":
+            self.fail("it is empty. Name a folder; the current one is '.'.", *context)
+        return super().convert(value, *context)
+
+
 def output_option(default: str, below: str = "") -> Decorator:
     """Return the option for the folder of the results, which go to ``below`` in it."""
     return click.option(
@@ -108,7 +118,7 @@ def output_option(default: str, below: str = "") -> Decorator:
         "--output",
         default=default,
         show_default=True,
-        type=click.Path(path_type=Path),
+        type=OutputFolder(path_type=Path),
         help="Folder for the results" + (f", which go to OUTPUT/{below}." if below else "."),
     )
 
@@ -323,14 +333,19 @@ def results_of(
     """
     with pool(timeout) as processes:
         processes.start()
+        from comparisons.case import file_of, name_of
         from reports.files import results
         from reports.terminal import progress
 
-        with results.hold(output, command_line()) as top, progress.shown() as bar:
-            folder = results.own(top / kind)
+        subjects = [(name_of(scene), file_of(scene)) for scene in scenes]
+        folder = output / kind
+        with (
+            results.hold_results(folder, subjects, command_line()) as places,
+            progress.shown() as bar,
+        ):
             tasks = [
-                Task(place, work, (scene, *words, folder / place), bar.of(place))
-                for place, scene in results.places(folder, scenes).items()
+                Task(place.name, work, (scene, *words, place), bar.of(place.name))
+                for place, scene in zip(places, scenes, strict=True)
             ]
             return {folder / each.name: done.result() for each, done in processes.each(tasks)}
 

@@ -52,6 +52,43 @@ def test_a_run_beyond_its_bounds_ends_with_1_and_says_so_everywhere(two_scenes):
     assert f"`{two_scenes.out / 'index.html'}`" in text
 
 
+@pytest.mark.parametrize("others", [(), ("lambert-sphere",)])
+def test_a_scene_that_fails_is_an_error_in_what_ci_reads(run, tmp_path, others):
+    (tmp_path / "bad.xml").write_text("<scene")
+    files = ("--junit", tmp_path / "j.xml", "--summary", tmp_path / "s.md")
+    words = (tmp_path / "bad.xml", *others, *SMALL, "-o", tmp_path / "out", "--max-visible", "99%")
+    assert run("compare", *words, *files)[0] == 2
+    suite = ElementTree.parse(tmp_path / "j.xml").getroot().find("testsuite")
+    assert (suite.get("tests"), suite.get("errors")) == (str(1 + len(others)), "1")
+    case = suite.find("testcase/error/..")
+    assert (case.get("name"), case.find("error").get("type")) == ("bad", "InputError")
+    assert "bad.xml" in case.find("error").get("message")
+    assert "bad.xml" in (tmp_path / "s.md").read_text()
+    assert (tmp_path / "out").exists() == bool(others)
+
+
+def test_junit_and_a_summary_are_two_files(run, tmp_path):
+    for first, second in (("a.md", "a.md"), ("a.md", "b/../a.md")):
+        files = ("--junit", tmp_path / first, "--summary", tmp_path / second)
+        code, _, messages = run("compare", "lambert-sphere", *SMALL, "-o", tmp_path / "out", *files)
+        assert code == 2
+        assert "they are one file. Name two." in messages
+        assert not list(tmp_path.iterdir())
+
+
+def test_a_picture_among_the_results_is_not_replaced(run, tmp_path):
+    words = ("compare", "lambert-sphere", *SMALL, "-o", tmp_path / "out")
+    assert run(*words)[0] == 0
+    picture = tmp_path / "out/lambert-sphere/comparison.exr"
+    content = picture.read_bytes()
+    code, _, messages = run(*words, "--image", f"{picture}:reference")
+    assert code == 2
+    assert "this picture is in the folder of the results" in messages
+    assert picture.read_bytes() == content
+    words = ("compare", "lambert-sphere", *SMALL, "-o", tmp_path / "another")
+    assert run(*words, "--image", f"{picture}:reference")[0] == 0
+
+
 # --- Checks ----------------------------------------------------------------------------------
 
 

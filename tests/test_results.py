@@ -173,7 +173,7 @@ def test_a_command_leaves_the_folder_of_another_one_alone(tmp_path):
         with results.hold(tmp_path / "out", "compare"):
             assert results.is_own(scene)
         assert results.is_own(scene)
-        partial = inner / f"picture{atomic.PARTIAL}"
+        partial = inner / f".picture.1{atomic.PARTIAL}"
         partial.touch()
         with results.hold(tmp_path / "out", "compare"):
             pass
@@ -186,7 +186,7 @@ def test_a_study_is_refused_before_it_computes(run, tmp_path, monkeypatch):
     study = tmp_path / "s.toml"
     study.write_text("[[part]]\nscene = 'lobe'\n[part.parameters]\nalpha = [0.1]\n")
     monkeypatch.setattr(running, "all_points", None)  # not to be called
-    with results.hold(tmp_path / "out", "another"):
+    with results.hold_results(tmp_path / "out/study", [("s", study)], "another"):
         code, _, messages = run("study", study, "-o", tmp_path / "out")
     assert code == 2
     assert "another command writes there" in messages
@@ -200,6 +200,131 @@ def test_a_link_as_the_output_folder_is_called_a_link(run, scene_file, tmp_path)
     assert (code, printed) == (2, "")
     assert messages.startswith(f"fotismos: error: {link}: this is a symbolic link, to 'folder'")
     assert not list((tmp_path / "folder").iterdir())
+
+
+@pytest.mark.guarantee("runs", "Files that you put into an output folder are never replaced.")
+@pytest.mark.parametrize("name", ["index.html", "details.html", "run.json"])
+def test_what_a_user_makes_later_stays(tmp_path, name):
+    """In a folder that other commands use, after a run, and in place of a file of ours."""
+    fault = f"{name}: this file was not made"
+    with results.hold(tmp_path, "first") as out:
+        results.write(results.own(out / "my-scene") / "comparison.json", "{}")
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(InputError, match=fault), results.hold(tmp_path, "second"):
+        pass
+    (tmp_path / name).unlink()
+    with results.hold(tmp_path, "third") as out:
+        results.write(out / name, "ours")
+    with results.hold(tmp_path, "fourth") as out:
+        results.write(out / name, "ours again")
+    (tmp_path / name).write_text("mine, in its place")
+    with pytest.raises(InputError, match=fault), results.hold(tmp_path, "fifth"):
+        pass
+    assert (tmp_path / name).read_text() == "mine, in its place"
+
+
+def test_a_file_made_while_a_command_runs_stays(tmp_path):
+    with results.hold(tmp_path, "first") as out:
+        (out / "index.html").write_text("mine")
+        with pytest.raises(InputError, match=r"index\.html: this file was not made"):
+            results.write(out / "index.html", "ours")
+    assert (tmp_path / "index.html").read_text() == "mine"
+
+
+def test_a_process_that_ends_while_a_file_is_replaced_does_not_lock_itself_out(
+    tmp_path, monkeypatch
+):
+    replace = Path.replace
+    for moment in ("before", "after"):
+
+        def ending(path, target, moment=moment):
+            if target.name != "index.html":
+                return replace(path, target)
+            if moment == "after":
+                replace(path, target)
+            raise EndedError
+
+        with results.hold(tmp_path, "first") as out:
+            results.write(out / "index.html", f"old {moment}")
+            with monkeypatch.context() as patched:
+                patched.setattr(Path, "replace", ending)
+                with pytest.raises(EndedError):
+                    results.write(out / "index.html", f"new {moment}")
+        with results.hold(tmp_path, "second") as out:
+            results.write(out / "index.html", "newer")
+
+
+def test_partial_files_of_others_stay_and_ours_go(tmp_path):
+    names = [f"mine{atomic.PARTIAL}", f".index.html.123{atomic.PARTIAL}"]
+    for name in names:
+        (tmp_path / name).write_text("part")
+    with results.hold(tmp_path, "test"):
+        assert (tmp_path / names[0]).exists()
+        assert not (tmp_path / names[1]).exists()
+
+
+def test_a_folder_of_version_0_3_is_taken_over(tmp_path):
+    (tmp_path / ".fotismos").touch()
+    (tmp_path / "index.html").write_text("of 0.3")
+    with results.hold(tmp_path, "test") as out:
+        results.write(out / "index.html", "new")
+    assert (tmp_path / "index.html").read_text() == "new"
+
+
+@pytest.mark.parametrize("command", ["compare", "cost", "report"])
+def test_an_output_folder_has_a_name(run, command):
+    scenes = [] if command == "report" else ["fig-8-9"]
+    code, _, messages = run(command, *scenes, "-o", "")
+    assert code == 2
+    assert "it is empty. Name a folder" in messages
+
+
+PAIRS = """
+import random, sys, time
+from pathlib import Path
+from heuristic.errors import OutputError
+from reports.files import results
+top, seed, rounds = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+rng = random.Random(seed)
+refused = 0
+for number in range(rounds):
+    time.sleep(rng.uniform(0, 0.01))
+    kind = rng.choice(["out", "out/report", "cost", "fit", "fit"])
+    name = rng.choice("ab")
+    try:
+        if kind.startswith("out"):
+            with results.hold(top / kind, "compare") as folder:
+                (name,) = results.assigned(folder, [(f"{name}-{seed}", None)])
+                time.sleep(rng.uniform(0, 0.01))
+                results.write(folder / name / "comparison.json", kind)
+                results.write(folder / "index.html", str(number))
+                assert (folder / name / "comparison.json").read_text() == kind
+        else:
+            with results.hold_results(top / "out" / kind, [(name, None)], kind) as (place,):
+                time.sleep(rng.uniform(0, 0.01))
+                results.write(place / "index.html", kind)
+                results.write(place / f"{kind}.json", kind)
+                assert (place / "index.html").read_text() == kind
+    except OutputError as error:
+        assert "another command writes there" in str(error), error
+        refused += 1
+print(rounds - refused)
+"""
+
+
+@pytest.mark.thorough
+@pytest.mark.guarantee("runs", "Commands that run at once lose nothing, and are not refused late.")
+def test_commands_that_run_at_once_lose_nothing(tmp_path):
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    words = [sys.executable, "-P", "-c", PAIRS, str(tmp_path)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    processes = [
+        subprocess.Popen([*words, str(seed), "60"], env=environment, **pipes) for seed in range(4)
+    ]
+    for process in processes:
+        printed, messages = process.communicate()
+        assert (process.returncode, messages) == (0, "")
+        assert int(printed) > 20  # the others were refused before they wrote anything
 
 
 HOLD = """

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ from comparisons.comparison import ComparisonRecord
 from comparisons.departure.criterion import TOLERANCE, Verdict, decide
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import VisibleShare
-from heuristic.errors import InputError, OutputError
+from heuristic.errors import FotismosError, InputError, OutputError
 from reports import verdict
 from reports.terminal.tables import escaped, markdown, printed
 from reports.terminal.words import number, percent, visible
@@ -106,6 +106,9 @@ def require_free(junit: Path | None, summary: Path | None, inputs: Iterable[str 
     ``$GITHUB_STEP_SUMMARY``. Devices and pipes are free.
     """
     paths = [Path(one) for one in inputs]
+    is_same = junit and summary and junit.resolve() == summary.resolve()
+    if is_same and not (junit.exists() and not junit.is_file()):
+        raise InputError(f"--junit {junit} and --summary: they are one file. Name two.")
     for option, path in (("--junit", junit), ("--summary", summary)):
         if path is None or not path.is_file():
             continue
@@ -172,9 +175,13 @@ def junit_of_checks(checks: Sequence[CheckRecord]) -> bytes:
     return _document("check", cases)
 
 
-def junit_of_gates(gates: Sequence[Gate]) -> bytes:
-    """Return the XML document of a comparison's gates, one test case for each."""
+def junit_of_gates(gates: Sequence[Gate], errors: Mapping[str, FotismosError]) -> bytes:
+    """Return the XML document of a comparison: a test case for each gate, and for each error."""
     cases = []
+    for name, error in errors.items():
+        case = _element("testcase", {"name": name, "classname": "fotismos.compare"})
+        case.append(_element("error", {"message": str(error), "type": type(error).__name__}))
+        cases.append(case)
     for gate in gates:
         case = _element("testcase", {"name": gate.scene, "classname": "fotismos.compare"})
         if gate.state != "pass":
@@ -208,10 +215,11 @@ def _clean(text: str) -> str:
 def of_comparison(
     scenes: Sequence[verdict.Studied],
     gates: Sequence[Gate],
+    errors: Mapping[str, FotismosError],
     page: str,
     threshold: float = TOLERANCE,
 ) -> str:
-    """Return the summary of a run: its verdict, a row for each scene, and its gates."""
+    """Return the summary of a run: verdict, a row for each scene, gates, and errors."""
     headings = ("Scene", "Pixels that differ", f"Mean {LEADING.label}", "What to do")
     rows: list[tuple[str, ...]] = []
     for record, cost in scenes:
@@ -229,7 +237,9 @@ def of_comparison(
     if gates:
         rows = [gate.cells() for gate in gates]
         parts += [_marked_down([GATE_HEADINGS, *rows]), gate_outcome(gates)]
-    return "\n\n".join([*parts, _where(page)]) + "\n\n"
+    parts += [escaped(f"{name}: {error}") for name, error in errors.items()]
+    parts += [_where(page)] if page else []
+    return "\n\n".join(parts) + "\n\n"
 
 
 def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:

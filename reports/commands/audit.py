@@ -67,20 +67,18 @@ def audit(
     with jobs.pool(timeout) as pool:
         pool.start()
         from reference.records import to_json
-        from reports.files.results import PAGE, assigned, hold, own
+        from reports.files.results import PAGE, hold_results
         from reports.run import audit_files
 
         command = jobs.command_line()
-        with hold(output, command) as top:
-            folder = own(top / "audit")
-            (place,) = assigned(folder, [_folder_of(name)])
-            words = (kind, name, dict(parameters), command, folder / place)
+        with hold_results(output / "audit", [_folder_of(name)], command) as (folder,):
+            words = (kind, name, dict(parameters), command, folder)
             record = pool.do(Task(name, audited, words))
     if as_json:
         click.echo(to_json(record), nl=False)
     else:
         tell(audit_files.lines(record))
-        tell_where(folder / place / PAGE)
+        tell_where(folder / PAGE)
     if record.faults:
         click.get_current_context().exit(1)
 

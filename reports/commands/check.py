@@ -121,8 +121,7 @@ def check(
                 pool, baseline, scenes, images, significance, changes, patterns
             )
         else:
-            with results.hold(output, jobs.command_line()) as top:
-                folder = results.own(top / "check")
+            with results.hold(output / "check", jobs.command_line(), ()) as folder:
                 outcomes, views, moved = checks.examine_all(
                     pool, baseline, significance, changes.get("seed"), folder, patterns
                 )
@@ -130,11 +129,11 @@ def check(
                 if views or moved:
                     records = [view.record for view in views]
                     details = page.details(records=records)
-                    results.write(folder / page.DETAILS, details)
+                    results.write(folder / results.DETAILS, details)
                     results.write(folder / results.PAGE, page.render(views, title, moved=moved))
                     place = str(folder / results.PAGE)
                 else:
-                    results.clear(folder, (results.PAGE, page.DETAILS))
+                    results.clear(folder, (results.PAGE, results.DETAILS))
     for each in outcomes:
         if each.status == "error":
             echo(f"fotismos: error: {each.message}", err=True)

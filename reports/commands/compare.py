@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from reports.run import batch
 from reports.terminal.words import echo, is_quiet
 
 if TYPE_CHECKING:
+    from heuristic.errors import FotismosError
     from reports.page.scene_view import SceneView
 
 
@@ -94,7 +95,9 @@ def compare(
         require_free(junit, summary, [*scenes, *filter(None, files)])
     code = 0
 
-    def finish(folder: Path, views: Sequence[SceneView]) -> None:
+    def finish(
+        folder: Path, views: Sequence[SceneView], errors: Mapping[str, FotismosError]
+    ) -> None:
         """Print the gates, and write the files for CI."""
         from reports.ci import summary as ci  # loaded late: most comparisons need no CI
 
@@ -105,9 +108,9 @@ def compare(
         for line in ci.gate_lines(gates) if gates else ():
             if code or not is_quiet():  # the reason of a failure is never lost
                 echo(line, err=is_quiet())
-        ci.write_junit(junit, lambda: ci.junit_of_gates(gates))
-        page = str(folder / "index.html")
-        ci.append(summary, lambda: ci.of_comparison(studied, gates, page, within))
+        ci.write_junit(junit, lambda: ci.junit_of_gates(gates, errors))
+        page = str(folder / "index.html") if views else ""
+        ci.append(summary, lambda: ci.of_comparison(studied, gates, errors, page, within))
 
     batch.run(
         scenes,

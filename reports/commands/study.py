@@ -31,19 +31,16 @@ def study(
     # Here, because start-up needs neither Mitsuba nor SciPy.
     from comparisons.processes.pool import Task
     from comparisons.study import design, running
-    from reports.files.results import assigned, hold, own
+    from reports.files.results import hold_results, own
     from reports.run import study_files
     from reports.terminal import progress
 
     chosen = design.read(file)
-    with hold(output, jobs.command_line()) as top:
+    with hold_results(output / "study", [(chosen.name, file)], jobs.command_line()) as (folder,):
         with jobs.pool(timeout) as pool:
             points = pool.do(Task(chosen.name, running.all_points, (chosen,)))
         tasks = len(points) // running.WORTH_A_PROCESS + 1
-        studies = own(top / "study")
-        (place,) = assigned(studies, [(chosen.name, file)])
-        folder = studies / place
-        for part in (folder, folder / study_files.FIGURES, folder / running.POINTS):
+        for part in (folder / study_files.FIGURES, folder / running.POINTS):
             own(part)  # a study replaces only its own results
         with jobs.pool(timeout, tasks, workers, scheduler) as pool, progress.shown("points") as bar:
             table, done = running.run(chosen, folder, pool, bar.of(chosen.name), points)

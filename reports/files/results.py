@@ -2,17 +2,21 @@
 
 fotismos promises this, and no more: a folder is its own if it has the mark ``.fotismos``. In it,
 each file is replaced atomically. Nothing in a folder without the mark is overwritten or deleted.
-One command at a time writes to a folder. A scene's record is removed first and written last
-(:mod:`reports.run.scene`): without it, the scene is unfinished, and begins again.
+The output folder itself may hold files of others: its mark lists the files that fotismos wrote
+there, with digests, and nothing else in it is overwritten. One command at a time writes to a
+folder, and it tidies no folder that another one has locked. A scene's record is removed first and
+written last (:mod:`reports.run.scene`): without it, the scene is unfinished, and begins again.
 """
 
 import errno
+import hashlib
 import json
 import os
 import platform
+import re
 import unicodedata
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import datetime
 from itertools import chain, count
 from pathlib import Path
@@ -31,11 +35,12 @@ START = perf_counter()
 
 MARK, LOCK = ".fotismos", ".fotismos-lock"
 
-PAGE, RUN, TABLES, FIGURES = "index.html", "run.json", "tables", "figures"
+PAGE, DETAILS, RUN = "index.html", "details.html", "run.json"
+TABLES, FIGURES = "tables", "figures"
 
 RESERVED = {
-    PAGE, RUN, TABLES, FIGURES, "assets", "audit", "check", "cost", "departures", "details.html",
-    "export", "fit", "study",
+    PAGE, DETAILS, RUN, TABLES, FIGURES, "assets", "audit", "check", "cost", "departures", "export",
+    "fit", "study",
 }  # fmt: skip
 """Names that no scene's folder may have."""
 
@@ -44,6 +49,12 @@ LONGEST = 100
 
 PATIENCE_S = 0.5
 """Seconds to wait for a command that is just ending."""
+
+ASSIGNING_S = 10.0
+"""Seconds to wait for commands that are choosing their folders, which takes milliseconds."""
+
+PARTIAL_NAME = re.compile(rf"\..+\.\d+{re.escape(atomic.PARTIAL)}")
+"""Names of partial files, see :func:`comparisons.atomic.replacing`."""
 
 WITHOUT_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP}
 """Errors of file systems without locks, where no command is kept out."""
@@ -74,13 +85,21 @@ class RunRecord(Record, kw_only=True):
 
 
 @contextmanager
-def hold(folder: str | Path, command: str) -> Iterator[Path]:
-    """Make or take the output folder, and keep other commands out of it while the block runs.
+def hold(
+    folder: str | Path,
+    command: str,
+    names: Sequence[str] = (PAGE, DETAILS, RUN),
+    patience: float = PATIENCE_S,
+) -> Iterator[Path]:
+    """Make or take a folder, and keep other commands out of it while the block runs.
 
-    ``command`` names this one to others. A command that writes nothing leaves no trace.
+    ``command`` names this one to others. It writes files of these ``names``, beside which the
+    folder may hold files of others; without names the folder holds nothing else. A command that
+    writes nothing leaves no trace. ``patience`` is in seconds.
     """
     folder = Path(folder)
-    lock = FileLock(folder / LOCK, PATIENCE_S, fallback_to_soft=False, preserve_lock_file=True)
+    lock = FileLock(folder / LOCK, patience, fallback_to_soft=False, preserve_lock_file=True)
+    missing = [path for path in (folder, *folder.parents) if not os.path.lexists(path)]
     with atomic.explained(folder / LOCK):
         folder.mkdir(parents=True, exist_ok=True)
         _require_file(folder / LOCK)
@@ -96,18 +115,44 @@ def hold(folder: str | Path, command: str) -> Iterator[Path]:
             holder = {"pid": os.getpid(), "host": platform.node(), "command": command}
             holder["since"] = datetime.now().astimezone().isoformat(" ", "seconds")
             (folder / LOCK).write_text(json.dumps(holder), encoding="utf-8")
-            own(folder, PAGE, RUN)
+            own(folder, *names)
+            _require_made(folder, names)
             _tidy(folder)
         yield folder
     finally:
         with suppress(OSError):
             _tidy(folder)
-            is_used = any(p.name in (PAGE, RUN) or is_own(p) for p in folder.iterdir())
-            if is_own(folder) and not is_used:
+            if is_own(folder) and not _is_used(folder, names):
                 (folder / MARK).unlink()
             if not is_own(folder):
                 (folder / LOCK).unlink()
+            for path in missing if names else [folder, *missing[1:]]:
+                path.rmdir()  # fails if it is not empty
         lock.release()
+
+
+@contextmanager
+def hold_results(
+    folder: Path, subjects: Iterable[tuple[str, Path | None]], command: str
+) -> Iterator[list[Path]]:
+    """Make or take a folder below ``folder`` for each subject (:func:`assigned`), and hold these.
+
+    Other commands may write to other folders below it at the same time.
+    """
+    with ExitStack() as held:
+        with hold(folder, command, (), ASSIGNING_S):
+            places = [folder / name for name in assigned(folder, subjects)]
+            for place in places:
+                held.enter_context(hold(place, command, ()))
+        yield places
+    with suppress(OutputError), hold(folder, command, (), ASSIGNING_S):
+        pass  # if nothing was written, it goes
+
+
+def _is_used(folder: Path, names: Sequence[str]) -> bool:
+    """Return whether a held folder has results."""
+    paths = [path for path in folder.iterdir() if path.name not in (MARK, LOCK)]
+    return any(not names or path.name in names or is_own(path) for path in paths)
 
 
 def _held_by_another(folder: Path) -> str:
@@ -128,7 +173,7 @@ def _tidy(folder: Path) -> None:
     A folder with a lock belongs to another command, which may be running.
     """
     for path in folder.iterdir():
-        if path.name.endswith(atomic.PARTIAL):
+        if PARTIAL_NAME.fullmatch(path.name):
             path.unlink()
         elif not path.is_symlink() and is_own(path) and not os.path.lexists(path / LOCK):
             with suppress(OSError):  # an inaccessible folder does not hinder the others
@@ -163,8 +208,41 @@ def own(folder: Path, *names: str) -> Path:
         for name in there:
             if os.path.lexists(folder / name):
                 raise _not_ours(folder / name if names else folder)
-        (folder / MARK).touch()
+        atomic.write(folder / MARK, "{}" if names else "")
     return folder
+
+
+def _made(folder: Path) -> dict[str, list[str]] | None:
+    """Return the digests of the files that fotismos wrote to a folder, by name.
+
+    None if the folder is not shared with others: all files in it are its own, or none is.
+    """
+    text = (folder / MARK).read_bytes()[: 2**16] if is_own(folder) else b""
+    return json.loads(text) if text.startswith(b"{") else None
+
+
+def _is_made(path: Path, made: dict[str, list[str]]) -> bool:
+    """Return whether a file is as fotismos wrote it."""
+    is_file = path.is_file() and not path.is_symlink()
+    return is_file and digest_of(path) in made.get(path.name, ())
+
+
+def digest_of(path: Path) -> str:
+    """Return the SHA-256 of a file, in hexadecimal digits."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _require_made(folder: Path, names: Sequence[str]) -> None:
+    """Require that the files of these names, where there are any, are as fotismos wrote them."""
+    there = [folder / name for name in names if os.path.lexists(folder / name)]
+    made = _made(folder)
+    if names and made is None:  # the mark of 0.3, for which they were all its own
+        made = {path.name: [digest_of(path)] for path in there if path.is_file()}
+        atomic.write(folder / MARK, json.dumps(made))
+    for path in there:
+        if not _is_made(path, made or {}):
+            raise _not_ours(path)
 
 
 def _not_ours(path: Path) -> InputError:
@@ -191,10 +269,16 @@ def _require_file(path: Path) -> None:
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a file to write to, which replaces ``path`` at the end."""
-    if os.path.lexists(path) and not is_own(path.parent):
+    folder = path.parent
+    made = _made(folder)
+    is_free = is_own(folder) if made is None else _is_made(path, made)
+    if os.path.lexists(path) and not is_free:
         raise _not_ours(path)
     with atomic.replacing(path) as partial:
         yield partial
+        if made is not None:  # noted first: a process may end before the file is replaced
+            made[path.name] = [*made.get(path.name, [])[-1:], digest_of(partial)]
+            atomic.write(folder / MARK, json.dumps(made))
 
 
 def write(path: Path, content: str | bytes) -> None:

@@ -24,7 +24,7 @@ from reference.records import plain
 from reports import glossary, verdict
 from reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT
 from reports.files import images
-from reports.files.results import Failure, RunRecord
+from reports.files.results import DETAILS, Failure, RunRecord
 from reports.page.scene_view import Before, SceneView, WhyView
 from reports.page.templating import HELP, rendered
 from reports.terminal.words import difference
@@ -34,9 +34,6 @@ if TYPE_CHECKING:  # few pages need these
     from comparisons.hard_cases import HardCases
 
 TITLE = "Textbook shading against physically based rendering"
-
-DETAILS = "details.html"
-"""The file of :func:`details`, beside the page."""
 
 SCRIPTS = (
     *HELP, "address", "overview", "images", "viewport", "drawing", "switches", "panels", "viewer",

@@ -15,13 +15,14 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from comparisons.processes.pool import Pool, Task
-from heuristic.errors import FotismosError, InstallationError, OutputError
+from heuristic.errors import FotismosError, InputError, InstallationError, OutputError
 from reports import jobs
 from reports.jobs import Job
 from reports.terminal.words import remark, tell, tell_where
 
 if TYPE_CHECKING:
     from comparisons.hard_cases import HardCases
+    from comparisons.options import Options
     from reports.files.results import Failure, RunRecord
     from reports.page.scene_view import SceneView
     from reports.terminal.progress import Bar
@@ -95,7 +96,7 @@ class Batch:
             state = f"In progress: {done}; reload to see more."
         records = [view.record for view in self.ordered]
         details = page.details(self.hard_cases, run, records)
-        results.write(self.folder / page.DETAILS, details)
+        results.write(self.folder / results.DETAILS, details)
         html = page.render(
             self.ordered, failures=self.failures(), state=state, threshold=self.within
         )
@@ -123,13 +124,13 @@ def run(
     pool: Pool,
     hard_cases: Task | None = None,
     on_page: Callable[[Path], object] | None = None,
-    finish: Callable[[Path, Sequence[SceneView]], None] | None = None,
+    finish: Callable[[Path, Sequence[SceneView], Mapping[str, FotismosError]], None] | None = None,
 ) -> None:
     """Compare scenes in a pool, and write the results of each, then the page and tables of all.
 
     The task ``hard_cases`` returns them for the details, and the seconds that it took. ``on_page``
-    is called with the page's path once it exists; ``finish`` at the end with the output folder and
-    the views of the compared scenes. The gravest error of a scene is raised at last.
+    is called with the page's path once it exists; ``finish`` at the end with the output folder, the
+    views of the compared scenes and the errors of the others. The gravest error is raised at last.
     """
     with pool as pool:
         pool.start()
@@ -143,6 +144,7 @@ def run(
         command = jobs.command_line()
         with results.hold(folder, command) as folder:
             places = results.places(folder, scenes)
+            _require_inputs_apart(job.request, [folder / place for place in places])
             for name in (TABLES, FIGURES) if job.figures else (TABLES,):
                 results.own(folder / name)
             batch = Batch(folder, places, on_page, command, job.within)
@@ -161,9 +163,12 @@ def run(
                 if batch.done:
                     _write(batch, is_interrupted=True)
                 raise
-            _write(batch)
+            if batch.views or len(places) > 1:
+                _write(batch)
             if finish is not None:
-                finish(folder, batch.ordered)
+                finish(folder, batch.ordered, batch.errors)
+    if batch.errors and len(places) == 1:
+        raise batch.errors.popitem()[1]
     if batch.errors:
         error = max(batch.errors.values(), key=lambda error: error.exit_code)
         count = f"{len(batch.errors)} of {len(places)} scenes failed, "
@@ -198,8 +203,6 @@ def _compare(
         except InstallationError:
             raise
         except FotismosError as error:
-            if len(calls) == 1:
-                raise
             batch.errors[task.name] = error
         else:
             batch.views[task.name] = scene.with_fit(view, batch.folder / "fit" / task.name)
@@ -209,6 +212,19 @@ def _compare(
         finally:
             bar.over(task.progress)
         batch.grow_page()
+
+
+def _require_inputs_apart(request: Options, places: Sequence[Path]) -> None:
+    """Refuse pictures in a folder whose files are about to be replaced."""
+    for word in request.image:
+        from comparisons import pictures  # loaded late: few comparisons have any
+
+        path, _ = pictures.parts(word)
+        if path.resolve().parent in [place.resolve() for place in places]:
+            raise InputError(
+                f"{path}: this picture is in the folder of the results, and would be replaced by"
+                " them. Choose another output folder with -o."
+            )
 
 
 def _write(batch: Batch, is_interrupted: bool = False) -> None:

@@ -124,7 +124,7 @@ def key_of(case: Case, job: Job) -> str | None:
         "versions": versions(),
         "sources": program.source_digest(),
         "heuristic": shading.digest(),
-        "pictures": [_digest_of(path) for path in files if path.is_file()],
+        "pictures": [results.digest_of(path) for path in files if path.is_file()],
         "scene": digest(case.source),
     }
     return _digest(json.dumps(parts, sort_keys=True).encode())
@@ -137,7 +137,7 @@ def load(place: Path, key: str | None) -> SceneView | None:
     try:
         # JSON has no bytes: pictures are text in it.
         found = msgspec.convert(atomic.Entry(place / VIEW, key).load(), Finished, builtin_types=())
-        current = {name: _digest_of(place / name) for name in found.digests}
+        current = {name: results.digest_of(place / name) for name in found.digests}
         if current != found.digests:
             return None
         view = found.view
@@ -153,11 +153,6 @@ def load(place: Path, key: str | None) -> SceneView | None:
 
 def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
-
-
-def _digest_of(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 # --- Files -----------------------------------------------------------------------------------
@@ -198,7 +193,7 @@ def write(
     images.write_exr(place / PICTURE, _layers(comparison.images), _header(record))
     made[RECORD] = atomic.encoded(to_json(record))
     digests = {file: _digest(content) for file, content in made.items()}
-    digests[PICTURE] = _digest_of(place / PICTURE)
+    digests[PICTURE] = results.digest_of(place / PICTURE)
     results.clear(place, earlier - digests.keys())
     finished = Finished(view, digests)
     atomic.Entry(place / VIEW, key or "none").save(plain(finished))

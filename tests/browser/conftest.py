@@ -63,7 +63,7 @@ def report(tmp_path_factory):
     machine = Machine(processor="any", cores=2, system="Linux")
     run = RunRecord(command="", stages={"page": 1.0}, failures=(), machine=machine, versions={})
     (folder / "index.html").write_text(page.render(views, failures=failures))
-    (folder / page.DETAILS).write_text(page.details(run=run))
+    (folder / results.DETAILS).write_text(page.details(run=run))
     return found
 
 
