@@ -17,7 +17,7 @@ from click.shell_completion import get_completion_class
 
 from comparisons.processes import interruption
 from heuristic import llvm
-from heuristic.errors import FotismosError, suggestion
+from heuristic.errors import FotismosError, InstallationError, suggestion
 from heuristic.program import __version__, program
 from reports import jobs
 from reports.terminal.words import echo
@@ -122,6 +122,11 @@ def cli() -> None:
     Colours and bars appear only on terminals; NO_COLOR=1 switches colours off.
     """  # noqa: D301 click reads the \b as: keep these lines
     llvm.require_libraries()
+    if sys.flags.optimize > 1:
+        raise InstallationError(
+            f"Python is at level {sys.flags.optimize} of optimisation, without the docstrings that"
+            " Altair needs for charts. Unset PYTHONOPTIMIZE and omit -OO; level 1 is allowed."
+        )
 
 
 def main() -> None:

@@ -102,6 +102,17 @@ def test_causes_that_cannot_be_found_leave_the_comparison_and_a_warning(
     assert "The causes are unknown: the effects are unknown" in page
 
 
+@pytest.mark.parametrize(
+    ("level", "code", "message"), [("1", 0, ""), ("2", 2, "docstrings .* Unset PYTHONOPTIMIZE")]
+)
+def test_python_without_docstrings_is_refused_before_any_work(level, code, message, tmp_path):
+    words = ("audit", "--heuristic", "phong", "-o", tmp_path / "out")
+    done = python("-m", "reports", *words, PYTHONOPTIMIZE=level)
+    assert (done.returncode, done.stderr.count("\n")) == (code, len(message) > 0)
+    assert re.search(message, done.stderr)
+    assert (tmp_path / "out").exists() == (code == 0)
+
+
 def test_a_scene_that_fails_is_named_and_the_others_are_compared(run, scene_file, tmp_path):
     broken = tmp_path / "broken.xml"
     broken.write_text(_changed('type="diffuse"', 'type="nonesuch"'))
