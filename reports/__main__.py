@@ -14,6 +14,8 @@ def main() -> None:
     _open_standard_streams()
     # Jupyter names a backend that need not be installed here; charts need none.
     os.environ["MPLBACKEND"] = "agg"
+    # No file of ours holds a date, and libraries fail if this is not a number.
+    os.environ.pop("SOURCE_DATE_EPOCH", None)
     if Path(sys.argv[0]).name == "__main__.py":
         os.environ.setdefault(VARIABLE, "python -m reports")
     try:

@@ -113,6 +113,13 @@ def test_python_without_docstrings_is_refused_before_any_work(level, code, messa
     assert (tmp_path / "out").exists() == (code == 0)
 
 
+def test_any_date_of_building_is_ignored(scene_file, tmp_path):
+    for date in ("x", "", "9" * 30):
+        words = ("compare", scene_file, "-o", tmp_path / f"out{date}", "--figures", *SMALL)
+        done = python("-m", "reports", *words, "--no-why", SOURCE_DATE_EPOCH=date)
+        assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_a_scene_that_fails_is_named_and_the_others_are_compared(run, scene_file, tmp_path):
     broken = tmp_path / "broken.xml"
     broken.write_text(_changed('type="diffuse"', 'type="nonesuch"'))

@@ -4,7 +4,6 @@ The map has the fixed range of its metric, so that strips of different scenes ca
 Pictures are kept pixel for pixel. The files are reproducible: they hold no date.
 """
 
-import os
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -30,9 +29,6 @@ GAP, BAR, HEADING = 0.08, 0.55, 0.22
 
 #: Points, printed at that width.
 FONT_SIZE = 8
-
-#: Environment variable with the date of files that are built.
-DATE = "SOURCE_DATE_EPOCH"
 
 
 def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
@@ -93,11 +89,6 @@ def drawn(figure: Figure, kind: str, dots_per_inch: float = 300) -> bytes:
     settings: Any = {"pdf.fonttype": 42, "svg.hashsalt": "fotismos"}
     undated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
     buffer = BytesIO()
-    date = os.environ.pop(DATE, None)  # Matplotlib reads it even where a file holds no date
-    try:
-        with rc_context(settings):
-            figure.savefig(buffer, format=kind, dpi=dots_per_inch, metadata=undated.get(kind))
-    finally:
-        if date is not None:
-            os.environ[DATE] = date
+    with rc_context(settings):
+        figure.savefig(buffer, format=kind, dpi=dots_per_inch, metadata=undated.get(kind))
     return buffer.getvalue()
