@@ -1,5 +1,7 @@
 """What memory does not hold is refused before anything is rendered."""
 
+import resource
+
 import pytest
 
 from comparisons.compare import compare
@@ -21,3 +23,19 @@ def test_what_does_not_fit_is_refused_before_it_is_rendered(rgb, monkeypatch):
 
 def test_the_machine_says_how_much_is_free():
     assert 0 < renderer.available_memory() < 2**50
+
+
+@pytest.mark.parametrize("limit", ["RLIMIT_DATA", "RLIMIT_AS"])
+def test_a_limit_of_the_process_counts(rgb, monkeypatch, limit):
+    asked, largest = getattr(resource, limit), [2**62]
+
+    def getrlimit(kind):
+        return (largest[0] if kind == asked else resource.RLIM_INFINITY, resource.RLIM_INFINITY)
+
+    monkeypatch.setattr(resource, "getrlimit", getrlimit)
+    monkeypatch.setattr(renderer.Renderer, "render", lambda *_: pytest.fail("it was rendered"))
+    assert 10**6 < renderer.available_memory() < 2**50
+    largest[0] = 10**6
+    assert renderer.available_memory() == 0
+    with pytest.raises(InputError, match=r"0 GB are free\. .* raise the limits .* \(ulimit -d"):
+        compare(SCENES["cornell-box"].source(), Options(resolution=(16, 16)))

@@ -6,6 +6,7 @@ both. Samples within a pass are stratified; passes are independent, and give the
 """
 
 import gc
+import resource
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
@@ -344,14 +345,22 @@ def require_memory(name: str, width: int, height: int) -> None:
     if free is not None and need > free:
         raise InputError(
             f"{name}: an image of {width}x{height} pixels needs {need / 1e9:.2g} GB of memory, and"
-            f" {free / 1e9:.2g} GB are free. Give a smaller --resolution, or free some memory."
+            f" {free / 1e9:.2g} GB are free. Give a smaller --resolution, free some memory, or raise"
+            " the limits of the process (ulimit -d, ulimit -v)."
         )
 
 
 def available_memory() -> int | None:
-    """Return the bytes that are free on the machine; None if it does not say."""
+    """Return the bytes free on the machine and to this process; None if it does not say."""
     with suppress(OSError, ValueError, KeyError):
-        lines = Path("/proc/meminfo").read_text(encoding="utf-8").splitlines()
-        words = dict(line.split()[:2] for line in lines)
-        return 1024 * int(words["MemAvailable:"])
+        files = (Path("/proc/meminfo"), Path("/proc/self/status"))
+        lines = [line.split() for file in files for line in file.read_text("utf-8").splitlines()]
+        sizes = {words[0]: 1024 * int(words[1]) for words in lines if words[-1] == "kB"}
+        limits = {"VmData:": resource.RLIMIT_DATA, "VmSize:": resource.RLIMIT_AS}
+        left = [
+            resource.getrlimit(limit)[0] - sizes[name]
+            for name, limit in limits.items()
+            if resource.getrlimit(limit)[0] != resource.RLIM_INFINITY
+        ]
+        return max(min([sizes["MemAvailable:"], *left]), 0)
     return None
