@@ -345,8 +345,8 @@ def require_memory(name: str, width: int, height: int) -> None:
     if free is not None and need > free:
         raise InputError(
             f"{name}: an image of {width}x{height} pixels needs {need / 1e9:.2g} GB of memory, and"
-            f" {free / 1e9:.2g} GB are free. Give a smaller --resolution, free some memory, or raise"
-            " the limits of the process (ulimit -d, ulimit -v)."
+            f" {free / 1e9:.2g} GB are free. Give a smaller --resolution, free some memory, or"
+            " raise the limits of the process (ulimit -d, ulimit -v)."
         )
 
 
