@@ -106,8 +106,7 @@ def require_free(junit: Path | None, summary: Path | None, inputs: Iterable[str 
     ``$GITHUB_STEP_SUMMARY``. Devices and pipes are free.
     """
     paths = [Path(one) for one in inputs]
-    is_same = junit and summary and junit.resolve() == summary.resolve()
-    if is_same and not (junit.exists() and not junit.is_file()):
+    if junit and summary and junit.resolve() == summary.resolve():
         raise InputError(f"--junit {junit} and --summary: they are one file. Name two.")
     for option, path in (("--junit", junit), ("--summary", summary)):
         if path is None or not path.is_file():
