@@ -1,5 +1,6 @@
 """Scenes that cannot be meant are refused in words, and never rendered in silence."""
 
+import os
 import re
 import struct
 import tomllib
@@ -16,8 +17,10 @@ from comparisons.cost.cost import cost
 from comparisons.fit.fit import fit
 from comparisons.options import LARGEST_SPP, Options
 from comparisons.prepared import require_light
+from comparisons.study import design
 from heuristic.errors import FotismosError, InputError
 from reference.rendering.renderer import LARGEST_PASS
+from reference.scene.source import Source
 from reports import verdict
 from tests import corpus_files
 from tests.small_scene import SCENE
@@ -300,3 +303,37 @@ def test_an_error_of_another_kind_is_found_out(rgb, corpus, monkeypatch):
 @pytest.mark.slow
 def test_any_scene_broken_at_random_is(rgb, corpus):
     assert {outcome(seed, corpus) for seed in range(20, 400)} == {"rendered", "refused"}
+
+
+@pytest.mark.parametrize("device", ["pipe", "/dev/zero"])
+@pytest.mark.parametrize("where", ["include", "nested", "mesh", "bitmap", "placeholder", "table"])
+def test_a_pipe_or_a_device_that_a_scene_names_is_refused_at_once(rgb, tmp_path, where, device):
+    """Reading it might never end."""
+    os.mkfifo(tmp_path / "pipe")
+    table = '<bsdf type="diffuse"><spectrum name="reflectance" filename="{}"/></bsdf>'
+    text = {
+        "include": '<include filename="{}"/>',
+        "nested": '<include filename="part.xml"/>',
+        "mesh": '<shape type="ply"><string name="filename" value="{}"/></shape>',
+        "bitmap": '<texture type="bitmap" id="t"><string name="filename" value="{}"/></texture>',
+        "placeholder": '<include filename="$part"/>',
+        "table": f'<shape type="sphere">{table}</shape>',
+    }[where].format(device)
+    part = f'<scene version="3.0.0"><include filename="{device}"/></scene>'
+    (tmp_path / "part.xml").write_text(part)
+    define = {"part": device} if where == "placeholder" else {}
+    with pytest.raises(InputError, match=f"{device} is not a regular file"):
+        compared(tmp_path, SCENE.replace(END, f"{text}{END}"), define=define)
+
+
+def test_a_pipe_that_a_dictionary_names_is_refused_at_once(rgb, tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    mesh = {"type": "obj", "filename": str(tmp_path / "pipe")}
+    with pytest.raises(InputError, match="pipe is not a regular file"):
+        compare(Source("odd", {"type": "scene", "mesh": mesh}))
+
+
+def test_a_study_in_a_pipe_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="pipe: it is not a regular file"):
+        design.read(tmp_path / "pipe")

@@ -168,7 +168,7 @@ def read(path: str | Path) -> StudyFile:
     """Read a study from a TOML file; ``InputError`` says what in it is not allowed."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = atomic.content(path).decode()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: {reason}. Give the TOML file of a study.") from error

@@ -13,7 +13,7 @@ import numpy as np
 
 from heuristic import meshes
 from heuristic.errors import InputError
-from reference.scene.graph import Graph
+from reference.scene.graph import Graph, find_file, require_regular_file
 
 LARGEST = float(np.finfo(np.float32).max)
 
@@ -76,6 +76,8 @@ def check_node(graph: Graph, index: int) -> None:
     """Reject values of one element that make no sense."""
     props, plugin = graph.props(index), graph.plugin(index)
     for key, value in props.items():
+        if isinstance(value, str) and (path := find_file(graph.resolver, value)):
+            require_regular_file(f"{graph.name}: {graph.label(index)}", value, path)
         for allowed in _objections(plugin, key, value):
             raise _refusal(graph, index, f"{key} = {_shown(value)} is not allowed: give {allowed}.")
     for objection in _missing(graph, index):

@@ -241,6 +241,14 @@ def find_file(resolver: mi.FileResolver | None, name: str) -> Path | None:
         return None
 
 
+def require_regular_file(scene: str, name: str, path: Path) -> None:
+    """Raise `InputError` for a pipe or a device that a scene names: reading it may never end."""
+    if not (path.is_file() or path.is_dir()):
+        raise InputError(
+            f"{scene}: {name} is not a regular file. Write its content to one, and name that."
+        )
+
+
 @contextmanager
 def resolving(resolver: Any) -> Iterator[None]:
     """Let Mitsuba find files with a resolver, to which a ``<path>`` in a scene adds places."""

@@ -20,7 +20,15 @@ import numpy as np
 
 from heuristic.errors import InputError
 from heuristic.user_code import contained
-from reference.scene.graph import SCRIPT, Graph, Reference, find_file, plain_message, resolving
+from reference.scene.graph import (
+    SCRIPT,
+    Graph,
+    Reference,
+    find_file,
+    plain_message,
+    require_regular_file,
+    resolving,
+)
 
 Parser = mi.parser
 Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
@@ -127,9 +135,9 @@ class Source:
                 state = Parser.parse_dict(config, dict(content))
             else:
                 path = Path(content)
-                text_of(path)  # Mitsuba takes any bytes, which later cannot be names
                 resolver = mi.FileResolver(mi.file_resolver())
                 resolver.prepend(str(path.resolve().parent))  # first, as for Mitsuba's command
+                _require_regular(path, resolver, self.parameters, set())
                 with resolving(resolver):
                     state = Parser.parse_file(config, str(path), **self.parameters)
                 _require_text(self.name, state)
@@ -142,6 +150,26 @@ class Source:
         graph = Graph(self.name, config, state)
         graph.resolver = resolver
         return graph
+
+
+def _require_regular(
+    path: Path, resolver: mi.FileResolver, parameters: Mapping[str, str], seen: set[Path]
+) -> None:
+    """Require that what a file and its includes name are regular files: a pipe waits for ever.
+
+    The text must be UTF-8: Mitsuba takes any bytes, which later cannot be names.
+    """
+    seen.add(path)
+    text = text_of(path)
+    for key, value in parameters.items():
+        text = text.replace(f"${key}", value)
+    for name in set(re.findall(r"[\"']([^\"'\n]+)[\"']", text)):
+        file = find_file(resolver, name)
+        if file is None or file.is_dir() or file in seen:
+            continue
+        require_regular_file(str(path), name, file)
+        if file.suffix == ".xml":
+            _require_regular(file, resolver, parameters, seen)
 
 
 def _require_text(name: str, state: Any) -> None:
