@@ -378,7 +378,8 @@ def picture_record(
     shown, reference = (each[images.counted] for each in (images.heuristic, images.reference))
     half.half.spp = TEMPLATE_SPP
     template, (height, width) = np.array(half.half.render(0), float), images.counted.shape
-    expected = [geometry_edges(scene, width, height), picture_edges(template)]
+    expected = [geometry_edges(scene, width, height)]
+    expected += [picture_edges(image) for image in (template, images.reference)]
     shift, edges = measure(np.mean(half.images, axis=0), expected)
     files, ratio = options.image, ratios(shown, reference)
     record = PictureRecord(files, options.transfer, len(files), shift, edges, ratio)
@@ -408,10 +409,10 @@ def describe(
     if record.shift is None:
         yield "The picture's edges do not show whether it is aligned with the scene's camera."
     elif max(map(abs, record.shift)) >= SHIFT:
-        x, y = record.shift
+        across = _in_pixels(record.shift[0], "to the right", "to the left")
+        down = _in_pixels(record.shift[1], "down", "up")
         yield (
-            f"The picture's edges are shifted by {abs(x):.1f} pixels to the"
-            f" {'right' if x > 0 else 'left'} and {abs(y):.1f} pixels {'down' if y > 0 else 'up'},"
+            f"The picture's edges are shifted by {' and '.join(filter(None, (across, down)))},"
             " which looks like wrong shading. Check the camera, the crop and the pixel centres"
             " first."
         )
@@ -427,6 +428,14 @@ def describe(
             f" {mistake or 'another exposure'}?"
         )
     yield from _white(picture, reference, counted)
+
+
+def _in_pixels(shift: float, ahead: str, back: str) -> str:
+    """Return a shift in words, to half a pixel, which is what edges can tell; less is none."""
+    if abs(shift) < SHIFT:
+        return ""
+    size = round(abs(shift) / SHIFT) * SHIFT
+    return f"{size:g} pixel{'' if size == 1 else 's'} {ahead if shift > 0 else back}"
 
 
 def _white(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> Iterator[str]:

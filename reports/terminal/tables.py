@@ -168,7 +168,7 @@ def time_ratio(record: ComparisonRecord) -> str:
 def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:
     """Yield a picture's shift, and what is odd about it: all numbers depend on that."""
     shift, ratio = picture.shift, ", ".join(f"{value:.3g}" for value in picture.ratio)
-    place = "not known" if shift is None else f"{shift[0]:+.2f}, {shift[1]:+.2f} pixels"
+    place = "not known" if shift is None else f"{shift[0]:+.1f}, {shift[1]:+.1f} pixels"
     yield f"{record.scene}: {record.heuristic}"
     yield f"shift {place}; red, green, blue {ratio} times the reference's"
     yield from picture.odd
