@@ -15,13 +15,13 @@ from reference.rendering.sums import student
 WARM = 1
 """Passes that do not count: the first one compiles, or wakes the threads."""
 
-FEWEST, MOST = 3, 64
+FEWEST, MOST = 3, 24
 """Pairs of passes that make a ratio."""
 
 BATCHES = 8
 """Groups of pairs, of each of which the shortest passes count: other work only ever adds time."""
 
-BUDGET_S = 1.0
+BUDGET_S = 0.5
 """If enough pairs take less, they are timed again without a pause in between."""
 
 WIDEST = 0.3

@@ -20,7 +20,7 @@ from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import VisibleShare
 from comparisons.gallery.builtin import SCENES
 from heuristic import program
-from reference.planning.effects import EFFECTS
+from reference.planning.effects import EFFECTS, MICROFACETS
 from reports.terminal.words import number, percent, seconds
 
 if TYPE_CHECKING:
@@ -90,8 +90,18 @@ def missing(record: ComparisonRecord) -> dict[str, float]:
 
 
 def cause(record: ComparisonRecord) -> str:
-    """Return what is mostly missing in a scene, as a sentence; empty if that is unknown."""
-    return _mostly([*missing(record)][:1])
+    """Return why a scene differs, as a sentence; empty if that is unknown."""
+    largest = [*missing(record)][:1]
+    if MICROFACETS.label in largest and (albedo := _impossible_albedo(record)):
+        amount = f"{number(albedo)} times the light that it receives"
+        return f"A material reflects {amount}; no physical material does."
+    return _mostly(largest)
+
+
+def _impossible_albedo(record: ComparisonRecord) -> float:
+    """Return the largest albedo above 1 that a textbook material has; 0 if none has."""
+    wanted = [miss.wanted for miss in record.pairing.misses if "albedo" in miss.what]
+    return max([albedo for albedo in wanted if albedo > 1], default=0.0)
 
 
 def sentence(
@@ -224,7 +234,10 @@ def most_missing(records: Sequence[ComparisonRecord], threshold: float = TOLERAN
     for record in records:
         if decision(record, threshold) == "fail":
             wrong = share(record, threshold).value
-            pixels.update({effect: wrong * part for effect, part in missing(record).items()})
+            parts = missing(record)
+            if _impossible_albedo(record):
+                parts.pop(MICROFACETS.label, None)
+            pixels.update({effect: wrong * part for effect, part in parts.items()})
     return _mostly([effect for effect, _ in pixels.most_common(NAMED)])
 
 

@@ -5,10 +5,13 @@ from types import SimpleNamespace
 import pytest
 from msgspec import structs
 
+from comparisons.case import open_case
+from comparisons.compare import compare
 from comparisons.comparison import MeanError
 from comparisons.cost import cost_record
 from comparisons.departure.metrics import LEADING
 from comparisons.departure.noise import VisibleShare
+from comparisons.options import Options
 from heuristic.heuristics import HEURISTICS, Interpolation, Point
 from reference.records import Estimated
 from reports import verdict
@@ -181,3 +184,19 @@ def test_a_chosen_threshold_decides_on_the_terminal_and_where_the_page_begins(ru
     assert "Textbook shading looks right in fig-8-9." in printed
     assert 'value="10.0"' in (tmp_path / "index.html").read_text()
     assert run(*words, "--within", 2.1)[0] == 2
+
+
+def test_a_material_that_reflects_more_than_it_receives_is_the_cause(rgb, tmp_path):
+    bright = (
+        '<bsdf type="phong"><float name="k_d" value="2.5"/><float name="k_s" value="0.4"/></bsdf>'
+    )
+    text = PLAIN.replace('<bsdf type="diffuse"/>', bright, 1)
+    assert bright in text
+    path = tmp_path / "bright.xml"
+    path.write_text(text)
+    case = open_case(path, Options(resolution=(12, 8), spp=16))
+    record = compare(case.source, case.options, command=case.command(), why=True).record
+    assert verdict.missing(record)
+    said = f"{verdict.about(record)} {verdict.most_missing([record])}"
+    assert "A material reflects 2.50 times the light that it receives" in said
+    assert "microfacets" not in said

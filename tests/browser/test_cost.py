@@ -27,7 +27,7 @@ def test_map_and_inspector_name_the_effect_that_dominates(visitor, pixel):
     visitor.open(f"{SCENE}&map=effects&pixel={pixel[0]},{pixel[1]}")
     found = causes()
     known = dominating(found.maps, found.counted)[place(*pixel)]
-    names = [*found.maps, "unknown", "none visible"]
+    names = [*found.maps, "unknown", "none"]
     colours = [*map(theme.EFFECT_COLOURS.get, found.maps), "#82888f", theme.NO_EFFECT]
     assert visitor.inspected()["cause"] == names[known]
     x, y = pixel[0] + (2 if pixel[0] != 23 else -2), pixel[1]  # beside the mark

@@ -174,7 +174,7 @@ function letterAt(effects, x, y) {
   return effects.map[Math.floor(y * effects.height) * effects.width + Math.floor(x * effects.width)];
 }
 
-/** What is missing where a letter stands; empty if unknown. @param {Effects | null} effects @param {string} letter */
+/** What is missing where a letter stands; empty if unknown or nothing. @param {Effects | null} effects @param {string} letter */
 function effectName(effects, letter) {
-  return letter === NO_EFFECT ? "none visible" : effects?.names[parseInt(letter, 36)] ?? "";
+  return effects?.names[parseInt(letter, 36)] ?? "";
 }

@@ -107,9 +107,12 @@ class Panels {
   }
 }
 
-/** What is missing at a pixel: the effect that dominates there, or in its region; empty if unknown. @param {Painter} painter @param {number[]} pixel */
+/** What is missing at a pixel: the effect that dominates there, or in its region; "none" if nothing is, empty if unknown. @param {Painter} painter @param {number[]} pixel */
 function causeAt({ scene }, [x, y]) {
-  if (scene.effects) return effectName(scene.effects, letterAt(scene.effects, (x + 0.5) / scene.width, (y + 0.5) / scene.height));
+  if (scene.effects) {
+    const letter = letterAt(scene.effects, (x + 0.5) / scene.width, (y + 0.5) / scene.height);
+    return letter === NO_EFFECT ? "none" : effectName(scene.effects, letter);
+  }
   return scene.regions.find((one) => x >= one.x && y >= one.y && x < one.x + one.width && y < one.y + one.height)?.effect ?? "";
 }
 
