@@ -168,7 +168,7 @@ def _compare(
     exact = ready.plan.exact and not options.image
     numbers, images = _measure(estimates, ready.surface, options, exact)
     shown = images.heuristic, images.reference, images.counted
-    caution = require_light(*shown, source.name, options)
+    caution = ready.caution() or require_light(*shown, source.name, options)
     picture = None
     if options.image:
         from comparisons import pictures  # loaded late: few comparisons have any

@@ -21,7 +21,14 @@ from reference.pairing.prepare import Override
 from reference.planning.guard import examine_plan
 from reference.planning.plan import Guard, Plan, physical_integrator, plan
 from reference.planning.rules import SAMPLED_AS_HIT, loses_light
-from reference.rendering.gbuffer import GBuffer, gbuffer, image_size, require_surface
+from reference.rendering.direct import is_behind_two_lamps
+from reference.rendering.gbuffer import (
+    GBuffer,
+    gbuffer,
+    image_size,
+    pixel_rays,
+    require_surface,
+)
 from reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
 from reference.rendering.sampler import SAMPLER, STOCK_SAMPLER, with_sampler
 from reference.scene.source import Source
@@ -95,12 +102,26 @@ class Prepared:
             for entry in pair.overridden
         ]
         asks_for_volumes = pair.media or pair.integrator in ("volpath", "volpathmis")
-        if plan.stock_integrator == "volpath" and not asks_for_volumes:
+        if plan.integrator == "volpath" and not asks_for_volumes:
             used = "volpath: others err on curved shapes behind hidden lamps"
             overrides.append(Override("integrator", pair.integrator or "path", used))
         if pair.rr_depth is not None and pair.rr_depth != plan.rr_depth:
             overrides.append(Override("rr_depth", str(pair.rr_depth), str(plan.rr_depth)))
         return tuple(overrides)
+
+    def caution(self) -> str:
+        """Return where no integrator of Mitsuba is right, in words; empty if there is none."""
+        if not (self.pair.hide_emitters and self.plan.integrator in ("volpath", "volpathmis")):
+            return ""
+        size = image_size(self.scene)
+        places = np.meshgrid(*map(np.arange, size))
+        count = int(np.sum(is_behind_two_lamps(self.scene, pixel_rays(self.scene, size, *places))))
+        if not count:
+            return ""
+        return (
+            f"The reference is wrong at {count} pixels, which see a shape through both sides of a"
+            " hidden lamp: no integrator of Mitsuba is right there. Show the lamp, or make it flat."
+        )
 
     def plan_record(self, passes: int) -> Plan:
         """Return the plan with the samples and passes that were rendered."""

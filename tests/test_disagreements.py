@@ -12,7 +12,8 @@ from reference.planning.rules import LIGHT_BY_LIGHT
 from reference.rendering import direct
 from reference.rendering.renderer import pass_seed
 from reference.scene.source import Source
-from tests.misplanned import BLACK, DIFFUSE, lamp, octahedron, scene
+from reports import verdict
+from tests.misplanned import BLACK, DIFFUSE, TWO_SIDED, lamp, octahedron, scene
 from tests.parts import look_at, moved
 
 PASSES = 8
@@ -117,6 +118,52 @@ def test_a_shape_seen_through_a_hidden_lamp_is_as_bright_as_without_looking_thro
             assert agree(found, truth), (integrator, made.plan.integrator, found, truth)
         _, whole = planned(described, everything=True)
         assert agree(whole, found), (integrator, whole, found)
+
+
+def seen_through_a_ball(max_depth=-1, flip_normals=True, body="cylinder", aside=0.0):
+    """A shape behind a hidden ball that shines, to one side or inwards."""
+    ball = {"type": "sphere", "to_world": moved((aside, 0.2, 1.3), 1.59), "bsdf": BLACK}
+    emitter = {"type": "area", "radiance": 10.0}
+    return scene(
+        integrator={"type": "path", "hide_emitters": True, "max_depth": max_depth},
+        ball=ball | {"flip_normals": flip_normals, "emitter": emitter},
+        body={"type": body, "to_world": moved((0, 4, 0), 0.8), "bsdf": DIFFUSE},
+        floor={"type": "rectangle", "to_world": moved((0, 0, -1), 4), "bsdf": TWO_SIDED},
+        point=lamp((0, -3, 2.0)),
+    )
+
+
+@pytest.mark.guarantee(
+    "plans", "What is seen through both sides of a hidden lamp is warned of first."
+)
+def test_a_shape_seen_through_both_sides_of_a_hidden_lamp_is_warned_of(rgb):
+    """Mitsuba's volpath lights it as if it were inside."""
+    for flip_normals in (True, False):
+        described = seen_through_a_ball(flip_normals=flip_normals, body="sphere")
+        record = compare(Source("a test", described), Options(spp=16)).record
+        assert record.plan.integrator == "volpath"
+        assert "through both sides of a hidden lamp" in record.caution
+        assert verdict.headline([record]).startswith("a test: The reference is wrong at")
+        assert "integrator" in {entry.what for entry in record.overridden}
+    for described in (
+        seen_through_a_ball(max_depth=2, body="sphere", flip_normals=False),
+        seen_through_a_ball(body="cube"),
+        seen_through_a_ball(body="sphere", aside=9.0),
+    ):
+        record = compare(Source("a test", described), Options(spp=16)).record
+        assert record.caution == ""
+        is_override = "integrator" in {entry.what for entry in record.overridden}
+        assert is_override is (record.plan.integrator == "volpath")
+
+
+def test_what_the_warning_names_is_wrong_in_mitsuba_alone(rgb):
+    """The ball shines inwards, so it lights nothing outside."""
+    described = seen_through_a_ball(body="sphere")
+    made, _ = planned(described)
+    assert np.array(made.reference.render(0)).max() > 5
+    without = {name: part for name, part in described.items() if name != "ball"}
+    made, _ = planned(without)
+    assert np.array(made.reference.render(0)).max() < 1
 
 
 # --- Settings of the scene's own integrator --------------------------------------------------

@@ -140,6 +140,20 @@ def _beyond_lamps(scene, ray, active):
     return si
 
 
+@dr.syntax
+def is_behind_two_lamps(scene, ray):
+    """Return whether rays reach a shape that is not a mesh through two or more shining surfaces."""
+    si = scene.ray_intersect(ray)
+    count = dr.zeros(mi.UInt32, dr.width(ray.d))
+    skip = si.is_valid() & (si.shape.emitter() != None)  # noqa: E711  lane-wise
+    while skip:
+        count[skip] = count + 1
+        ray[skip] = si.spawn_ray(ray.d)
+        si[skip] = scene.ray_intersect(ray, mi.RayFlags.All, False, skip)
+        skip &= si.is_valid() & (si.shape.emitter() != None)  # noqa: E711  lane-wise
+    return si.is_valid() & (count > 1) & ~si.shape.is_mesh()
+
+
 def _has_delta(scene):
     bsdfs = (shape.bsdf() for shape in scene.shapes())
     return any(bsdf and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) for bsdf in bsdfs)
