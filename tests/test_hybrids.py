@@ -25,6 +25,7 @@ from tests.misplanned import BLACK, DIFFUSE
 from tests.misplanned import scene as described
 from tests.noisy import require_equal, whole
 from tests.parts import camera, moved
+from tests.programs import ROOT
 from tests.test_objects import shadowed
 
 MADE_OF = {
@@ -75,6 +76,17 @@ def test_a_clamped_fall_off_is_a_cause(rgb):
     assert record.departure > 0.5
     assert [entry.effect for entry in record.effects] == ["distance attenuation"]
     assert abs(record.closure.mean) < 0.01 * record.departure
+
+
+@pytest.mark.thorough
+def test_a_pane_counts_as_an_obstacle(rgb):
+    """As docs/reading.md says, with numbers."""
+    case = open_case(ROOT / "docs/scenes/pane.xml", Options())
+    ready = guarded(case.source, case.options)
+    record = attribution.find(ready, case.source, case.options).record
+    removed = {entry.effect: entry.removes.value for entry in record.effects}
+    expected = {"occlusion": -11, "interreflection": 6, "extended lights": 6, "transmission": 0}
+    assert removed == pytest.approx(expected, abs=2)
 
 
 @pytest.mark.guarantee(

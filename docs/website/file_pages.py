@@ -7,7 +7,9 @@ from textwrap import indent
 
 from guarantees import ROOT, Guarantee, guarantees
 
-LANGUAGES = {".py": "python", ".json": "json", ".toml": "toml", ".glsl": "glsl"}
+LANGUAGES = {
+    ".py": "python", ".json": "json", ".toml": "toml", ".glsl": "glsl", ".xml": "xml"
+}  # fmt: skip
 
 
 @cache
