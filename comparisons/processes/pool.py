@@ -24,7 +24,7 @@ from time import monotonic, sleep
 from typing import Any, NoReturn, Self
 
 from comparisons.processes.interruption import SIGNALS, held_back
-from heuristic.errors import FotismosError, LostProcessError
+from heuristic.errors import FotismosError, InputError, LostProcessError
 
 LOOK_S = 1.0
 """Seconds between checks that a process lives: its forks may hold its pipe open."""
@@ -209,6 +209,14 @@ class Worker:
             sleep(0.01)
         code = self.process.exitcode
         self.end()
+        if code == 0:  # nothing of ours ends a process that has a task
+            self.outcome.set_exception(
+                InputError(
+                    f"{self.task.name}: a script or shader ended its process with exit code 0."
+                    " Remove os._exit from it."
+                )
+            )
+            return
         if code == -signal.SIGKILL:
             reason = "its process was killed (SIGKILL), usually because memory ran out."
         elif code is not None and code < 0:
