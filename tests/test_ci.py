@@ -115,6 +115,7 @@ def failure(made_baselines, tmp_path_factory):
 def test_what_moved_fails_with_a_table_and_the_others_are_checked(failure):
     assert failure.code == 2, "one baseline could not be read"
     assert "1 of 3 moved" in failure.printed
+    assert "fig-8-6b: failed. reference R, block 2,3 moved from " in failure.printed
     assert "1 could not be checked" in failure.printed
     assert re.search(r"reference R, block 2,3 +\S+ +\S+ +-33 % +-\S+ +\S+", failure.printed)
     accepting = f"fotismos check {failure.baselines / 'fig-8-6b.json'} --update"
@@ -125,6 +126,10 @@ def test_what_moved_fails_with_a_table_and_the_others_are_checked(failure):
 @pytest.mark.guarantee("checks", "A failure writes one page: before, now, where, and why.")
 def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
     html = (failure.out / "index.html").read_text()
+    headline = re.search(r'<h1 id="headline">(.*?)</h1>', html)[1]
+    assert "fig-8-6b: reference R, block 2,3 moved from " in headline
+    assert "-33 %" in headline
+    assert "differ visibly</h1>" not in html
     for part in ("1 of 3 moved", "row 2, column 3", "reference, before", "--update"):
         assert part in html, part
     names = {path.name for path in (failure.out / "fig-8-6b").iterdir()}
@@ -151,7 +156,7 @@ def test_ci_reads_what_moved_and_what_was_not_checked(failure):
     assert message.get("message").startswith("reference R, block 2,3 moved from ")
     assert "standard errors" in message.text
     text = (failure.folder / "s.md").read_text()
-    assert "| fig-8-6b | failed | reference R, block 2,3 (1 in all) |" in text
+    assert "| fig-8-6b | failed | reference R, block 2,3, -33 % (1 in all) |" in text
     assert f"`{failure.folder / 'out/check/index.html'}`" in text
 
 
@@ -274,11 +279,24 @@ def redder(image):
     return image
 
 
+def test_what_moved_most_is_the_largest_not_the_most_certain():
+    change = {"half": None, "block": None, "error": 0.0, "standard_errors": 1.0, "p_corrected": 0.0}
+    moves = [
+        Move(quantity="certain", before=100.0, after=101.0, p=1e-30, **change),
+        Move(quantity="large", before=0.1, after=0.2, p=1e-4, **change),
+        Move(quantity="larger", before=0.0, after=0.01, p=1e-5, **change),
+        Move(quantity="odd", before=0.1, after=float("nan"), p=1e-5, **change),
+    ]
+    found = moved(moves)
+    assert [move.quantity for move in found] == ["odd", "larger", "large", "certain"]
+    assert [move.change for move in found[1:]] == ["+0.01", "+1e+02 %", "+1 %"]
+
+
 def test_causes_name_the_half_the_place_and_the_colour():
     found = check_of(reference=redder)
     causes = " ".join(found.causes())
     assert "Only the reference moved" in causes
-    assert "in 1 of 16 blocks, most in row 2, column 3." in causes
+    assert "in 1 of 16 blocks, most in row 2, column 3, from luminance 0.5" in causes
     level = " ".join(check_of(heuristic=lambda image: 1.3 * image).causes())
     assert "1.3 times the light everywhere" in level
     assert check_of(redder, redder).causes()[0].startswith("Both halves moved: look at what")

@@ -77,6 +77,18 @@ class Move(Record):
     p: Share
     p_corrected: Share
 
+    @property
+    def size(self) -> float:
+        """How much it moved: metrics, which differ in unit, by their share, colours in light."""
+        change = abs(self.after - self.before)
+        return change if self.half or self.block else change / max(self.before, self.after, 1e-9)
+
+    @property
+    def change(self) -> str:
+        """How much it moved, in words: in percent of what it was, unless that was 0."""
+        change = self.after - self.before
+        return f"{100 * change / abs(self.before):+.2g} %" if self.before else f"{change:+.2g}"
+
     def cells(self) -> tuple[str, ...]:
         """Return cells of a table: name, from, to, standard errors and p-value."""
         errors = self.standard_errors
@@ -151,26 +163,24 @@ def level_of_each(level: float, checks: int) -> float:
 
 
 def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
-    """Return those that moved: metrics, then whole images, then blocks, smallest p first.
+    """Return those that moved: metrics, then whole images, then blocks, the largest move first."""
 
-    Equal ones are in order of their difference, the largest first.
-    """
-
-    def order(move: Move) -> tuple[int, float, float]:
+    def order(move: Move) -> tuple[int, float]:
         part = (move.half is not None) + (move.block is not None)
-        return part, move.p, -abs(move.after - move.before)
+        return part, -np.nan_to_num(move.size, nan=np.inf)
 
     # A NaN does not pass.
     return sorted((move for move in moves if not move.p_corrected >= level), key=order)
 
 
 def where_moved(before: Array, after: Array, count: int) -> str:
-    """Return how many blocks (rows, columns, 3) moved, ``count``, and where most."""
+    """Return how many blocks (rows, columns, 3) moved, ``count``, where most and by how much."""
     if not count:
         return "moved in the mean of the image, but in no single block"
     change = np.abs(after - before).sum(axis=-1)
     row, column = np.unravel_index(change.argmax(), change.shape)
-    most = f"most in row {row + 1}, column {column + 1}"
+    old, new = (float(luminance(colours[row, column])) for colours in (before, after))
+    most = f"most in row {row + 1}, column {column + 1}, from luminance {old:.3g} to {new:.3g}"
     return f"moved in {count} of {change.size} blocks, {most}"
 
 

@@ -80,6 +80,21 @@ class CheckRecord(Record, kw_only=True, omit_defaults=True):
         return Path(self.baseline).stem
 
     @property
+    def largest(self) -> Move | None:
+        """What moved most: of a block, which says where, if any did."""
+        moved = self.moved or ()
+        return next((move for move in moved if move.block), moved[0] if moved else None)
+
+    @property
+    def headline(self) -> str:
+        """What moved most, where, from what to what, and how much else; empty for nothing."""
+        if (most := self.largest) is None:
+            return ""
+        others = len(self.moved or ()) - 1
+        more = f", and {others} more" if others else ""
+        return f"{most.quantity} moved from {most.before:.4g} to {most.after:.4g} ({most.change}){more}."
+
+    @property
     def exit_code(self) -> int:
         """1 if something moved, 2 if the baseline could not be checked, else 0."""
         return {"failed": 1, "error": 2}.get(self.status, 0)
@@ -226,6 +241,7 @@ def _before(made: CheckRecord, before: baselines.Kept, after: baselines.Kept) ->
         shown[f"{name}, {LEADING.label} between them"] = error
     return Before(
         name=made.name,
+        headline=made.headline,
         sentences=tuple(filter(None, (*made.causes, made.versions_line))),
         moved=tuple(move.cells() for move in made.moved or ()),
         tested=made.tested or 0,

@@ -165,7 +165,7 @@ def junit_of_checks(checks: Sequence[CheckRecord]) -> bytes:
         names = {"name": made.name, "file": made.baseline, "time": f"{made.seconds:.3f}"}
         case = _element("testcase", {**names, "classname": "fotismos.check"})
         if made.status == "failed":
-            failure = _element("failure", {"message": headline(made), "type": "moved"})
+            failure = _element("failure", {"message": made.headline, "type": "moved"})
             failure.text = _clean("\n".join(moved_lines(made)))
             case.append(failure)
         elif made.status == "error":
@@ -248,9 +248,9 @@ def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
     ]
     for made in checks:
         cells: tuple[str, ...] = (made.message, "", "", "", "")
-        if made.moved:
-            what, *numbers = made.moved[0].cells()
-            cells = (f"{what} ({len(made.moved)} in all)", *numbers)
+        if made.moved and (most := made.largest):
+            what, *numbers = most.cells()
+            cells = (f"{what}, {most.change} ({len(made.moved)} in all)", *numbers)
         rows.append((made.name, made.status, *cells))
     parts = ["### fotismos check", outcome(checks, level), _marked_down(rows, right=3)]
     parts += [escaped(f"{made.name}: {' '.join(made.causes)}") for made in checks if made.causes]
@@ -291,16 +291,6 @@ def outcome(checks: Sequence[CheckRecord], level: float) -> str:
     return text + (f"; {errors} could not be checked" if errors else "")
 
 
-def headline(made: CheckRecord) -> str:
-    """Return one line on a baseline of which something moved."""
-    first, *others = made.moved or ()
-    more = f", and {len(others)} more" if others else ""
-    return (
-        f"{first.quantity} moved from {first.before:.6g} to {first.after:.6g}"
-        f" (p = {first.p_corrected:.1g}){more}"
-    )
-
-
 def moved_lines(made: CheckRecord) -> Iterator[str]:
     """Yield the table of what moved: from, to, by how many standard errors, p-value; and causes."""
     moved = made.moved or ()
@@ -308,10 +298,8 @@ def moved_lines(made: CheckRecord) -> Iterator[str]:
         ("what moved", "baseline", "now", "change", "standard errors", "p")
     ]
     for move in moved[:SHOWN]:
-        old, new = move.before, move.after
-        change = f"{100 * (new - old) / abs(old):+.2g} %" if old else f"{new - old:+.2g}"
         name, before, now, *certainty = move.cells()
-        rows.append((name, before, now, change, *certainty))
+        rows.append((name, before, now, move.change, *certainty))
     yield from printed(rows, right=2)
     if len(moved) > SHOWN:
         yield f"and {len(moved) - SHOWN} more; {made.tested} quantities were tested"
@@ -323,7 +311,7 @@ def _details(made: CheckRecord) -> Iterator[str]:
         yield f"{made.name}: {made.message}"
     if not made.moved:
         return
-    yield f"{made.name}: {made.status}"
+    yield f"{made.name}: {made.status}. {made.headline}"
     yield from ("  " + line for line in moved_lines(made))
     if made.versions_line:
         yield "  " + made.versions_line

@@ -40,6 +40,9 @@ SCRIPTS = (
     "pointer", "keyboard", "terms", "shading", "live", "main",
 )  # fmt: skip
 
+FIRST_MOVED = 3
+"""Moved scenes that the headline of a check names."""
+
 CHARTED = 6
 """Most charts of error against time on the overview."""
 
@@ -77,6 +80,8 @@ def render(
     scenes = [_scene(view, taken) for view in views]
     scenes.sort(key=lambda scene: -scene.shares[usual])
     failed = {_identifier(failure.scene, taken): failure for failure in failures}
+    since = [*(view.before for view in views if view.before), *moved]
+    headline = " ".join([title, *(f"{one.name}: {one.headline}" for one in since[:FIRST_MOVED])])
     data = {
         "scenes": [
             *map(_scene_data, scenes),
@@ -84,10 +89,8 @@ def render(
         ],
         "thresholds": THRESHOLDS,
         "usual": threshold,
-        "headlines": _runs(
-            lambda t: verdict.headline(records, t) if records or not moved else title
-        ),
-        "missing": _runs(lambda t: verdict.most_missing(records, t)),
+        "headlines": _runs(lambda t: headline if since else verdict.headline(records, t)),
+        "missing": _runs(lambda t: "" if since else verdict.most_missing(records, t)),
         "find": verdict.FIND,
         "terms": glossary.meanings(),
         **_drawing(),

@@ -84,11 +84,12 @@ class CostView(Record):
 class Before(Record):
     """What moved in a scene or picture since its baseline.
 
-    ``moved`` has a name, before, now, standard errors and p. ``pictures`` are WebP files by their
-    captions: how it was, and maps of the change.
+    ``headline`` says what moved most; ``moved`` has a name, before, now, standard errors and p.
+    ``pictures`` are WebP files by their captions: how it was, and maps of the change.
     """
 
     name: str
+    headline: str
     sentences: tuple[str, ...]
     moved: tuple[tuple[str, ...], ...]
     tested: int
