@@ -92,7 +92,8 @@ class CheckRecord(Record, kw_only=True, omit_defaults=True):
             return ""
         others = len(self.moved or ()) - 1
         more = f", and {others} more" if others else ""
-        return f"{most.quantity} moved from {most.before:.4g} to {most.after:.4g} ({most.change}){more}."
+        values = f"from {most.before:.4g} to {most.after:.4g} ({most.change})"
+        return f"{most.quantity} moved {values}{more}."
 
     @property
     def exit_code(self) -> int:
