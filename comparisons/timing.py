@@ -15,13 +15,13 @@ from reference.rendering.sums import student
 WARM = 1
 """Passes that do not count: the first one compiles, or wakes the threads."""
 
-FEWEST, MOST = 3, 24
+FEWEST, MOST = 3, 48
 """Pairs of passes that make a ratio."""
 
-BATCHES = 8
+BATCHES = 6
 """Groups of pairs, of each of which the shortest passes count: other work only ever adds time."""
 
-BUDGET_S = 0.5
+BUDGET_S = 1.0
 """If enough pairs take less, they are timed again without a pause in between."""
 
 WIDEST = 0.3
@@ -49,7 +49,7 @@ def ratio(heuristic: Sequence[float], reference: Sequence[float]) -> tuple[Estim
     """Return the geometric mean of the batches' ratios with its interval, or why there is none."""
     if len(heuristic) < FEWEST:
         return None, TOO_FEW
-    count = max(FEWEST, min(BATCHES, len(heuristic) // 2))
+    count = max(FEWEST, min(BATCHES, len(heuristic) // 3))
     shortest_h = [batch.min() for batch in np.array_split(np.array(heuristic), count)]
     shortest_r = [batch.min() for batch in np.array_split(np.array(reference), count)]
     logarithms = np.log(np.divide(shortest_r, shortest_h))

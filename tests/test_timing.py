@@ -46,9 +46,9 @@ def test_a_ratio_is_the_true_one_or_absent(busy):
     rng = np.random.default_rng(0)
     ratios = []
     for _ in range(200):
-        added = (rng.random((2, 24)) < busy) * rng.uniform(0, 2, (2, 24))
-        heuristic = 1e-3 * rng.normal(1, 0.02, 24) * (1 + added[0])
-        reference = 7e-3 * rng.normal(1, 0.02, 24) * (1 + added[1])
+        added = (rng.random((2, 48)) < busy) * rng.uniform(0, 2, (2, 48))
+        heuristic = 1e-3 * rng.normal(1, 0.02, 48) * (1 + added[0])
+        reference = 7e-3 * rng.normal(1, 0.02, 48) * (1 + added[1])
         ratio, reason = timing.ratio(heuristic, reference)
         assert (ratio is None) is (reason == timing.TOO_WIDE)
         ratios += [ratio] if ratio else []
