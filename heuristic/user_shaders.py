@@ -77,6 +77,11 @@ def from_file(word: str) -> Heuristic:
     return known
 
 
+def forget() -> None:
+    """Forget all files: what else they read may have changed."""
+    _known.clear()
+
+
 def names_of(path: Path, content: str) -> dict[str, Any]:
     """Run a user's file and return its names; InputError tells the ``content`` that it needs."""
     if not path.is_file():

@@ -34,6 +34,7 @@ from comparisons.fit.fit_record import FitRecord
 from comparisons.options import Options
 from comparisons.pixel_terms import PixelTerms
 from comparisons.prepared import prepare
+from heuristic import user_shaders
 from heuristic.errors import InputError
 from heuristic.heuristics import Heuristic
 from heuristic.heuristics import declare as declare_heuristic
@@ -62,11 +63,12 @@ Result = TypeVar("Result")
 
 
 def _alone(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """Let a function run in one thread at a time, and switch Mitsuba's variant back after it."""
+    """Let a function run in one thread at a time, read shaders again, and keep the variant."""
 
     @wraps(function)
     def call(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
         with _running, same_variant():
+            user_shaders.forget()
             return function(*arguments, **options)
 
     return call

@@ -322,7 +322,7 @@ def test_a_study_with_a_python_shader_is_done_again(rgb, tmp_path):
     first, done = running.run(study, tmp_path / "out")
     assert (done, failed(first)) == (2, [])
     (tmp_path / "level").write_text("0.75")
-    user_shaders._known.clear()  # as in a new process
+    user_shaders.forget()  # as in a new process
     second, done = running.run(study, tmp_path / "out")
     assert done == 2
     assert first["heuristic"].to_pylist() != second["heuristic"].to_pylist()

@@ -360,7 +360,7 @@ def test_a_shader_that_reads_something_is_rendered_again(way, rgb, run, written,
         written(text, "level")
         written(f"LEVEL = {text}\n", "level_module.py")
         monkeypatch.setenv("LEVEL", text)
-        user_shaders._known.clear()  # as in a new process
+        user_shaders.forget()  # as in a new process
         code, _, messages = run(*words, "-o", "out")
         assert (code, messages) == (0, "")
         means.append(record_of(Path("out"))["metrics"]["rmse"]["mean"])
