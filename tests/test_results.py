@@ -263,6 +263,16 @@ def test_partial_files_of_others_stay_and_ours_go(tmp_path):
         assert not (tmp_path / names[1]).exists()
 
 
+@pytest.mark.parametrize("mark", ["{", "{}", '{"index.html": 5}', '{"index.html": ["x"]}', "{[}"])
+def test_a_damaged_mark_makes_nothing_ours(tmp_path, mark):
+    (tmp_path / ".fotismos").write_text(mark)
+    (tmp_path / "index.html").write_text("mine")
+    fault = "index.html: this file was not made"
+    with pytest.raises(InputError, match=fault), results.hold(tmp_path, "test"):
+        pass
+    assert (tmp_path / "index.html").read_text() == "mine"
+
+
 def test_a_folder_of_version_0_3_is_taken_over(tmp_path):
     (tmp_path / ".fotismos").touch()
     (tmp_path / "index.html").write_text("of 0.3")

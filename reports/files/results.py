@@ -23,6 +23,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Annotated
 
+import msgspec
 from filelock import FileLock, Timeout
 from msgspec import Meta
 
@@ -218,7 +219,12 @@ def _made(folder: Path) -> dict[str, list[str]] | None:
     None if the folder is not shared with others: all files in it are its own, or none is.
     """
     text = (folder / MARK).read_bytes()[: 2**16] if is_own(folder) else b""
-    return json.loads(text) if text.startswith(b"{") else None
+    if not text.startswith(b"{"):
+        return None
+    try:
+        return msgspec.json.decode(text, type=dict[str, list[str]])
+    except msgspec.DecodeError:  # damaged: nothing is known to be its own
+        return {}
 
 
 def _is_made(path: Path, made: dict[str, list[str]]) -> bool:
@@ -251,10 +257,12 @@ def _not_ours(path: Path) -> InputError:
             f"{atomic.printable(path)}: this is a symbolic link, to {os.readlink(path)!r}, and is"
             " not followed. Give the folder itself with -o, or move the link away."
         )
-    kind = "folder" if path.is_dir() else "file"
+    fault = "folder was not made by fotismos"
+    if not path.is_dir():
+        fault = "file was not made by fotismos, or was changed since"
     return InputError(
-        f"{atomic.printable(path)}: this {kind} was not made by fotismos. Move it away, or choose"
-        " another output folder with -o."
+        f"{atomic.printable(path)}: this {fault}. Move it away, or choose another output folder"
+        " with -o."
     )
 
 
