@@ -6,7 +6,7 @@ The seed of pass ``i`` is hashed from the run's seed and ``i``.
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from importlib import import_module
 from threading import Thread
@@ -82,6 +82,7 @@ def compare(
     progress: Progress | None = None,
     command: str = "",
     why: bool = False,
+    alone: AbstractContextManager[Any] | None = None,
 ) -> Comparison:
     """Compare the heuristic half of a scene with the physical one, in the current variant.
 
@@ -89,7 +90,7 @@ def compare(
     after each pass; with a noise target, ``total`` is the limit. ``why`` finds causes, and traces
     equation 8.10 at pixels. Raises `InputError` if the scene cannot be read or paired, no
     pixel sees a surface, or both halves are black; `NonFiniteError` for a NaN or an infinity in a
-    rendering.
+    rendering. Times are taken within the context ``alone``.
     """
     options = options or Options()
     printed: list[str] = []
@@ -99,7 +100,7 @@ def compare(
 
             formulas.enter_context(definitions.in_use())
         with collect_messages(printed):
-            comparison, ready = _compare(source, options, progress, command, why)
+            comparison, ready = _compare(source, options, progress, command, why, alone)
         lines = count_messages([*source.messages, *printed])
         record = comparison.record
         record = structs.replace(record, warnings=(*record.warnings, *lines))
@@ -143,7 +144,12 @@ def _computed_twice(comparison: Comparison) -> Comparison:
 
 
 def _compare(
-    source: Source, options: Options, progress: Progress | None, command: str, why: bool
+    source: Source,
+    options: Options,
+    progress: Progress | None,
+    command: str,
+    why: bool,
+    alone: AbstractContextManager[Any] | None,
 ) -> tuple[Comparison, Prepared]:
     stages: dict[str, float] = {}
     begin = perf_counter()
@@ -162,7 +168,8 @@ def _compare(
     stages |= {"planning": ready.planning_seconds, "guard": guard.seconds}
     estimates = render(ready, options, ready.counted, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
-    spent = _times(heuristic, reference, options)
+    with alone or nullcontext():
+        spent = _times(heuristic, reference, options)
     done("timing")
     _load()  # not beside the passes, whose times are compared
     exact = ready.plan.exact and not options.image

@@ -48,3 +48,38 @@ def test_one_that_measures_is_alone_and_no_newcomer_comes_first(tmp_path):
     assert over.is_set()
     assert order[0] == "first"
     assert "measure" in order
+
+
+@pytest.mark.guarantee("runs", "A comparison takes its times while its command does nothing else.")
+def test_one_that_works_gives_way_between_its_steps(tmp_path):
+    """One that measures does not wait for all that another has to do."""
+    gate = tmp_path / "tables"
+    gate.mkdir()
+    busy, measured = [0], []
+    lock, both = threading.Lock(), threading.Barrier(2, timeout=10)
+
+    def work(name):
+        with Turn(tmp_path, gate) as turn:
+            both.wait()
+            for step in range(40):
+                turn.give_way()
+                with lock:
+                    busy[0] += 1
+                sleep(0.005)
+                with lock:
+                    busy[0] -= 1
+                if (name, step) == ("a", 5):
+                    with turn.alone():
+                        assert busy[0] == 0
+                        sleep(0.02)
+                        assert busy[0] == 0
+                        measured.append(name)
+            measured.append(f"end of {name}")
+
+    threads = [threading.Thread(target=work, args=(name,)) for name in "ab"]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(10)
+    assert measured[0] == "a"
+    assert set(measured[1:]) == {"end of a", "end of b"}

@@ -312,6 +312,12 @@ class Turn:
     def __exit__(self, *_: object) -> None:
         os.close(self._file)
 
+    def give_way(self) -> None:
+        """Wait while another process measures, or is about to."""
+        fcntl.flock(self._file, fcntl.LOCK_UN)
+        with self._at_gate():
+            fcntl.flock(self._file, fcntl.LOCK_SH)
+
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Wait until no other process works, and let none begin within this context."""

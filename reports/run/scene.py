@@ -60,9 +60,14 @@ def compare(
             return view, spent
         import comparisons.compare  # loaded late: a finished scene needs none
 
+        def in_turn(*state: Any) -> None:
+            """Show progress, after other processes have measured."""
+            turn.give_way()
+            progress(*state)
+
         begin, source, options = perf_counter(), case.source, case.options
         comparison = comparisons.compare.compare(
-            source, options, progress, case.command(), job.with_causes
+            source, options, in_turn, case.command(), job.with_causes, turn.alone()
         )
         spent = _stages(comparison.record, perf_counter() - begin)
         study, causes = None, comparison.causes
