@@ -102,6 +102,7 @@ def compare(
         from reports.ci import summary as ci  # loaded late: most comparisons need no CI
 
         nonlocal code
+        ci.require_free(junit, summary, [])  # nor what this command wrote
         studied = [view.studied for view in views]
         gates = ci.gates([record for record, _ in studied], max_visible, within)
         code = int(any(gate.state != "pass" for gate in gates))

@@ -102,15 +102,8 @@ def hold(
     lock = FileLock(folder / LOCK, patience, fallback_to_soft=False, preserve_lock_file=True)
     missing = [path for path in (folder, *folder.parents) if not os.path.lexists(path)]
     with atomic.explained(folder / LOCK):
-        folder.mkdir(parents=True, exist_ok=True)
-        _require_file(folder / LOCK)
-        try:
-            lock.acquire()
-        except Timeout:
-            raise OutputError(_held_by_another(folder)) from None
-        except OSError as error:
-            if error.errno not in WITHOUT_LOCKS:
-                raise
+        while not _acquires(lock, folder):
+            pass
     try:
         with atomic.explained(folder):
             holder = {"pid": os.getpid(), "host": platform.node(), "command": command}
@@ -154,6 +147,22 @@ def _is_used(folder: Path, names: Sequence[str]) -> bool:
     """Return whether a held folder has results."""
     paths = [path for path in folder.iterdir() if path.name not in (MARK, LOCK)]
     return any(not names or path.name in names or is_own(path) for path in paths)
+
+
+def _acquires(lock: FileLock, folder: Path) -> bool:
+    """Make a folder and lock it; False if a command that ended removed it in between."""
+    folder.mkdir(parents=True, exist_ok=True)
+    _require_file(folder / LOCK)
+    try:
+        lock.acquire()
+    except FileNotFoundError:
+        return False
+    except Timeout:
+        raise OutputError(_held_by_another(folder)) from None
+    except OSError as error:
+        if error.errno not in WITHOUT_LOCKS:
+            raise
+    return True
 
 
 def _held_by_another(folder: Path) -> str:
