@@ -10,7 +10,6 @@ they interpolate any heuristic (:mod:`heuristic.plugins.interpolated`).
 
 import pkgutil
 import re
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
@@ -291,13 +290,14 @@ class Heuristic:
             )
         return self.prepare(scene, **values) if self.prepare is not None else None
 
-    def digest(self) -> str:
-        """Return a digest of the files that ``shade`` and ``prepare`` are in."""
-        if self.code:
-            return self.code
-        modules = {function.__module__ for function in (self.shade, self.prepare) if function}
-        files = [getattr(sys.modules[module], "__file__", None) for module in sorted(modules)]
-        return content_digest(Path(file) for file in files if file)
+    def digest(self) -> str | None:
+        """Return what identifies the code: a name of the package's, or a digest of GLSL.
+
+        None for others' Python, of which nobody knows what else it reads.
+        """
+        if self.is_own:
+            return self.name
+        return self.code if self.name.endswith(".glsl") else None
 
     def evaluate(
         self,
@@ -313,11 +313,6 @@ class Heuristic:
         if self.is_own:
             return self.shade(point)
         return pkgutil.resolve_name(SHADED)(self.name, self.shade, point)
-
-    @property
-    def is_script(self) -> bool:
-        """Whether it is a user's Python code, of which nobody knows what else it reads."""
-        return not self.is_own and not self.name.endswith(".glsl")
 
     @property
     def inputs(self) -> tuple[str, ...]:

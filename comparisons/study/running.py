@@ -97,11 +97,11 @@ def _points(part: StudyPart) -> Iterator[StudyPoint]:
     except InputError as error:
         raise InputError(f"part {part.name!r}: {error}") from error
     own = "" if part.scene in SCENES else digest(source_of(part, points[0]))
-    heuristic = named(part.options.heuristic)
-    content = [own, heuristic.digest(), versions()]
+    code = named(part.options.heuristic).digest()
+    content = [own, code, versions()]
     identity = sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
     for number, values in enumerate(points):
-        yield StudyPoint(part, number, values, identity, not heuristic.is_script)
+        yield StudyPoint(part, number, values, identity, code is not None)
 
 
 def _check(part: StudyPart, points: list[Point]) -> None:

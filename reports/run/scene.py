@@ -112,8 +112,8 @@ def key_of(case: Case, job: Job) -> str | None:
     from comparisons.comparison import versions
     from reference.scene.source import digest
 
-    shading = named(case.options.heuristic)
-    if Path(case.word).suffix == ".py" or shading.is_script:
+    code = named(case.options.heuristic).digest()
+    if Path(case.word).suffix == ".py" or code is None:
         return None
     files = []
     if case.options.image:
@@ -128,7 +128,7 @@ def key_of(case: Case, job: Job) -> str | None:
         "variant": case.variant,
         "versions": versions(),
         "sources": program.source_digest(),
-        "heuristic": shading.digest(),
+        "heuristic": code,
         "pictures": [results.digest_of(path) for path in files if path.is_file()],
         "scene": digest(case.source),
     }
