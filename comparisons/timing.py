@@ -49,7 +49,7 @@ def ratio(heuristic: Sequence[float], reference: Sequence[float]) -> tuple[Estim
     """Return the geometric mean of the batches' ratios with its interval, or why there is none."""
     if len(heuristic) < FEWEST:
         return None, TOO_FEW
-    count = max(FEWEST, min(BATCHES, len(heuristic) // 3))
+    count = min(BATCHES, len(heuristic))
     shortest_h = [batch.min() for batch in np.array_split(np.array(heuristic), count)]
     shortest_r = [batch.min() for batch in np.array_split(np.array(reference), count)]
     logarithms = np.log(np.divide(shortest_r, shortest_h))
