@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from heuristic.errors import InputError, OutputError
+from fotismos.heuristic.errors import InputError, OutputError
 
 PARTIAL = ".fotismos-partial"
 

@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from comparisons import atomic
-from comparisons.gallery.builtin import builtin
-from comparisons.options import Options
-from comparisons.processes.pool import end_after_task
-from heuristic import program
-from heuristic.errors import InputError, suggestion
-from reference.planning.plan import wants_spectra
-from reference.scene.graph import set_variant
-from reference.scene.source import Script, Source
+from fotismos.comparisons import atomic
+from fotismos.comparisons.gallery.builtin import builtin
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.processes.pool import end_after_task
+from fotismos.heuristic import program
+from fotismos.heuristic.errors import InputError, suggestion
+from fotismos.reference.planning.plan import wants_spectra
+from fotismos.reference.scene.graph import set_variant
+from fotismos.reference.scene.source import Script, Source
 
 RGB, SPECTRAL = "llvm_ad_rgb", "llvm_ad_spectral"
 

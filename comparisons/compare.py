@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from msgspec import structs
 
-from comparisons import timing
-from comparisons.comparison import (
+from fotismos.comparisons import timing
+from fotismos.comparisons.comparison import (
     Comparison,
     ComparisonRecord,
     Deviations,
@@ -27,17 +27,17 @@ from comparisons.comparison import (
     TimeSpent,
     versions,
 )
-from comparisons.departure import marks, regions, statistics
-from comparisons.departure.blocks import bands
-from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import LEADING, METRICS, RATIO, leading_distance
-from comparisons.options import Options
-from comparisons.prepared import Prepared, guarded, require_light
-from heuristic import heuristics
-from reference.records import Pixels
-from reference.rendering.gbuffer import GBuffer
-from reference.rendering.renderer import Progress, Renderer, passes
-from reference.rendering.sums import (
+from fotismos.comparisons.departure import marks, regions, statistics
+from fotismos.comparisons.departure.blocks import bands
+from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, leading_distance
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import Prepared, guarded, require_light
+from fotismos.heuristic import heuristics
+from fotismos.reference.records import Pixels
+from fotismos.reference.rendering.gbuffer import GBuffer
+from fotismos.reference.rendering.renderer import Progress, Renderer, passes
+from fotismos.reference.rendering.sums import (
     DEVIATION,
     MEAN,
     Accumulator,
@@ -45,10 +45,10 @@ from reference.rendering.sums import (
     DifferenceSums,
     add_difference,
 )
-from reference.scene.source import Source, collect_messages, count_messages
+from fotismos.reference.scene.source import Source, collect_messages, count_messages
 
 if TYPE_CHECKING:
-    from comparisons.pixel_terms import LivePoints, TermGrid
+    from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
 
 PERCENTILE = 95
 """A noise target is for this percentile of the noise over the counted pixels."""
@@ -96,7 +96,7 @@ def compare(
     printed: list[str] = []
     with ExitStack() as formulas:
         if options.colour_science:
-            from comparisons.departure import definitions  # loaded late: it takes a second
+            from fotismos.comparisons.departure import definitions  # loaded late: it takes a second
 
             formulas.enter_context(definitions.in_use())
         with collect_messages(printed):
@@ -106,7 +106,9 @@ def compare(
         record = structs.replace(record, warnings=(*record.warnings, *lines))
         comparison = replace(comparison, record=record)
         if why and not options.image:  # no effect can be added to a picture
-            from comparisons.hybrids import attribution  # loaded late: --no-why needs none of it
+            from fotismos.comparisons.hybrids import (
+                attribution,  # loaded late: --no-why needs none of it
+            )
 
             comparison = attribution.explained(comparison, ready, source, options, progress)
         return _computed_twice(comparison)
@@ -116,12 +118,12 @@ def _load() -> None:
     """Load colour-science in a thread, which takes a second; importing it waits for the thread."""
     import scipy.optimize  # noqa: F401  not by two threads at once
 
-    Thread(target=import_module, args=("comparisons.departure.definitions",)).start()
+    Thread(target=import_module, args=("fotismos.comparisons.departure.definitions",)).start()
 
 
 def _computed_twice(comparison: Comparison) -> Comparison:
     """Note how far colour differences are from those of colour-science, and warn if it is far."""
-    from comparisons.departure import definitions
+    from fotismos.comparisons.departure import definitions
 
     shown, record = comparison.images, comparison.record
     some = np.random.default_rng(0).permutation(np.flatnonzero(shown.counted))[:COMPUTED_TWICE]
@@ -178,7 +180,7 @@ def _compare(
     caution = ready.caution() or require_light(*shown, source.name, options)
     picture = None
     if options.image:
-        from comparisons import pictures  # loaded late: few comparisons have any
+        from fotismos.comparisons import pictures  # loaded late: few comparisons have any
 
         picture = pictures.picture_record(heuristic, ready.scene, options, images)
     done("metrics")
@@ -188,7 +190,7 @@ def _compare(
     )
     live: LivePoints | str = "It needs --why."
     if why:
-        from comparisons import pixel_terms  # loaded late: --no-why traces none
+        from fotismos.comparisons import pixel_terms  # loaded late: --no-why traces none
 
         traced = pixel_terms.trace(ready.heuristic, options)
         live = pixel_terms.live(ready.heuristic, options)
@@ -197,7 +199,9 @@ def _compare(
         done("terms")
     mistakes: tuple[str, ...] = ()
     if not options.image and not heuristics.named(options.heuristic).is_own:
-        from comparisons.audit import diagnosis  # loaded late: only users' shaders have any
+        from fotismos.comparisons.audit import (
+            diagnosis,  # loaded late: only users' shaders have any
+        )
 
         mistakes = diagnosis.describe(options.heuristic)
     record = ComparisonRecord(

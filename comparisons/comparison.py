@@ -13,16 +13,16 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from comparisons.departure.colour import Viewing
-from comparisons.departure.regions import ObjectShare, Region
-from comparisons.departure.statistics import RatioSummary, Summary
-from comparisons.processes.pool import cores
-from heuristic import __version__
-from reference.pairing.factors import Unrepresentable
-from reference.pairing.halves import Pairing
-from reference.pairing.prepare import Override
-from reference.planning.plan import Plan
-from reference.records import (
+from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.regions import ObjectShare, Region
+from fotismos.comparisons.departure.statistics import RatioSummary, Summary
+from fotismos.comparisons.processes.pool import cores
+from fotismos.heuristic import __version__
+from fotismos.reference.pairing.factors import Unrepresentable
+from fotismos.reference.pairing.halves import Pairing
+from fotismos.reference.pairing.prepare import Override
+from fotismos.reference.planning.plan import Plan
+from fotismos.reference.records import (
     VERSION,
     Amount,
     Count,
@@ -36,10 +36,10 @@ from reference.records import (
     Size,
     Versions,
 )
-from reference.rendering.renderer import Times
+from fotismos.reference.rendering.renderer import Times
 
 if TYPE_CHECKING:
-    from comparisons.pixel_terms import LivePoints, TermGrid
+    from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
 
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")

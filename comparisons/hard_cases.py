@@ -13,9 +13,11 @@ import numpy as np
 from drjit.llvm import Array3f, Float
 from numpy.typing import ArrayLike, NDArray
 
-import heuristic
-from comparisons import textbook
-from comparisons.textbook import NAIVE, Setting, unit
+from fotismos.comparisons import textbook
+from fotismos.comparisons.textbook import NAIVE, Setting, unit
+from fotismos.heuristic.kernel import shade
+from fotismos.heuristic.lights import PointLight, SpotLight
+from fotismos.heuristic.materials import Material
 
 ABSENT = 1e-3
 """Values below this share of the largest are judged by their absolute error."""
@@ -87,7 +89,7 @@ POINTS = 2001
 
 
 def by_kernel(setting: Setting) -> NDArray[np.float32]:
-    """Evaluate :func:`heuristic.shade` at a setting, in single precision: an array (N,)."""
+    """Evaluate the kernel at a setting, in single precision: an array (N,)."""
     s = setting.rounded()
     vectors = (np.reshape(v, (-1, 3)) for v in (s.position, s.normal, s.view, s.light))
     numbers = (np.reshape(v, (-1, 1)) for v in (s.n, s.intensity))
@@ -95,17 +97,17 @@ def by_kernel(setting: Setting) -> NDArray[np.float32]:
     position, normal, view, light = map(Array3f, columns[:4])
     n, intensity = (Float(each[0]) for each in columns[4:])
     k0, k1, k2 = map(float, s.attenuation)
-    lamp: heuristic.PointLight | heuristic.SpotLight
+    lamp: PointLight | SpotLight
     if s.direction is None:
-        lamp = heuristic.PointLight(light, intensity, (k0, k1, k2))
+        lamp = PointLight(light, intensity, (k0, k1, k2))
     else:
         axis = tuple(map(float, s.direction))
         cone = float(s.cutoff), float(s.m)
-        lamp = heuristic.SpotLight(light, axis, intensity, *cone, (k0, k1, k2))
+        lamp = SpotLight(light, axis, intensity, *cone, (k0, k1, k2))
     exponent = n if np.isfinite(s.n).all() else np.inf  # a mirror is a plain number
-    material = heuristic.Material(k_d=float(s.k_d), k_s=float(s.k_s), n=exponent)
+    material = Material(k_d=float(s.k_d), k_s=float(s.k_s), n=exponent)
     dr.eval(position, normal, view, n, light, intensity)
-    value = heuristic.shade(position, normal, view, material, [lamp])
+    value = shade(position, normal, view, material, [lamp])
     return np.array(value + dr.zeros(Float, len(columns[0][0])))
 
 

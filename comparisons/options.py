@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import msgspec
 from msgspec import Meta, inspect, structs
 
-from heuristic import program
-from heuristic.errors import InputError, unknown
+from fotismos.heuristic import program
+from fotismos.heuristic.errors import InputError, unknown
 
 if TYPE_CHECKING:  # the command line reads options without loading Dr.Jit
-    from comparisons.departure.colour import Viewing
-    from heuristic.heuristics import Interpolation
-    from reference.pairing.factors import Convention
-    from reference.pairing.halves import Pair
-    from reference.scene.source import Source
+    from fotismos.comparisons.departure.colour import Viewing
+    from fotismos.heuristic.heuristics import Interpolation
+    from fotismos.reference.pairing.factors import Convention
+    from fotismos.reference.pairing.halves import Pair
+    from fotismos.reference.scene.source import Source
 
 LARGEST_SPP = 2**20
 """Samples per pixel: the noise is a thousandth of one sample's, and an image takes days."""
@@ -30,7 +30,7 @@ Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
 Samples = Annotated[int, Meta(ge=2, le=LARGEST_SPP)]  # the noise needs at least 2
 Error = Annotated[float, Meta(gt=0, le=1000)]  # ΔE2000
 Side = Annotated[int, Meta(ge=1, le=2**31 - 1)]
-Fineness = Annotated[int, Meta(ge=1, le=512)]  # heuristic.tessellation.FINEST
+Fineness = Annotated[int, Meta(ge=1, le=512)]  # fotismos.heuristic.tessellation.FINEST
 Sensor = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Density = Annotated[float, Meta(ge=1, le=1000)]  # departure.colour.MOST_PIXELS
 
@@ -45,8 +45,8 @@ class Options(
 ):
     """The options of a comparison, as the command line names them; None leaves one to the scene.
 
-    A ``heuristic`` may also be a function of a point or a :class:`heuristic.Heuristic`: it is
-    declared in this process, and its name is stored. A value that is not allowed raises
+    A ``heuristic`` may also be a function of a point or a :class:`fotismos.heuristic.Heuristic`: it
+    is declared in this process, and its name is stored. A value that is not allowed raises
     :class:`InputError`.
     """
 
@@ -164,28 +164,28 @@ class Options(
     @property
     def convention(self) -> Convention:
         """How roughplastic and phong are paired."""
-        from reference.pairing.factors import Convention
+        from fotismos.reference.pairing.factors import Convention
 
         return Convention(self.pairing)
 
     @property
     def polygon_shading(self) -> Interpolation:
         """How the heuristic half shades polygons."""
-        from heuristic.heuristics import Interpolation
+        from fotismos.heuristic.heuristics import Interpolation
 
         return Interpolation(self.interpolation or "phong")
 
     @property
     def viewing(self) -> Viewing:
         """The viewing conditions."""
-        from comparisons.departure.colour import DEFAULT_VIEWING, Viewing
+        from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Viewing
 
         density = self.pixels_per_degree
         return DEFAULT_VIEWING if density is None else Viewing(pixels_per_degree=density)
 
     def pair(self, source: Source) -> Pair:
-        """Derive both halves of a scene, for the current variant (:func:`reference.pair`)."""
-        from reference.pairing.halves import pair
+        """Derive both halves of a scene, for the current variant."""
+        from fotismos.reference.pairing.halves import pair
 
         return pair(
             source,
@@ -210,7 +210,7 @@ class Options(
 def _plain(name: str, value: Any) -> Any:
     """Return a value of an option as a file would have it."""
     if name == "heuristic" and value is not None and not isinstance(value, str):
-        from heuristic.heuristics import known_as
+        from fotismos.heuristic.heuristics import known_as
 
         return known_as(value)
     if name == "define":

@@ -22,14 +22,14 @@ import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
-from comparisons.comparison import Images, PictureRecord
-from comparisons.departure.colour import CHROMATICITIES, from_srgb, luminance, to_srgb
-from comparisons.options import Options
-from heuristic.errors import InputError, NonFiniteError, suggestion
-from reference.pairing.prepare import film_size
-from reference.rendering.gbuffer import gbuffer
-from reference.rendering.renderer import LARGEST_VALUE, Renderer, Times
-from reference.scene.source import Source
+from fotismos.comparisons.comparison import Images, PictureRecord
+from fotismos.comparisons.departure.colour import CHROMATICITIES, from_srgb, luminance, to_srgb
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
+from fotismos.reference.pairing.prepare import film_size
+from fotismos.reference.rendering.gbuffer import gbuffer
+from fotismos.reference.rendering.renderer import LARGEST_VALUE, Renderer, Times
+from fotismos.reference.scene.source import Source
 
 SUFFIXES = (".exr", ".png")
 

@@ -13,16 +13,16 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.departure.blocks import shrunk
-from comparisons.options import Options
-from heuristic import kernel, materials, terms, vectors
-from heuristic.convention import Scene
-from heuristic.errors import InputError
-from heuristic.heuristics import Interpolation
-from heuristic.lights import lamps
-from heuristic.materials import COEFFICIENTS, FORMS, Material
-from reference.rendering.gbuffer import image_size, pixel_rays
-from reference.rendering.renderer import Renderer, pass_seed, variant
+from fotismos.comparisons.departure.blocks import shrunk
+from fotismos.comparisons.options import Options
+from fotismos.heuristic import kernel, materials, terms, vectors
+from fotismos.heuristic.convention import Scene
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.heuristic.lights import lamps
+from fotismos.heuristic.materials import COEFFICIENTS, FORMS, Material
+from fotismos.reference.rendering.gbuffer import image_size, pixel_rays
+from fotismos.reference.rendering.renderer import Renderer, pass_seed, variant
 
 SIDE = 64
 """Points along the longer side of the grid, at most."""
@@ -195,8 +195,9 @@ class LivePoints:
     surface is seen; ``depth``, the logarithm of the distance from a ray's origin; ``normal.x`` and
     so on; ``face_normal.x`` and so on, if faces of meshes have other normals; and ``k_d.x`` and so
     on, factors on the materials', if they vary. ``lights`` have a name, and the fields of
-    :mod:`heuristic.lights` as lists of numbers. ``rays`` (2, 3, 3) are origins and directions, of
-    any length, of the rays of three pixels in the corners: left, right, and left again below.
+    :mod:`fotismos.heuristic.lights` as lists of numbers. ``rays`` (2, 3, 3) are origins and
+    directions, of any length, of the rays of three pixels in the corners: left, right, and left
+    again below.
     """
 
     planes: dict[str, NDArray]

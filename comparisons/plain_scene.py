@@ -11,16 +11,16 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from comparisons.options import Options
-from heuristic import meshes
-from heuristic.convention import Scene
-from heuristic.errors import InputError
-from heuristic.lights import INTENSITIES, PLUGINS, lamps
-from heuristic.materials import COEFFICIENTS, PHYSICAL
-from heuristic.tessellation import RESOLUTION, to_mesh
-from reference.pairing.halves import pair
-from reference.rendering.gbuffer import gbuffer, image_size
-from reference.scene.source import Source
+from fotismos.comparisons.options import Options
+from fotismos.heuristic import meshes
+from fotismos.heuristic.convention import Scene
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.lights import INTENSITIES, PLUGINS, lamps
+from fotismos.heuristic.materials import COEFFICIENTS, PHYSICAL
+from fotismos.heuristic.tessellation import RESOLUTION, to_mesh
+from fotismos.reference.pairing.halves import pair
+from fotismos.reference.rendering.gbuffer import gbuffer, image_size
+from fotismos.reference.scene.source import Source
 
 KINDS = {kind: plugin.removeprefix("heuristic_") for plugin, kind in PLUGINS.items()}
 
@@ -137,7 +137,7 @@ def camera(scene: mi.Scene) -> dict:
 
 
 def triangles_of(shape: mi.Shape, material: int, resolution: int | None) -> Triangles:
-    """Return a shape as the triangles of :func:`heuristic.tessellation.to_mesh`."""
+    """Return a shape as the triangles of :func:`fotismos.heuristic.tessellation.to_mesh`."""
     mesh = to_mesh(shape, resolution or RESOLUTION)
     parts = (meshes.POSITIONS, meshes.NORMALS, meshes.TEXCOORDS, meshes.FACES)
     positions, normals, texcoords, faces = (meshes.rows(mesh, part) for part in parts)

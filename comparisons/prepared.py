@@ -12,26 +12,26 @@ import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
-from comparisons.options import Options
-from heuristic.convention import Scene
-from heuristic.errors import InputError
-from heuristic.heuristics import named
-from reference.pairing.halves import Pair
-from reference.pairing.prepare import Override
-from reference.planning.guard import examine_plan
-from reference.planning.plan import Guard, Plan, physical_integrator, plan
-from reference.planning.rules import SAMPLED_AS_HIT, loses_light
-from reference.rendering.direct import is_behind_two_lamps
-from reference.rendering.gbuffer import (
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.convention import Scene
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import named
+from fotismos.reference.pairing.halves import Pair
+from fotismos.reference.pairing.prepare import Override
+from fotismos.reference.planning.guard import examine_plan
+from fotismos.reference.planning.plan import Guard, Plan, physical_integrator, plan
+from fotismos.reference.planning.rules import SAMPLED_AS_HIT, loses_light
+from fotismos.reference.rendering.direct import is_behind_two_lamps
+from fotismos.reference.rendering.gbuffer import (
     GBuffer,
     gbuffer,
     image_size,
     pixel_rays,
     require_surface,
 )
-from reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
-from reference.rendering.sampler import SAMPLER, STOCK_SAMPLER, with_sampler
-from reference.scene.source import Source
+from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
+from fotismos.reference.rendering.sampler import SAMPLER, STOCK_SAMPLER, with_sampler
+from fotismos.reference.scene.source import Source
 
 WAVEFRONT = 2**24
 """Most samples of one pass, unless the image has more pixels: then one sample per pixel."""
@@ -156,7 +156,7 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
     """Pair and plan a scene in the current variant, and make both halves ready to render."""
     options = options or Options()
     if options.image:
-        from comparisons import pictures  # loaded late: few comparisons have any
+        from fotismos.comparisons import pictures  # loaded late: few comparisons have any
 
         options = pictures.at_size_of_pictures(source, options)
     pair = options.pair(source)
@@ -248,6 +248,6 @@ def _heuristic_renderer(
         renderer = Renderer(scene, None, spp, "heuristic image")
         if not options.image:
             return renderer
-        from comparisons import pictures
+        from fotismos.comparisons import pictures
 
         return pictures.PictureHalf(pictures.read_all(options), renderer)

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from reference.records import Estimated
-from reference.rendering.renderer import Renderer, passes
-from reference.rendering.sums import student
+from fotismos.reference.records import Estimated
+from fotismos.reference.rendering.renderer import Renderer, passes
+from fotismos.reference.rendering.sums import student
 
 WARM = 1
 """Passes that do not count: the first one compiles, or wakes the threads."""
@@ -34,7 +34,8 @@ TOO_WIDE = "passes too short, or the machine too busy, to time within 30 %"
 def measure(heuristic: Renderer, reference: Renderer, seed: int) -> tuple[Estimated | None, str]:
     """Return the ratio of the times of both halves, physical over textbook, or why there is none.
 
-    Both have rendered the same passes in turns (:func:`reference.rendering.renderer.passes`).
+    Both have rendered the same passes in turns
+    (:func:`fotismos.reference.rendering.renderer.passes`).
     """
     halves = (heuristic, reference)
     count = min(MOST, int(BUDGET_S / np.add(heuristic.times, reference.times).min()))

@@ -8,18 +8,18 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from statistics import median
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
-from comparisons.case import open_case
-from comparisons.cost.cost import cost
-from comparisons.cost.cost_record import Cost, Point
-from comparisons.cost.front import at_size, fronted, sufficient
-from comparisons.cost.methods import FULL_PLAN, STAND_INS
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from reports.terminal.cost_tables import busy
-from reports.terminal.tables import markdown
-from reports.terminal.words import number, parameter, seconds
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.cost.cost import cost
+from fotismos.comparisons.cost.cost_record import Cost, Point
+from fotismos.comparisons.cost.front import at_size, fronted, sufficient
+from fotismos.comparisons.cost.methods import FULL_PLAN, STAND_INS
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.reports.terminal.cost_tables import busy
+from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.words import number, parameter, seconds
 from tests.benchmarks import prediction
 
 LARGER = tuple(sorted((Path(__file__).parent / "scenes").glob("*.py")))

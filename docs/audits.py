@@ -3,15 +3,15 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
-from comparisons.audit.checks import Audit, Checked, audit
-from comparisons.audit.furnace import single_scattering
-from reports.terminal.tables import markdown
-from reports.terminal.words import number, percent
+from fotismos.comparisons.audit.checks import Audit, Checked, audit
+from fotismos.comparisons.audit.furnace import single_scattering
+from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.words import number, percent
 
 SHADERS = Path(__file__).parent / "shaders"
 PICTURED = "phong"

@@ -7,23 +7,23 @@ meshes, and the sphere itself, are rendered in turn, with the same samples.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from model_figures import COLOURS, GROUND, STYLE
 
-from comparisons.cost import measure
-from comparisons.cost.times import ratio
-from comparisons.gallery import scenes
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from heuristic.heuristics import Interpolation
-from reference.records import Estimated
-from reference.rendering.renderer import Renderer
-from reference.scene.source import Source
-from reports.terminal.words import number
+from fotismos.comparisons.cost import measure
+from fotismos.comparisons.cost.times import ratio
+from fotismos.comparisons.gallery import scenes
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.reference.records import Estimated
+from fotismos.reference.rendering.renderer import Renderer
+from fotismos.reference.scene.source import Source
+from fotismos.reports.terminal.words import number
 
 FINENESS = (2, 4, 8, 16, 32, 64)
 """Edges per quarter turn."""

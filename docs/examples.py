@@ -5,17 +5,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from textwrap import wrap
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 
-from comparisons.case import open_case
-from comparisons.compare import compare
-from comparisons.comparison import Comparison
-from comparisons.departure.metrics import LEADING
-from comparisons.options import Options
-from reference.scene.source import Source
-from reports.terminal.tables import markdown
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.comparison import Comparison
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.options import Options
+from fotismos.reference.scene.source import Source
+from fotismos.reports.terminal.tables import markdown
 from tests.wrong_shaders import WRONG
 
 SHADERS = Path(__file__).parent / "shaders"

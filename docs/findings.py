@@ -7,8 +7,8 @@ import jinja2
 import numpy as np
 import pyarrow as pa
 
-from comparisons.study import dataset
-from comparisons.study.design import StudyFile
+from fotismos.comparisons.study import dataset
+from fotismos.comparisons.study.design import StudyFile
 
 TEMPLATE = Path(__file__).with_suffix(".md.j2")
 
@@ -16,7 +16,7 @@ TEMPLATE = Path(__file__).with_suffix(".md.j2")
 class Facts:
     """The functions of the template: single values of a dataset, and the figures of its study.
 
-    ``where`` selects points by columns (:func:`comparisons.study.dataset.rows`).
+    ``where`` selects points by columns (:func:`fotismos.comparisons.study.dataset.rows`).
     """
 
     def __init__(self, study: StudyFile, table: pa.Table) -> None:

@@ -9,23 +9,23 @@ from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from PIL import Image
 
-from comparisons.departure.criterion import TOLERANCE
-from comparisons.departure.metrics import LEADING
-from comparisons.options import Options
-from reports import verdict
-from reports.charts import figures
-from reports.charts.theme import EFFECT_COLOURS
-from reports.files.images import webp
-from reports.files.results import TABLES
-from reports.jobs import Job
-from reports.run import scene
-from reports.terminal.words import number, percent
+from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.options import Options
+from fotismos.reports import verdict
+from fotismos.reports.charts import figures
+from fotismos.reports.charts.theme import EFFECT_COLOURS
+from fotismos.reports.files.images import webp
+from fotismos.reports.files.results import TABLES
+from fotismos.reports.jobs import Job
+from fotismos.reports.run import scene
+from fotismos.reports.terminal.words import number, percent
 
 SCENE = "cornell-box"
 GROUND, INK, QUIET = "#fcfcfb", "#1c1e21", "#585f67"

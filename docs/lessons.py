@@ -4,15 +4,15 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 
-from comparisons.case import open_case
-from comparisons.compare import compare
-from comparisons.comparison import Images
-from comparisons.options import Options
-from reports.terminal.tables import markdown
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.comparison import Images
+from fotismos.comparisons.options import Options
+from fotismos.reports.terminal.tables import markdown
 
 SIDE, SAMPLES = 64, 1024
 

@@ -9,27 +9,27 @@ rest is written by hand.
 import sys
 from pathlib import Path
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import nbformat
 from nbclient import NotebookClient
 
-from comparisons import atomic
-from comparisons.compare import compare
-from comparisons.departure.metrics import METRICS
-from comparisons.gallery.builtin import builtin
-from comparisons.options import Options
-from heuristic import plugins
-from heuristic.heuristics import Interpolation
-from reference.planning.rules import RULES
-from reference.rendering import direct
-from reference.scene.graph import set_variant
-from reports.charts import figures, vega
-from reports.charts.cost_charts import titled
-from reports.files import images
-from reports.run import audit_files
-from reports.terminal import tables
-from reports.terminal.words import number, percent
+from fotismos.comparisons import atomic
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.gallery.builtin import builtin
+from fotismos.comparisons.options import Options
+from fotismos.heuristic import plugins
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.reference.planning.rules import RULES
+from fotismos.reference.rendering import direct
+from fotismos.reference.scene.graph import set_variant
+from fotismos.reports.charts import figures, vega
+from fotismos.reports.charts.cost_charts import titled
+from fotismos.reports.files import images
+from fotismos.reports.run import audit_files
+from fotismos.reports.terminal import tables
+from fotismos.reports.terminal.words import number, percent
 from tests.witnesses import page
 
 DOCS = Path(__file__).parent

@@ -9,21 +9,21 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import msgspec
 import numpy as np
 
-from comparisons import atomic
-from comparisons.case import open_case
-from comparisons.cost.cost import cost
-from comparisons.departure.metrics import LEADING
-from comparisons.fit.fit_record import FitRecord
-from comparisons.options import Options
-from comparisons.study import dataset, design
-from reports.charts import vega
-from reports.charts.cost_charts import titled
-from reports.terminal.tables import markdown
+from fotismos.comparisons import atomic
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.cost.cost import cost
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.fit.fit_record import FitRecord
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.study import dataset, design
+from fotismos.reports.charts import vega
+from fotismos.reports.charts.cost_charts import titled
+from fotismos.reports.terminal.tables import markdown
 from tests.benchmarks import kernel
 from tests.verification import verify
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-import heuristic  # isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 from drjit.auto import Array3f
@@ -13,10 +13,10 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 from PIL import Image
 
-from comparisons.comparison import Images
-from comparisons.departure.metrics import LEADING
-from reports.charts import figures
-from reports.files import images
+from fotismos.comparisons.comparison import Images
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.reports.charts import figures
+from fotismos.reports.files import images
 
 GROUND, FAINT = "#fcfcfb", "#8a8a8a"
 EXPONENTS = {3: "#b97b00", 9: "#0067a8", 81: "#00795a"}
@@ -76,9 +76,9 @@ def seen(incidence: float, **material: float | str) -> NDArray[np.float64]:
     """
     view = Array3f(*(np.float32(part) for part in at(VIEWS)), 0)
     toward = at(-incidence)
-    light = heuristic.DirectionalLight(direction=(-toward[0], -toward[1], 0), intensity=1.0)
-    made = heuristic.Material(**material)
-    value = heuristic.shade(Array3f(0), Array3f(0, 1, 0), view, made, [light])
+    light = fotismos.DirectionalLight(direction=(-toward[0], -toward[1], 0), intensity=1.0)
+    made = fotismos.Material(**material)
+    value = fotismos.shade(Array3f(0), Array3f(0, 1, 0), view, made, [light])
     return np.broadcast_to(np.array(value, np.float64), VIEWS.shape)
 
 

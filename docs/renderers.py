@@ -5,17 +5,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 from engines import three_js  # next to this script
 
-from comparisons.case import Case, open_case
-from comparisons.compare import compare
-from comparisons.departure.metrics import leading_distance
-from comparisons.options import Options
-from comparisons.plain_scene import plain_scene
-from reports.terminal.tables import markdown
+from fotismos.comparisons.case import Case, open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.departure.metrics import leading_distance
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.plain_scene import plain_scene
+from fotismos.reports.terminal.tables import markdown
 from tests.witnesses import povray, povray_scenes
 
 SCENES = ("fig-8-9", "fig-8-8c", "lambert-sphere", "plastic-spheres")

@@ -47,7 +47,7 @@ def way() -> list[str]:
 
     The second of two comparisons is traced, because the first one runs imports.
     """
-    from reports import cli, jobs
+    from fotismos.reports import cli, jobs
 
     jobs.IN_PROCESSES = False  # calls in other processes would not be seen
     words = ["fotismos", "compare", SCENE, "--resolution", "16x16", "-q", "--fresh", "-o"]

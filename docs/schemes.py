@@ -7,7 +7,7 @@ squares, as in chapter 8.
 
 from collections.abc import Callable, Mapping, Sequence
 
-import heuristic  # isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 from drjit.auto import Array3f
@@ -31,8 +31,8 @@ from model_figures import (
 )
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure.colour import to_srgb
-from comparisons.gallery.builtin import THREE_LIGHTS, VIEWER_A, VIEWER_C, WHITE_LIGHT
+from fotismos.comparisons.departure.colour import to_srgb
+from fotismos.comparisons.gallery.builtin import THREE_LIGHTS, VIEWER_A, VIEWER_C, WHITE_LIGHT
 
 INK, LIGHT, GREY = "#1c1e21", COLOURS["L"], "#e3e5e8"
 N, L, R, V = (rf"\mathbf{{{letter}}}" for letter in "nlrv")
@@ -223,9 +223,9 @@ def ball(**material: float) -> Callable[[Axes], None]:
         x, y = np.meshgrid(np.linspace(-1, 1, 121), np.linspace(1, -1, 121))
         z = np.sqrt(np.maximum(1 - x**2 - y**2, 0))
         normal = Array3f(*(np.float32(part.ravel()) for part in (x, y, z)))
-        light = heuristic.DirectionalLight(direction=(1, -1, -1.2), intensity=1.0)
-        made = heuristic.Material(k_a=0.1, k_d=0.6, **material)
-        value = heuristic.shade(normal, normal, Array3f(0, 0, 1), made, [light], 1.0)
+        light = fotismos.DirectionalLight(direction=(1, -1, -1.2), intensity=1.0)
+        made = fotismos.Material(k_a=0.1, k_d=0.6, **material)
+        value = fotismos.shade(normal, normal, Array3f(0, 0, 1), made, [light], 1.0)
         shown = to_srgb(np.clip(np.array(value, float), 0, 1)).reshape(x.shape)
         box = -0.78, 0.78, -0.3, 1.26
         drawn = axes.imshow(shown, "gray", vmin=0, vmax=1, extent=box, interpolation="none",
@@ -306,10 +306,10 @@ def lost_highlight(axes: Axes) -> None:
     """Draw the kernel's value along a scan line, and Gouraud's between its ends (figure 6.14)."""
     place = np.linspace(-1.25, 1.25, 101)
     high = 1.2
-    light = heuristic.PointLight(position=(-1.2, high, 0), intensity=1.0)
+    light = fotismos.PointLight(position=(-1.2, high, 0), intensity=1.0)
     view = Array3f(np.float32(1.2 - place), high, 0)
-    made = heuristic.Material(k_d=0.2, k_s=0.6, n=40)
-    value = heuristic.shade(Array3f(np.float32(place), 0, 0), Array3f(0, 1, 0), view, made, [light])
+    made = fotismos.Material(k_d=0.2, k_s=0.6, n=40)
+    value = fotismos.shade(Array3f(np.float32(place), 0, 0), Array3f(0, 1, 0), view, made, [light])
     shown = np.array(value, float)
     _ground(axes)
     axes.plot(place, shown, color=COLOURS["V"], linewidth=1.8)

@@ -1,28 +1,31 @@
 """The heuristic side: the textbook illumination model as a Dr.Jit kernel and as Mitsuba plugins."""
 
+if __name__ == "heuristic":
+    raise ImportError("write `import fotismos.heuristic` in place of `import heuristic`")
+
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from heuristic import llvm
-from heuristic.program import __version__
+from fotismos.heuristic import llvm
+from fotismos.heuristic.program import __version__
 
 if TYPE_CHECKING:
-    from heuristic.heuristics import Heuristic, Parameter, Range
-    from heuristic.kernel import shade
-    from heuristic.lights import DirectionalLight, PointLight, SpotLight
-    from heuristic.materials import Material
+    from fotismos.heuristic.heuristics import Heuristic, Parameter, Range
+    from fotismos.heuristic.kernel import shade
+    from fotismos.heuristic.lights import DirectionalLight, PointLight, SpotLight
+    from fotismos.heuristic.materials import Material
 
 llvm.configure()  # Dr.Jit looks for LLVM once, at its first import
 
 HOMES = {
-    "DirectionalLight": "heuristic.lights",
-    "Heuristic": "heuristic.heuristics",
-    "Material": "heuristic.materials",
-    "Parameter": "heuristic.heuristics",
-    "PointLight": "heuristic.lights",
-    "Range": "heuristic.heuristics",
-    "SpotLight": "heuristic.lights",
-    "shade": "heuristic.kernel",
+    "DirectionalLight": "fotismos.heuristic.lights",
+    "Heuristic": "fotismos.heuristic.heuristics",
+    "Material": "fotismos.heuristic.materials",
+    "Parameter": "fotismos.heuristic.heuristics",
+    "PointLight": "fotismos.heuristic.lights",
+    "Range": "fotismos.heuristic.heuristics",
+    "SpotLight": "fotismos.heuristic.lights",
+    "shade": "fotismos.heuristic.kernel",
 }
 """Where names come from when they are asked for: errors and options need no Dr.Jit."""
 
@@ -39,7 +42,7 @@ def __getattr__(name: str) -> object:
 
 
 def register() -> None:
-    """Register the Mitsuba plugins for the current variant (:mod:`heuristic.plugins`)."""
-    from heuristic import plugins  # the kernel alone does not need Mitsuba
+    """Register the Mitsuba plugins for the current variant (:mod:`fotismos.heuristic.plugins`)."""
+    from fotismos.heuristic import plugins  # the kernel alone does not need Mitsuba
 
     plugins.register()

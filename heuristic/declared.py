@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from importlib.metadata import entry_points
 from typing import Any, Generic, TypeVar
 
-from heuristic.errors import InputError
+from fotismos.heuristic.errors import InputError
 
 Declaration = TypeVar("Declaration")
 

@@ -17,9 +17,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic import program, user_shaders
-from heuristic.errors import InputError, InstallationError
-from heuristic.heuristics import INPUTS, Heuristic, LightAtPoint, Parameter, Point
+from fotismos.heuristic import program, user_shaders
+from fotismos.heuristic.errors import InputError, InstallationError
+from fotismos.heuristic.heuristics import INPUTS, Heuristic, LightAtPoint, Parameter, Point
 
 VERSION = 430
 """OpenGL 4.3, the first with compute shaders."""
@@ -142,7 +142,7 @@ def of_text(word: str, text: str) -> Heuristic:
 
 
 class Shader:
-    """A user's GLSL as a function of a :class:`heuristic.heuristics.Point`.
+    """A user's GLSL as a function of a :class:`fotismos.heuristic.heuristics.Point`.
 
     It evaluates the point's arrays and sends those that its code may read. So it cannot be traced
     in a loop and has no derivatives.

@@ -1,11 +1,12 @@
 """Heuristics: ways to shade the first half of a pair, each one declaration.
 
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
-``blinn`` are here, those of engines in :mod:`heuristic.shadow_maps` and
-:mod:`heuristic.indirect_light`. Users write a function in a file (:mod:`heuristic.user_shaders`,
-:mod:`heuristic.glsl`); a program calls :func:`declare`; a package has an entry point of the group
-:data:`GROUP` whose object is a :class:`Heuristic`. Flat and Gouraud shading are not heuristics:
-they interpolate any heuristic (:mod:`heuristic.plugins.interpolated`).
+``blinn`` are here, those of engines in :mod:`fotismos.heuristic.shadow_maps` and
+:mod:`fotismos.heuristic.indirect_light`. Users write a function in a file
+(:mod:`fotismos.heuristic.user_shaders`, :mod:`fotismos.heuristic.glsl`); a program calls
+:func:`declare`; a package has an entry point of the group :data:`GROUP` whose object is a
+:class:`Heuristic`. Flat and Gouraud shading are not heuristics: they interpolate any heuristic
+(:mod:`fotismos.heuristic.plugins.interpolated`).
 """
 
 import pkgutil
@@ -20,12 +21,12 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
-from heuristic import kernel, vectors
-from heuristic.convention import Array, Visibility
-from heuristic.declared import Declared
-from heuristic.errors import InputError
-from heuristic.lights import Extent
-from heuristic.materials import Material, check_form
+from fotismos.heuristic import kernel, vectors
+from fotismos.heuristic.convention import Array, Visibility
+from fotismos.heuristic.declared import Declared
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.lights import Extent
+from fotismos.heuristic.materials import Material, check_form
 
 GROUP = "fotismos.heuristics"
 
@@ -35,10 +36,16 @@ INPUTS = ("position", "normal", "view", "uv", "material", "ambient", "lights", "
 RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "prune")
 """Parameters of the integrator ``heuristic`` itself; heuristics must use other names."""
 
-LOADERS = {".py": "heuristic.user_shaders:from_file", ".glsl": "heuristic.glsl:from_file"}
+LOADERS = {
+    ".py": "fotismos.heuristic.user_shaders:from_file",
+    ".glsl": "fotismos.heuristic.glsl:from_file",
+}
 """Functions that read a user's file by its suffix, imported when a name has it."""
 
-OF_FUNCTION, SHADED = "heuristic.user_shaders:of_function", "heuristic.user_shaders:shaded"
+OF_FUNCTION, SHADED = (
+    "fotismos.heuristic.user_shaders:of_function",
+    "fotismos.heuristic.user_shaders:shaded",
+)
 """Make a heuristic of a function, and call and check a user's; imported as late."""
 
 _FILE = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)
@@ -53,7 +60,7 @@ class Interpolation(Enum):
 
 
 class ShadingArguments(NamedTuple):
-    """The arguments of :func:`heuristic.shade`."""
+    """The arguments of :func:`fotismos.heuristic.shade`."""
 
     position: Array
     normal: Array
@@ -145,7 +152,7 @@ class Point:
 
     @_input
     def material(self) -> Material:
-        """The material of the surface, a :class:`heuristic.materials.PairedMaterial`.
+        """The material of the surface, a :class:`fotismos.heuristic.materials.PairedMaterial`.
 
         ``k_i``, ``k_a``, ``k_d``, ``k_s`` and ``n`` as paired, for a lobe without normalisation;
         ``base_color``, ``alpha``, ``ior`` and ``metallic`` as the physical half has them.
@@ -163,7 +170,7 @@ class Point:
         return tuple(map(self._light, self.arguments.lights))
 
     def textbook(self, **instead: Any) -> Array:
-        """Return the chapters' model at the points, :func:`heuristic.shade`.
+        """Return the chapters' model at the points, :func:`fotismos.heuristic.shade`.
 
         Named arguments replace those given there, such as ``ambient=0``.
         """
@@ -243,7 +250,7 @@ class Heuristic:
                  again. Parameters that are ``prepared`` are keyword arguments
     form         form of the specular lobe for all materials; None for each material's own
     refuse       ``refuse(scene)`` returns why it cannot shade a scene; empty if it can
-    reads        what it read on trial (:func:`heuristic.user_shaders.examine`)
+    reads        what it read on trial (:func:`fotismos.heuristic.user_shaders.examine`)
     files, code  the user's files that it depends on, and a digest of their content
     traced       whether Dr.Jit can record ``shade``; otherwise it is called in evaluated loops, and
                  has no derivatives
@@ -328,10 +335,10 @@ class Heuristic:
 HEURISTICS: Declared[Heuristic] = Declared(
     "heuristic",
     GROUP,
-    phong="heuristic.heuristics:PHONG",
-    blinn="heuristic.heuristics:BLINN",
-    shadow_map="heuristic.shadow_maps:MAP",
-    hemisphere_ambient="heuristic.indirect_light:HEMISPHERE",
+    phong="fotismos.heuristic.heuristics:PHONG",
+    blinn="fotismos.heuristic.heuristics:BLINN",
+    shadow_map="fotismos.heuristic.shadow_maps:MAP",
+    hemisphere_ambient="fotismos.heuristic.indirect_light:HEMISPHERE",
 )
 """All heuristics."""
 

@@ -25,10 +25,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic import materials
-from heuristic.convention import RADIANCE_PER_IRRADIANCE, Array, Doubles
-from heuristic.heuristics import INPUTS, Heuristic, Point
-from heuristic.plugins.coefficients import SceneMaterials
+from fotismos.heuristic import materials
+from fotismos.heuristic.convention import RADIANCE_PER_IRRADIANCE, Array, Doubles
+from fotismos.heuristic.heuristics import INPUTS, Heuristic, Point
+from fotismos.heuristic.plugins.coefficients import SceneMaterials
 
 GRID = 32
 """Points along each side of the image."""

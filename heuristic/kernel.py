@@ -9,11 +9,11 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from heuristic import materials, numerics, terms, vectors
-from heuristic.convention import Array, Colour, Position, Vector, Visibility
-from heuristic.errors import InputError, type_of
-from heuristic.lights import INTENSITIES, Light
-from heuristic.materials import COEFFICIENTS, Material
+from fotismos.heuristic import materials, numerics, terms, vectors
+from fotismos.heuristic.convention import Array, Colour, Position, Vector, Visibility
+from fotismos.heuristic.errors import InputError, type_of
+from fotismos.heuristic.lights import INTENSITIES, Light
+from fotismos.heuristic.materials import COEFFICIENTS, Material
 
 HOW = "give a Dr.Jit array of three components, such as drjit.auto.Array3f(x, y, z)"
 
@@ -50,7 +50,7 @@ def shade(
 
     Two points under a light from straight above, the second of them tilted:
 
-    >>> from heuristic import DirectionalLight, Material, shade
+    >>> from fotismos.heuristic import DirectionalLight, Material, shade
     >>> from drjit.auto import Array3f
     >>> sun = DirectionalLight(direction=(0, 0, -1), intensity=1.0)
     >>> normals = Array3f([0, 0.6], [0, 0], [1, 0.8])
@@ -60,7 +60,7 @@ def shade(
     position, normal, view = checked_vectors(position, normal, view)
     lights = _checked_lights(lights)
     if not isinstance(material, Material):
-        raise InputError(f"material is {type_of(material)}: give a heuristic.Material.")
+        raise InputError(f"material is {type_of(material)}: give a fotismos.heuristic.Material.")
     ambient = materials.checked_colour("ambient", ambient)
     values = {name: getattr(material, name) for name in COEFFICIENTS} | {"ambient": ambient}
     point = {"position": position, "normal": normal, "view": view, "n": material.n}
@@ -111,9 +111,10 @@ def sum_lights(
     """Return the diffuse and specular sums of 8.10, with ``k_d`` and ``k_s`` taken out of them.
 
     Each is None if its coefficient is zero; the specular one is for a mirror, too
-    (:func:`heuristic.terms.mirror`). More than :data:`BLOCK` lights are evaluated in blocks,
-    so compile time, kernel size and memory do not grow with their number. They are unrolled if
-    there is nothing to evaluate (scalar arrays) or it is impossible (in a symbolic loop or call).
+    (:func:`fotismos.heuristic.terms.mirror`). More than :data:`BLOCK` lights are evaluated in
+    blocks, so compile time, kernel size and memory do not grow with their number. They are unrolled
+    if there is nothing to evaluate (scalar arrays) or it is impossible (in a symbolic loop or
+    call).
     """
     has_diffuse = not materials.is_zero(material.k_d)
     has_specular = not (materials.is_zero(material.k_s) or numerics.is_number(material.n, inf))

@@ -15,10 +15,18 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import drjit as dr
 
-from heuristic import materials, numerics, terms, vectors
-from heuristic.convention import Colour, Direction, Number, Position, Scene, Vector, Visibility
-from heuristic.errors import InputError
-from heuristic.numerics import is_number
+from fotismos.heuristic import materials, numerics, terms, vectors
+from fotismos.heuristic.convention import (
+    Colour,
+    Direction,
+    Number,
+    Position,
+    Scene,
+    Vector,
+    Visibility,
+)
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.numerics import is_number
 
 UNATTENUATED = (1, 0, 0)
 INVERSE_SQUARE = (0, 0, 1)

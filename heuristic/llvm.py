@@ -14,7 +14,7 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
-from heuristic.errors import InstallationError
+from fotismos.heuristic.errors import InstallationError
 
 VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
 """The supported variants of Mitsuba."""

@@ -8,9 +8,9 @@ from typing import Any
 import drjit as dr
 import numpy as np
 
-from heuristic import numerics
-from heuristic.convention import Colour, Number
-from heuristic.errors import InputError, unknown
+from fotismos.heuristic import numerics
+from fotismos.heuristic.convention import Colour, Number
+from fotismos.heuristic.errors import InputError, unknown
 
 FORMS = ("phong", "blinn")
 
@@ -111,23 +111,24 @@ class Material:
     diffuse and specular coefficients (8.2, 8.5, 8.8), physically in 0..1. Each is 0 or more: a
     number, RGB, one value per wavelength, or a Dr.Jit array. ``n`` is Phong's exponent, 0 or more:
     a plain number is compiled into the kernel, an integer up to
-    :data:`heuristic.numerics.LARGEST_LITERAL_EXPONENT` as products; a Dr.Jit array is a run-time
-    value, and ``n_is_moderate`` says whether it is known to lie within
-    :data:`heuristic.numerics.MODERATE_EXPONENTS`, where the kernel may do without double precision.
-    A plain ``inf`` makes a mirror (8.7), which shows no light of the kernel
-    (:func:`heuristic.terms.mirror`); an array is finite.
+    :data:`fotismos.heuristic.numerics.LARGEST_LITERAL_EXPONENT` as products; a Dr.Jit array is a
+    run-time value, and ``n_is_moderate`` says whether it is known to lie within
+    :data:`fotismos.heuristic.numerics.MODERATE_EXPONENTS`, where the kernel may do without double
+    precision. A plain ``inf`` makes a mirror (8.7), which shows no light of the kernel
+    (:func:`fotismos.heuristic.terms.mirror`); an array is finite.
 
     ``form`` is ``phong`` for the chapters' ``(R.V)^n`` (8.9), or ``blinn`` for ``(N.H)^n`` of Blinn
     (1977), which OpenGL's fixed pipeline and most engines use. ``normalised`` scales the lobe by
-    :func:`heuristic.terms.normalisation`; ``k_s`` is then its albedo at normal incidence, which the
-    chapters' model does not have.
+    :func:`fotismos.heuristic.terms.normalisation`; ``k_s`` is then its albedo at normal incidence,
+    which the chapters' model does not have.
 
     >>> Material(k_d=(0.5, 0.4, 0.3), k_s=0.7, n=9).k_d
     (0.5, 0.4, 0.3)
     >>> Material(k_d=-0.5)
     Traceback (most recent call last):
         ...
-    heuristic.errors.InputError: k_d = -0.5 is not allowed: give finite values of 0 or more.
+    fotismos.heuristic.errors.InputError: k_d = -0.5 is not allowed: give finite values of 0 or
+    more.
     """
 
     k_i: Colour = 0

@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.convention import Array, Direction, Mesh, Position, Vector
+from fotismos.heuristic.convention import Array, Direction, Mesh, Position, Vector
 
 POSITIONS, NORMALS = "vertex_positions", "vertex_normals"
 TEXCOORDS, FACES = "vertex_texcoords", "faces"

@@ -19,9 +19,9 @@ from typing import Any
 import drjit as dr
 from drjit import scalar
 
-from heuristic import vectors
-from heuristic.convention import Array, Direction, Number, Position, Vector
-from heuristic.errors import unknown
+from fotismos.heuristic import vectors
+from fotismos.heuristic.convention import Array, Direction, Number, Position, Vector
+from fotismos.heuristic.errors import unknown
 
 PARALLEL_STEPS = 4
 """Edges and tangents are off by half a rounding step per component, products by as much again."""

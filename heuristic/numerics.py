@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from heuristic.convention import Array, Cosines, Direction, Number, Vector
+from fotismos.heuristic.convention import Array, Cosines, Direction, Number, Vector
 
 LARGEST_LITERAL_EXPONENT = 64
 """Up to here an integer exponent is multiplied out: at most 11 products and an error of ``n``

@@ -9,8 +9,9 @@ from pathlib import Path
 
 __version__ = "0.3.0"
 
-ROOT = Path(__file__).parents[1]
-ROOMS = ("heuristic", "reference", "comparisons", "reports")
+ROOT = Path(__file__).resolve().parents[1]
+"""The folder of the rooms, also where they were imported through the links in fotismos/."""
+FOLDERS = ("fotismos", "heuristic", "reference", "comparisons", "reports")
 
 VARIABLE = "FOTISMOS_PROGRAM"
 """Environment variable with the words that start the program, such as ``./run``."""
@@ -22,7 +23,7 @@ def source_digest() -> str:
     if not (ROOT / "pyproject.toml").is_file():
         return ""
     whole = hashlib.sha256()
-    for path in sorted(path for room in ROOMS for path in (ROOT / room).rglob("*.*")):
+    for path in sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.*")):
         if "__pycache__" not in path.parts and path.is_file():
             whole.update(f"{path.relative_to(ROOT)}\0".encode())
             whole.update(hashlib.sha256(path.read_bytes()).digest())

@@ -17,10 +17,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic import meshes
-from heuristic.convention import Array, Doubles
-from heuristic.heuristics import INPUTS, Heuristic, Parameter, Point
-from heuristic.lights import FAR, DirectionalLight, lamps
+from fotismos.heuristic import meshes
+from fotismos.heuristic.convention import Array, Doubles
+from fotismos.heuristic.heuristics import INPUTS, Heuristic, Parameter, Point
+from fotismos.heuristic.lights import FAR, DirectionalLight, lamps
 
 LAMPS = 16
 """Lamps with a depth image, at most."""

@@ -1,9 +1,10 @@
 """The illumination model, term by term: one function per equation.
 
 Equation numbers 8.x are of the chapter *Illumination* (sections 8.2.1-8.2.5), 6.x of the chapter
-*Lighting models*. Intensities and coefficients are display-linear (:mod:`heuristic.convention`):
-numbers, Dr.Jit floats, or colours with one component per wavelength (8.11, 8.12). The same
-functions serve the kernel (:mod:`heuristic.kernel`) and the plugins (:mod:`heuristic.plugins`).
+*Lighting models*. Intensities and coefficients are display-linear
+(:mod:`fotismos.heuristic.convention`): numbers, Dr.Jit floats, or colours with one component per
+wavelength (8.11, 8.12). The same functions serve the kernel (:mod:`fotismos.heuristic.kernel`) and
+the plugins (:mod:`fotismos.heuristic.plugins`).
 """
 
 from math import inf
@@ -11,9 +12,9 @@ from numbers import Real
 
 import drjit as dr
 
-from heuristic import numerics
-from heuristic.convention import Colour, Cosines, Number
-from heuristic.numerics import power
+from fotismos.heuristic import numerics
+from fotismos.heuristic.convention import Colour, Cosines, Number
+from fotismos.heuristic.numerics import power
 
 
 def emission(k_i: Colour) -> Colour:
@@ -45,9 +46,9 @@ def specular(intensity: Colour, k_s: Colour, cos_reflection: Cosines, n: Number)
 
     6.10 is the same for an ``intensity`` that is already attenuated. Chapter 6 writes ``L_s`` for
     ``I_p``. The limit of large ``n`` is :func:`mirror`. ``cos_reflection`` is a float
-    or, for large ``n``, a :class:`heuristic.numerics.Cosine`. The caller handles the horizon
-    (``N.L > 0``); the lobe itself ends where ``R.V <= 0``, for every ``n``, so ``n = 0`` is the
-    limit of small ``n``.
+    or, for large ``n``, a :class:`fotismos.heuristic.numerics.Cosine`. The caller handles the
+    horizon (``N.L > 0``); the lobe itself ends where ``R.V <= 0``, for every ``n``, so ``n = 0`` is
+    the limit of small ``n``.
 
     >>> specular(intensity=1.0, k_s=0.5, cos_reflection=0.5, n=2)
     0.125
@@ -170,9 +171,9 @@ def _inverse_root(value: Number, at_zero: Number) -> Number:
 def spot_cone(cos_axis: Cosines, cos_cutoff: Cosines) -> Number:
     """Equation 6.2: 1 inside the cone, ``v_L.v_P >= cos(omega_L)``, and 0 outside it.
 
-    Both are cosines, or both :class:`heuristic.numerics.Cosine` with supplement; these compare by
-    the difference from 1 or -1, whichever is nearer to the cutoff, and include the edge to within
-    :data:`EDGE_STEPS` rounding steps.
+    Both are cosines, or both :class:`fotismos.heuristic.numerics.Cosine` with supplement; these
+    compare by the difference from 1 or -1, whichever is nearer to the cutoff, and include the edge
+    to within :data:`EDGE_STEPS` rounding steps.
     """
     if not isinstance(cos_axis, numerics.Cosine):
         return dr.select(cos_axis >= cos_cutoff, 1.0, 0.0)

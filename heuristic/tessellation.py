@@ -10,10 +10,10 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from heuristic.convention import Array, Direction, Interaction, Mesh, Position, Shape
-from heuristic.errors import InputError
-from heuristic.meshes import faces, new_mesh, positions, texture_coordinates
-from heuristic.normals import triangle_normal, vertex_normals
+from fotismos.heuristic.convention import Array, Direction, Interaction, Mesh, Position, Shape
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.meshes import faces, new_mesh, positions, texture_coordinates
+from fotismos.heuristic.normals import triangle_normal, vertex_normals
 
 RESOLUTION = 16
 FINEST = 512

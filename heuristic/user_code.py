@@ -15,8 +15,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import suggestion
-from heuristic.program import ROOMS, ROOT
+from fotismos.heuristic.errors import suggestion
+from fotismos.heuristic.program import FOLDERS, ROOT
 
 CALLED = {"PairedMaterial": "material", "LightAtPoint": "light"}
 """What a user's code calls the objects of these classes."""
@@ -79,7 +79,7 @@ def is_users(path: Path) -> bool:
 def _left_out() -> tuple[str, ...]:
     installed = sysconfig.get_paths()
     names = ("stdlib", "platstdlib", "purelib", "platlib")
-    own = [str(ROOT / room) for room in (*ROOMS, "fotismos.py")]
+    own = [str(ROOT / folder) for folder in FOLDERS]
     places = [installed[name] for name in names] + site.getsitepackages() + own
     return (*places, *map(os.path.realpath, places), site.getusersitepackages())
 

@@ -1,11 +1,11 @@
 """Heuristics made of plain functions, in files or programs: parameters, needs, and a trial.
 
 A file is named as ``FILE.py`` or ``FILE.py:function``; the function is ``shade`` unless another is
-named, or a :class:`heuristic.heuristics.Heuristic`. Every process finds the same heuristic by the
-same words, and reads a changed file again::
+named, or a :class:`fotismos.heuristic.heuristics.Heuristic`. Every process finds the same heuristic
+by the same words, and reads a changed file again::
 
     import drjit as dr
-    from heuristic import Range
+    from fotismos.heuristic import Range
 
     def shade(point, steps: Range(1, 8) = 3):
         value = point.ambient * point.material.k_a
@@ -34,8 +34,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.random import default_rng
 
-from heuristic.errors import FotismosError, InputError, suggestion, type_of
-from heuristic.heuristics import (
+from fotismos.heuristic.errors import FotismosError, InputError, suggestion, type_of
+from fotismos.heuristic.heuristics import (
     INPUTS,
     Heuristic,
     Parameter,
@@ -45,9 +45,9 @@ from heuristic.heuristics import (
     content_digest,
     in_file,
 )
-from heuristic.lights import DirectionalLight, PointLight
-from heuristic.materials import PairedMaterial
-from heuristic.user_code import contained, error_text, first_error, place_of, same_variant
+from fotismos.heuristic.lights import DirectionalLight, PointLight
+from fotismos.heuristic.materials import PairedMaterial
+from fotismos.heuristic.user_code import contained, error_text, first_error, place_of, same_variant
 
 FUNCTION = "shade"
 """Name of the function, if omitted."""
@@ -129,7 +129,7 @@ def of_function(function: Any, name: str, label: str = "") -> Heuristic:
     if not callable(function):
         raise InputError(
             f"{name} is of type {type(function).__name__}: give a function of a point that returns"
-            " a colour, or a heuristic.Heuristic."
+            " a colour, or a fotismos.heuristic.Heuristic."
         )
     parameters = _parameters(function)
     names = [parameter.name for parameter in parameters]
@@ -236,8 +236,8 @@ def _advice(error: BaseException) -> str:
 def examine(heuristic: Heuristic) -> tuple[str, ...]:
     """Try a heuristic, and return what it reads.
 
-    Inputs are those of :data:`heuristic.heuristics.INPUTS`; the parts of the material are named,
-    too, such as ``material.k_d``. InputError if it fails, or returns something that is not a
+    Inputs are those of :data:`fotismos.heuristic.heuristics.INPUTS`; the parts of the material are
+    named, too, such as ``material.k_d``. InputError if it fails, or returns something that is not a
     colour, not finite or negative.
     """
     if mi.variant() is None:

@@ -9,9 +9,9 @@ from typing import Any
 
 import drjit as dr
 
-from heuristic import numerics
-from heuristic.convention import Cosines, Direction, Number, Position, Vector
-from heuristic.materials import Material
+from fotismos.heuristic import numerics
+from fotismos.heuristic.convention import Cosines, Direction, Number, Position, Vector
+from fotismos.heuristic.materials import Material
 
 
 def normalise(vector: Vector) -> Direction:
@@ -76,7 +76,7 @@ def mirror_vector(normal: Vector, direction: Direction, cosine: Cosines) -> Dire
 
 
 def chord_cosine(a: Direction, b: Direction) -> numerics.Cosine:
-    """Return the :class:`heuristic.numerics.Cosine` of the angle between two unit vectors.
+    """Return the :class:`fotismos.heuristic.numerics.Cosine` of the angle between two unit vectors.
 
     ``1 - a.b = |a - b|^2 / 2`` and ``1 + a.b = |a + b|^2 / 2``: near 0 and 180 degrees the chords
     keep the digits that the scalar product loses.
@@ -92,10 +92,11 @@ def lobe(
     It is ``R.V`` (8.9), or ``N.H`` for the form ``blinn``, and 0 for lights below the horizon.
     Whatever depends only on the normal and the view is computed once for all lights.
 
-    For moderate exponents (:data:`heuristic.numerics.MODERATE_EXPONENTS`) it is a float from unit
-    vectors of the kernel's precision. For others it is a :class:`heuristic.numerics.Cosine` from
-    double precision throughout: rounding ``N``, ``L`` and ``V`` to single precision alone turns
-    them by 1e-7, which at ``n = 1e6`` changes the highlight by a thousandth.
+    For moderate exponents (:data:`fotismos.heuristic.numerics.MODERATE_EXPONENTS`) it is a float
+    from unit vectors of the kernel's precision. For others it is a
+    :class:`fotismos.heuristic.numerics.Cosine` from double precision throughout: rounding ``N``,
+    ``L`` and ``V`` to single precision alone turns them by 1e-7, which at ``n = 1e6`` changes the
+    highlight by a thousandth.
     """
     unit = normalise if material.n_is_moderate else numerics.wide_unit
     sides = _sides(material.form, unit(normal), unit(view), unit)

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 from msgspec import Meta
 
-from heuristic.errors import InputError
+from fotismos.heuristic.errors import InputError
 
 VERSION = 3
 """Version of all records. Records of fotismos 0.1 have none."""

@@ -1,11 +1,11 @@
-"""``python -m reports`` is ``fotismos``."""
+"""``python -m fotismos.reports`` is ``fotismos``."""
 
 import os
 import sys
 from pathlib import Path
 
-from comparisons.processes import interruption
-from heuristic.program import VARIABLE
+from fotismos.comparisons.processes import interruption
+from fotismos.heuristic.program import VARIABLE
 
 
 def main() -> None:
@@ -17,9 +17,9 @@ def main() -> None:
     # No file of ours holds a date, and libraries fail if this is not a number.
     os.environ.pop("SOURCE_DATE_EPOCH", None)
     if Path(sys.argv[0]).name == "__main__.py":
-        os.environ.setdefault(VARIABLE, "python -m reports")
+        os.environ.setdefault(VARIABLE, "python -m fotismos.reports")
     try:
-        from reports import cli  # a signal may also interrupt this import
+        from fotismos.reports import cli  # a signal may also interrupt this import
 
         cli.main()
     except KeyboardInterrupt as error:

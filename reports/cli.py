@@ -15,12 +15,12 @@ from typing import Any, cast
 import click
 from click.shell_completion import get_completion_class
 
-from comparisons.processes import interruption
-from heuristic import llvm
-from heuristic.errors import FotismosError, InstallationError, suggestion
-from heuristic.program import __version__, program
-from reports import jobs
-from reports.terminal.words import echo
+from fotismos.comparisons.processes import interruption
+from fotismos.heuristic import llvm
+from fotismos.heuristic.errors import FotismosError, InstallationError, suggestion
+from fotismos.heuristic.program import __version__, program
+from fotismos.reports import jobs
+from fotismos.reports.terminal.words import echo
 
 COMMANDS = {
     "One scene": ("compare", "plan", "cost", "fit"),
@@ -28,7 +28,7 @@ COMMANDS = {
     "Baselines, shaders, other renderers": ("check", "audit", "export"),
     "This installation": ("doctor", "scenes", "completion"),
 }
-"""The commands by groups of the help; most are a module of `reports.commands`."""
+"""The commands by groups of the help; most are a module of `fotismos.reports.commands`."""
 
 COMPLETION = "_FOTISMOS_COMPLETE"
 """Environment variable with which a shell requests completions."""
@@ -43,7 +43,7 @@ def scenes() -> None:
       fotismos scenes
       fotismos scenes | grep sphere
     """  # noqa: D301 click reads the \b as: keep these lines
-    from comparisons.gallery.builtin import SCENES
+    from fotismos.comparisons.gallery.builtin import SCENES
 
     width = max(map(len, SCENES))
     for scene in SCENES.values():
@@ -81,7 +81,9 @@ class Group(jobs.Helped, click.Group):
         """Return a command by its name."""
         if name not in self.list_commands(context) or name in self.commands:
             return self.commands.get(name)
-        return cast(click.Command, getattr(import_module(f"reports.commands.{name}"), name))
+        return cast(
+            click.Command, getattr(import_module(f"fotismos.reports.commands.{name}"), name)
+        )
 
     def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options, and the commands with their whole summaries."""

@@ -1,6 +1,6 @@
 """The technical terms of the page, each with one sentence: its help, and its list of terms."""
 
-from comparisons.departure.metrics import METRICS, RATIO
+from fotismos.comparisons.departure.metrics import METRICS, RATIO
 
 Terms = dict[tuple[str, ...], str]
 """A sentence by the names under which a term is shown."""

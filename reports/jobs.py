@@ -17,11 +17,11 @@ import click
 from click.shell_completion import CompletionItem
 from msgspec import inspect
 
-from comparisons.options import Options
-from comparisons.processes.pool import Pool, Task, cores
-from heuristic import llvm, program
-from heuristic.errors import InputError
-from reports.terminal.words import echo, level, quiet_option, verbose_option
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.processes.pool import Pool, Task, cores
+from fotismos.heuristic import llvm, program
+from fotismos.heuristic.errors import InputError
+from fotismos.reports.terminal.words import echo, level, quiet_option, verbose_option
 
 Decorator: TypeAlias = Callable[[Any], Any]
 
@@ -48,7 +48,7 @@ def complete_scene(
     context: click.Context, parameter: click.Parameter, beginning: str
 ) -> list[CompletionItem]:
     """Complete a SCENE: built-in ones with this beginning, or else files."""
-    from comparisons.gallery.builtin import SCENES
+    from fotismos.comparisons.gallery.builtin import SCENES
 
     named = [name for name in SCENES if name.startswith(beginning)]
     items = [CompletionItem(name, help=SCENES[name].title) for name in named]
@@ -168,7 +168,7 @@ METAVARS = {
 
 
 def option(name: str, command_default: str = "") -> Decorator:
-    """Return the command line's form of a field of :class:`comparisons.options.Options`.
+    """Return the command line's form of a field of :class:`fotismos.comparisons.options.Options`.
 
     ``command_default`` is what a command does without the option, if that is its own.
     """
@@ -312,7 +312,7 @@ def pool(
         return Pool(workers if IN_PROCESSES else 0, Ready(level(), threads), timeout)
     if workers and workers > 1:
         raise click.UsageError("--workers and --scheduler exclude each other.")
-    from comparisons.processes import cluster
+    from fotismos.comparisons.processes import cluster
 
     # As a context it gives a Cluster, which does what a Pool does.
     ready = Ready(level(), None, os.getcwd(), shlex.join(program.program()))
@@ -333,9 +333,9 @@ def results_of(
     """
     with pool(timeout) as processes:
         processes.start()
-        from comparisons.case import file_of, name_of
-        from reports.files import results
-        from reports.terminal import progress
+        from fotismos.comparisons.case import file_of, name_of
+        from fotismos.reports.files import results
+        from fotismos.reports.terminal import progress
 
         subjects = [(name_of(scene), file_of(scene)) for scene in scenes]
         folder = output / kind
@@ -378,12 +378,12 @@ class Ready:
         llvm.use_threads(self.threads)
 
         # Unless verbose, a message is ignored: the record has the warnings that concern it.
-        from reference.scene.source import divert_messages
+        from fotismos.reference.scene.source import divert_messages
 
         divert_messages(partial(echo, err=True) if self.level > 0 else lambda _: None)
         if self.level > 0:
             logging.basicConfig(level=logging.INFO)
-        import comparisons.compare  # noqa: F401  part of start-up
+        import fotismos.comparisons.compare  # noqa: F401  part of start-up
 
         gc.freeze()  # modules stay: garbage collections need not look at them
 
@@ -413,7 +413,7 @@ def requests(whole: Options, scenes: Sequence[str]) -> list[Options]:
     """Return the request for each scene: with values only for the placeholders that it has."""
     if len(scenes) == 1 or not whole.define:
         return [whole] * len(scenes)
-    from reference.scene.source import placeholders
+    from fotismos.reference.scene.source import placeholders
 
     known = (placeholders(Path(scene)) for scene in scenes)
     own = [{key: value for key, value in whole.define.items() if key in names} for names in known]

@@ -18,36 +18,36 @@ from pathlib import Path
 from threading import RLock
 from typing import Any, ParamSpec, TypeVar
 
-import comparisons.compare
-from comparisons.audit.checks import Audit, Kind
-from comparisons.audit.checks import audit as examined
-from comparisons.case import RGB, Scene, open_case
-from comparisons.check.moved import LEVEL
-from comparisons.comparison import Comparison
-from comparisons.cost.cost import cost as study
-from comparisons.cost.cost_record import Cost, Method
-from comparisons.cost.methods import declare as declare_method
-from comparisons.departure.metrics import Metric
-from comparisons.departure.metrics import declare as declare_metric
-from comparisons.fit.fit import fit as fit_parameters
-from comparisons.fit.fit_record import FitRecord
-from comparisons.options import Options
-from comparisons.pixel_terms import PixelTerms
-from comparisons.prepared import prepare
-from heuristic import user_shaders
-from heuristic.errors import InputError
-from heuristic.heuristics import Heuristic
-from heuristic.heuristics import declare as declare_heuristic
-from heuristic.plugins import register
-from heuristic.user_code import same_variant
-from reference.scene.graph import set_variant
-from reports import verdict
-from reports.charts import figures
-from reports.ci import baselines, checks
-from reports.ci.checks import CheckRecord
-from reports.page import page
-from reports.run.scene import view_of
-from reports.terminal.plan_lines import PlanReport, plan_report
+import fotismos.comparisons.compare
+from fotismos.comparisons.audit.checks import Audit, Kind
+from fotismos.comparisons.audit.checks import audit as examined
+from fotismos.comparisons.case import RGB, Scene, open_case
+from fotismos.comparisons.check.moved import LEVEL
+from fotismos.comparisons.comparison import Comparison
+from fotismos.comparisons.cost.cost import cost as study
+from fotismos.comparisons.cost.cost_record import Cost, Method
+from fotismos.comparisons.cost.methods import declare as declare_method
+from fotismos.comparisons.departure.metrics import Metric
+from fotismos.comparisons.departure.metrics import declare as declare_metric
+from fotismos.comparisons.fit.fit import fit as fit_parameters
+from fotismos.comparisons.fit.fit_record import FitRecord
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.pixel_terms import PixelTerms
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic import user_shaders
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import Heuristic
+from fotismos.heuristic.heuristics import declare as declare_heuristic
+from fotismos.heuristic.plugins import register
+from fotismos.heuristic.user_code import same_variant
+from fotismos.reference.scene.graph import set_variant
+from fotismos.reports import verdict
+from fotismos.reports.charts import figures
+from fotismos.reports.ci import baselines, checks
+from fotismos.reports.ci.checks import CheckRecord
+from fotismos.reports.page import page
+from fotismos.reports.run.scene import view_of
+from fotismos.reports.terminal.plan_lines import PlanReport, plan_report
 
 HEIGHT = 900
 """Height of the frame in pixels: the viewer with its controls fits a wide notebook."""
@@ -118,7 +118,7 @@ def compare(scene: Scene, name: str | None = None, why: bool = True, **options: 
     line, such as ``spp=64`` or ``resolution=(128, 128)``; ``why`` finds causes.
     """
     case = open_case(scene, Options.of(options), name)
-    comparison = comparisons.compare.compare(
+    comparison = fotismos.comparisons.compare.compare(
         case.source, case.options, command=case.command(), why=why
     )
     return Shown(comparison, page.render([view_of(comparison)]))

@@ -1,7 +1,7 @@
 """What a run found, in sentences: how many scenes look right, what is missing, and what to do.
 
-One quantity decides everything here, see :mod:`comparisons.departure.criterion`: the share of the
-pixels that differ visibly, by more than a tolerance.
+One quantity decides everything here, see :mod:`fotismos.comparisons.departure.criterion`: the share
+of the pixels that differ visibly, by more than a tolerance.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from comparisons.comparison import ComparisonRecord
-from comparisons.departure.criterion import LIMIT, TOLERANCE, Verdict, decide, share_above
-from comparisons.departure.metrics import LEADING
-from comparisons.departure.noise import VisibleShare
-from comparisons.gallery.builtin import SCENES
-from heuristic import program
-from reference.planning.effects import EFFECTS, MICROFACETS
-from reports.terminal.words import number, percent, seconds
+from fotismos.comparisons.comparison import ComparisonRecord
+from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, Verdict, decide, share_above
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.heuristic import program
+from fotismos.reference.planning.effects import EFFECTS, MICROFACETS
+from fotismos.reports.terminal.words import number, percent, seconds
 
 if TYPE_CHECKING:
-    from comparisons.cost.cost_record import Cost
+    from fotismos.comparisons.cost.cost_record import Cost
 
 NAMED = 3
 """Number of effects that the sentence on a run names."""
@@ -136,7 +136,7 @@ def _remedy(record: ComparisonRecord, cost: Cost, threshold: float) -> str:
 
     At the scene's own size, if the study predicts for it.
     """
-    from comparisons.cost.front import sufficient  # loaded late: few scenes have a study
+    from fotismos.comparisons.cost.front import sufficient  # loaded late: few scenes have a study
 
     points = cost.predicted or cost.points
     size = "x".join(map(str, cost.at if cost.predicted and cost.at else cost.resolution))

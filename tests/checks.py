@@ -10,8 +10,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-import heuristic
-from heuristic import kernel
+import fotismos
+from fotismos.heuristic import kernel
 from tests import oracle
 
 POINTS = 20_000
@@ -76,11 +76,11 @@ def kernel_light(light):
     """Turn an oracle's light into the kernel's."""
     own = {name: getattr(light, name) for name in OWN}
     if light.kind == "directional":
-        return heuristic.DirectionalLight(light.direction, light.intensity, **own)
+        return fotismos.DirectionalLight(light.direction, light.intensity, **own)
     own |= {"attenuation": light.attenuation, "clamped": light.clamped}
     if light.kind == "point":
-        return heuristic.PointLight(light.position, light.intensity, **own)
-    return heuristic.SpotLight(
+        return fotismos.PointLight(light.position, light.intensity, **own)
+    return fotismos.SpotLight(
         light.position,
         light.direction,
         light.intensity,
@@ -91,7 +91,7 @@ def kernel_light(light):
 
 
 def check_kernel(vector_type, tolerance, coefficients="rgb"):
-    """Compare `heuristic.shade` with the oracle over random points, under every kind of light.
+    """Compare `fotismos.shade` with the oracle over random points, under every kind of light.
 
     Points of scalar types are shaded one by one, so there are few of them.
     """
@@ -100,7 +100,7 @@ def check_kernel(vector_type, tolerance, coefficients="rgb"):
     lights = tinted(LIGHTS, TINTS[coefficients])
     values = COEFFICIENTS[coefficients] | {"n": 9}
     ambient = 0.5
-    material, lamps = heuristic.Material(**values), [kernel_light(light) for light in lights]
+    material, lamps = fotismos.Material(**values), [kernel_light(light) for light in lights]
     arrays = points.position, points.normal, points.view
     if is_scalar:
         rows = (map(vector_type, row) for row in zip(*arrays, strict=True))

@@ -1,4 +1,4 @@
-"""What all tests share. `heuristic` comes first: it finds LLVM before Dr.Jit is imported."""
+"""What all tests share. `fotismos` comes first: it finds LLVM before Dr.Jit is imported."""
 
 import gc
 import shutil
@@ -6,23 +6,23 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from types import SimpleNamespace
 
-import heuristic  # noqa: F401  isort: skip
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import drjit as dr
 import mitsuba as mi
 import pytest
 
-from heuristic import plugins
-from reference.rendering import direct
-from reports import jobs
-from reports.commands.compare import compare
+from fotismos.heuristic import plugins
+from fotismos.reference.rendering import direct
+from fotismos.reports import jobs
+from fotismos.reports.commands.compare import compare
 from tests import small_baselines
 from tests.programs import command_line
 from tests.small_scene import SCENE
 
 # An installed fotismos brings its pytest plugin along; from a checkout it is named here.
 if "fotismos" not in entry_points(group="pytest11").names:
-    pytest_plugins = ["reports.ci.plugin"]
+    pytest_plugins = ["fotismos.reports.ci.plugin"]
 
 
 @pytest.fixture

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 from msgspec import convert, structs
 
-from comparisons.comparison import Attribution
-from comparisons.cost.cost import Study
-from comparisons.cost.cost_record import Cost
-from comparisons.hybrids.attribution import Causes
-from reference.records import VERSION
+from fotismos.comparisons.comparison import Attribution
+from fotismos.comparisons.cost.cost import Study
+from fotismos.comparisons.cost.cost_record import Cost
+from fotismos.comparisons.hybrids.attribution import Causes
+from fotismos.reference.records import VERSION
 from tests import records
 
 WIDTH, HEIGHT = 12, 8

@@ -11,7 +11,7 @@ precision, and raises AssertionError with the inputs of the first row that is wr
 
 Inputs are evaluated before they are used: inside one kernel, LLVM may fuse the product and sum of
 one use and not of another, and the two precisions would see different numbers. What counts as zero
-is what :mod:`heuristic.numerics` says: below the smallest normal float.
+is what :mod:`fotismos.heuristic.numerics` says: below the smallest normal float.
 """
 
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ import drjit as dr
 import numpy as np
 from drjit.llvm import PCG32, Array3f, Array3f64, Bool, Float, Float64, UInt32, UInt64
 
-import heuristic
-from heuristic import numerics, terms, vectors
+import fotismos
+from fotismos.heuristic import numerics, terms, vectors
 
 SMALLEST, LARGEST = 2.0**-126, float(np.finfo(np.float32).max)
 STEP = 2.0**-23
@@ -214,13 +214,13 @@ CHECKS = {
 
 
 def _shaded(vector, number, inputs):
-    light = heuristic.PointLight(
+    light = fotismos.PointLight(
         vector(inputs["light"]), number(inputs["I"]),
         tuple(number(inputs[k]) for k in ("k0", "k1", "k2")),
     )  # fmt: skip
-    material = heuristic.Material(k_d=0.25, k_s=1.0, n=number(inputs["n"]))
+    material = fotismos.Material(k_d=0.25, k_s=1.0, n=number(inputs["n"]))
     points = (vector(inputs[name]) for name in ("position", "normal", "view"))
-    return heuristic.shade(*points, material, [light])
+    return fotismos.shade(*points, material, [light])
 
 
 def _arriving(inputs):

@@ -1,7 +1,7 @@
 """Small scenes that rules of pruning without premises get wrong, by 1 % to everything."""
 
-from reference.pairing.probe import AlbedoTable
-from reference.planning.rules import PruningRule, RuleResult
+from fotismos.reference.pairing.probe import AlbedoTable
+from fotismos.reference.planning.rules import PruningRule, RuleResult
 from tests.parts import camera, moved
 
 DIFFUSE = {"type": "diffuse", "reflectance": 0.7}

@@ -10,16 +10,16 @@ from dataclasses import dataclass
 import mitsuba as mi
 import numpy as np
 
-from comparisons.departure import marks
-from comparisons.departure.colour import DEFAULT_VIEWING
-from comparisons.departure.metrics import LEADING, leading_distance
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from reference.rendering.gbuffer import gbuffer
-from reference.rendering.renderer import pass_seed
-from reference.rendering.sums import Accumulator, DifferenceSums
-from reference.scene.source import Source
+from fotismos.comparisons.departure import marks
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure.metrics import LEADING, leading_distance
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.rendering.gbuffer import gbuffer
+from fotismos.reference.rendering.renderer import pass_seed
+from fotismos.reference.rendering.sums import Accumulator, DifferenceSums
+from fotismos.reference.scene.source import Source
 from tests.parts import camera, look_at, moved, rgb_of
 
 SIZE = 40

@@ -3,7 +3,7 @@
 import mitsuba as mi
 import numpy as np
 
-from comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.gallery.builtin import SCENES
 
 
 def look_at(origin, target=(0, 0, 0), up=(0, 0, 1)):

@@ -8,7 +8,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from unittest.mock import patch
 
-from reports.cli import main
+from fotismos.reports.cli import main
 
 ROOT = Path(__file__).parents[1]
 

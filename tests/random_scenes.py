@@ -17,16 +17,16 @@ import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import heuristic  # noqa: F401  isort: skip
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import mitsuba as mi
 import numpy as np
 
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from heuristic.errors import FotismosError
-from reference.rendering.renderer import pass_seed
-from reference.scene.source import Source
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic.errors import FotismosError
+from fotismos.reference.rendering.renderer import pass_seed
+from fotismos.reference.scene.source import Source
 from tests.misplanned import octahedron
 
 SIZE, PASSES, SPP = 16, 8, 64
@@ -374,8 +374,8 @@ def _rgb(image):
 
 def examine_batch(first, count, variant):
     """Examine some seeds in this process, and print a line for each."""
-    from heuristic import plugins
-    from reference.rendering import direct
+    from fotismos.heuristic import plugins
+    from fotismos.reference.rendering import direct
 
     mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)  # of samples that are rounded up

@@ -6,13 +6,13 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from comparisons.comparison import Comparison, ComparisonRecord, Images
-from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import RATIO, THRESHOLDS, drawn
-from comparisons.departure.noise import VisibleShare
-from comparisons.departure.statistics import Summary
-from reference.records import plain
-from reports.page.scene_view import SceneView
+from fotismos.comparisons.comparison import Comparison, ComparisonRecord, Images
+from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.metrics import RATIO, THRESHOLDS, drawn
+from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.comparisons.departure.statistics import Summary
+from fotismos.reference.records import plain
+from fotismos.reports.page.scene_view import SceneView
 
 CONTENT = Path(__file__).with_name("record.json").read_text(encoding="utf-8")
 

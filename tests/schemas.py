@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-import reports
+import fotismos.reports
 
-FOLDER = Path(reports.__file__).parent / "schemas"
+FOLDER = Path(fotismos.reports.__file__).parent / "schemas"
 
 
 def schema(name):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from comparisons.pixel_terms import GridLight, LivePoints, TermGrid, TermMaterial
+from fotismos.comparisons.pixel_terms import GridLight, LivePoints, TermGrid, TermMaterial
 
 CELL = 4
 """Pixels along the sides of a cell."""

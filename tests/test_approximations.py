@@ -4,13 +4,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.gallery.builtin import SCENES
-from heuristic import indirect_light, shadow_maps, tessellation
-from heuristic.errors import InputError
-from heuristic.heuristics import named
-from reference.pairing.halves import pair
-from reference.rendering.renderer import Renderer
-from reference.scene.source import Source
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.heuristic import indirect_light, shadow_maps, tessellation
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import named
+from fotismos.reference.pairing.halves import pair
+from fotismos.reference.rendering.renderer import Renderer
+from fotismos.reference.scene.source import Source
 from tests.parts import camera, moved
 from tests.random_scenes import is_sound, random_scene
 from tests.sky import sky_above, two_colours

@@ -6,9 +6,9 @@ from math import comb
 import numpy as np
 import pytest
 
-from comparisons.departure.colour import DEFAULT_VIEWING
-from comparisons.departure.metrics import LEADING
-from comparisons.hybrids.attribution import (
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.hybrids.attribution import (
     LEAST,
     NONE,
     UNCOUNTED,

@@ -11,14 +11,19 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from comparisons.audit import checks, furnace
-from comparisons.audit.subjects import DISTANCES, EXTREMES, ScatteringSubject, ShadingSubject
-from heuristic import Range, heuristics
-from heuristic.errors import InputError
-from heuristic.heuristics import HEURISTICS
-from heuristic.user_shaders import of_function
-from reference.pairing import albedo, factors
-from reports.run import audit_files
+from fotismos.comparisons.audit import checks, furnace
+from fotismos.comparisons.audit.subjects import (
+    DISTANCES,
+    EXTREMES,
+    ScatteringSubject,
+    ShadingSubject,
+)
+from fotismos.heuristic import Range, heuristics
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import HEURISTICS
+from fotismos.heuristic.user_shaders import of_function
+from fotismos.reference.pairing import albedo, factors
+from fotismos.reports.run import audit_files
 from tests import test_engine_lobes as engine_lobes
 from tests.schemas import schema
 from tests.test_glsl import opengl

@@ -2,7 +2,7 @@
 
 import pytest
 
-from comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.gallery.builtin import SCENES
 
 SPECTRAL = ("narrow-band-lamp", "metameric-pair")
 

@@ -11,7 +11,7 @@ from random import Random
 import jsonschema
 import pytest
 
-from comparisons.case import file_of
+from fotismos.comparisons.case import file_of
 from tests.outputs import results
 from tests.programs import ROOT
 from tests.schemas import schema

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from heuristic.errors import InputError
-from reports.ci import baselines
+from fotismos.heuristic.errors import InputError
+from fotismos.reports.ci import baselines
 from tests.small_baselines import FAST, change
 
 

@@ -10,18 +10,18 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.case import open_case
-from comparisons.check.measurement import measure_scene
-from comparisons.compare import compare
-from comparisons.cost.cost import cost
-from comparisons.fit.fit import fit
-from comparisons.options import LARGEST_SPP, Options
-from comparisons.prepared import require_light
-from comparisons.study import design
-from heuristic.errors import FotismosError, InputError
-from reference.rendering.renderer import LARGEST_PASS
-from reference.scene.source import Source
-from reports import verdict
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.check.measurement import measure_scene
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.cost.cost import cost
+from fotismos.comparisons.fit.fit import fit
+from fotismos.comparisons.options import LARGEST_SPP, Options
+from fotismos.comparisons.prepared import require_light
+from fotismos.comparisons.study import design
+from fotismos.heuristic.errors import FotismosError, InputError
+from fotismos.reference.rendering.renderer import LARGEST_PASS
+from fotismos.reference.scene.source import Source
+from fotismos.reports import verdict
 from tests import corpus_files
 from tests.small_scene import SCENE
 

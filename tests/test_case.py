@@ -6,12 +6,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.case import open_case
-from comparisons.departure.colour import MOST_PIXELS
-from comparisons.options import LARGEST_SPP, Options
-from heuristic.errors import InputError, unknown
-from heuristic.tessellation import FINEST
-from reference.scene import source
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.departure.colour import MOST_PIXELS
+from fotismos.comparisons.options import LARGEST_SPP, Options
+from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.tessellation import FINEST
+from fotismos.reference.scene import source
 from tests.small_scene import PLAIN
 
 SMALL = ("--spp", 4, "--resolution", "12x12")
@@ -70,7 +70,7 @@ def test_a_script_runs_once_in_each_attempt(run, tmp_path):
 
 
 def test_notebook_and_command_line_choose_one_variant(rgb):
-    from reports import notebook
+    from fotismos.reports import notebook
 
     shown = notebook.compare(spectral_scene, spp=4)
     assert open_case(spectral_scene).variant == "llvm_ad_spectral"

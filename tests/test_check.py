@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from comparisons.check.measurement import baseline_of, measure_scene, read_baseline
-from comparisons.check.moved import differences, moved
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from heuristic.errors import InputError
-from reference.scene.source import Source
+from fotismos.comparisons.check.measurement import baseline_of, measure_scene, read_baseline
+from fotismos.comparisons.check.moved import differences, moved
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.scene.source import Source
 from tests.parts import look_at
 
 SMALL = Options(resolution=(64, 64))

@@ -9,11 +9,17 @@ import pytest
 from msgspec import structs
 from scipy import special, stats
 
-from comparisons.check import measurement as measuring
-from comparisons.check import moved as moving
-from comparisons.check.measurement import Block, Half, Measurement, MetricAmount, measurement
-from comparisons.departure.colour import DEFAULT_VIEWING
-from comparisons.departure.metrics import METRICS, RATIO
+from fotismos.comparisons.check import measurement as measuring
+from fotismos.comparisons.check import moved as moving
+from fotismos.comparisons.check.measurement import (
+    Block,
+    Half,
+    Measurement,
+    MetricAmount,
+    measurement,
+)
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure.metrics import METRICS, RATIO
 
 PASSES = 16
 

@@ -12,12 +12,12 @@ import OpenEXR
 import pytest
 from msgspec import structs
 
-from comparisons.check.measurement import HALVES, MeasuredScene, measurement
-from comparisons.check.moved import Check, Move, differences, moved
-from comparisons.departure.colour import DEFAULT_VIEWING
-from comparisons.departure.metrics import METRICS
-from comparisons.departure.noise import VisibleShare
-from reports.ci import checks, summary
+from fotismos.comparisons.check.measurement import HALVES, MeasuredScene, measurement
+from fotismos.comparisons.check.moved import Check, Move, differences, moved
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.reports.ci import checks, summary
 from tests import records
 from tests.programs import command_line
 from tests.schemas import schema

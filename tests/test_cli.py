@@ -13,11 +13,11 @@ from io import StringIO
 import jsonschema
 import pytest
 
-from comparisons.cost import measure
-from comparisons.fit import fit as fitting
-from heuristic.errors import InputError
-from reports import cli
-from reports.terminal import progress
+from fotismos.comparisons.cost import measure
+from fotismos.comparisons.fit import fit as fitting
+from fotismos.heuristic.errors import InputError
+from fotismos.reports import cli
+from fotismos.reports.terminal import progress
 from tests.programs import ROOT, python
 from tests.schemas import schema
 from tests.small_scene import SCENE
@@ -92,7 +92,7 @@ def test_causes_that_cannot_be_found_leave_the_comparison_and_a_warning(
     def fails(*_args, **_kwargs):
         raise InputError("the effects are unknown")
 
-    monkeypatch.setattr("comparisons.hybrids.attribution.find", fails)
+    monkeypatch.setattr("fotismos.comparisons.hybrids.attribution.find", fails)
     words = ("--spp", 4, "--resolution", "12x8", "-o", tmp_path)
     assert run("compare", scene_file, "--why", *words)[0] == 0
     record = read(tmp_path / "my-scene/comparison.json")
@@ -164,7 +164,7 @@ def test_a_file_with_tabulated_spectra_is_compared_spectrally(run, tmp_path):
 
 COMPARE = """
 import sys
-from reports import cli, jobs
+from fotismos.reports import cli, jobs
 jobs.IN_PROCESSES = False
 words = "compare fig-8-9 --no-why --resolution 16x16 -q -o".split()
 sys.argv = ["fotismos", *words, sys.argv[1]]
@@ -177,10 +177,10 @@ def test_a_comparison_of_a_built_in_scene_imports_what_it_needs(tmp_path):
     done = python("-c", COMPARE, tmp_path / "out")
     assert (done.returncode, done.stderr) == (0, "")
     modules = done.stdout.split()
-    assert "comparisons.compare" in modules
+    assert "fotismos.comparisons.compare" in modules
     assert "altair" not in modules, "the charts of a study of cost alone need it"
     elsewhere = ("hard", "fit", "study", "check")
-    unneeded = tuple(f"comparisons.{name}" for name in elsewhere)
+    unneeded = tuple(f"fotismos.comparisons.{name}" for name in elsewhere)
     assert [name for name in modules if name.startswith(unneeded)] == []
 
 

@@ -4,9 +4,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.compare import compare
-from comparisons.options import Options
-from reference.scene.source import Source
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.options import Options
+from fotismos.reference.scene.source import Source
 from tests.parts import camera, moved
 
 WHITE = {"type": "diffuse", "reflectance": 0.6}

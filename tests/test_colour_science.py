@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-import comparisons.compare
-from comparisons.case import open_case
-from comparisons.comparison import Deviations
-from comparisons.departure import definitions
-from comparisons.departure.colour import ciede2000
-from comparisons.departure.definitions import AGREEMENT, DEFINED
-from comparisons.departure.metrics import LEADING, METRICS
-from comparisons.options import Options
-from reports.page import page
-from reports.terminal import tables
+import fotismos.comparisons.compare
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.comparison import Deviations
+from fotismos.comparisons.departure import definitions
+from fotismos.comparisons.departure.colour import ciede2000
+from fotismos.comparisons.departure.definitions import AGREEMENT, DEFINED
+from fotismos.comparisons.departure.metrics import LEADING, METRICS
+from fotismos.comparisons.options import Options
+from fotismos.reports.page import page
+from fotismos.reports.terminal import tables
 from tests import records
 from tests.misplanned import SKY, scene, sphere
 from tests.programs import python
@@ -20,7 +20,7 @@ from tests.programs import python
 
 def compared(**options):
     case = open_case("fig-8-9", Options(spp=16, resolution=(24, 16), **options))
-    return comparisons.compare.compare(case.source, case.options)
+    return fotismos.comparisons.compare.compare(case.source, case.options)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_the_record_says_how_far_its_colour_differences_are_and_at_how_many_pixe
     assert min(found.largest.values()) > 0
     assert max(found.largest.values()) < AGREEMENT
     assert not usual.record.warnings
-    monkeypatch.setattr(comparisons.compare, "COMPUTED_TWICE", 5)
+    monkeypatch.setattr(fotismos.comparisons.compare, "COMPUTED_TWICE", 5)
     assert compared().record.colour_science.pixels == 5
 
 
@@ -100,11 +100,11 @@ def test_details_give_the_largest_deviation_of_all_scenes():
 
 def test_it_is_loaded_once_it_is_needed_and_leaves_numpy_as_it_was():
     code = """
-import heuristic, sys, numpy
-import comparisons.compare as c
+import fotismos, sys, numpy
+import fotismos.comparisons.compare as c
 print("colour" in sys.modules)
 c._load()
-from comparisons.departure import definitions
+from fotismos.comparisons.departure import definitions
 print("colour" in sys.modules, numpy.get_printoptions()["legacy"])
 """
     done = python("-c", code)
@@ -114,5 +114,5 @@ print("colour" in sys.modules, numpy.get_printoptions()["legacy"])
 def test_a_view_of_nothing_has_nothing_to_compute():
     away = scene(viewer=(0, -4, 0), target=(0, -9, 0), size=8, ball=sphere(), sky=SKY)
     case = open_case(lambda: away, Options(spp=4, allow_empty=True))
-    found = comparisons.compare.compare(case.source, case.options).record
+    found = fotismos.comparisons.compare.compare(case.source, case.options).record
     assert found.colour_science == Deviations(pixels=0, largest=dict.fromkeys(DEFINED, 0))

@@ -12,12 +12,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.compare import compare
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from heuristic.errors import InputError
-from reference import Source
-from reference.planning.plan import wants_spectra
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic.errors import InputError
+from fotismos.reference import Source
+from fotismos.reference.planning.plan import wants_spectra
 from tests import corpus_files
 
 CORPUS = Path(__file__).parent / "corpus"

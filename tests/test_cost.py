@@ -11,23 +11,23 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from comparisons.case import open_case
-from comparisons.comparison import MeanError
-from comparisons.cost import cost as studies
-from comparisons.cost import measure, methods, times
-from comparisons.cost.cost import cost
-from comparisons.cost.cost_record import Cost, Method
-from comparisons.cost.measure import WIDTH, Effort, measure_ladder, reduced
-from comparisons.cost.methods import BUILT_IN, Ladder, declare
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from heuristic.errors import InputError
-from heuristic.heuristics import Interpolation
-from reference.scene.graph import set_variant
-from reference.scene.source import Source
-from reports.run import cost_files
-from reports.terminal import cost_tables
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.comparison import MeanError
+from fotismos.comparisons.cost import cost as studies
+from fotismos.comparisons.cost import measure, methods, times
+from fotismos.comparisons.cost.cost import cost
+from fotismos.comparisons.cost.cost_record import Cost, Method
+from fotismos.comparisons.cost.measure import WIDTH, Effort, measure_ladder, reduced
+from fotismos.comparisons.cost.methods import BUILT_IN, Ladder, declare
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.reference.scene.graph import set_variant
+from fotismos.reference.scene.source import Source
+from fotismos.reports.run import cost_files
+from fotismos.reports.terminal import cost_tables
 from tests.misplanned import scene as described
 from tests.noisy import require_equal, whole
 from tests.schemas import schema

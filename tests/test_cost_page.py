@@ -9,13 +9,13 @@ import pytest
 import vl_convert
 from msgspec import convert, structs
 
-from comparisons.comparison import MeanError
-from comparisons.cost.cost_record import Point
-from reports.charts import cost_charts
-from reports.page import page
-from reports.page.scene_view import SceneView
-from reports.run import cost_files, scene
-from reports.terminal import cost_tables
+from fotismos.comparisons.comparison import MeanError
+from fotismos.comparisons.cost.cost_record import Point
+from fotismos.reports.charts import cost_charts
+from fotismos.reports.page import page
+from fotismos.reports.page.scene_view import SceneView
+from fotismos.reports.run import cost_files, scene
+from fotismos.reports.terminal import cost_tables
 from tests import cost_records, records
 from tests.browser.conftest import noisy
 from tests.schemas import schema

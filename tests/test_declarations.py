@@ -17,18 +17,18 @@ import OpenEXR
 import pytest
 from scipy.ndimage import uniform_filter
 
-from comparisons.check.measurement import measurement
-from comparisons.check.moved import differences
-from comparisons.cost import methods
-from comparisons.cost.cost_record import Method
-from comparisons.departure.colour import DEFAULT_VIEWING
-from comparisons.departure.metrics import METRICS, Metric, declare
-from comparisons.fit.fit import RenderedHalves, departures
-from comparisons.study import dataset
-from heuristic.declared import Declared
-from heuristic.errors import InputError
-from heuristic.heuristics import HEURISTICS, Heuristic
-from reference.rendering.sums import Estimate
+from fotismos.comparisons.check.measurement import measurement
+from fotismos.comparisons.check.moved import differences
+from fotismos.comparisons.cost import methods
+from fotismos.comparisons.cost.cost_record import Method
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure.metrics import METRICS, Metric, declare
+from fotismos.comparisons.fit.fit import RenderedHalves, departures
+from fotismos.comparisons.study import dataset
+from fotismos.heuristic.declared import Declared
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import HEURISTICS, Heuristic
+from fotismos.reference.rendering.sums import Estimate
 from tests.schemas import schema
 from tests.small_scene import PLAIN
 

@@ -7,13 +7,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.gallery.builtin import SCENES
-from heuristic import kernel, tessellation
-from heuristic.declared import Declared
-from heuristic.errors import InputError
-from heuristic.heuristics import HEURISTICS, PHONG, Heuristic, Parameter, declare, named
-from reference.pairing import halves
-from reference.rendering.renderer import Renderer
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.heuristic import kernel, tessellation
+from fotismos.heuristic.declared import Declared
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import HEURISTICS, PHONG, Heuristic, Parameter, declare, named
+from fotismos.reference.pairing import halves
+from fotismos.reference.rendering.renderer import Renderer
 from tests import checks
 from tests.parts import camera, moved, rgb_of, shown_by
 
@@ -193,8 +193,8 @@ def test_a_wrong_declaration_is_refused():
 def test_packages_declare_by_entry_points_that_are_loaded_once(monkeypatch):
     loads, late = [], Heuristic("late", toon)
     entry = SimpleNamespace(name="late", value="package:LATE", load=lambda: loads.append(1) or late)
-    monkeypatch.setattr("heuristic.declared.entry_points", lambda group: [entry])
-    registry = Declared("heuristic", "fotismos.toys", phong="heuristic.heuristics:PHONG")
+    monkeypatch.setattr("fotismos.heuristic.declared.entry_points", lambda group: [entry])
+    registry = Declared("heuristic", "fotismos.toys", phong="fotismos.heuristic.heuristics:PHONG")
     assert (registry["phong"], loads) == (PHONG, [])
     mine = registry.declare(Heuristic("mine", toon))
     assert list(registry) == ["phong", "mine", "late"]

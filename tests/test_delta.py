@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from reference.rendering.renderer import Renderer, Stream, pass_seed
-from reference.rendering.sums import Accumulator
+from fotismos.reference.rendering.renderer import Renderer, Stream, pass_seed
+from fotismos.reference.rendering.sums import Accumulator
 from tests.misplanned import scene as described
 from tests.parts import moved
 

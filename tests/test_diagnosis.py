@@ -5,10 +5,10 @@ import re
 import numpy as np
 import pytest
 
-from comparisons.audit import diagnosis
-from comparisons.textbook import halfway, mirrored
-from heuristic import heuristics
-from heuristic.errors import InputError
+from fotismos.comparisons.audit import diagnosis
+from fotismos.comparisons.textbook import halfway, mirrored
+from fotismos.heuristic import heuristics
+from fotismos.heuristic.errors import InputError
 from tests.test_glsl import opengl
 from tests.wrong_shaders import GLSL, PYTHON, SHADERS, WRONG
 

@@ -4,15 +4,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.compare import compare
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from reference.planning.facts import Facts
-from reference.planning.rules import LIGHT_BY_LIGHT
-from reference.rendering import direct
-from reference.rendering.renderer import pass_seed
-from reference.scene.source import Source
-from reports import verdict
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.planning.facts import Facts
+from fotismos.reference.planning.rules import LIGHT_BY_LIGHT
+from fotismos.reference.rendering import direct
+from fotismos.reference.rendering.renderer import pass_seed
+from fotismos.reference.scene.source import Source
+from fotismos.reports import verdict
 from tests.misplanned import BLACK, DIFFUSE, TWO_SIDED, lamp, octahedron, scene
 from tests.parts import look_at, moved
 

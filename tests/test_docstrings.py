@@ -15,7 +15,7 @@ def with_examples():
     for room in ROOMS:
         for path in sorted((ROOT / room).rglob("*.py")):
             if ">>>" in path.read_text():
-                yield ".".join(path.relative_to(ROOT).with_suffix("").parts)
+                yield ".".join(("fotismos", *path.relative_to(ROOT).with_suffix("").parts))
 
 
 @pytest.mark.parametrize("name", list(with_examples()))

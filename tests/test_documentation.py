@@ -12,7 +12,7 @@ from markdown_it import MarkdownIt
 from nbclient import NotebookClient
 from PIL import Image
 
-from reports import cli
+from fotismos.reports import cli
 from tests.programs import ROOT, python
 
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]

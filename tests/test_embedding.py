@@ -6,9 +6,9 @@ import zlib
 import numpy as np
 import pytest
 
-from comparisons.departure.metrics import drawn
-from reports.files import images
-from reports.page import embedding
+from fotismos.comparisons.departure.metrics import drawn
+from fotismos.reports.files import images
+from fotismos.reports.page import embedding
 
 ROUNDING, ERROR_ROUNDING = 0.0025, 2**-4
 """Largest relative errors, of values and of standard errors."""

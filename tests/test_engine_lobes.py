@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparisons.audit import furnace
-from comparisons.audit.subjects import ShadingSubject
-from heuristic import heuristics
+from fotismos.comparisons.audit import furnace
+from fotismos.comparisons.audit.subjects import ShadingSubject
+from fotismos.heuristic import heuristics
 
 SHADERS = Path(__file__).parents[1] / "docs/shaders"
 DIELECTRIC = 0.04

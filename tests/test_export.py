@@ -10,14 +10,14 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from comparisons.case import open_case
-from comparisons.options import Options
-from comparisons.plain_scene import plain_scene
-from heuristic import meshes
-from heuristic.errors import InputError
-from reference.rendering.gbuffer import gbuffer
-from reference.scene.source import Source
-from reports.files.export_files import gltf
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.plain_scene import plain_scene
+from fotismos.heuristic import meshes
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.rendering.gbuffer import gbuffer
+from fotismos.reference.scene.source import Source
+from fotismos.reports.files.export_files import gltf
 from tests import oracle
 from tests.test_pixel_terms import centres
 

@@ -7,7 +7,7 @@ sums are Mitsuba's in one and the kernel's in the other.
 import mitsuba as mi
 import pytest
 
-from comparisons.gallery.builtin import SCENES, THREE_LIGHTS, VIEWER_C
+from fotismos.comparisons.gallery.builtin import SCENES, THREE_LIGHTS, VIEWER_C
 from tests import checks
 from tests.parts import rgb_of
 

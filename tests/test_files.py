@@ -9,11 +9,11 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from comparisons.departure import colour
-from comparisons.departure.metrics import METRICS, RATIO, drawn
-from reference.records import plain
-from reports.files import images
-from reports.terminal import tables
+from fotismos.comparisons.departure import colour
+from fotismos.comparisons.departure.metrics import METRICS, RATIO, drawn
+from fotismos.reference.records import plain
+from fotismos.reports.files import images
+from fotismos.reports.terminal import tables
 from tests import records
 
 CONTRACT = {

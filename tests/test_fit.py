@@ -12,22 +12,22 @@ import numpy as np
 import pytest
 from drjit.llvm.ad import Array3f64
 
-from comparisons.departure.colour import DEFAULT_VIEWING
-from comparisons.departure.metrics import LEADING
-from comparisons.fit import fit as fitting
-from comparisons.fit.fit import fit
-from comparisons.fit.model import OwnModel, PhongModel, bounds, see, start
-from comparisons.fit.search import LOSSES, Objective, descend, identify, search
-from comparisons.gallery.builtin import builtin
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from heuristic.errors import InputError
-from heuristic.heuristics import named
-from heuristic.terms import normalisation
-from reference.rendering.gbuffer import gbuffer
-from reference.rendering.renderer import Renderer
-from reference.scene.source import Source
-from reports.terminal.words import percent
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.fit import fit as fitting
+from fotismos.comparisons.fit.fit import fit
+from fotismos.comparisons.fit.model import OwnModel, PhongModel, bounds, see, start
+from fotismos.comparisons.fit.search import LOSSES, Objective, descend, identify, search
+from fotismos.comparisons.gallery.builtin import builtin
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import named
+from fotismos.heuristic.terms import normalisation
+from fotismos.reference.rendering.gbuffer import gbuffer
+from fotismos.reference.rendering.renderer import Renderer
+from fotismos.reference.scene.source import Source
+from fotismos.reports.terminal.words import percent
 from tests.misplanned import scene as described
 from tests.parts import look_at, moved, rgb_of
 from tests.schemas import schema
@@ -278,7 +278,7 @@ def test_the_errors_are_those_of_the_loss_that_was_minimised(name, rgb):
 
 GAIN = """
 import drjit as dr
-from heuristic import Range
+from fotismos.heuristic import Range
 
 def shade(point, gain: Range(0, 4) = 1, tint: Range(-1, 1) = 0.25):
     cosines = [dr.maximum(dr.dot(point.normal, each.toward), 0) for each in point.lights]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from flip_evaluator import evaluate
 
-from comparisons.departure.colour import DEFAULT_VIEWING, Viewing
-from comparisons.departure.flip import LARGEST, MOST_STOPS, exposures, hdr_flip, ldr_flip
-from comparisons.departure.metrics import METRICS
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Viewing
+from fotismos.comparisons.departure.flip import LARGEST, MOST_STOPS, exposures, hdr_flip, ldr_flip
+from fotismos.comparisons.departure.metrics import METRICS
 
 FLIPS = pytest.mark.parametrize("name", ["ldr_flip", "hdr_flip"])
 SIZE = (11, 13, 3)

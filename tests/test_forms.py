@@ -5,7 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.planning.facts import Form, geometry
+from fotismos.reference.planning.facts import Form, geometry
 from tests.parts import mesh_of, moved
 
 pytestmark = pytest.mark.usefixtures("rgb")

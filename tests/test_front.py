@@ -7,14 +7,14 @@ import pytest
 from msgspec import structs
 from msgspec.structs import astuple
 
-from comparisons.comparison import MeanError
-from comparisons.cost import times
-from comparisons.cost.cost_record import Method, Point
-from comparisons.cost.front import at_size, beats, fronted, reach, sufficient
-from comparisons.cost.measure import QUICK, Effort, timed, tried
-from heuristic.errors import InputError
-from reference.records import Estimated
-from reference.rendering.renderer import passes
+from fotismos.comparisons.comparison import MeanError
+from fotismos.comparisons.cost import times
+from fotismos.comparisons.cost.cost_record import Method, Point
+from fotismos.comparisons.cost.front import at_size, beats, fronted, reach, sufficient
+from fotismos.comparisons.cost.measure import QUICK, Effort, timed, tried
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.records import Estimated
+from fotismos.reference.rendering.renderer import passes
 from tests import cost_records
 
 PIXELS = 64 * 64

@@ -3,7 +3,7 @@
 import pytest
 from drjit.llvm import Float
 
-from heuristic import numerics, terms, vectors
+from fotismos.heuristic import numerics, terms, vectors
 from tests import fuzz
 
 ROWS, LARGE = 1_000_000, 4_000_000

@@ -2,7 +2,7 @@
 
 import mitsuba as mi
 
-from reference.rendering.gbuffer import gbuffer
+from fotismos.reference.rendering.gbuffer import gbuffer
 from tests.parts import look_at
 
 HALVES = """

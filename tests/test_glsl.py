@@ -9,14 +9,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.case import open_case
-from comparisons.compare import compare
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from heuristic import glsl, program, user_shaders
-from heuristic.errors import InputError, InstallationError
-from heuristic.heuristics import INPUTS, Heuristic, named
-from reports.commands import doctor
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic import glsl, program, user_shaders
+from fotismos.heuristic.errors import InputError, InstallationError
+from fotismos.heuristic.heuristics import INPUTS, Heuristic, named
+from fotismos.reports.commands import doctor
 from tests.parts import camera
 from tests.test_user_heuristics import SHADERS, SMALL, image, require_sizes
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from comparisons.compare import compare
-from comparisons.options import Options
-from comparisons.prepared import guarded
-from reference.planning import guard
-from reference.planning.plan import Guard
-from reference.scene.source import Source
-from reports.page import page
-from reports.page.scene_view import SceneView
-from reports.terminal import tables
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import guarded
+from fotismos.reference.planning import guard
+from fotismos.reference.planning.plan import Guard
+from fotismos.reference.scene.source import Source
+from fotismos.reports.page import page
+from fotismos.reports.page.scene_view import SceneView
+from fotismos.reports.terminal import tables
 from tests.misplanned import SCENES, SKY, lamp, prune_blindly, scene, sphere
 
 SLIGHTLY_WRONG = {"an anisotropic sphere"}

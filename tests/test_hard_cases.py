@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from markupsafe import escape
 
-from comparisons import hard_cases
-from comparisons.hard_cases import CASES, by_kernel, error
-from reports.page import page
+from fotismos.comparisons import hard_cases
+from fotismos.comparisons.hard_cases import CASES, by_kernel, error
+from fotismos.reports.page import page
 
 
 @pytest.fixture(scope="module")

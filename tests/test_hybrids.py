@@ -7,20 +7,20 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.case import open_case
-from comparisons.compare import compare
-from comparisons.cost.cost_record import Method
-from comparisons.cost.methods import Ladder
-from comparisons.departure.metrics import LEADING
-from comparisons.gallery.builtin import SCENES
-from comparisons.hybrids import attribution
-from comparisons.hybrids.hybrids import HybridImages, HybridScenes
-from comparisons.options import Options
-from comparisons.prepared import guarded, prepare
-from reference.planning.effects import EXTENDED, INTERREFLECTION, OCCLUSION, labelled
-from reference.rendering.renderer import Stream, passes
-from reference.scene.graph import set_variant
-from reference.scene.source import Source
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.cost.cost_record import Method
+from fotismos.comparisons.cost.methods import Ladder
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.hybrids import attribution
+from fotismos.comparisons.hybrids.hybrids import HybridImages, HybridScenes
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import guarded, prepare
+from fotismos.reference.planning.effects import EXTENDED, INTERREFLECTION, OCCLUSION, labelled
+from fotismos.reference.rendering.renderer import Stream, passes
+from fotismos.reference.scene.graph import set_variant
+from fotismos.reference.scene.source import Source
 from tests.misplanned import BLACK, DIFFUSE
 from tests.misplanned import scene as described
 from tests.noisy import require_equal, whole

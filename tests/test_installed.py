@@ -20,7 +20,9 @@ def installed(tmp_path_factory):
     pip = (sys.executable, "-m", "pip", "-q", "--disable-pip-version-check")
     # Made of a copy: what a wheel leaves behind would be found as another plugin of pytest.
     source = folder / "source"
-    shutil.copytree(ROOT, source, ignore=shutil.ignore_patterns(".*", "node_modules", "out"))
+    shutil.copytree(
+        ROOT, source, symlinks=True, ignore=shutil.ignore_patterns(".*", "node_modules", "out")
+    )
     do(*pip, "wheel", "--no-deps", "-w", folder, source)
     (wheel,) = folder.glob("fotismos-*.whl")
     do(sys.executable, "-m", "venv", "--without-pip", folder / "env")

@@ -5,13 +5,18 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from heuristic import DirectionalLight, Material, PointLight, meshes, shade, tessellation
-from heuristic.errors import InputError
-from heuristic.normals import WEIGHTINGS
-from heuristic.plugins.interpolated import Interpolation, shade_mesh, shading_points, stored_shade
-from reference import Source
-from reference.pairing.halves import pair
-from reference.scene.source import collect_messages
+from fotismos.heuristic import DirectionalLight, Material, PointLight, meshes, shade, tessellation
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.normals import WEIGHTINGS
+from fotismos.heuristic.plugins.interpolated import (
+    Interpolation,
+    shade_mesh,
+    shading_points,
+    stored_shade,
+)
+from fotismos.reference import Source
+from fotismos.reference.pairing.halves import pair
+from fotismos.reference.scene.source import collect_messages
 from tests import oracle
 from tests.parts import camera, mesh_of, moved
 from tests.test_normals import rows

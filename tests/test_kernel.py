@@ -1,4 +1,4 @@
-"""The kernel `heuristic.shade`: its values, what it compiles, and what it refuses."""
+"""The kernel `fotismos.heuristic.shade`: its values, what it compiles, and what it refuses."""
 
 import drjit as dr
 import drjit.llvm
@@ -7,7 +7,7 @@ import drjit.scalar
 import numpy as np
 import pytest
 
-from heuristic import DirectionalLight, Material, PointLight, shade
+from fotismos.heuristic import DirectionalLight, Material, PointLight, shade
 from tests import checks
 
 Float, Array3f = drjit.llvm.ad.Float, drjit.llvm.ad.Array3f

@@ -4,8 +4,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.rendering.renderer import Renderer
-from reference.scene.source import Source, digest
+from fotismos.reference.rendering.renderer import Renderer
+from fotismos.reference.scene.source import Source, digest
 
 SCENE = """<scene version="3.0.0">
   %s

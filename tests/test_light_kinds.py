@@ -3,10 +3,10 @@
 import mitsuba as mi
 import numpy as np
 
-from heuristic.lights import PLUGINS
-from reference import Source
-from reference.pairing import emitters, lights
-from reference.pairing.factors import Replacements
+from fotismos.heuristic.lights import PLUGINS
+from fotismos.reference import Source
+from fotismos.reference.pairing import emitters, lights
+from fotismos.reference.pairing.factors import Replacements
 
 PHYSICAL = [plugin for kind in lights.KINDS for plugin in kind.plugins]
 NEEDED = {"projector": {"irradiance": 1.0}}

@@ -4,8 +4,8 @@ import drjit as dr
 import numpy as np
 import pytest
 
-import heuristic
-from heuristic import kernel
+import fotismos
+from fotismos.heuristic import kernel
 from tests import checks, oracle
 from tests.parts import camera, moved, rgb_of
 
@@ -90,9 +90,9 @@ def test_any_number_of_lights_adds_up(count):
     expected = oracle.shade(*arrays, oracle.Material(**material), lights, 0.5)
     away = ~oracle.near_an_edge(points.position, points.normal, lights, 1e-6)
     for vector_type, tolerance in ((dr.llvm.Array3f64, 1e-12), (dr.llvm.Array3f, 4e-6)):
-        found = heuristic.shade(
+        found = fotismos.shade(
             *(vector_type(array.T) for array in arrays),
-            heuristic.Material(**material),
+            fotismos.Material(**material),
             [checks.kernel_light(light) for light in lights],
             0.5,
         )
@@ -106,9 +106,9 @@ def test_many_lights_pass_gradients():
     position = dr.llvm.ad.Array3f([0, 0.5], [0, 0.1], [0, 0.2])
     k_d = dr.llvm.ad.Float(0.5)
     dr.enable_grad(k_d)
-    lights = [heuristic.PointLight((x, 1.0, 3.0), 0.1) for x in np.linspace(-1, 1, 20)]
+    lights = [fotismos.PointLight((x, 1.0, 3.0), 0.1) for x in np.linspace(-1, 1, 20)]
     up = dr.llvm.ad.Array3f(0, 0, 1)
-    value = heuristic.shade(position, up, up, heuristic.Material(k_d=k_d), lights)
+    value = fotismos.shade(position, up, up, fotismos.Material(k_d=k_d), lights)
     dr.backward(dr.sum(value))
     assert dr.grad(k_d)[0] == pytest.approx(dr.sum(value)[0] / 0.5, rel=1e-5)
 
@@ -142,9 +142,9 @@ def test_two_intensities_are_those_of_the_equations_in_random_sets(kind, omitted
     float64 = dr.llvm.Array3f64
     given = {n: float64(v.T) if v.ndim > 1 else dr.llvm.Float64(v) for n, v in numbers.items()}
     material, lamp = split(given)
-    classes = heuristic.PointLight, heuristic.DirectionalLight, heuristic.SpotLight
+    classes = fotismos.PointLight, fotismos.DirectionalLight, fotismos.SpotLight
     made = dict(zip(("point", "directional", "spot"), classes, strict=True))[kind](**lamp)
-    found = heuristic.shade(*(float64(a.T) for a in arrays), heuristic.Material(**material), [made])
+    found = fotismos.shade(*(float64(a.T) for a in arrays), fotismos.Material(**material), [made])
     away = ~oracle.near_an_edge(points.position, points.normal, [light], 1e-9)
     assert (expected > 0.01).any(axis=1).sum() > 500
     oracle.require_close(checks.as_rows(found), expected, absolute=1e-12, where=away)

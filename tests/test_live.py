@@ -6,12 +6,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons import pixel_terms
-from reference.rendering.gbuffer import image_size, pixel_rays
-from reference.rendering.renderer import variant
-from reports.page.scene_view import LiveView
-from reports.page.why_view import live_view
-from reports.run import scene
+from fotismos.comparisons import pixel_terms
+from fotismos.reference.rendering.gbuffer import image_size, pixel_rays
+from fotismos.reference.rendering.renderer import variant
+from fotismos.reports.page.scene_view import LiveView
+from fotismos.reports.page.why_view import live_view
+from fotismos.reports.run import scene
 from tests import records
 from tests.misplanned import scene as described
 from tests.test_embedding import codes

@@ -13,14 +13,14 @@ import tomllib
 
 import pytest
 
-from heuristic import llvm
-from heuristic.errors import InstallationError
+from fotismos.heuristic import llvm
+from fotismos.heuristic.errors import InstallationError
 from tests.programs import ROOT, python
 
 REQUIREMENTS = ["requirements.txt", "requirements-test.txt"]
 
 PROBE = """
-from heuristic import llvm
+from fotismos.heuristic import llvm
 info = llvm.check()
 print(info.source, info.version, info.path)
 """
@@ -60,7 +60,9 @@ def test_no_llvm_at_all(monkeypatch):
 
 
 def command(words, prelude):
-    run = f"sys.argv = 'fotismos {words}'.split(); from reports.__main__ import main; main()"
+    run = (
+        f"sys.argv = 'fotismos {words}'.split(); from fotismos.reports.__main__ import main; main()"
+    )
     done = python("-c", f"import os, sys; {prelude}; {run}")
     assert "Traceback" not in done.stderr
     return done

@@ -4,7 +4,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.rendering import direct
+from fotismos.reference.rendering import direct
 from tests.parts import camera, look_at, moved, rgb_of
 
 ALBEDO = 0.5

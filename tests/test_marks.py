@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from comparisons.departure.marks import LEVEL, MARKED, UNDETERMINED
+from fotismos.comparisons.departure.marks import LEVEL, MARKED, UNDETERMINED
 from tests import noisy
 
 KINDS = ("lognormal", "poisson", "spikes")

@@ -4,11 +4,11 @@ import resource
 
 import pytest
 
-from comparisons.compare import compare
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from heuristic.errors import InputError
-from reference.rendering import renderer
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.rendering import renderer
 
 
 def test_what_does_not_fit_is_refused_before_it_is_rendered(rgb, monkeypatch):

@@ -3,7 +3,7 @@
 import mitsuba as mi
 import numpy as np
 
-from heuristic import meshes
+from fotismos.heuristic import meshes
 
 POINTS = [(0, 0, 0), (4, 0, 0), (0, 4, 1), (4, 4, 2)]
 FACES = [(0, 1, 2), (2, 1, 3)]

@@ -4,26 +4,26 @@ import colour
 import numpy as np
 import pytest
 
-from comparisons.departure import definitions
-from comparisons.departure.colour import Viewing, cam16ucs_unclipped, ciede2000
-from comparisons.departure.definitions import AGREEMENT, DEFINED
-from comparisons.departure.metrics import (
+from fotismos.comparisons.departure import definitions
+from fotismos.comparisons.departure.colour import Viewing, cam16ucs_unclipped, ciede2000
+from fotismos.comparisons.departure.definitions import AGREEMENT, DEFINED
+from fotismos.comparisons.departure.metrics import (
     LEADING,
     LOG2_EPSILON,
     METRICS,
     Pixelwise,
     log2_luminance_ratio,
 )
-from comparisons.departure.statistics import (
+from fotismos.comparisons.departure.statistics import (
     best_exposure,
     noise_floor,
     summarise,
     summarise_log2_luminance,
 )
-from heuristic.errors import InputError, InstallationError, NonFiniteError
-from reference.records import plain
-from reference.rendering.renderer import require_finite
-from reports.commands import doctor
+from fotismos.heuristic.errors import InputError, InstallationError, NonFiniteError
+from fotismos.reference.records import plain
+from fotismos.reference.rendering.renderer import require_finite
+from fotismos.reports.commands import doctor
 
 ALL = pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS.keys())
 POINTWISE = pytest.mark.parametrize(

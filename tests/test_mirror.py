@@ -11,14 +11,14 @@ import pytest
 from drjit.llvm.ad import Array3f, Float
 from scipy import stats
 
-from comparisons.options import Options
-from comparisons.plain_scene import material_of
-from comparisons.prepared import prepare
-from heuristic import DirectionalLight, Material, PointLight, shade
-from heuristic.errors import InputError
-from reference import Convention, Source
-from reference.pairing import halves
-from reference.planning.effects import INTERREFLECTION, SPECULAR
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.plain_scene import material_of
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic import DirectionalLight, Material, PointLight, shade
+from fotismos.heuristic.errors import InputError
+from fotismos.reference import Convention, Source
+from fotismos.reference.pairing import halves
+from fotismos.reference.planning.effects import INTERREFLECTION, SPECULAR
 from tests.misplanned import scene as described
 from tests.parts import camera, look_at, moved, rgb_of
 from tests.test_phong_bsdf import direction, interaction, spherical_grid

@@ -10,8 +10,8 @@ import drjit as dr
 import drjit.llvm.ad
 import pytest
 
-from comparisons.gallery.builtin import SCENES
-from heuristic import DirectionalLight, Material, kernel, terms
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.heuristic import DirectionalLight, Material, kernel, terms
 from tests import checks
 from tests.test_figures import everything
 

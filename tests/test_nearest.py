@@ -7,15 +7,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from heuristic.errors import InputError
-from reference import Convention, Source
-from reference.pairing import albedo, probe
-from reference.pairing.albedo import RoughPlastic
-from reference.pairing.bsdfs import Context
-from reference.pairing.nearest import rule_of
-from reference.pairing.probe import mean_radiance
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic.errors import InputError
+from fotismos.reference import Convention, Source
+from fotismos.reference.pairing import albedo, probe
+from fotismos.reference.pairing.albedo import RoughPlastic
+from fotismos.reference.pairing.bsdfs import Context
+from fotismos.reference.pairing.nearest import rule_of
+from fotismos.reference.pairing.probe import mean_radiance
 from tests.parts import camera, moved, rgb_of
 
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter

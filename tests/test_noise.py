@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from scipy.special import stdtrit
 
-from comparisons.departure.metrics import METRICS
-from comparisons.departure.statistics import noise_floor
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from reference.rendering.sums import Accumulator
+from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.departure.statistics import noise_floor
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.rendering.sums import Accumulator
 
 pytestmark = pytest.mark.thorough
 

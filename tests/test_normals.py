@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from heuristic import normals
-from heuristic.errors import InputError
-from heuristic.normals import WEIGHTINGS, corner_angles, vertex_normals
+from fotismos.heuristic import normals
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.normals import WEIGHTINGS, corner_angles, vertex_normals
 
 SINGLE, DOUBLE = drjit.llvm.ad.Array3f, drjit.llvm.ad.Array3f64
 EVERY_TYPE = pytest.mark.parametrize(

@@ -14,12 +14,12 @@ from nbclient import NotebookClient
 from PIL import Image
 
 import fotismos
-from comparisons.case import open_case
-from comparisons.compare import compare
-from comparisons.departure.metrics import METRICS
-from comparisons.options import Options
-from heuristic.errors import InputError
-from reports.notebook import Shown
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.errors import InputError
+from fotismos.reports.notebook import Shown
 from tests.programs import ROOT
 
 CELL = """

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import heuristic
-from heuristic import numerics, terms
+import fotismos
+from fotismos.heuristic import numerics, terms
 
 Single, Double = drjit.llvm.ad.Float, drjit.llvm.ad.Float64
 Array3f, Array3f64 = drjit.llvm.ad.Array3f, drjit.llvm.ad.Array3f64
@@ -76,11 +76,11 @@ def test_sums_lose_next_to_nothing(values):
 def test_derivatives_of_the_lobe_are_those_of_differences(n):
     """By the view, in a highlight, against the kernel in double precision."""
     view = np.array([0.6 / np.sqrt(n), 0.0, 1.0])
-    light, step = [heuristic.PointLight((0, 0, 2), 1.0)], 1e-6 / np.sqrt(n)
+    light, step = [fotismos.PointLight((0, 0, 2), 1.0)], 1e-6 / np.sqrt(n)
 
     def at(vector_type, x):
-        material = heuristic.Material(k_s=1, n=vector_type(n, n, n).x)
-        return heuristic.shade(
+        material = fotismos.Material(k_s=1, n=vector_type(n, n, n).x)
+        return fotismos.shade(
             vector_type(0), vector_type(0, 0, 1), vector_type(x, 0, 1), material, light
         )
 
@@ -110,10 +110,10 @@ def test_a_highlight_keeps_its_digits_at_any_exponent(form):
             else:
                 cosine = _exact_dot(n_, _exact_unit([a + b for a, b in zip(l_, v_, strict=True)]))
             expected = float(cosine ** mpmath.mpf(n))
-        sun = heuristic.DirectionalLight(tuple(toward), 1.0)
-        material = heuristic.Material(k_s=1.0, n=n, form=form)
+        sun = fotismos.DirectionalLight(tuple(toward), 1.0)
+        material = fotismos.Material(k_s=1.0, n=n, form=form)
         place, *given = (Array3f(*map(float, each)) for each in ((0, 0, 0), normal, view))
-        found = heuristic.shade(place, *given, material, [sun])
+        found = fotismos.shade(place, *given, material, [sun])
         assert abs(found[0] - expected) < 1e-4
 
 

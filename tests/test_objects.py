@@ -6,13 +6,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.case import open_case
-from comparisons.compare import compare
-from comparisons.departure import regions
-from comparisons.hybrids.attribution import BIAS, by_object, named
-from comparisons.options import Options
-from reference.rendering import sums
-from reference.rendering.gbuffer import ObjectIds, gbuffer
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.departure import regions
+from fotismos.comparisons.hybrids.attribution import BIAS, by_object, named
+from fotismos.comparisons.options import Options
+from fotismos.reference.rendering import sums
+from fotismos.reference.rendering.gbuffer import ObjectIds, gbuffer
 from tests import records
 from tests.parts import camera, moved
 

@@ -10,14 +10,14 @@ import jsonschema
 import numpy as np
 import pytest
 
-from comparisons.cost.methods import BUILT_IN
-from comparisons.departure.metrics import METRICS, THRESHOLDS, drawn
-from reference.planning.effects import EFFECTS
-from reference.records import Machine
-from reports import glossary, verdict
-from reports.files.results import Failure, RunRecord
-from reports.page import embedding, page, templating
-from reports.terminal import words
+from fotismos.comparisons.cost.methods import BUILT_IN
+from fotismos.comparisons.departure.metrics import METRICS, THRESHOLDS, drawn
+from fotismos.reference.planning.effects import EFFECTS
+from fotismos.reference.records import Machine
+from fotismos.reports import glossary, verdict
+from fotismos.reports.files.results import Failure, RunRecord
+from fotismos.reports.page import embedding, page, templating
+from fotismos.reports.terminal import words
 from tests import records
 from tests.schemas import schema
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from comparisons.gallery.builtin import SCENES
-from heuristic.errors import InputError
-from reference import Convention, Source
-from reference.pairing import albedo, factors, halves
-from reference.pairing.albedo import RoughPlastic
-from reference.pairing.factors import Phong
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.heuristic.errors import InputError
+from fotismos.reference import Convention, Source
+from fotismos.reference.pairing import albedo, factors, halves
+from fotismos.reference.pairing.albedo import RoughPlastic
+from fotismos.reference.pairing.factors import Phong
 from tests.parts import camera, rgb_of
 
 MATCHED, LITERAL = Convention.MATCHED, Convention.LITERAL

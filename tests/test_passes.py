@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from comparisons.compare import compare
-from comparisons.departure.metrics import METRICS
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from comparisons.prepared import LIMIT_SPP, WAVEFRONT, prepare, schedule
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import LIMIT_SPP, WAVEFRONT, prepare, schedule
 
 SMALL = (24, 24)
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-import heuristic
-from comparisons.gallery.builtin import SCENES
-from heuristic import numerics
-from heuristic.errors import InputError
+import fotismos
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.heuristic import numerics
+from fotismos.heuristic.errors import InputError
 from tests import checks
 from tests.parts import rgb_of
 
@@ -279,4 +279,4 @@ def test_a_value_edited_below_zero_is_refused(rgb):
 
 def test_scalar_variants_are_refused(rgb):
     with mi.scoped_set_variant("scalar_rgb"), pytest.raises(InputError, match="they trace arrays"):
-        heuristic.register()
+        fotismos.register()

@@ -4,12 +4,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.compare import compare
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from reference import Source
-from reference.pairing import halves
-from reference.rendering import renderer
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.reference import Source
+from fotismos.reference.pairing import halves
+from fotismos.reference.rendering import renderer
 from tests.parts import camera, look_at, moved
 
 ALBEDO = np.array([0.7, 0.45, 0.2])

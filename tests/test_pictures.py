@@ -11,15 +11,15 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from comparisons import pictures
-from comparisons.case import open_case
-from comparisons.compare import compare
-from comparisons.comparison import PictureRecord
-from comparisons.departure.colour import from_srgb, to_srgb
-from comparisons.departure.metrics import METRICS
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from heuristic.errors import InputError, NonFiniteError
+from fotismos.comparisons import pictures
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.comparison import PictureRecord
+from fotismos.comparisons.departure.colour import from_srgb, to_srgb
+from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic.errors import InputError, NonFiniteError
 
 SIDE = 64
 

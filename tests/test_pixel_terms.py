@@ -7,17 +7,17 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from comparisons import pixel_terms
-from comparisons.case import open_case
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from reference.rendering.gbuffer import pixel_rays
-from reference.rendering.renderer import passes, variant
-from reports.files import results
-from reports.page import page
-from reports.page.why_view import terms_view
-from reports.run.scene import view_of, write
+from fotismos.comparisons import pixel_terms
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.rendering.gbuffer import pixel_rays
+from fotismos.reference.rendering.renderer import passes, variant
+from fotismos.reports.files import results
+from fotismos.reports.page import page
+from fotismos.reports.page.why_view import terms_view
+from fotismos.reports.run.scene import view_of, write
 from tests import records
 from tests.misplanned import scene as described
 from tests.oracle import unit

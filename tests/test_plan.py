@@ -5,14 +5,14 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from reference.pairing.probe import AlbedoTable
-from reference.planning.effects import EFFECTS, INTERREFLECTION, OCCLUSION
-from reference.planning.facts import Facts
-from reference.planning.plan import wants_spectra
-from reference.scene.source import Source
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.pairing.probe import AlbedoTable
+from fotismos.reference.planning.effects import EFFECTS, INTERREFLECTION, OCCLUSION
+from fotismos.reference.planning.facts import Facts
+from fotismos.reference.planning.plan import wants_spectra
+from fotismos.reference.scene.source import Source
 from tests import misplanned
 from tests.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron, prune_blindly
 from tests.parts import look_at, moved, rgb_of

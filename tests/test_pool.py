@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from comparisons.processes import cluster
-from comparisons.processes.pool import Pool, Task, end_after_task
-from heuristic.errors import InputError, LostProcessError
+from fotismos.comparisons.processes import cluster
+from fotismos.comparisons.processes.pool import Pool, Task, end_after_task
+from fotismos.heuristic.errors import InputError, LostProcessError
 from tests import dask_cluster
 from tests.outputs import results
 from tests.programs import ROOT
@@ -180,7 +180,7 @@ def test_processes_answer_once_and_are_replaced_when_spent_or_dead():
 PARENT = """
 import sys
 from pathlib import Path
-from comparisons.processes.pool import Pool, Task
+from fotismos.comparisons.processes.pool import Pool, Task
 from tests.test_pool import leave_behind
 
 if __name__ == "__main__":
@@ -221,7 +221,7 @@ print("loaded", flush=True)
 """
 PROGRAM = """
 import sys, time
-from comparisons.processes import interruption
+from fotismos.comparisons.processes import interruption
 interruption.listen()
 try:
     import module

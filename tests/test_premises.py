@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from comparisons.compare import compare
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from reference.planning.effects import NO_SECOND_REFLECTION, NO_SHADOWS
-from reference.planning.facts import Facts, Form
-from reference.planning.rules import (
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.planning.effects import NO_SECOND_REFLECTION, NO_SHADOWS
+from fotismos.reference.planning.facts import Facts, Form
+from fotismos.reference.planning.rules import (
     CONVEX,
     FEW,
     LIGHT_BY_LIGHT,
@@ -20,7 +20,7 @@ from reference.planning.rules import (
     TABULATED_ENVIRONMENT,
     loses_light,
 )
-from reference.scene.source import Source
+from fotismos.reference.scene.source import Source
 from tests.misplanned import DIFFUSE, SCENES, TWO_SIDED, lamp, prune_blindly, scene, sphere, tube
 from tests.parts import moved
 from tests.test_disagreements import planned, stock

@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from comparisons.departure.metrics import METRICS
-from reports.charts import figures
-from reports.files import images, results
+from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.reports.charts import figures
+from fotismos.reports.files import images, results
 from tests import records
 
 

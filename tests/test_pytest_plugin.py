@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from heuristic.errors import InputError
-from reports.ci.testing import Departure, Fotismos
+from fotismos.heuristic.errors import InputError
+from fotismos.reports.ci.testing import Departure, Fotismos
 from tests import small_baselines
 from tests.programs import ROOT, python
 from tests.small_scene import PLAIN, SCENE
@@ -64,7 +64,7 @@ def suite(tmp_path):
     (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --strict-markers\n")
 
     def run(*arguments, **variables):
-        words = [sys.executable, "-m", "pytest", "-p", "reports.ci.plugin", "-W", "error"]
+        words = [sys.executable, "-m", "pytest", "-p", "fotismos.reports.ci.plugin", "-W", "error"]
         # Without the colours and services of the run that this is part of.
         environment = {
             k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "GITHUB"))
@@ -117,7 +117,7 @@ def test_without_llvm_tests_are_skipped_with_the_reason(suite):
 
 def test_the_plugin_imports_nothing_heavy():
     heavy = "{'mitsuba', 'drjit', 'numpy'}"
-    code = f"import reports.ci.plugin, sys; print({heavy} & {{*sys.modules}})"
+    code = f"import fotismos.reports.ci.plugin, sys; print({heavy} & {{*sys.modules}})"
     assert python("-c", code).stdout.strip() == "set()"
 
 

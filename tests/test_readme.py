@@ -11,7 +11,7 @@ import numpy as np
 import OpenEXR
 import pytest
 
-from reports import cli, jobs
+from fotismos.reports import cli, jobs
 from tests.programs import ROOT, command_line
 from tests.small_scene import SCENE
 

@@ -3,10 +3,10 @@
 import jsonschema
 import pytest
 
-from heuristic.errors import InputError
-from reference import records
-from reference.records import VERSION, Record
-from reports.schemas import __main__ as schemas
+from fotismos.heuristic.errors import InputError
+from fotismos.reference import records
+from fotismos.reference.records import VERSION, Record
+from fotismos.reports.schemas import __main__ as schemas
 from tests.schemas import FOLDER, schema
 
 
@@ -69,7 +69,7 @@ def test_a_record_of_version_2_in_which_nothing_changed_is_read():
 def test_a_published_schema_is_that_of_its_type(name):
     jsonschema.Draft202012Validator.check_schema(schema(name))
     published = (FOLDER / f"{name}.schema.json").read_text()
-    assert published == schemas.text(name), "run python -m reports.schemas"
+    assert published == schemas.text(name), "run python -m fotismos.reports.schemas"
 
 
 def test_every_published_schema_has_a_type():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons.departure import regions
+from fotismos.comparisons.departure import regions
 
 ALL = np.ones((96, 96), bool)
 

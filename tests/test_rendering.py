@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from comparisons.gallery.builtin import SCENES
-from reference.pairing import halves
-from reference.rendering import renderer, sums
-from reference.rendering.renderer import pass_seed
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.reference.pairing import halves
+from fotismos.reference.rendering import renderer, sums
+from fotismos.reference.rendering.renderer import pass_seed
 from tests.parts import camera, look_at, moved
 
 GLOSSY = {"type": "roughplastic", "alpha": 0.3, "diffuse_reflectance": 0.4}

@@ -4,11 +4,11 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.case import open_case
-from comparisons.cost.methods import Ladder
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from reference.rendering.renderer import Renderer, variant
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.cost.methods import Ladder
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.rendering.renderer import Renderer, variant
 from tests.parts import camera
 from tests.programs import python
 

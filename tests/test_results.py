@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
-import heuristic.program
-from comparisons import atomic
-from comparisons.study import running
-from heuristic.errors import InputError, OutputError
-from reports.files import results
-from reports.run import scene
+import fotismos.heuristic.program
+from fotismos.comparisons import atomic
+from fotismos.comparisons.study import running
+from fotismos.heuristic.errors import InputError, OutputError
+from fotismos.reports.files import results
+from fotismos.reports.run import scene
 from tests import records
 from tests.programs import ROOT
 from tests.small_scene import SCENE
@@ -49,7 +49,9 @@ def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
     record.unlink()
     assert rendered(run, scene_file, out)
     with monkeypatch.context() as patched:
-        patched.setattr(heuristic.program, "source_digest", lambda: "terms.diffuse, halved")
+        patched.setattr(
+            fotismos.heuristic.program, "source_digest", lambda: "terms.diffuse, halved"
+        )
         assert [rendered(run, scene_file, out) for _ in range(2)] == [True, False]
     for more in (("--fresh",), ("--seed", 1)):
         assert rendered(run, scene_file, out, *more)
@@ -292,8 +294,8 @@ def test_an_output_folder_has_a_name(run, command):
 PAIRS = """
 import random, sys, time
 from pathlib import Path
-from heuristic.errors import OutputError
-from reports.files import results
+from fotismos.heuristic.errors import OutputError
+from fotismos.reports.files import results
 top, seed, rounds = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
 rng = random.Random(seed)
 refused = 0
@@ -339,7 +341,7 @@ def test_commands_that_run_at_once_lose_nothing(tmp_path):
 
 HOLD = """
 import sys
-from reports.files import results
+from fotismos.reports.files import results
 with results.hold(sys.argv[1], "fotismos compare mine.xml"):
     print("held", flush=True)
     sys.stdin.read()

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from comparisons.case import open_case
-from comparisons.compare import compare
-from comparisons.options import Options
-from reference.rendering.sampler import SAMPLER, cells, register
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.options import Options
+from fotismos.reference.rendering.sampler import SAMPLER, cells, register
 from tests.parts import camera
 
 COUNTS = (1, 2, 3, 4, 7, 16, 48, 64)

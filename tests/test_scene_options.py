@@ -5,8 +5,8 @@ import re
 
 import pytest
 
-from reference import Source
-from reference.pairing import halves
+from fotismos.reference import Source
+from fotismos.reference.pairing import halves
 from tests.small_scene import PLAIN
 
 BALL = '<bsdf type="diffuse"><rgb name="reflectance" value="$grey"/></bsdf>'

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from heuristic.errors import InputError
-from reference.scene.source import Script
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.scene.source import Script
 from tests.small_scene import SCENE
 
 SCENE_OF = """
@@ -26,7 +26,8 @@ def scene():
 """
 
 DEEDS = {
-    "breaks modules": "import json, comparisons.compare as c; json.dumps = c.compare = None",
+    "breaks modules": "import json, fotismos.comparisons.compare as c;"
+    " json.dumps = c.compare = None",
     "changes its process": "import os, sys; os.chdir('/'); os.umask(0o777); os.environ.clear();"
     " os.write(1, b'words'); print('more'); sys.path.clear(); sys.argv.clear();"
     " mi.set_variant('scalar_rgb') if 'scalar_rgb' in mi.variants() else None",

@@ -1,4 +1,4 @@
-"""What `heuristic.shade` takes, what it refuses in words, and that its gradients are finite."""
+"""What `fotismos.shade` takes, what it refuses in words, and that its gradients are finite."""
 
 from itertools import product
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from drjit.llvm.ad import Array2f, Array3f, Array3f16, Array3f64, Array3i, Array4f, Float, TensorXf
 
-from heuristic import DirectionalLight, Material, PointLight, SpotLight, shade
-from heuristic.errors import InputError
+from fotismos.heuristic import DirectionalLight, Material, PointLight, SpotLight, shade
+from fotismos.heuristic.errors import InputError
 
 UP = (0.0, 0.0, 1.0)
 LAMP = PointLight((0, 0, 3), 1.0)

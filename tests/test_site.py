@@ -49,8 +49,8 @@ def test_links_to_modules_name_what_exists(sources):
     names = re.findall(r"\]\(#((?:heuristic|reference|comparisons|reports)\b[\w.]*)\)", str(pages))
     assert len(names) > 50
     assert [name for name in names if locate(name) is None] == []
-    assert "heuristic.terms.specular" in names  # by the index of equations
-    assert "heuristic.kernel.shade" in names  # by its other name, heuristic.shade
+    assert "fotismos.heuristic.terms.specular" in names  # by the index of equations
+    assert "fotismos.heuristic.kernel.shade" in names  # by its other name, fotismos.heuristic.shade
 
 
 def test_every_equation_of_the_models_can_be_drawn(docs):
@@ -93,7 +93,7 @@ def test_the_home_of_an_equation_names_it(docs):
 def test_every_figure_is_a_scene_or_drawn(docs):
     import schemes
 
-    from comparisons.gallery.builtin import SCENES
+    from fotismos.comparisons.gallery.builtin import SCENES
 
     drawn = []
     for name, panels in schemes.SHEETS.items():

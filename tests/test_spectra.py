@@ -4,9 +4,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.compare import compare
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
 
 
 def test_rgb_cannot_tell_metamers_apart_and_spectra_can(rgb):

@@ -3,9 +3,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.pairing import lamps
-from reference.pairing.halves import pair
-from reference.scene.source import Source
+from fotismos.reference.pairing import lamps
+from fotismos.reference.pairing.halves import pair
+from fotismos.reference.scene.source import Source
 from tests.parts import camera, mesh_of
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from comparisons.processes.pool import Pool
-from comparisons.study import dataset, design, running, scenes
-from heuristic import user_shaders
-from heuristic.errors import InputError
-from reports.charts import study_charts
+from fotismos.comparisons.processes.pool import Pool
+from fotismos.comparisons.study import dataset, design, running, scenes
+from fotismos.heuristic import user_shaders
+from fotismos.heuristic.errors import InputError
+from fotismos.reports.charts import study_charts
 from tests.programs import ROOT
 from tests.test_engine_lobes import dot, integral
 from tests.witnesses.fresnel import dielectric

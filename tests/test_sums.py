@@ -4,7 +4,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from reference.rendering.sums import DEVIATION, MEAN, Accumulator, DifferenceSums, add_difference
+from fotismos.reference.rendering.sums import (
+    DEVIATION,
+    MEAN,
+    Accumulator,
+    DifferenceSums,
+    add_difference,
+)
 
 SIZE = (24, 17)
 

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from comparisons import timing
-from comparisons.compare import compare
-from comparisons.options import Options
-from reference.records import plain
-from reference.rendering import renderer
-from reference.rendering.renderer import passes
-from reference.scene.source import Source
-from reports.run.scene import _stages
-from reports.terminal import tables
+from fotismos.comparisons import timing
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.options import Options
+from fotismos.reference.records import plain
+from fotismos.reference.rendering import renderer
+from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.scene.source import Source
+from fotismos.reports.run.scene import _stages
+from fotismos.reports.terminal import tables
 from tests.misplanned import DIFFUSE, lamp, scene
 from tests.parts import moved
 

@@ -5,7 +5,7 @@ from time import monotonic, sleep
 
 import pytest
 
-from comparisons.processes.pool import Turn
+from fotismos.comparisons.processes.pool import Turn
 
 
 @pytest.mark.guarantee("runs", "While one process of a command measures, its others wait.")

@@ -7,15 +7,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.case import open_case
-from comparisons.compare import compare
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from heuristic import Range, user_shaders
-from heuristic.errors import FotismosError, InputError
-from heuristic.heuristics import HEURISTICS, Heuristic, Parameter, known_as, named
-from reference.pairing import halves
-from reference.scene.source import Source
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic import Range, user_shaders
+from fotismos.heuristic.errors import FotismosError, InputError
+from fotismos.heuristic.heuristics import HEURISTICS, Heuristic, Parameter, known_as, named
+from fotismos.reference.pairing import halves
+from fotismos.reference.scene.source import Source
 from tests import checks, oracle
 from tests.parts import camera, look_at, moved, rgb_of, shown_by
 
@@ -420,7 +420,7 @@ def test_the_plan_and_the_record_say_what_is_read(run, written, tmp_path):
 
 
 def test_a_program_gives_a_function_or_an_object(undeclared):
-    from reports.notebook import compare
+    from fotismos.reports.notebook import compare
 
     def half_lambert(point, gain: Range(0, 2) = 1):
         """A wrapped cosine, squared."""

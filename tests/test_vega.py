@@ -2,7 +2,7 @@
 
 import re
 
-from reports.charts import theme, vega
+from fotismos.reports.charts import theme, vega
 
 
 def bars(effect="shadow", **extra):

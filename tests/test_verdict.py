@@ -5,16 +5,16 @@ from types import SimpleNamespace
 import pytest
 from msgspec import structs
 
-from comparisons.case import open_case
-from comparisons.compare import compare
-from comparisons.comparison import MeanError
-from comparisons.cost import cost_record
-from comparisons.departure.metrics import LEADING
-from comparisons.departure.noise import VisibleShare
-from comparisons.options import Options
-from heuristic.heuristics import HEURISTICS, Interpolation, Point
-from reference.records import Estimated
-from reports import verdict
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.comparison import MeanError
+from fotismos.comparisons.cost import cost_record
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.heuristics import HEURISTICS, Interpolation, Point
+from fotismos.reference.records import Estimated
+from fotismos.reports import verdict
 from tests import records
 from tests.small_scene import PLAIN
 

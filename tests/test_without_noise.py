@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from comparisons.departure import criterion, statistics
-from comparisons.departure.colour import DEFAULT_VIEWING
-from comparisons.departure.metrics import LEADING
-from comparisons.departure.noise import VisibleShare, debiased
-from heuristic.errors import InputError
-from reference.records import Estimated
-from reference.rendering import sums
+from fotismos.comparisons.departure import criterion, statistics
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.noise import VisibleShare, debiased
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.records import Estimated
+from fotismos.reference.rendering import sums
 from tests import noisy
 
 GREY = np.full((32, 32, 3), 0.2)

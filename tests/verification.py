@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comparisons.departure import marks
-from comparisons.departure.metrics import leading_distance
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from reference.rendering.renderer import Renderer, Stream, pass_seed, passes
-from reference.rendering.sampler import with_sampler
-from reference.rendering.sums import DEVIATION, Accumulator, DifferenceSums, add_difference
+from fotismos.comparisons.departure import marks
+from fotismos.comparisons.departure.metrics import leading_distance
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.rendering.renderer import Renderer, Stream, pass_seed, passes
+from fotismos.reference.rendering.sampler import with_sampler
+from fotismos.reference.rendering.sums import DEVIATION, Accumulator, DifferenceSums, add_difference
 
 LEVEL = 0.01
 """Chance that any pixel is marked though nothing differs."""

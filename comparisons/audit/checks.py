@@ -9,13 +9,19 @@ import mitsuba as mi
 import numpy as np
 from msgspec import Meta
 
-from comparisons.audit import diagnosis, furnace
-from comparisons.audit.subjects import INCIDENT, LEVEL, ScatteringSubject, ShadingSubject, Subject
-from comparisons.comparison import versions
-from heuristic import heuristics
-from heuristic.errors import FotismosError, InputError
-from heuristic.user_code import error_text
-from reference.records import VERSION, Amount, Record, Versions
+from fotismos.comparisons.audit import diagnosis, furnace
+from fotismos.comparisons.audit.subjects import (
+    INCIDENT,
+    LEVEL,
+    ScatteringSubject,
+    ShadingSubject,
+    Subject,
+)
+from fotismos.comparisons.comparison import versions
+from fotismos.heuristic import heuristics
+from fotismos.heuristic.errors import FotismosError, InputError
+from fotismos.heuristic.user_code import error_text
+from fotismos.reference.records import VERSION, Amount, Record, Versions
 
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 89.0)
 """Degrees from the normal."""

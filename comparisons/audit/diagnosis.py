@@ -15,14 +15,14 @@ import mitsuba as mi
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from comparisons.audit.subjects import shaded
-from comparisons.departure.colour import from_srgb, to_srgb
-from comparisons.pictures import MISREADINGS, factor_of_pi
-from comparisons.textbook import clamped, dot, halfway, lobe, mirrored, unit
-from heuristic import heuristics
-from heuristic.heuristics import Heuristic
-from heuristic.lights import INVERSE_SQUARE, PointLight
-from heuristic.user_shaders import DEFAULT_VARIANT
+from fotismos.comparisons.audit.subjects import shaded
+from fotismos.comparisons.departure.colour import from_srgb, to_srgb
+from fotismos.comparisons.pictures import MISREADINGS, factor_of_pi
+from fotismos.comparisons.textbook import clamped, dot, halfway, lobe, mirrored, unit
+from fotismos.heuristic import heuristics
+from fotismos.heuristic.heuristics import Heuristic
+from fotismos.heuristic.lights import INVERSE_SQUARE, PointLight
+from fotismos.heuristic.user_shaders import DEFAULT_VARIANT
 
 Array = np.ndarray
 

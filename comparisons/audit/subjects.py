@@ -15,15 +15,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from comparisons.audit import furnace
-from comparisons.audit.furnace import UP
-from heuristic import heuristics, terms, user_shaders
-from heuristic.errors import InputError, unknown
-from heuristic.heuristics import Heuristic, ShadingArguments
-from heuristic.lights import DirectionalLight, PointLight
-from heuristic.materials import PairedMaterial
-from heuristic.user_code import contained
-from reference.pairing import albedo, factors
+from fotismos.comparisons.audit import furnace
+from fotismos.comparisons.audit.furnace import UP
+from fotismos.heuristic import heuristics, terms, user_shaders
+from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.heuristics import Heuristic, ShadingArguments
+from fotismos.heuristic.lights import DirectionalLight, PointLight
+from fotismos.heuristic.materials import PairedMaterial
+from fotismos.heuristic.user_code import contained
+from fotismos.reference.pairing import albedo, factors
 
 ALPHAS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
 """Roughness of the materials; the quadrature resolves their lobes at every angle."""
@@ -64,7 +64,7 @@ class Subject(ABC):
         """Yield the numbers that it depends on."""
 
     def response(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
-        """Return ``pi f cos(theta_l)``, (C, N): see :mod:`comparisons.audit.furnace`.
+        """Return ``pi f cos(theta_l)``, (C, N): see :mod:`fotismos.comparisons.audit.furnace`.
 
         Values that are not finite, or negative, are noted and count as 0.
         """

@@ -18,22 +18,22 @@ import numpy as np
 from msgspec import Meta, structs
 from numpy.typing import NDArray
 
-from comparisons.case import Case
-from comparisons.comparison import versions
-from comparisons.departure.blocks import shrunk
-from comparisons.departure.colour import Array, Viewing
-from comparisons.departure.metrics import LEADING, METRICS, RATIO, log2_luminance_ratio
-from comparisons.departure.statistics import noise_floor
-from comparisons.options import Options
-from comparisons.prepared import guarded, require_light
-from heuristic import program
-from heuristic.errors import InputError
-from reference import records
-from reference.pairing.prepare import film_size
-from reference.records import VERSION, Amount, Record, Versions
-from reference.rendering.renderer import Progress, passes
-from reference.rendering.sums import jackknife_error
-from reference.scene.source import Source
+from fotismos.comparisons.case import Case
+from fotismos.comparisons.comparison import versions
+from fotismos.comparisons.departure.blocks import shrunk
+from fotismos.comparisons.departure.colour import Array, Viewing
+from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, log2_luminance_ratio
+from fotismos.comparisons.departure.statistics import noise_floor
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import guarded, require_light
+from fotismos.heuristic import program
+from fotismos.heuristic.errors import InputError
+from fotismos.reference import records
+from fotismos.reference.pairing.prepare import film_size
+from fotismos.reference.records import VERSION, Amount, Record, Versions
+from fotismos.reference.rendering.renderer import Progress, passes
+from fotismos.reference.rendering.sums import jackknife_error
+from fotismos.reference.scene.source import Source
 
 PASSES, MOST_PASSES = 16, 1024
 """The former are enough for a t-test, corrected for a hundred quantities, to detect five standard

@@ -12,20 +12,20 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.check.measurement import (
+from fotismos.comparisons.check.measurement import (
     HALVES,
     LINEAR_ROUNDING,
     MeasuredScene,
     Measurement,
     measure_scene,
 )
-from comparisons.departure.colour import Array, luminance
-from comparisons.departure.metrics import METRICS, RATIO
-from comparisons.options import Options
-from heuristic.errors import InputError
-from reference.records import Amount, Record, Share
-from reference.rendering.renderer import Progress
-from reference.scene.source import Source
+from fotismos.comparisons.departure.colour import Array, luminance
+from fotismos.comparisons.departure.metrics import METRICS, RATIO
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.records import Amount, Record, Share
+from fotismos.reference.rendering.renderer import Progress
+from fotismos.reference.scene.source import Source
 
 LEVEL = 0.01
 """Chance of a false alarm, over all quantities that one check tests."""

@@ -34,8 +34,8 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.check.measurement import LINEAR_ROUNDING, Colour, Errors
-from comparisons.check.moved import (
+from fotismos.comparisons.check.measurement import LINEAR_ROUNDING, Colour, Errors
+from fotismos.comparisons.check.moved import (
     RELATIVE_ROUNDING,
     Move,
     level_of_each,
@@ -43,11 +43,11 @@ from comparisons.check.moved import (
     sidak,
     where_moved,
 )
-from comparisons.departure.blocks import block_sums, ratio
-from comparisons.departure.colour import Array
-from comparisons.pictures import require_one_size
-from heuristic.errors import InputError
-from reference.records import VERSION, Amount, Record, Resolution, Share
+from fotismos.comparisons.departure.blocks import block_sums, ratio
+from fotismos.comparisons.departure.colour import Array
+from fotismos.comparisons.pictures import require_one_size
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.records import VERSION, Amount, Record, Resolution, Share
 
 SIDE, TILES = 16, 8
 """Side in pixels of the blocks that are tested; tiles of whole blocks along the longer side of the

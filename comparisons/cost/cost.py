@@ -9,11 +9,11 @@ import drjit as dr
 import numpy as np
 from msgspec import structs
 
-from comparisons.comparison import Causes, machine, versions
-from comparisons.cost import times
-from comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
-from comparisons.cost.front import Reach, at_size, fronted, reach, sufficient
-from comparisons.cost.measure import (
+from fotismos.comparisons.comparison import Causes, machine, versions
+from fotismos.comparisons.cost import times
+from fotismos.comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
+from fotismos.comparisons.cost.front import Reach, at_size, fronted, reach, sufficient
+from fotismos.comparisons.cost.measure import (
     LARGEST_CERTAIN,
     QUICK,
     QUICK_WIDTH,
@@ -25,16 +25,16 @@ from comparisons.cost.measure import (
     measure_ladder,
     reduced,
 )
-from comparisons.cost.methods import FULL_PLAN
-from comparisons.departure.criterion import checked_threshold
-from comparisons.hybrids.attribution import find
-from comparisons.options import Options
-from heuristic.errors import InputError
-from reference.pairing.prepare import film_size
-from reference.planning.plan import Guard
-from reference.records import VERSION, Pixels, Positive, Record, Resolution
-from reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
-from reference.scene.source import Source
+from fotismos.comparisons.cost.methods import FULL_PLAN
+from fotismos.comparisons.departure.criterion import checked_threshold
+from fotismos.comparisons.hybrids.attribution import find
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.pairing.prepare import film_size
+from fotismos.reference.planning.plan import Guard
+from fotismos.reference.records import VERSION, Pixels, Positive, Record, Resolution
+from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
+from fotismos.reference.scene.source import Source
 
 SPP = 64
 """Samples per pixel of the image to which effects add time."""
@@ -66,10 +66,11 @@ def cost(
     """Study what accuracy costs on one scene, in the current variant.
 
     For ``source``, ``options``, ``progress`` and ``command`` see
-    :func:`comparisons.compare.compare`, and :func:`comparisons.cost.measure.measure_ladder` for an
-    omitted resolution, ``options.spp`` and ``alone``. ``at`` is a size to predict for: times
-    follow from overhead and time per sample, and errors are those of the study's size. If
-    ``is_measured``, methods also render there. ``causes`` are those of the scene, if known.
+    :func:`fotismos.comparisons.compare.compare`, and
+    :func:`fotismos.comparisons.cost.measure.measure_ladder` for an omitted resolution,
+    ``options.spp`` and ``alone``. ``at`` is a size to predict for: times follow from overhead and
+    time per sample, and errors are those of the study's size. If ``is_measured``, methods also
+    render there. ``causes`` are those of the scene, if known.
     """
     progress = progress or (lambda *_: None)
     options, effort = options or Options(), effort or Effort()

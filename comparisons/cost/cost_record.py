@@ -5,11 +5,11 @@ from typing import Annotated, Literal
 from msgspec import Meta
 from msgspec.structs import astuple
 
-from comparisons.comparison import Contribution, MeanError
-from comparisons.departure.colour import Viewing
-from heuristic.heuristics import Interpolation
-from reference.planning.plan import Guard
-from reference.records import (
+from fotismos.comparisons.comparison import Contribution, MeanError
+from fotismos.comparisons.departure.colour import Viewing
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.reference.planning.plan import Guard
+from fotismos.reference.records import (
     VERSION,
     Amount,
     Count,

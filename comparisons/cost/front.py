@@ -1,8 +1,8 @@
 """Which methods are worth their time: the front of time and error, and what passes.
 
 A method passes at a tolerance t if at most 5 % of the pixels of its image exceed ΔE2000 t
-(:mod:`comparisons.departure.criterion`). Intervals decide: what lies inside one another's is too
-close to call.
+(:mod:`fotismos.comparisons.departure.criterion`). Intervals decide: what lies inside one another's
+is too close to call.
 """
 
 from collections.abc import Sequence
@@ -10,9 +10,9 @@ from math import ceil, sqrt
 
 from msgspec import structs
 
-from comparisons.comparison import MeanError
-from comparisons.cost.cost_record import Point, TimedMethod
-from reference.records import Estimated, Record
+from fotismos.comparisons.comparison import MeanError
+from fotismos.comparisons.cost.cost_record import Point, TimedMethod
+from fotismos.reference.records import Estimated, Record
 
 Interval = Estimated | MeanError
 

@@ -1,8 +1,8 @@
 """Measure the ladder: the time of each method, and its error against a converged reference.
 
 The first image of a method traces and compiles, and is reported separately. Then all methods take
-turns, at several sample counts; :mod:`comparisons.cost.times` makes overhead and time per sample of
-it. Each round has its own seed, so the errors of the rounds are independent.
+turns, at several sample counts; :mod:`fotismos.comparisons.cost.times` makes overhead and time per
+sample of it. Each round has its own seed, so the errors of the rounds are independent.
 """
 
 import gc
@@ -19,22 +19,22 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.comparison import MeanError
-from comparisons.cost import times
-from comparisons.cost.cost_record import Converged, Method, Point, TimedMethod
-from comparisons.cost.methods import Ladder, Step
-from comparisons.departure.colour import Viewing
-from comparisons.departure.criterion import LIMIT
-from comparisons.departure.metrics import LEADING
-from comparisons.options import Options
-from comparisons.prepared import Prepared, guarded
-from heuristic.errors import InputError
-from reference.pairing.prepare import film_size
-from reference.records import Estimated
-from reference.rendering.gbuffer import gbuffer, image_size, resize
-from reference.rendering.renderer import LARGEST_PASS, Progress, Renderer, Stream, passes
-from reference.rendering.sums import Accumulator, Estimate
-from reference.scene.source import Source
+from fotismos.comparisons.comparison import MeanError
+from fotismos.comparisons.cost import times
+from fotismos.comparisons.cost.cost_record import Converged, Method, Point, TimedMethod
+from fotismos.comparisons.cost.methods import Ladder, Step
+from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.criterion import LIMIT
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import Prepared, guarded
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.pairing.prepare import film_size
+from fotismos.reference.records import Estimated
+from fotismos.reference.rendering.gbuffer import gbuffer, image_size, resize
+from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, Renderer, Stream, passes
+from fotismos.reference.rendering.sums import Accumulator, Estimate
+from fotismos.reference.scene.source import Source
 
 Size = tuple[int, int]
 

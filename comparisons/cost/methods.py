@@ -4,8 +4,8 @@ Each method first loses what the scene's plan leaves out. Methods that do not di
 then become equal, and are merged; the result keeps all their names. Methods from outside come
 before the full plan::
 
-    from comparisons.cost.cost_record import Method
-    from comparisons.cost.methods import declare
+    from fotismos.comparisons.cost.cost_record import Method
+    from fotismos.comparisons.cost.methods import declare
 
     declare(Method(name="no shadows", family="physical", without=("occlusion",), max_depth=2))
 """
@@ -17,16 +17,16 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 from msgspec import structs
 
-from comparisons.cost.cost_record import Method
-from comparisons.hybrids.hybrids import HybridScenes, Pairs
-from comparisons.options import Options
-from comparisons.prepared import Prepared
-from heuristic.errors import InputError
-from heuristic.heuristics import PHONG, Interpolation, named
-from heuristic.plugins.interpolated import require_colours
-from heuristic.tessellation import RESOLUTION
-from reference.pairing.halves import INTEGRATOR
-from reference.planning.effects import (
+from fotismos.comparisons.cost.cost_record import Method
+from fotismos.comparisons.hybrids.hybrids import HybridScenes, Pairs
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import Prepared
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import PHONG, Interpolation, named
+from fotismos.heuristic.plugins.interpolated import require_colours
+from fotismos.heuristic.tessellation import RESOLUTION
+from fotismos.reference.pairing.halves import INTEGRATOR
+from fotismos.reference.planning.effects import (
     EFFECTS,
     ENVIRONMENT,
     INTERREFLECTION,
@@ -37,11 +37,11 @@ from reference.planning.effects import (
     SPECTRAL,
     TRANSMISSION,
 )
-from reference.planning.facts import SHAPE
-from reference.planning.plan import physical_integrator
-from reference.rendering.renderer import Renderer, variant
-from reference.rendering.sampler import with_sampler
-from reference.scene.source import Source
+from fotismos.reference.planning.facts import SHAPE
+from fotismos.reference.planning.plan import physical_integrator
+from fotismos.reference.rendering.renderer import Renderer, variant
+from fotismos.reference.rendering.sampler import with_sampler
+from fotismos.reference.scene.source import Source
 
 UNLIMITED = -1
 

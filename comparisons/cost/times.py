@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from reference.records import Estimated
+from fotismos.reference.records import Estimated
 
 LEAST_S = 0.05
 """Seconds that the largest rendering of a method takes, at least."""

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from comparisons.departure.colour import Array
-from reference.rendering.sums import BLOCK
+from fotismos.comparisons.departure.colour import Array
+from fotismos.reference.rendering.sums import BLOCK
 
 # Rows processed at a time, in whole blocks, to keep temporaries small.
 _ROWS = 32 * BLOCK

@@ -21,8 +21,8 @@ from drjit.llvm import Array3f, Array3f64, Float32, Float64
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from heuristic.errors import InputError
-from reference.records import Positive, Record
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.records import Positive, Record
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.floating]  # of either precision

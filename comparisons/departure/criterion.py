@@ -7,9 +7,9 @@ that noise leaves undecided widen its interval, and so a scene may be undecided,
 from collections.abc import Sequence
 from typing import Literal
 
-from comparisons.departure.metrics import THRESHOLDS
-from comparisons.departure.noise import VisibleShare
-from heuristic.errors import InputError
+from fotismos.comparisons.departure.metrics import THRESHOLDS
+from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.heuristic.errors import InputError
 
 LIMIT = 0.05
 """Largest share of the pixels that may differ visibly."""

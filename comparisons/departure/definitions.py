@@ -1,7 +1,7 @@
 """The colour differences as colour-science defines them.
 
-They take ten times as long as the compiled ones (`comparisons.departure.colour`), which are used
-instead. Every comparison, ``fotismos doctor`` and the tests compare the two.
+They take ten times as long as the compiled ones (`fotismos.comparisons.departure.colour`), which
+are used instead. Every comparison, ``fotismos doctor`` and the tests compare the two.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -22,8 +22,8 @@ from colour.models import (
     XYZ_to_Lab,
 )
 
-from comparisons.departure.colour import DEFAULT_VIEWING, PQ_PEAK, Array, Viewing
-from comparisons.departure.metrics import METRICS
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, PQ_PEAK, Array, Viewing
+from fotismos.comparisons.departure.metrics import METRICS
 
 AGREEMENT = 1e-4
 """Largest allowed deviation of the compiled colour differences from colour-science's."""

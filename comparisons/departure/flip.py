@@ -20,8 +20,15 @@ import numpy as np
 from drjit.llvm import Array3f, Float32
 from numpy.typing import NDArray
 
-from comparisons.departure.blocks import bands
-from comparisons.departure.colour import Array, Viewing, luminance, rgb_to_xyz, times, xyz_to_lab
+from fotismos.comparisons.departure.blocks import bands
+from fotismos.comparisons.departure.colour import (
+    Array,
+    Viewing,
+    luminance,
+    rgb_to_xyz,
+    times,
+    xyz_to_lab,
+)
 
 Plane = NDArray[np.float32]
 Curve = Callable[[Array3f], Array3f]

@@ -39,10 +39,16 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure.blocks import bands, block_sums, neighbourhood, ratio, spread_out
-from comparisons.departure.colour import Array
-from reference.rendering.renderer import require_finite
-from reference.rendering.sums import BLOCK, DifferenceEstimate
+from fotismos.comparisons.departure.blocks import (
+    bands,
+    block_sums,
+    neighbourhood,
+    ratio,
+    spread_out,
+)
+from fotismos.comparisons.departure.colour import Array
+from fotismos.reference.rendering.renderer import require_finite
+from fotismos.reference.rendering.sums import BLOCK, DifferenceEstimate
 
 LEVEL, BLOCK_LEVEL = 0.05, 0.01
 VISIBLE = 2.0

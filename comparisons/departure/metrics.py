@@ -30,7 +30,7 @@ Declare a metric from outside with :func:`declare`, or with an entry point of th
     )
 
 Every image is a float array (H, W, 3) of linear light with the sRGB primaries (ITU-R BT.709, D65);
-1.0 is display white. Statistics over an image are in `comparisons.departure.statistics`.
+1.0 is display white. Statistics over an image are in `fotismos.comparisons.departure.statistics`.
 """
 
 from collections.abc import Callable
@@ -41,7 +41,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure.colour import (
+from fotismos.comparisons.departure.colour import (
     DEFAULT_VIEWING,
     Array,
     Floats,
@@ -55,10 +55,10 @@ from comparisons.departure.colour import (
     luminance,
     root_mean_square,
 )
-from comparisons.departure.flip import hdr_flip, ldr_flip
-from heuristic.declared import Declared
-from heuristic.errors import InputError
-from reference.rendering.renderer import require_finite
+from fotismos.comparisons.departure.flip import hdr_flip, ldr_flip
+from fotismos.heuristic.declared import Declared
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.rendering.renderer import require_finite
 
 LOG2_EPSILON = 1e-4
 """Added to both luminances of `log2_luminance_ratio`; 1.0 is display white."""

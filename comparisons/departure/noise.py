@@ -32,7 +32,7 @@ all pixels of equal p were above, or none. Half of the noise's own part is added
 the shrinkage. In tests with normal, skewed and rare noise, intervals hold the truth in 97 % of the
 cases; they fail where all pixels lie just at a threshold, or noise is larger than it.
 
-All of it is computed on sampled blocks (`reference.rendering.sums.sample`), at most 16,384
+All of it is computed on sampled blocks (`fotismos.reference.rendering.sums.sample`), at most 16,384
 pixels; the bias found there is applied to the whole image.
 """
 
@@ -43,11 +43,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from comparisons.departure.blocks import ratio
-from comparisons.departure.colour import Array, Floats, Viewing
-from comparisons.departure.metrics import Distances, Metric, Pixelwise
-from reference.records import Positive, Record, Share
-from reference.rendering.sums import Grouped, jackknife_error, student
+from fotismos.comparisons.departure.blocks import ratio
+from fotismos.comparisons.departure.colour import Array, Floats, Viewing
+from fotismos.comparisons.departure.metrics import Distances, Metric, Pixelwise
+from fotismos.reference.records import Positive, Record, Share
+from fotismos.reference.rendering.sums import Grouped, jackknife_error, student
 
 CONTRASTS = 3
 """Noise is added in this many independent ways, and the results are averaged."""

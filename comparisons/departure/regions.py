@@ -17,10 +17,10 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure.blocks import block_sums
-from comparisons.departure.colour import Floats
-from reference.records import Amount, Count, Record, Share, Size
-from reference.rendering.gbuffer import ObjectIds
+from fotismos.comparisons.departure.blocks import block_sums
+from fotismos.comparisons.departure.colour import Floats
+from fotismos.reference.records import Amount, Count, Record, Share, Size
+from fotismos.reference.rendering.gbuffer import ObjectIds
 
 CELLS = 48
 """Cells along the longer side of the image."""

@@ -12,11 +12,16 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure.colour import DEFAULT_VIEWING, Array, Floats, Viewing
-from comparisons.departure.metrics import Metric, Pixelwise, checked_pair, log2_luminance_ratio
-from comparisons.departure.noise import VisibleShare, debiased, exactly, roughly
-from reference.records import Amount, Positive, Record
-from reference.rendering.sums import Grouped
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Array, Floats, Viewing
+from fotismos.comparisons.departure.metrics import (
+    Metric,
+    Pixelwise,
+    checked_pair,
+    log2_luminance_ratio,
+)
+from fotismos.comparisons.departure.noise import VisibleShare, debiased, exactly, roughly
+from fotismos.reference.records import Amount, Positive, Record
+from fotismos.reference.rendering.sums import Grouped
 
 # Pixels measured at a time, to keep temporaries small.
 _BLOCK_PIXELS = 2**18

@@ -2,5 +2,3 @@
 
 Is the model wrong, or only its parameters?
 """
-
-import heuristic  # noqa: F401  before Mitsuba: it finds LLVM

@@ -18,13 +18,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.comparison import versions
-from comparisons.departure.colour import Viewing
-from comparisons.departure.criterion import share_above
-from comparisons.departure.metrics import LEADING, drawn
-from comparisons.departure.statistics import noise_floor, summarise
-from comparisons.fit import model
-from comparisons.fit.fit_record import (
+from fotismos.comparisons.comparison import versions
+from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.criterion import share_above
+from fotismos.comparisons.departure.metrics import LEADING, drawn
+from fotismos.comparisons.departure.statistics import noise_floor, summarise
+from fotismos.comparisons.fit import model
+from fotismos.comparisons.fit.fit_record import (
     FitDeparture,
     FitRecord,
     FittedMaterial,
@@ -32,18 +32,25 @@ from comparisons.fit.fit_record import (
     parameter_record,
     physical_materials,
 )
-from comparisons.fit.model import OwnModel, PhongModel
-from comparisons.fit.search import LOSSES, Loss, Objective, bounded_minimum, identify, search
-from comparisons.options import Options
-from comparisons.prepared import Prepared, guarded
-from heuristic.errors import InputError, unknown
-from heuristic.heuristics import PHONG, Interpolation, named
-from heuristic.materials import FORMS
-from reference.records import Pixels
-from reference.rendering.renderer import Progress, pass_seed, passes, variant
-from reference.rendering.sums import Accumulator, Estimate, add_difference
-from reference.scene.graph import Graph, properties
-from reference.scene.source import Source
+from fotismos.comparisons.fit.model import OwnModel, PhongModel
+from fotismos.comparisons.fit.search import (
+    LOSSES,
+    Loss,
+    Objective,
+    bounded_minimum,
+    identify,
+    search,
+)
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import Prepared, guarded
+from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.heuristics import PHONG, Interpolation, named
+from fotismos.heuristic.materials import FORMS
+from fotismos.reference.records import Pixels
+from fotismos.reference.rendering.renderer import Progress, pass_seed, passes, variant
+from fotismos.reference.rendering.sums import Accumulator, Estimate, add_difference
+from fotismos.reference.scene.graph import Graph, properties
+from fotismos.reference.scene.source import Source
 
 RESOLUTION = (96, 96)
 SPP = 64
@@ -95,10 +102,10 @@ def fit(
 ) -> Fit:
     """Fit the heuristic half of a scene to its reference, in the current variant.
 
-    ``loss`` is a name in :data:`comparisons.fit.search.LOSSES`; ``forms`` are forms of the lobe.
-    The resolution and samples are :data:`RESOLUTION` and :data:`SPP` if omitted. Films get a box
-    filter, which keeps pixels independent. ``progress(stage, done, total)`` is called after each
-    pass; ``command`` repeats the fit, for the record.
+    ``loss`` is a name in :data:`fotismos.comparisons.fit.search.LOSSES`; ``forms`` are forms of the
+    lobe. The resolution and samples are :data:`RESOLUTION` and :data:`SPP` if omitted. Films get a
+    box filter, which keeps pixels independent. ``progress(stage, done, total)`` is called after
+    each pass; ``command`` repeats the fit, for the record.
     """
     begin = perf_counter()
     if loss not in LOSSES:

@@ -8,13 +8,22 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from comparisons.departure.colour import Viewing
-from comparisons.departure.noise import VisibleShare
-from comparisons.fit.model import OwnModel, PhongModel
-from comparisons.fit.search import AT_BOUND, COVERAGE, Certainty
-from heuristic.terms import normalisation
-from reference.records import VERSION, Amount, Count, Pixels, Record, Resolution, Size, Versions
-from reference.scene.graph import Graph
+from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.comparisons.fit.model import OwnModel, PhongModel
+from fotismos.comparisons.fit.search import AT_BOUND, COVERAGE, Certainty
+from fotismos.heuristic.terms import normalisation
+from fotismos.reference.records import (
+    VERSION,
+    Amount,
+    Count,
+    Pixels,
+    Record,
+    Resolution,
+    Size,
+    Versions,
+)
+from fotismos.reference.scene.graph import Graph
 
 
 class FitDeparture(Record):

@@ -8,7 +8,7 @@ Parameter      Number in the vector                    Bounds              A nat
 ``k_a, k_d``   itself                                  0 to 1              1
 ``k_s``        the lobe's albedo at normal incidence,  0 to 1              1
                ``k_s`` over
-               :func:`heuristic.terms.normalisation`
+               :func:`fotismos.heuristic.terms.normalisation`
 ``n``          ``ln n``                                :data:`EXPONENTS`   a factor e
 =============  ======================================  ==================  ================
 
@@ -36,14 +36,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from heuristic.convention import Colour
-from heuristic.errors import InputError
-from heuristic.heuristics import Heuristic
-from heuristic.kernel import shade
-from heuristic.materials import Material
-from heuristic.plugins.coefficients import SceneMaterials
-from reference.pairing.factors import Phong, alpha_of, exponent_of, specular_albedo
-from reference.rendering.renderer import Renderer, variant
+from fotismos.heuristic.convention import Colour
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import Heuristic
+from fotismos.heuristic.kernel import shade
+from fotismos.heuristic.materials import Material
+from fotismos.heuristic.plugins.coefficients import SceneMaterials
+from fotismos.reference.pairing.factors import Phong, alpha_of, exponent_of, specular_albedo
+from fotismos.reference.rendering.renderer import Renderer, variant
 
 COEFFICIENTS = ("k_a", "k_d", "k_s")
 

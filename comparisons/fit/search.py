@@ -33,8 +33,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from comparisons.departure.colour import Viewing, cam16ucs_unclipped
-from comparisons.fit.model import bounds
+from fotismos.comparisons.departure.colour import Viewing, cam16ucs_unclipped
+from fotismos.comparisons.fit.model import bounds
 
 STEP, SMALLEST_STEP = 1e-4, 1e-8
 """Relative step of the finite differences of colour spaces; their own error is its square."""

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from heuristic.errors import InputError, suggestion
+from fotismos.heuristic.errors import InputError, suggestion
 
 if TYPE_CHECKING:  # names are listed without importing Mitsuba
-    from reference.scene.source import Source
+    from fotismos.reference.scene.source import Source
 
 VIEWER_A = (-3, -3, 0)
 VIEWER_C = (-3, 0, 1)
@@ -40,8 +40,8 @@ class BuiltIn:
     tessellation: int | None = None
 
     def source(self) -> Source:
-        """Return the scene for :func:`reference.pair`."""
-        from reference.scene.source import Source
+        """Return the scene for :func:`fotismos.reference.pair`."""
+        from fotismos.reference.scene.source import Source
 
         return Source(self.name, self.make)
 
@@ -57,15 +57,15 @@ def builtin(name: str) -> BuiltIn:
 
 
 def _scene(function: str, *arguments: Any, **more: Any) -> dict[str, Any]:
-    """Make a scene by a function of :mod:`comparisons.gallery.scenes`, which imports Mitsuba."""
-    from comparisons.gallery import scenes
+    """Make a scene by a function of ``gallery.scenes``, which imports Mitsuba."""
+    from fotismos.comparisons.gallery import scenes
 
     return getattr(scenes, function)(*arguments, **more)
 
 
 def _spectral(function: str) -> dict[str, Any]:
-    """Make a scene by a function of :mod:`comparisons.gallery.spectra`, which few scenes load."""
-    from comparisons.gallery import spectra
+    """Make a scene by a function of ``gallery.spectra``, which few scenes load."""
+    from fotismos.comparisons.gallery import spectra
 
     return getattr(spectra, function)()
 

@@ -5,7 +5,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from comparisons.gallery.scenes import looking_from
+from fotismos.comparisons.gallery.scenes import looking_from
 
 WAVELENGTHS = np.arange(380.0, 721.0, 5.0)
 """Nanometres."""

@@ -24,7 +24,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from comparisons.comparison import (
+from fotismos.comparisons.comparison import (
     CAUSES,
     Attribution,
     Causes,
@@ -35,20 +35,26 @@ from comparisons.comparison import (
     MeanError,
     ObjectContribution,
 )
-from comparisons.departure.blocks import ratio
-from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import LEADING
-from comparisons.departure.noise import contrasts, without_noise
-from comparisons.departure.regions import Region, find_objects
-from comparisons.hybrids.hybrids import HybridImages, HybridScenes, Pairs, labels
-from comparisons.options import Options
-from comparisons.prepared import Prepared
-from heuristic.errors import FotismosError
-from reference.planning.effects import Effect
-from reference.rendering.gbuffer import ObjectIds, gbuffer, image_size, require_surface, resize
-from reference.rendering.renderer import Progress, Renderer, Stream, passes
-from reference.rendering.sums import block_numbers, jackknifed
-from reference.scene.source import Source
+from fotismos.comparisons.departure.blocks import ratio
+from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.noise import contrasts, without_noise
+from fotismos.comparisons.departure.regions import Region, find_objects
+from fotismos.comparisons.hybrids.hybrids import HybridImages, HybridScenes, Pairs, labels
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import Prepared
+from fotismos.heuristic.errors import FotismosError
+from fotismos.reference.planning.effects import Effect
+from fotismos.reference.rendering.gbuffer import (
+    ObjectIds,
+    gbuffer,
+    image_size,
+    require_surface,
+    resize,
+)
+from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, passes
+from fotismos.reference.rendering.sums import block_numbers, jackknifed
+from fotismos.reference.scene.source import Source
 
 WIDTH, NARROW, MANY = 48, 32, 64
 """Width of the images that causes are found in, at most, and that for more than MANY lights or
@@ -163,11 +169,11 @@ class ErrorMeter:
 
         A distance is never negative, so noise raises it, and most where it is small. So the noise
         of both images is added once more, and the increase of each block of pixels is taken away:
-        ``f² = 2 f0² − f1²`` (:mod:`comparisons.departure.noise`). Within a block each pixel
-        keeps its share. The rule is exact where doubled variance raises a mean distance by √2. The
-        noise of few path-traced samples is skewed, and colour spaces compress it, so it raises
-        distances by less (1.37 in the Cornell box at 64 samples): up to a fifth of the noise's part
-        remains there, and two fifths where a departure is near the size of the noise.
+        ``f² = 2 f0² − f1²`` (:mod:`fotismos.comparisons.departure.noise`). Within a block each
+        pixel keeps its share. The rule is exact where doubled variance raises a mean distance by
+        √2. The noise of few path-traced samples is skewed, and colour spaces compress it, so it
+        raises distances by less (1.37 in the Cornell box at 64 samples): up to a fifth of the
+        noise's part remains there, and two fifths where a departure is near the size of the noise.
         """
         images = np.asarray(images)[:, self.counted].astype(float)
         found = []

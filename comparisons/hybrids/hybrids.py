@@ -19,14 +19,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.departure.blocks import averaged, ratio
-from comparisons.options import Options
-from comparisons.prepared import Prepared
-from heuristic.convention import Scene
-from heuristic.heuristics import Interpolation
-from reference.pairing import lights
-from reference.pairing.halves import Pair
-from reference.planning.effects import (
+from fotismos.comparisons.departure.blocks import averaged, ratio
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import Prepared
+from fotismos.heuristic.convention import Scene
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.reference.pairing import lights
+from fotismos.reference.pairing.halves import Pair
+from fotismos.reference.planning.effects import (
     EFFECTS,
     ENVIRONMENT,
     ONE_INTENSITY,
@@ -34,15 +34,15 @@ from reference.planning.effects import (
     SPECTRAL,
     Effect,
 )
-from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
-from reference.planning.plan import Plan, physical_integrator
-from reference.rendering import direct
-from reference.rendering.gbuffer import image_size, resize
-from reference.rendering.renderer import Renderer, Stream, passes, variant
-from reference.rendering.sampler import with_sampler
-from reference.rendering.transport import Transport
-from reference.scene.graph import properties
-from reference.scene.source import Source
+from fotismos.reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
+from fotismos.reference.planning.plan import Plan, physical_integrator
+from fotismos.reference.rendering import direct
+from fotismos.reference.rendering.gbuffer import image_size, resize
+from fotismos.reference.rendering.renderer import Renderer, Stream, passes, variant
+from fotismos.reference.rendering.sampler import with_sampler
+from fotismos.reference.rendering.transport import Transport
+from fotismos.reference.scene.graph import properties
+from fotismos.reference.scene.source import Source
 
 REPLACED = tuple(effect for effect in EFFECTS if effect.put)
 IN_SCENE: frozenset[Effect] = frozenset(REPLACED)

@@ -1,9 +1,9 @@
 """Spreading tasks over the workers of a running Dask cluster, the way beyond one machine.
 
-It replaces a :class:`comparisons.processes.pool.Pool`. Dask gives the tasks of a lost worker to
-another. A lost scheduler ends the run, and the next run resumes there. Dask offers neither progress
-nor one process per task: time limits do not apply here, and changes that a script makes in its
-worker persist.
+It replaces a :class:`fotismos.comparisons.processes.pool.Pool`. Dask gives the tasks of a lost
+worker to another. A lost scheduler ends the run, and the next run resumes there. Dask offers
+neither progress nor one process per task: time limits do not apply here, and changes that a script
+makes in its worker persist.
 """
 
 import logging
@@ -15,9 +15,9 @@ from threading import Lock
 from typing import Any
 from uuid import uuid4
 
-from comparisons.processes.pool import Pool, Task, once
-from heuristic import program
-from heuristic.errors import FotismosError, InstallationError, LostProcessError
+from fotismos.comparisons.processes.pool import Pool, Task, once
+from fotismos.heuristic import program
+from fotismos.heuristic.errors import FotismosError, InstallationError, LostProcessError
 
 NEEDED = ("dask", "distributed")
 """The extra `cluster` of pyproject.toml."""

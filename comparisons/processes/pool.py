@@ -23,8 +23,8 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any, NoReturn, Self
 
-from comparisons.processes.interruption import SIGNALS, held_back
-from heuristic.errors import FotismosError, InputError, LostProcessError
+from fotismos.comparisons.processes.interruption import SIGNALS, held_back
+from fotismos.heuristic.errors import FotismosError, InputError, LostProcessError
 
 LOOK_S = 1.0
 """Seconds between checks that a process lives: its forks may hold its pipe open."""

@@ -2,5 +2,3 @@
 
 A worker process of a cluster imports this package before anything else of fotismos.
 """
-
-import heuristic  # noqa: F401  before Mitsuba: it finds LLVM

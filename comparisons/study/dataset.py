@@ -14,15 +14,15 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from msgspec.structs import replace
 
-from comparisons.atomic import require_regular
-from comparisons.comparison import versions
-from comparisons.departure import statistics
-from comparisons.departure.colour import DEFAULT_VIEWING
-from comparisons.departure.metrics import LEADING, METRICS, RATIO
-from comparisons.study.design import OWN, StudyFile
-from comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
-from heuristic.errors import InputError, unknown
-from reference.planning.effects import EFFECTS
+from fotismos.comparisons.atomic import require_regular
+from fotismos.comparisons.comparison import versions
+from fotismos.comparisons.departure import statistics
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO
+from fotismos.comparisons.study.design import OWN, StudyFile
+from fotismos.comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
+from fotismos.heuristic.errors import InputError, unknown
+from fotismos.reference.planning.effects import EFFECTS
 
 Row: TypeAlias = dict[str, Any]
 """Values by column."""

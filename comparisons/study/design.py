@@ -45,10 +45,10 @@ import msgspec
 import numpy as np
 from scipy.stats import qmc
 
-from comparisons import atomic
-from comparisons.case import SUFFIXES
-from comparisons.options import Options
-from comparisons.study.scenes import (
+from fotismos.comparisons import atomic
+from fotismos.comparisons.case import SUFFIXES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.study.scenes import (
     PHONG,
     RENDERED,
     ROUGHPLASTIC,
@@ -57,9 +57,9 @@ from comparisons.study.scenes import (
     Point,
     StudyParameter,
 )
-from heuristic import heuristics
-from heuristic.errors import InputError, unknown
-from reference.records import Count, Record
+from fotismos.heuristic import heuristics
+from fotismos.heuristic.errors import InputError, unknown
+from fotismos.reference.records import Count, Record
 
 LARGEST = 1_000_000
 """Most points of a part."""

@@ -17,26 +17,26 @@ import mitsuba as mi
 import numpy as np
 import pyarrow as pa
 
-from comparisons.atomic import Entry
-from comparisons.case import RGB, open_case
-from comparisons.comparison import versions
-from comparisons.prepared import guarded
-from comparisons.processes.pool import Pool, Task
-from comparisons.study import dataset, scenes
-from comparisons.study.dataset import STEPPED, STEPS, Row, measure
-from comparisons.study.design import OWN, StudyFile, StudyPart
-from comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, largest_miss
-from heuristic import plugins
-from heuristic.errors import FotismosError, InputError, unknown
-from heuristic.heuristics import named
-from reference.planning.effects import EFFECTS
-from reference.planning.plan import Plan, physical_integrator
-from reference.rendering import direct
-from reference.rendering.renderer import Progress, Renderer, passes
-from reference.rendering.sums import Accumulator
-from reference.scene.graph import Graph, set_variant
-from reference.scene.source import Source, digest
-from reference.scene.values import COLOURS
+from fotismos.comparisons.atomic import Entry
+from fotismos.comparisons.case import RGB, open_case
+from fotismos.comparisons.comparison import versions
+from fotismos.comparisons.prepared import guarded
+from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.comparisons.study import dataset, scenes
+from fotismos.comparisons.study.dataset import STEPPED, STEPS, Row, measure
+from fotismos.comparisons.study.design import OWN, StudyFile, StudyPart
+from fotismos.comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, largest_miss
+from fotismos.heuristic import plugins
+from fotismos.heuristic.errors import FotismosError, InputError, unknown
+from fotismos.heuristic.heuristics import named
+from fotismos.reference.planning.effects import EFFECTS
+from fotismos.reference.planning.plan import Plan, physical_integrator
+from fotismos.reference.rendering import direct
+from fotismos.reference.rendering.renderer import Progress, Renderer, passes
+from fotismos.reference.rendering.sums import Accumulator
+from fotismos.reference.scene.graph import Graph, set_variant
+from fotismos.reference.scene.source import Source, digest
+from fotismos.reference.scene.values import COLOURS
 
 POINTS = "points"
 """Folder of finished points."""
@@ -182,9 +182,9 @@ def row(point: StudyPoint) -> Row:
 def _rendered(point: StudyPoint) -> Row:
     """Render both halves with the same camera rays, and the steps between them.
 
-    The columns :data:`comparisons.study.dataset.STEPS` are the root mean square changes of the
-    image as each step is added; ``dominant`` names the largest. The scene is read once while its
-    ``identity`` stays.
+    The columns :data:`fotismos.comparisons.study.dataset.STEPS` are the root mean square changes of
+    the image as each step is added; ``dominant`` names the largest. The scene is read once while
+    its ``identity`` stays.
     """
     part = point.part
     own, in_scene = split(point.values)

@@ -19,12 +19,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike
 
-from comparisons.audit import furnace
-from comparisons.audit.subjects import shaded
-from heuristic import heuristics
-from heuristic.lights import DirectionalLight
-from reference.pairing.albedo import RoughPlastic, to_phong, to_roughplastic
-from reference.pairing.factors import Convention, Miss, Phong
+from fotismos.comparisons.audit import furnace
+from fotismos.comparisons.audit.subjects import shaded
+from fotismos.heuristic import heuristics
+from fotismos.heuristic.lights import DirectionalLight
+from fotismos.reference.pairing.albedo import RoughPlastic, to_phong, to_roughplastic
+from fotismos.reference.pairing.factors import Convention, Miss, Phong
 
 Point: TypeAlias = dict[str, float]
 """Values by parameter."""

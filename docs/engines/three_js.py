@@ -26,15 +26,15 @@ from math import pi, radians
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import heuristic  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import mitsuba as mi
 import numpy as np
 
-from comparisons.case import open_case
-from comparisons.options import Options
-from comparisons.plain_scene import PlainScene, plain_scene
-from heuristic import terms
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.plain_scene import PlainScene, plain_scene
+from fotismos.heuristic import terms
 
 HERE = Path(__file__).parent
 SIDE, FINER, TESSELLATION = 256, 4, 96

@@ -48,4 +48,4 @@ def name(path: str, words: str) -> str:
 
 def dotted(path: Path) -> str:
     """Return the name of a module or package."""
-    return ".".join(path.relative_to(ROOT).parts)
+    return ".".join(("fotismos", *path.relative_to(ROOT).parts))

@@ -1,13 +1,13 @@
 """Settings of the documentation as a site: `./run docs --site`."""
 
-import heuristic  # isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # isort: skip  it finds LLVM before Dr.Jit is imported
 
-from reference.scene.graph import set_variant
+from fotismos.reference.scene.graph import set_variant
 
 set_variant("llvm_ad_rgb")  # some modules cannot be imported without one
 
 project = "fotismos"
-release = heuristic.__version__
+release = fotismos.__version__
 html_title = f"{project} {release}"
 html_theme = "furo"
 html_theme_options = {

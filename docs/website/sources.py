@@ -90,7 +90,7 @@ def contents() -> Iterator[str]:
     _, *parts = re.split(r"^\*\*(.*)\*\*$", (ROOT / ORDER).read_text("utf-8"), flags=re.MULTILINE)
     for heading, text in zip(parts[::2], parts[1::2], strict=True):
         yield from tree(heading, [f"docs/{place(m['target'])}" for m in LINK.finditer(text)])
-    yield from tree("Modules", [f"api/{room}.rst" for room in api_pages.ROOMS])
+    yield from tree("Modules", [f"api/fotismos.{room}.rst" for room in api_pages.ROOMS])
     yield from tree("Project", PROJECT)
 
 

@@ -4,14 +4,15 @@
 Plugin                      Kind        What it is
 ==========================  ==========  ==========================================================
 ``phong``                   BSDF        diffuse and specular terms behind Mitsuba's BSDF interface
-``heuristic``               integrator  calls the kernel :func:`heuristic.shade` where a ray hits
+``heuristic``               integrator  calls the kernel :func:`fotismos.heuristic.shade` where a
+                                        ray hits
 ``heuristic_point``         emitter     point light with the chapters' attenuation
 ``heuristic_spot``          emitter     spot light with cone, exponent and attenuation
 ``heuristic_directional``   emitter     parallel light
 ``heuristic_glow``          emitter     emission and ambient light of a shape, for Mitsuba's own
                                         integrators; it lights nothing else
 ``heuristic_product`` …     textures    coefficients computed from textures
-                                        (:mod:`heuristic.plugins.textures`)
+                                        (:mod:`fotismos.heuristic.plugins.textures`)
 ``heuristic_tilt``          texture     the normal from a bump or normal map
 ==========================  ==========  ==========================================================
 
@@ -24,8 +25,8 @@ from typing import Any
 
 import mitsuba as mi
 
-from heuristic import llvm
-from heuristic.errors import InputError
+from fotismos.heuristic import llvm
+from fotismos.heuristic.errors import InputError
 
 TEXTURES = ("product", "share", "rest", "sum", "blend", "sides", "exponent", "interior", "tilt")
 PLUGINS = {"phong": ("bsdf", "phong"), "heuristic": ("integrator", "integrator")}
@@ -63,4 +64,4 @@ def _plugin(name: str, module: str, props: Any) -> Any:
 
 @cache
 def _classes(module: str, variant: str) -> Any:
-    return import_module(f"heuristic.plugins.{module}").define()
+    return import_module(f"fotismos.heuristic.plugins.{module}").define()

@@ -9,10 +9,18 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic import materials
-from heuristic.convention import Array, Colour, Direction, Interaction, Mask, Properties, Scene
-from heuristic.errors import InputError
-from heuristic.materials import COEFFICIENTS, PHYSICAL, Material, PairedMaterial
+from fotismos.heuristic import materials
+from fotismos.heuristic.convention import (
+    Array,
+    Colour,
+    Direction,
+    Interaction,
+    Mask,
+    Properties,
+    Scene,
+)
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.materials import COEFFICIENTS, PHYSICAL, Material, PairedMaterial
 
 
 def coefficient(props: Properties, name: str) -> Any:
@@ -75,7 +83,7 @@ class SceneMaterials:
 
     ``prune`` leaves out the terms that no material has; ``form`` replaces the materials' own;
     ``physical`` also reads the parameters of the physical partners
-    (:class:`heuristic.materials.PairedMaterial`).
+    (:class:`fotismos.heuristic.materials.PairedMaterial`).
     """
 
     DRJIT_STRUCT: ClassVar = {"table": object}  # what dr.freeze must know of
@@ -90,7 +98,8 @@ class SceneMaterials:
             if not hasattr(bsdf, "material"):
                 raise InputError(
                     f"BSDF {bsdf.id()!r}: {bsdf.class_name()} is not a phong. The integrator"
-                    " heuristic renders the heuristic half of a pair, which reference.pair makes."
+                    " heuristic renders the heuristic half of a pair,"
+                    " which fotismos.reference.pair makes."
                 )
             places[int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(bsdf))[0])] = number
         self.table = mi.UInt32([places.get(i, 0) for i in range(max(places, default=0) + 1)])

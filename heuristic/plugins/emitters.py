@@ -24,8 +24,8 @@ Position, direction, the given intensities and the coefficients are exposed to
     {'type': 'heuristic_point', 'position': [-4.24, 0, 0], 'intensity': 1.0}
 
 Under Mitsuba's integrators a light of intensity ``I_p`` arrives as irradiance ``pi I_p f_att``
-(:mod:`heuristic.convention`). ``light`` hands the same parameters to the kernel. A sample of
-Mitsuba's has one colour, which is ``L_d``. So the sum of the chapters is there that of two
+(:mod:`fotismos.heuristic.convention`). ``light`` hands the same parameters to the kernel. A sample
+of Mitsuba's has one colour, which is ``L_d``. So the sum of the chapters is there that of two
 renderings: with ``k_s = 0``, and with ``k_d = 0`` and ``L_s`` in place of ``L_d``; emission and
 ambient light belong in one of them.
 
@@ -52,9 +52,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import convention, terms
-from heuristic.convention import Colour, Interaction, Mask, Number, Properties, Sample
-from heuristic.lights import (
+from fotismos.heuristic import convention, terms
+from fotismos.heuristic.convention import Colour, Interaction, Mask, Number, Properties, Sample
+from fotismos.heuristic.lights import (
     FAR,
     INTENSITIES,
     PLUGINS,
@@ -63,7 +63,7 @@ from heuristic.lights import (
     Extent,
     Light,
 )
-from heuristic.plugins.coefficients import coefficient, emitted
+from fotismos.heuristic.plugins.coefficients import coefficient, emitted
 
 
 def define() -> dict[str, Any]:
@@ -79,7 +79,7 @@ def define() -> dict[str, Any]:
     coefficients = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
 
     class HeuristicLight(mi.Emitter):
-        """One of the kinds in :data:`heuristic.lights.PLUGINS`, never hit by a ray."""
+        """One of the kinds in :data:`fotismos.heuristic.lights.PLUGINS`, never hit by a ray."""
 
         def __init__(self, props: Properties):
             super().__init__(props)

@@ -4,7 +4,7 @@
 Parameter           Type (default)      Meaning
 ==================  ==================  ===========================================================
 ``model``           string (phong)      name of the heuristic that shades
-                                        (:mod:`heuristic.heuristics`)
+                                        (:mod:`fotismos.heuristic.heuristics`)
 ``ambient``         spectrum (0)        ``I_a`` of 8.2
 ``interpolation``   string (phong)      ``phong`` shades every point, with the normal that Mitsuba
                                         interpolates; ``gouraud`` the vertices and ``flat`` the
@@ -34,12 +34,20 @@ from typing import Any, Self
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import heuristics
-from heuristic.convention import Colour, Direction, Interaction, Mask, Properties, Scene, Visibility
-from heuristic.errors import InputError, unknown
-from heuristic.heuristics import Interpolation, ShadingArguments
-from heuristic.lights import FAR, Light
-from heuristic.plugins.coefficients import SceneMaterials, emitted, may_be_nonzero
+from fotismos.heuristic import heuristics
+from fotismos.heuristic.convention import (
+    Colour,
+    Direction,
+    Interaction,
+    Mask,
+    Properties,
+    Scene,
+    Visibility,
+)
+from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.heuristics import Interpolation, ShadingArguments
+from fotismos.heuristic.lights import FAR, Light
+from fotismos.heuristic.plugins.coefficients import SceneMaterials, emitted, may_be_nonzero
 
 LAYERS = 64
 """Surfaces that a camera ray passes at most: a bound for stacks of empty ones."""
@@ -124,7 +132,7 @@ def define() -> dict[str, Any]:
             return colour
 
         def model_at(self, scene: Scene, si: Interaction) -> Callable[..., Colour]:
-            """Return the heuristic as a function of the arguments of :func:`heuristic.shade`."""
+            """Return the heuristic as a function of the arguments of the kernel's ``shade``."""
             prepared = self.known(scene).prepared
             return lambda *arguments: self.model.evaluate(
                 ShadingArguments(*arguments), si.uv, self.parameters, prepared, si.wavelengths
@@ -163,7 +171,7 @@ def define() -> dict[str, Any]:
                     raise InputError(
                         f"emitter {emitter.id()!r} ({emitter.class_name()}) has no heuristic form."
                         " The integrator heuristic renders the heuristic half of a pair, which"
-                        " reference.pair makes."
+                        " fotismos.reference.pair makes."
                     )
             return lights
 
@@ -173,7 +181,7 @@ def define() -> dict[str, Any]:
             return self.ambient.eval(si, active) if is_there else 0
 
         def visibility(self, scene: Scene, si: Interaction, active: Mask) -> Visibility | None:
-            """Return the shadow test for :func:`heuristic.shade`, None if there is none."""
+            """Return the shadow test for the kernel's ``shade``, None if there is none."""
             if not self.occlusion:
                 return None
 
@@ -204,7 +212,9 @@ def define() -> dict[str, Any]:
             raise unknown("interpolation", name, names)
         if name == "phong":
             return HeuristicIntegrator(props)
-        from heuristic.plugins import interpolated  # loaded late: most scenes have no meshes
+        from fotismos.heuristic.plugins import (
+            interpolated,  # loaded late: most scenes have no meshes
+        )
 
         return interpolated.derived(HeuristicIntegrator)(props)
 

@@ -19,13 +19,21 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import meshes, tessellation
-from heuristic.convention import Colour, Interaction, Mask, Mesh, Position, Scene, Visibility
-from heuristic.errors import InputError
-from heuristic.heuristics import Interpolation
-from heuristic.kernel import shade
-from heuristic.lights import Light
-from heuristic.materials import Material
+from fotismos.heuristic import meshes, tessellation
+from fotismos.heuristic.convention import (
+    Colour,
+    Interaction,
+    Mask,
+    Mesh,
+    Position,
+    Scene,
+    Visibility,
+)
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.heuristic.kernel import shade
+from fotismos.heuristic.lights import Light
+from fotismos.heuristic.materials import Material
 
 
 def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
@@ -48,8 +56,8 @@ def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
         if mesh.has_face_normals():
             raise InputError(
                 f"mesh {mesh.id()!r} has face_normals, so several normals at a vertex. Gouraud"
-                " shading needs one: pass it through heuristic.tessellation.split_faces, or take"
-                " face_normals off."
+                " shading needs one: pass it through"
+                " fotismos.heuristic.tessellation.split_faces, or take face_normals off."
             )
         si = dr.zeros(mi.SurfaceInteraction3f, mesh.vertex_count())
         si.n = tessellation.normals(mesh)
@@ -78,8 +86,8 @@ def shade_mesh(
 
     The values are as seen by a ``viewer`` ``P_V``: three numbers, or a Dr.Jit point. ``twosided``
     also stores those of the back, with reversed normals. ``model`` has the arguments of
-    :func:`heuristic.shade`; Dr.Jit values hold one entry, or one per vertex or face. Colours are
-    RGB or single numbers: Mitsuba 3.9.1 reads attributes of 1 or 3 components.
+    :func:`fotismos.heuristic.shade`; Dr.Jit values hold one entry, or one per vertex or face.
+    Colours are RGB or single numbers: Mitsuba 3.9.1 reads attributes of 1 or 3 components.
     """
     si = shading_points(mesh, interpolation)
     position, normal = mi.Vector3f(si.p), mi.Vector3f(si.n)
@@ -132,7 +140,7 @@ def derived(base: type) -> type:
     require_colours()
 
     class InterpolatingIntegrator(base):
-        """See :mod:`heuristic.plugins.integrator`."""
+        """See :mod:`fotismos.heuristic.plugins.integrator`."""
 
         def render(self, scene: Scene, sensor: Any = 0, *others: Any, **named: Any) -> Any:
             viewer = viewpoint(scene.sensors()[sensor] if isinstance(sensor, int) else sensor)
@@ -174,8 +182,8 @@ def _meshes(scene: Scene) -> list[Mesh]:
         if not shape.is_mesh():
             raise InputError(
                 f"shape {shape.id()!r} is a {shape.class_name()}: flat and Gouraud shading need"
-                " triangle meshes. Make one with heuristic.tessellation.to_mesh; fotismos does so"
-                " itself."
+                " triangle meshes. Make one with fotismos.heuristic.tessellation.to_mesh;"
+                " fotismos does so itself."
             )
     return shapes
 

@@ -24,8 +24,8 @@ All but ``twosided`` are exposed to ``mitsuba.traverse``. Python::
     {'type': 'phong', 'k_d': {'type': 'rgb', 'value': [0.5, 0.4, 0.3]}, 'k_s': 0.7, 'n': 9}
 
 The reflected radiance for irradiance ``E`` at normal incidence is 8.10's for ``I_p = E / pi``
-(:mod:`heuristic.convention`): ``f cos = [k_d (N.L) + k_s (R.V)^n] / pi``. The specular part
-has no cosine factor; as in the chapters, it neither conserves energy nor is reciprocal.
+(:mod:`fotismos.heuristic.convention`): ``f cos = [k_d (N.L) + k_s (R.V)^n] / pi``. The specular
+part has no cosine factor; as in the chapters, it neither conserves energy nor is reciprocal.
 """
 
 from collections.abc import Sequence
@@ -39,11 +39,24 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic import convention, numerics, terms, vectors
-from heuristic.convention import Colour, Direction, Interaction, Mask, Number, Properties, Sample
-from heuristic.errors import InputError
-from heuristic.materials import COEFFICIENTS, Material, PairedMaterial, check_form
-from heuristic.plugins.coefficients import coefficient, emitted, may_be_nonzero, require_positive
+from fotismos.heuristic import convention, numerics, terms, vectors
+from fotismos.heuristic.convention import (
+    Colour,
+    Direction,
+    Interaction,
+    Mask,
+    Number,
+    Properties,
+    Sample,
+)
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.materials import COEFFICIENTS, Material, PairedMaterial, check_form
+from fotismos.heuristic.plugins.coefficients import (
+    coefficient,
+    emitted,
+    may_be_nonzero,
+    require_positive,
+)
 
 SMALLEST_SAMPLE = 2.0**-25
 """In place of a random number of 0, which represents all numbers below 2^-24."""
@@ -79,7 +92,7 @@ def define() -> dict[str, Any]:
             """Return the material at a surface interaction; absent terms are plain zeros.
 
             ``k_s`` is that of a lobe without normalisation, 0 for a mirror. With ``physical`` the
-            material is a :class:`heuristic.materials.PairedMaterial`.
+            material is a :class:`fotismos.heuristic.materials.PairedMaterial`.
             """
             form, n = form or self.form, self.exponent(si, active)
             coefficients = {
@@ -209,7 +222,7 @@ def define() -> dict[str, Any]:
             """Note which coefficients can be non-zero, if it is a mirror, and make ``n`` opaque.
 
             An opaque exponent can change without a new compilation, unless it crosses the bounds of
-            :data:`heuristic.numerics.MODERATE_EXPONENTS`. Values below 0 raise InputError.
+            :data:`fotismos.heuristic.numerics.MODERATE_EXPONENTS`. Values below 0 raise InputError.
             """
             for name in (*COEFFICIENTS, "transmittance"):
                 require_positive(f"phong: {name}", getattr(self, name))
@@ -278,7 +291,7 @@ def define() -> dict[str, Any]:
             That vector is ``wo`` itself about the mirror image of ``wi``, or the half vector about
             the normal, at which ``wi`` is then mirrored. Its cosine is ``u^(1/(n + 1))``, whose ``1
             - c^2`` would vanish for large ``n``: with ``c = 2^-x`` the sine comes from ``1 -
-            2^(-2x)`` (:func:`heuristic.numerics.one_less_exp2`).
+            2^(-2x)`` (:func:`fotismos.heuristic.numerics.one_less_exp2`).
             """
             halvings = -dr.log2(numerics.at_least(sample2.y, SMALLEST_SAMPLE)) / (n + 1)
             sine = dr.sqrt(numerics.one_less_exp2(2 * halvings))

@@ -41,9 +41,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from heuristic.convention import Colour, Direction, Interaction, Mask, Number, Properties
-from heuristic.materials import SMALLEST_ALPHA
-from heuristic.plugins.coefficients import coefficient
+from fotismos.heuristic.convention import Colour, Direction, Interaction, Mask, Number, Properties
+from fotismos.heuristic.materials import SMALLEST_ALPHA
+from fotismos.heuristic.plugins.coefficients import coefficient
 
 SCALARS = ("weight", "alpha")
 MAPS = ("normals", "heights")

@@ -32,8 +32,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.terms import normalisation
-from reference.pairing.factors import (
+from fotismos.heuristic.terms import normalisation
+from fotismos.reference.pairing.factors import (
     Convention,
     Miss,
     Phong,

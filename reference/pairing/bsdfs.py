@@ -1,8 +1,8 @@
 """Replacing the BSDFs of a scene by their counterparts, by the conventions of pairing.
 
 Towards the heuristic half there is one rule per plugin, which returns the nearest ``phong``:
-:mod:`reference.pairing.nearest`. Those of the plainest materials are here. Values are those of
-:mod:`reference.scene.values`.
+:mod:`fotismos.reference.pairing.nearest`. Those of the plainest materials are here. Values are
+those of :mod:`fotismos.reference.scene.values`.
 """
 
 from collections.abc import Callable
@@ -12,10 +12,10 @@ from typing import Any
 
 import mitsuba as mi
 
-from heuristic.materials import COEFFICIENTS, SMALLEST_ALPHA
-from reference.pairing.factors import Convention, Miss, Phong, Replacements
-from reference.scene import values
-from reference.scene.graph import Graph, properties
+from fotismos.heuristic.materials import COEFFICIENTS, SMALLEST_ALPHA
+from fotismos.reference.pairing.factors import Convention, Miss, Phong, Replacements
+from fotismos.reference.scene import values
+from fotismos.reference.scene.graph import Graph, properties
 
 BSDF, TEXTURE = mi.ObjectType.BSDF, mi.ObjectType.Texture
 
@@ -63,7 +63,7 @@ def give_default(graph: Graph) -> None:
 
 @dataclass(frozen=True)
 class NearestPhong:
-    """The phong material that replaces a BSDF; with values as in :mod:`reference.scene.values`.
+    """The phong material that replaces a BSDF; with values as in ``reference.scene.values``.
 
     ``lost`` are pairs of something that the heuristic model has no form for, and the rule for the
     rest; ``physical`` are parameters of the BSDF, as engines have them, for users' heuristics.
@@ -204,7 +204,7 @@ def physical_partner(
     ``conductor`` that reflects ``k_s``, or a smooth ``plastic`` if there is a diffuse part, too.
     """
     if any(values.colour(graph, index, "k_s", 0.0)):
-        from reference.pairing import albedo  # loaded late: only lobes need it
+        from fotismos.reference.pairing import albedo  # loaded late: only lobes need it
 
         material = phong(graph, index)
         if material.n == inf and not any(material.k_d):
@@ -267,4 +267,4 @@ def diffuse(context: Context, index: int) -> NearestPhong:
 
 
 RULES: dict[str, Rule] = {"phong": itself, "diffuse": diffuse}
-"""By plugin; other rules are in :mod:`reference.pairing.nearest`."""
+"""By plugin; other rules are in :mod:`fotismos.reference.pairing.nearest`."""

@@ -1,4 +1,4 @@
-"""Replacing the lights of a scene by their counterparts, by :mod:`reference.pairing.factors`.
+"""Replacing the lights of a scene by their counterparts, by ``reference.pairing.factors``.
 
 Lights without a row in the table get the nearest light: an environment or a sky becomes ``I_a``,
 its mean radiance over the sphere, and the sun a directional light of its irradiance and mean
@@ -23,17 +23,17 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from reference.pairing.factors import Convention, Replacements
-from reference.pairing.lights import (
+from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
+from fotismos.reference.pairing.factors import Convention, Replacements
+from fotismos.reference.pairing.lights import (
     SECOND_INTENSITY,
     LightNode,
     heuristic,
     is_heuristic,
     level,
 )
-from reference.scene import values
-from reference.scene.graph import Graph, properties
+from fotismos.reference.scene import values
+from fotismos.reference.scene.graph import Graph, properties
 
 EMITTER = mi.ObjectType.Emitter
 
@@ -60,7 +60,9 @@ def to_heuristic(
             travel, intensity = mi.ScalarVector3f(*light.travel()), light.value("irradiance", 1.0)
             light.replace(heuristic("heuristic_directional", direction=travel, intensity=intensity))
         else:
-            from reference.pairing import lamps  # loaded late: most scenes have points alone
+            from fotismos.reference.pairing import (
+                lamps,  # loaded late: most scenes have points alone
+            )
 
             glow = lamps.to_heuristic(light)
             ambient = ambient if glow is None else glow
@@ -85,7 +87,7 @@ def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements
             props = properties("directional", direction=travel, irradiance=irradiance)
             light.replace(props, IRRADIANCE_PER_INTENSITY)
         else:
-            from reference.pairing import lamps  # loaded late: see to_heuristic
+            from fotismos.reference.pairing import lamps  # loaded late: see to_heuristic
 
             lamps.spot_to_physical(light)
 

@@ -1,6 +1,7 @@
 """Pairing: which heuristic value corresponds to which physical one. Factors are stated only here.
 
-Lights and diffuse surfaces pair exactly (:mod:`heuristic.convention`: irradiance ``E = pi I_p``):
+Lights and diffuse surfaces pair exactly (:mod:`fotismos.heuristic.convention`: irradiance ``E = pi
+I_p``):
 
 =============================================  =====================================================
 Physical (Mitsuba)                             Heuristic
@@ -11,7 +12,7 @@ Physical (Mitsuba)                             Heuristic
 ``spot``, intensity ``I``                      ``I_p0 = s I / pi``, ``f_att = 1 / d^2``, the same
                                                cone, ``m`` fitted, ``s`` that of equal flux; the
                                                other way cone and beam width are fitted
-                                               (:mod:`reference.pairing.lamps`)
+                                               (:mod:`fotismos.reference.pairing.lamps`)
 small flat ``area`` light, ``L`` and ``A``     spot at its centroid: ``I_p0 = L A / pi``, ``m = 1``,
                                                cone 90 degrees, ``f_att = 1 / d^2``
 closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L A / (4 pi)``
@@ -20,7 +21,7 @@ emission of radiance ``L``                     ``k_i = L``
 =============================================  =====================================================
 
 The rules for the level of lights without an exact pair, and for lights of two intensities, are in
-:mod:`reference.pairing.emitters`.
+:mod:`fotismos.reference.pairing.emitters`.
 
 A flat light of area ``A`` sends the intensity ``L A cos`` in its far field, a convex closed one the
 mean projected area ``A / 4`` times ``L`` (Cauchy). The ambient pair is exact for an unoccluded
@@ -38,9 +39,9 @@ from typing import Annotated, Any
 import numpy as np
 from msgspec import Meta
 
-from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.terms import normalisation
-from reference.records import Record
+from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
+from fotismos.heuristic.terms import normalisation
+from fotismos.reference.records import Record
 
 INTENSITY_FACTOR = 1 / IRRADIANCE_PER_INTENSITY
 """``I_p / E`` and ``I_p0 / I``: the factor of all rows above."""
@@ -174,7 +175,7 @@ def specular_albedo(phong: Phong) -> np.ndarray:
 
     ``2 k_s / (n + 2)`` for the chapters' form: the radiance is ``k_s cos^n / pi`` for unit
     irradiance, hence ``(k_s / pi) 2 pi int cos^n cos sin d(theta)``. In general it is ``k_s`` over
-    :func:`heuristic.terms.normalisation`, and ``k_s`` itself if the lobe is normalised.
+    :func:`fotismos.heuristic.terms.normalisation`, and ``k_s`` itself if the lobe is normalised.
 
     >>> specular_albedo(Phong(k_d=(0.5, 0.5, 0.5), k_s=(0.6, 0.6, 0.6), n=4)).round(9).tolist()
     [0.2, 0.2, 0.2]

@@ -11,11 +11,11 @@ from functools import cache
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import FotismosError, InputError
-from heuristic.heuristics import PHONG, Interpolation, named
-from heuristic.plugins import register
-from reference.pairing import bsdfs, emitters
-from reference.pairing.factors import (
+from fotismos.heuristic.errors import FotismosError, InputError
+from fotismos.heuristic.heuristics import PHONG, Interpolation, named
+from fotismos.heuristic.plugins import register
+from fotismos.reference.pairing import bsdfs, emitters
+from fotismos.reference.pairing.factors import (
     BsdfPair,
     Convention,
     EmitterPair,
@@ -24,11 +24,11 @@ from reference.pairing.factors import (
     Unrepresentable,
     specular_albedo,
 )
-from reference.pairing.prepare import Override, prepare
-from reference.records import Record
-from reference.rendering.gbuffer import gbuffer
-from reference.scene.graph import Graph, properties
-from reference.scene.source import Source
+from fotismos.reference.pairing.prepare import Override, prepare
+from fotismos.reference.records import Record
+from fotismos.reference.rendering.gbuffer import gbuffer
+from fotismos.reference.scene.graph import Graph, properties
+from fotismos.reference.scene.source import Source
 
 BSDF, INTEGRATOR, MEDIUM, SHAPE = (
     getattr(mi.ObjectType, kind) for kind in ("BSDF", "Integrator", "Medium", "Shape")
@@ -51,7 +51,7 @@ class Pair:
     ``heuristic`` and ``physical`` are graphs, to be copied before an edit. ``max_depth``,
     ``integrator`` and ``rr_depth`` are the scene's own: -1 for no limit, None if omitted. ``media``
     are labels and plugins of participating media, ``shading`` names the declaration that shades the
-    heuristic half (:mod:`heuristic.heuristics`).
+    heuristic half (:mod:`fotismos.heuristic.heuristics`).
     """
 
     name: str
@@ -83,10 +83,10 @@ def pair(
     """Derive both halves of a scene, for the current variant.
 
     FLAT and GOURAUD make meshes of the heuristic half's shapes, by ``tessellation``
-    (:mod:`heuristic.tessellation`); if that is given, PHONG gets meshes too. ``prune`` lets the
-    kernel leave out the terms that no material has. ``heuristic`` names the declaration that shades
-    the heuristic half; ``with_partners`` lets its materials know their physical parameters
-    (:mod:`reference.pairing.nearest`), as they do for every user's heuristic.
+    (:mod:`fotismos.heuristic.tessellation`); if that is given, PHONG gets meshes too. ``prune``
+    lets the kernel leave out the terms that no material has. ``heuristic`` names the declaration
+    that shades the heuristic half; ``with_partners`` lets its materials know their physical
+    parameters (:mod:`fotismos.reference.pairing.nearest`), as they do for every user's heuristic.
     """
     register()
     graph = source.parse()
@@ -114,7 +114,9 @@ def _paired(
     model, half, replaced = named(heuristic), graph.copy(), Replacements()
     context = bsdfs.Context(half, convention, for_users=with_partners or not model.is_own)
     if any(half.plugin(index) not in bsdfs.RULES for index in half.nodes(BSDF)):
-        from reference.pairing import nearest  # loaded late: only for lobes and transmission
+        from fotismos.reference.pairing import (
+            nearest,  # loaded late: only for lobes and transmission
+        )
 
         context.rule_of = nearest.rule_of
     bsdfs.to_heuristic(context, replaced)
@@ -135,7 +137,9 @@ def _paired(
     props.set_id("integrator")  # identifies its parameters
     half.attach(0, "integrator", half.add(INTEGRATOR, props))
     if interpolation is not Interpolation.PHONG or tessellation is not None:
-        from reference.pairing import polygons  # loaded late: few scenes are made into triangles
+        from fotismos.reference.pairing import (
+            polygons,  # loaded late: few scenes are made into triangles
+        )
 
         polygons.replace_shapes(half, geometry(), tessellation, interpolation)
 

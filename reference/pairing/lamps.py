@@ -18,10 +18,10 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from reference.pairing import probe
-from reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR
-from reference.pairing.lights import LightNode, heuristic, level
-from reference.scene.graph import Reference, properties
+from fotismos.reference.pairing import probe
+from fotismos.reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR
+from fotismos.reference.pairing.lights import LightNode, heuristic, level
+from fotismos.reference.scene.graph import Reference, properties
 
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
 

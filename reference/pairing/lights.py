@@ -8,11 +8,18 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.convention import IRRADIANCE_PER_INTENSITY
-from heuristic.lights import INVERSE_SQUARE, PLUGINS, DirectionalLight, Light, PointLight, SpotLight
-from reference.pairing.factors import INTENSITY_FACTOR, Replacements
-from reference.scene import values
-from reference.scene.graph import Graph, properties
+from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
+from fotismos.heuristic.lights import (
+    INVERSE_SQUARE,
+    PLUGINS,
+    DirectionalLight,
+    Light,
+    PointLight,
+    SpotLight,
+)
+from fotismos.reference.pairing.factors import INTENSITY_FACTOR, Replacements
+from fotismos.reference.scene import values
+from fotismos.reference.scene.graph import Graph, properties
 
 FALLOFF_OF_MITSUBA = dict(zip(("k0", "k1", "k2"), map(float, INVERSE_SQUARE), strict=True))
 
@@ -57,7 +64,7 @@ class LightNode:
         return self.graph.props(self.index).get(key, default)
 
     def number(self, key: str, default: float) -> float:
-        """Return a parameter as a finite number, or raise :class:`heuristic.errors.InputError`."""
+        """Return a parameter as a finite number, or raise ``InputError``."""
         return values.number(self.graph, self.index, key, default)
 
     def column(self, number: int) -> list[float]:
@@ -121,11 +128,12 @@ class LightNode:
 class LightKind:
     """A kind of light.
 
-    ``plugins`` are Mitsuba's emitters of this kind, ``model`` its class in :mod:`heuristic.lights`;
-    None if the heuristic has no light of this kind. ``colour`` is the parameter that holds the
-    intensity, if the kind is paired by its parameters. ``place`` returns ``position`` or
-    ``toward``, the direction to the light, (3,) each, if it has one. It may be ``exact`` (it needs
-    no random numbers), or shine from everywhere (``surrounds``), evenly so (``uniform``).
+    ``plugins`` are Mitsuba's emitters of this kind, ``model`` its class in
+    :mod:`fotismos.heuristic.lights`; None if the heuristic has no light of this kind. ``colour`` is
+    the parameter that holds the intensity, if the kind is paired by its parameters. ``place``
+    returns ``position`` or ``toward``, the direction to the light, (3,) each, if it has one. It may
+    be ``exact`` (it needs no random numbers), or shine from everywhere (``surrounds``), evenly so
+    (``uniform``).
     """
 
     plugins: tuple[str, ...]

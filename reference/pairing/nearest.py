@@ -19,15 +19,15 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError
-from heuristic.materials import COEFFICIENTS, SMALLEST_ALPHA
-from heuristic.terms import normalisation
-from reference.pairing import albedo, probe
-from reference.pairing.albedo import RoughPlastic
-from reference.pairing.bsdfs import TEXTURE, Context, NearestPhong, Rule
-from reference.pairing.factors import Convention, exponent_of
-from reference.scene import values
-from reference.scene.graph import Graph, Reference
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.materials import COEFFICIENTS, SMALLEST_ALPHA
+from fotismos.heuristic.terms import normalisation
+from fotismos.reference.pairing import albedo, probe
+from fotismos.reference.pairing.albedo import RoughPlastic
+from fotismos.reference.pairing.bsdfs import TEXTURE, Context, NearestPhong, Rule
+from fotismos.reference.pairing.factors import Convention, exponent_of
+from fotismos.reference.scene import values
+from fotismos.reference.scene.graph import Graph, Reference
 
 SMOOTH_ALPHA = 0.05
 """Replaces a smaller roughness: a mirror's lobe has no width, and the model's light no extent. The
@@ -40,8 +40,9 @@ LARGEST_IOR = 4.0
 def lobe(context: Context, reflected: Any, alpha: Any) -> dict[str, Any]:
     """Return ``k_s``, ``n`` and ``normalised`` of a lobe of an albedo and a roughness.
 
-    ``n`` is :func:`reference.pairing.factors.exponent_of` ``alpha``, and ``k_s`` the albedo times
-    :func:`heuristic.terms.normalisation`; if ``alpha`` is a texture, the plugin normalises.
+    ``n`` is :func:`fotismos.reference.pairing.factors.exponent_of` ``alpha``, and ``k_s`` the
+    albedo times :func:`fotismos.heuristic.terms.normalisation`; if ``alpha`` is a texture, the
+    plugin normalises.
     """
     if values.is_zero(reflected):
         return {}
@@ -117,7 +118,7 @@ MIRROR = ("mirror image", "a highlight of the same albedo")
 
 
 def roughplastic(context: Context, index: int) -> NearestPhong:
-    """``roughplastic``: by the convention (:class:`reference.pairing.factors.Convention`).
+    """``roughplastic``: by the convention (:class:`fotismos.reference.pairing.factors.Convention`).
 
     A textured reflectance is matched at each point: the diffuse part's albedo is linear in ``rho``,
     with ``nonlinear`` it is ``c rho / (1 - f rho)`` (``_of_base``); the lobe's is linear in

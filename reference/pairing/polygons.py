@@ -7,12 +7,12 @@ from tempfile import mkdtemp
 
 import mitsuba as mi
 
-from heuristic import tessellation
-from heuristic.convention import Scene
-from heuristic.errors import InputError, OutputError
-from heuristic.heuristics import Interpolation
-from heuristic.plugins.interpolated import viewpoint
-from reference.scene.graph import Graph, Reference, properties
+from fotismos.heuristic import tessellation
+from fotismos.heuristic.convention import Scene
+from fotismos.heuristic.errors import InputError, OutputError
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.heuristic.plugins.interpolated import viewpoint
+from fotismos.reference.scene.graph import Graph, Reference, properties
 
 
 def replace_shapes(

@@ -5,12 +5,12 @@ from typing import Any
 
 import mitsuba as mi
 
-from heuristic.errors import InputError
-from heuristic.lights import INTENSITIES
-from reference.pairing import bsdfs, lights
-from reference.records import Record
-from reference.scene import checks, values
-from reference.scene.graph import Graph, Reference, properties
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.lights import INTENSITIES
+from fotismos.reference.pairing import bsdfs, lights
+from fotismos.reference.records import Record
+from fotismos.reference.scene import checks, values
+from fotismos.reference.scene.graph import Graph, Reference, properties
 
 FILM, INTEGRATOR, SAMPLER, SENSOR, SHAPE = (
     getattr(mi.ObjectType, kind) for kind in ("Film", "Integrator", "Sampler", "Sensor", "Shape")

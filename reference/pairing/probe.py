@@ -23,10 +23,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.convention import IRRADIANCE_PER_INTENSITY, Colour, Number
-from heuristic.errors import InputError
-from reference.scene import values
-from reference.scene.graph import Graph
+from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY, Colour, Number
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.scene import values
+from fotismos.reference.scene.graph import Graph
 
 SAMPLES, SAMPLES_OF_LIGHTS = 8192, 65_536
 NODES = 256

@@ -10,13 +10,13 @@ from typing import Any
 
 import mitsuba as mi
 
-from heuristic.heuristics import Interpolation
-from reference.pairing import lights
-from reference.pairing.bsdfs import WRAPPERS, is_mirror
-from reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
-from reference.planning.rules import NO_SECOND_REFLECTION, NO_SHADOWS, PruningRule
-from reference.records import Record
-from reference.scene.graph import Graph, graft
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.reference.pairing import lights
+from fotismos.reference.pairing.bsdfs import WRAPPERS, is_mirror
+from fotismos.reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
+from fotismos.reference.planning.rules import NO_SECOND_REFLECTION, NO_SHADOWS, PruningRule
+from fotismos.reference.records import Record
+from fotismos.reference.scene.graph import Graph, graft
 
 
 class Decision(Record):

@@ -15,15 +15,15 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic import meshes
-from heuristic.heuristics import Interpolation
-from heuristic.materials import COEFFICIENTS
-from reference.pairing import lights
-from reference.pairing.bsdfs import REFLECTANCES, TRANSMITTANCES, is_mirror
-from reference.pairing.halves import Pair
-from reference.pairing.lights import LightNode
-from reference.scene import values
-from reference.scene.graph import Graph
+from fotismos.heuristic import meshes
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.heuristic.materials import COEFFICIENTS
+from fotismos.reference.pairing import lights
+from fotismos.reference.pairing.bsdfs import REFLECTANCES, TRANSMITTANCES, is_mirror
+from fotismos.reference.pairing.halves import Pair
+from fotismos.reference.pairing.lights import LightNode
+from fotismos.reference.scene import values
+from fotismos.reference.scene.graph import Graph
 
 BSDF, EMITTER, SENSOR, SHAPE = (
     getattr(mi.ObjectType, kind) for kind in ("BSDF", "Emitter", "Sensor", "Shape")

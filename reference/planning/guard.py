@@ -22,8 +22,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from reference.planning.plan import Guard, Plan, physical_integrator
-from reference.rendering.renderer import Stream, pass_seed
+from fotismos.reference.planning.plan import Guard, Plan, physical_integrator
+from fotismos.reference.rendering.renderer import Stream, pass_seed
 
 SHARE = 0.02
 """Share of the reference's samples that bounds the rays, within the next two limits."""

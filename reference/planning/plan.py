@@ -18,9 +18,9 @@ participating media                     ``volpath``, or ``volpathmis`` where the
                                         or its extinction is coloured
 ======================================  ===========================================================
 
-All take the sampler of :mod:`reference.rendering.sampler`, stratified within a pass: few passes of
-many samples are better than many of few, and eight are enough for standard errors. If only the
-pixel filter is sampled, four show the remaining noise.
+All take the sampler of :mod:`fotismos.reference.rendering.sampler`, stratified within a pass: few
+passes of many samples are better than many of few, and eight are enough for standard errors. If
+only the pixel filter is sampled, four show the remaining noise.
 """
 
 from collections.abc import Collection
@@ -30,20 +30,31 @@ import mitsuba as mi
 from msgspec import Meta
 from msgspec.structs import replace
 
-from heuristic.convention import Scene
-from heuristic.heuristics import Interpolation
-from heuristic.materials import COEFFICIENTS
-from reference.pairing import lights
-from reference.pairing.halves import Pair
-from reference.pairing.prepare import PATHS
-from reference.planning.effects import EFFECTS, INTERREFLECTION, OCCLUSION, Decision, Effect
-from reference.planning.facts import BSDF, Facts
-from reference.planning.rules import LIGHT_BY_LIGHT, RULES, TABULATED_ENVIRONMENT, RuleResult
-from reference.records import Amount, Count, Record, Size
-from reference.rendering import direct
-from reference.rendering.sampler import SAMPLER, STOCK_SAMPLER
-from reference.scene.graph import Graph
-from reference.scene.values import plain
+from fotismos.heuristic.convention import Scene
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.heuristic.materials import COEFFICIENTS
+from fotismos.reference.pairing import lights
+from fotismos.reference.pairing.halves import Pair
+from fotismos.reference.pairing.prepare import PATHS
+from fotismos.reference.planning.effects import (
+    EFFECTS,
+    INTERREFLECTION,
+    OCCLUSION,
+    Decision,
+    Effect,
+)
+from fotismos.reference.planning.facts import BSDF, Facts
+from fotismos.reference.planning.rules import (
+    LIGHT_BY_LIGHT,
+    RULES,
+    TABULATED_ENVIRONMENT,
+    RuleResult,
+)
+from fotismos.reference.records import Amount, Count, Record, Size
+from fotismos.reference.rendering import direct
+from fotismos.reference.rendering.sampler import SAMPLER, STOCK_SAMPLER
+from fotismos.reference.scene.graph import Graph
+from fotismos.reference.scene.values import plain
 
 Depth = Annotated[
     int, Meta(ge=-1, description="As Mitsuba counts: 2 is direct light alone, -1 is unlimited.")
@@ -215,7 +226,7 @@ def physical_integrator(plan: Plan, scene: Scene, hide_emitters: bool) -> Any:
     integrator = mi.load_dict(description | own)
     # The effect left out may be the environment itself.
     if plan.tabulated_environment and scene.environment() is not None:
-        from reference.pairing.probe import AlbedoTable  # loaded late: few plans need it
+        from fotismos.reference.pairing.probe import AlbedoTable  # loaded late: few plans need it
 
         integrator.environment_albedo = AlbedoTable(scene.shapes()[0].bsdf())
     return integrator

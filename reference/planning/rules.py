@@ -2,7 +2,7 @@
 
 A rule is one :class:`PruningRule`. Its premises are checked in order, and the first that is not
 known to hold rejects it. A rule is only as good as its list of premises; the guard looks for
-missing ones (:mod:`reference.planning.guard`).
+missing ones (:mod:`fotismos.reference.planning.guard`).
 """
 
 from collections.abc import Callable, Sequence
@@ -11,10 +11,18 @@ from dataclasses import dataclass
 import mitsuba as mi
 import numpy as np
 
-from reference.pairing import lights
-from reference.pairing.halves import Pair
-from reference.planning.facts import BSDF, EMITTER, ROUNDING, SHAPE, Facts, LightFacts, ShapeFacts
-from reference.records import Record
+from fotismos.reference.pairing import lights
+from fotismos.reference.pairing.halves import Pair
+from fotismos.reference.planning.facts import (
+    BSDF,
+    EMITTER,
+    ROUNDING,
+    SHAPE,
+    Facts,
+    LightFacts,
+    ShapeFacts,
+)
+from fotismos.reference.records import Record
 
 FAR = 1e6
 """Start of the shadow of a directional light, in multiples of the scene's size."""

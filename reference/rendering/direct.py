@@ -21,7 +21,7 @@ Parameter           Type (default)      Meaning
                                         else finds a light in them
 ``max_depth``       integer (2)         as in Mitsuba's ``path``: 1 is only what shines by itself;
                                         more than 2, or -1 for no limit, adds indirect light
-                                        (:mod:`reference.rendering.indirect`)
+                                        (:mod:`fotismos.reference.rendering.indirect`)
 ==================  ==================  ===========================================================
 
 One rendering can make several images, which share camera rays, paths and kernel: those of
@@ -35,9 +35,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from heuristic import numerics
-from heuristic.convention import Colour
-from reference.rendering.transport import Transport, found_by_bsdf, sums, visibility
+from fotismos.heuristic import numerics
+from fotismos.heuristic.convention import Colour
+from fotismos.reference.rendering.transport import Transport, found_by_bsdf, sums, visibility
 
 UNROLLED = 16
 """Lights of a kind that have their own code."""
@@ -62,7 +62,7 @@ def _define(_variant: str) -> None:
             own = (props.get(name, value) for name, value in Transport()._asdict().items())
             self.transports = (Transport(*own),)
             self.environment_albedo = None
-            """An `AlbedoTable` (:mod:`reference.pairing.probe`) in place of samples of the
+            """An `AlbedoTable` (:mod:`fotismos.reference.pairing.probe`) in place of samples of the
             environment, for one BSDF and nothing that hides it; set after construction."""
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
@@ -99,7 +99,7 @@ def _define(_variant: str) -> None:
             deep = [each for each in self.transports if each.max_depth != 2]
             if deep:  # first, so that paths have the same random numbers whatever lights there are
                 # Loaded late: most plans have direct light alone.
-                from reference.rendering.indirect import indirect_light
+                from fotismos.reference.rendering.indirect import indirect_light
 
                 (max_depth,) = {each.max_depth for each in deep}
                 parameters = max_depth, RR_DEPTH, hit, deep

@@ -9,8 +9,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.convention import Scene
-from heuristic.errors import InputError
+from fotismos.heuristic.convention import Scene
+from fotismos.heuristic.errors import InputError
 
 GRID = 192
 """Rays along each side for means over visible surfaces: some 37,000, enough for three digits."""

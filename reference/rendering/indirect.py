@@ -6,8 +6,8 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from heuristic.convention import Colour, Interaction, Mask, Scene
-from reference.rendering.transport import Transport, found_by_bsdf, sums, visibility
+from fotismos.heuristic.convention import Colour, Interaction, Mask, Scene
+from fotismos.reference.rendering.transport import Transport, found_by_bsdf, sums, visibility
 
 SURVIVAL = 0.95
 """Largest chance that Russian roulette lets a path continue, as in Mitsuba's ``path``."""

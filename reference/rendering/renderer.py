@@ -22,10 +22,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from heuristic.convention import Scene
-from heuristic.errors import FotismosError, InputError, NonFiniteError
-from reference.records import Amount, Record, Size
-from reference.rendering.gbuffer import image_size, resize
+from fotismos.heuristic.convention import Scene
+from fotismos.heuristic.errors import FotismosError, InputError, NonFiniteError
+from fotismos.reference.records import Amount, Record, Size
+from fotismos.reference.rendering.gbuffer import image_size, resize
 
 LARGEST_PASS = 2**26
 """Samples of one pass, and pixels of an image; memory may allow fewer."""

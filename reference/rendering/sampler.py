@@ -24,8 +24,8 @@ from math import isqrt
 import drjit as dr
 import mitsuba as mi
 
-from heuristic.convention import Array, Mask
-from reference.scene.graph import Graph, properties
+from fotismos.heuristic.convention import Array, Mask
+from fotismos.reference.scene.graph import Graph, properties
 
 SAMPLER = "rotated_multijitter"
 STOCK_SAMPLER = "independent"

@@ -16,8 +16,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from heuristic.convention import Array
-from reference.records import Estimated
+from fotismos.heuristic.convention import Array
+from fotismos.reference.records import Estimated
 
 GROUPS = 8
 """Groups of passes, at most: seven degrees of freedom for an interval."""

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
-from heuristic.convention import Colour, Interaction, Mask, Scene
+from fotismos.heuristic.convention import Colour, Interaction, Mask, Scene
 
 
 class Transport(NamedTuple):

@@ -11,9 +11,9 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic import meshes
-from heuristic.errors import InputError
-from reference.scene.graph import Graph, find_file, require_regular_file
+from fotismos.heuristic import meshes
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.scene.graph import Graph, find_file, require_regular_file
 
 LARGEST = float(np.finfo(np.float32).max)
 

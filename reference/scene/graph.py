@@ -13,9 +13,9 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic import llvm
-from heuristic.errors import InputError, unknown
-from heuristic.plugins import PLUGINS
+from fotismos.heuristic import llvm
+from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.plugins import PLUGINS
 
 FILENAME = "filename"
 """The parameter with which every plugin names its file."""

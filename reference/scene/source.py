@@ -18,9 +18,9 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError
-from heuristic.user_code import contained
-from reference.scene.graph import (
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.user_code import contained
+from fotismos.reference.scene.graph import (
     SCRIPT,
     Graph,
     Reference,
@@ -56,7 +56,7 @@ class Script:
     path: Path
 
     def __call__(self) -> Any:
-        """Run the file; :class:`heuristic.errors.InputError` if it raises or has no scene."""
+        """Run the file; ``InputError`` if it raises or has no scene."""
         try:
             with contained(self.path):
                 scene = runpy.run_path(str(self.path)).get(SCRIPT)

@@ -2,8 +2,8 @@
 
 A value is a number, three components, or the parser's form of a texture or tabulated spectrum.
 :func:`product` and the functions after it combine any: if all operands are plain the result is
-plain; otherwise it is a reference to a new node of :mod:`heuristic.plugins.textures`, which
-computes the same at each point.
+plain; otherwise it is a reference to a new node of :mod:`fotismos.heuristic.plugins.textures`,
+which computes the same at each point.
 """
 
 from collections.abc import Callable, Iterable
@@ -13,8 +13,8 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from heuristic.errors import InputError
-from reference.scene.graph import Graph, Reference, properties
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.scene.graph import Graph, Reference, properties
 
 COLOURS = (mi.ScalarColor3f, mi.ScalarColor3d)
 

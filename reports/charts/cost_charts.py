@@ -8,9 +8,9 @@ import altair as alt
 import numpy as np
 from scipy.optimize import isotonic_regression
 
-from comparisons.cost.cost_record import Cost
-from reports.charts.theme import FAINT, Spec
-from reports.charts.vega import specification
+from fotismos.comparisons.cost.cost_record import Cost
+from fotismos.reports.charts.theme import FAINT, Spec
+from fotismos.reports.charts.vega import specification
 
 WIDTH, HEIGHT = 560, 380
 """Pixels of the plot, without the names to its right."""

@@ -14,10 +14,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from comparisons.comparison import Comparison
-from comparisons.departure.metrics import LEADING
-from reports.files import images, results
-from reports.terminal.words import number
+from fotismos.comparisons.comparison import Comparison
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.reports.files import images, results
+from fotismos.reports.terminal.words import number
 
 FORMATS = ("svg", "pdf")
 

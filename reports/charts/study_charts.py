@@ -1,4 +1,4 @@
-"""The figures of a study as charts; for their keys see :mod:`comparisons.study.design`.
+"""The figures of a study as charts; for their keys see :mod:`fotismos.comparisons.study.design`.
 
 Points that differ in other parameters are averaged, and the subtitle says over which. Colours are
 viridis and magma, whose lightness rises steadily: they also work in grey.
@@ -11,11 +11,11 @@ from typing import Any, TypeAlias
 import altair as alt
 import pyarrow as pa
 
-from comparisons.study import dataset
-from comparisons.study.dataset import Row
-from comparisons.study.design import StudyFigure, StudyFile, StudyPart
-from reports.charts.theme import FAINT, Spec
-from reports.charts.vega import specification
+from fotismos.comparisons.study import dataset
+from fotismos.comparisons.study.dataset import Row
+from fotismos.comparisons.study.design import StudyFigure, StudyFile, StudyPart
+from fotismos.reports.charts.theme import FAINT, Spec
+from fotismos.reports.charts.vega import specification
 
 Cell: TypeAlias = dict[str, Any]
 """A mark of a chart: ``x``, perhaps ``y``, and ``value``."""

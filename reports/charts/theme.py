@@ -2,7 +2,7 @@
 
 from typing import Any, TypeAlias
 
-from reference.planning.effects import EFFECTS
+from fotismos.reference.planning.effects import EFFECTS
 
 Spec: TypeAlias = dict[str, Any]
 """A Vega-Lite specification, or a part of one."""

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from heuristic.errors import OutputError
-from reports.charts import theme
-from reports.charts.theme import Spec
+from fotismos.heuristic.errors import OutputError
+from fotismos.reports.charts import theme
+from fotismos.reports.charts.theme import Spec
 
 if TYPE_CHECKING:
     import altair

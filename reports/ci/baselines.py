@@ -10,16 +10,16 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from comparisons import atomic
-from comparisons.atomic import content, require_regular
-from comparisons.case import SUFFIXES, Case, file_of, open_case
-from comparisons.check.measurement import HALVES, Baseline, read_baseline
-from comparisons.departure.blocks import averaged, shrunk
-from comparisons.options import Options
-from heuristic import program
-from heuristic.errors import InputError
-from heuristic.heuristics import in_file
-from reports.files import images
+from fotismos.comparisons import atomic
+from fotismos.comparisons.atomic import content, require_regular
+from fotismos.comparisons.case import SUFFIXES, Case, file_of, open_case
+from fotismos.comparisons.check.measurement import HALVES, Baseline, read_baseline
+from fotismos.comparisons.departure.blocks import averaged, shrunk
+from fotismos.comparisons.options import Options
+from fotismos.heuristic import program
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import in_file
+from fotismos.reports.files import images
 
 Kept = Mapping[str, NDArray[np.floating]]
 """The halves' small pictures, ``{half: (H, W, 3) linear RGB}``."""
@@ -139,7 +139,7 @@ def small(image: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def scene_from(scene: str, path: Path) -> str:
-    """Return a baseline's scene as :func:`comparisons.case.open_case` takes it."""
+    """Return a baseline's scene as :func:`fotismos.comparisons.case.open_case` takes it."""
     beside = path.parent / scene
     return str(beside) if Path(scene).suffix in SUFFIXES or beside.is_file() else scene
 
@@ -151,7 +151,7 @@ def scene_for(scene: str, path: Path) -> str:
 
 
 def options_from(options: Mapping[str, Any], path: Path) -> dict[str, Any]:
-    """Return a baseline's options as a :class:`comparisons.options.Options` takes them."""
+    """Return a baseline's options as a :class:`fotismos.comparisons.options.Options` takes them."""
     return _with_heuristic(options, lambda file: os.path.relpath(path.parent / file))
 
 

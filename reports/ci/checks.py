@@ -7,27 +7,27 @@ from typing import Annotated, Any, Literal
 
 from msgspec import Meta, field, structs
 
-from comparisons.case import Case, open_case
-from comparisons.check.measurement import baseline_of, made_small, measure_scene
-from comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
-from comparisons.check.pictures import PictureCheck, SmallestChanges, check_pictures
-from comparisons.compare import compare
-from comparisons.comparison import versions
-from comparisons.departure.blocks import averaged
-from comparisons.departure.metrics import LEADING
-from comparisons.options import Options
-from comparisons.processes.pool import Pool, Task
-from heuristic import program
-from heuristic.errors import FotismosError, InputError
-from reference.records import VERSION, Amount, Count, Record, Share, to_json
-from reference.rendering.renderer import Progress
-from reference.scene.graph import set_variant
-from reports.ci import baselines, pictures
-from reports.ci.baselines import BaselineFile
-from reports.files import images, results
-from reports.page.scene_view import Before, SceneView
-from reports.run import scene
-from reports.terminal import progress
+from fotismos.comparisons.case import Case, open_case
+from fotismos.comparisons.check.measurement import baseline_of, made_small, measure_scene
+from fotismos.comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
+from fotismos.comparisons.check.pictures import PictureCheck, SmallestChanges, check_pictures
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.comparison import versions
+from fotismos.comparisons.departure.blocks import averaged
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.heuristic import program
+from fotismos.heuristic.errors import FotismosError, InputError
+from fotismos.reference.records import VERSION, Amount, Count, Record, Share, to_json
+from fotismos.reference.rendering.renderer import Progress
+from fotismos.reference.scene.graph import set_variant
+from fotismos.reports.ci import baselines, pictures
+from fotismos.reports.ci.baselines import BaselineFile
+from fotismos.reports.files import images, results
+from fotismos.reports.page.scene_view import Before, SceneView
+from fotismos.reports.run import scene
+from fotismos.reports.terminal import progress
 
 RECORD = "check.json"
 

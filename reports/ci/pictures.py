@@ -6,9 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from comparisons import pictures
-from comparisons.check.measurement import LINEAR_ROUNDING, laid_out
-from comparisons.check.pictures import (
+from fotismos.comparisons import pictures
+from fotismos.comparisons.check.measurement import LINEAR_ROUNDING, laid_out
+from fotismos.comparisons.check.pictures import (
     SIDE,
     PictureBaseline,
     Repeats,
@@ -16,10 +16,10 @@ from comparisons.check.pictures import (
     colour,
     means,
 )
-from heuristic import program
-from heuristic.errors import InputError
-from reference import records
-from reports.ci import baselines
+from fotismos.heuristic import program
+from fotismos.heuristic.errors import InputError
+from fotismos.reference import records
+from fotismos.reports.ci import baselines
 
 LAYERS = ("mean", "variance")
 

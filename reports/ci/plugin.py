@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from reports.ci.testing import Fotismos
+    from fotismos.reports.ci.testing import Fotismos
 
 MARK = "fotismos_variant"
 
@@ -55,9 +55,9 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
-    """Departures and baselines of scenes: see :class:`reports.ci.testing.Fotismos`."""
-    from heuristic import llvm
-    from heuristic.errors import InstallationError
+    """Departures and baselines of scenes: see :class:`fotismos.reports.ci.testing.Fotismos`."""
+    from fotismos.heuristic import llvm
+    from fotismos.heuristic.errors import InstallationError
 
     try:
         llvm.check()
@@ -65,8 +65,8 @@ def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
         pytest.skip(f"fotismos cannot render here. {error}")
     import mitsuba as mi
 
-    from reference.scene.graph import set_variant
-    from reports.ci.testing import Fotismos
+    from fotismos.reference.scene.graph import set_variant
+    from fotismos.reports.ci.testing import Fotismos
 
     before, variant = mi.variant(), getattr(request, "param", None)
     # A test may make a scene from Mitsuba's types, which needs a variant.

@@ -10,18 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from comparisons import atomic
-from comparisons.comparison import ComparisonRecord
-from comparisons.departure.criterion import TOLERANCE, Verdict, decide
-from comparisons.departure.metrics import LEADING
-from comparisons.departure.noise import VisibleShare
-from heuristic.errors import FotismosError, InputError, OutputError
-from reports import verdict
-from reports.terminal.tables import escaped, markdown, printed
-from reports.terminal.words import number, percent, visible
+from fotismos.comparisons import atomic
+from fotismos.comparisons.comparison import ComparisonRecord
+from fotismos.comparisons.departure.criterion import TOLERANCE, Verdict, decide
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.heuristic.errors import FotismosError, InputError, OutputError
+from fotismos.reports import verdict
+from fotismos.reports.terminal.tables import escaped, markdown, printed
+from fotismos.reports.terminal.words import number, percent, visible
 
 if TYPE_CHECKING:
-    from reports.ci.checks import CheckRecord
+    from fotismos.reports.ci.checks import CheckRecord
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 """The variable with the file whose Markdown GitHub, Forgejo and Gitea show."""

@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from comparisons import atomic
-from comparisons.case import Case, Scene, open_case
-from comparisons.check.measurement import PASSES, made_small, measure_scene
-from comparisons.check.moved import LEVEL
-from comparisons.options import Options
-from heuristic.errors import InputError, unknown
-from heuristic.heuristics import in_file, known_as
-from reference import records
-from reference.rendering.sums import student
-from reports.ci import baselines, checks, summary
+from fotismos.comparisons import atomic
+from fotismos.comparisons.case import Case, Scene, open_case
+from fotismos.comparisons.check.measurement import PASSES, made_small, measure_scene
+from fotismos.comparisons.check.moved import LEVEL
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.heuristics import in_file, known_as
+from fotismos.reference import records
+from fotismos.reference.rendering.sums import student
+from fotismos.reports.ci import baselines, checks, summary
 
 
 class Departure(float):

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from comparisons.processes.pool import Task
-from reports import jobs
-from reports.terminal.words import tell, tell_where
+from fotismos.comparisons.processes.pool import Task
+from fotismos.reports import jobs
+from fotismos.reports.terminal.words import tell, tell_where
 
 if TYPE_CHECKING:
-    from comparisons.audit.checks import Audit, Kind
+    from fotismos.comparisons.audit.checks import Audit, Kind
 
 
 def _parameter(text: str) -> tuple[str, float | bool | str]:
@@ -66,9 +66,9 @@ def audit(
     kind = "heuristic" if heuristic else "bsdf"
     with jobs.pool(timeout) as pool:
         pool.start()
-        from reference.records import to_json
-        from reports.files.results import PAGE, hold_results
-        from reports.run import audit_files
+        from fotismos.reference.records import to_json
+        from fotismos.reports.files.results import PAGE, hold_results
+        from fotismos.reports.run import audit_files
 
         command = jobs.command_line()
         with hold_results(output / "audit", [_folder_of(name)], command) as (folder,):
@@ -85,7 +85,7 @@ def audit(
 
 def _folder_of(name: str) -> tuple[str, Path | None]:
     """Return a folder's name, one for each function, and the heuristic's file if it has one."""
-    from heuristic.heuristics import in_file
+    from fotismos.heuristic.heuristics import in_file
 
     if (place := in_file(name)) is None:
         return name, None
@@ -95,11 +95,11 @@ def _folder_of(name: str) -> tuple[str, Path | None]:
 
 def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, place: Path) -> Audit:
     """Audit a heuristic or a BSDF, and write the audit's files."""
-    from comparisons.audit.checks import audit
-    from comparisons.case import RGB
-    from heuristic import plugins
-    from reference.scene.graph import set_variant
-    from reports.run import audit_files
+    from fotismos.comparisons.audit.checks import audit
+    from fotismos.comparisons.case import RGB
+    from fotismos.heuristic import plugins
+    from fotismos.reference.scene.graph import set_variant
+    from fotismos.reports.run import audit_files
 
     set_variant(RGB)
     plugins.register()

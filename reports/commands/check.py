@@ -7,10 +7,10 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from comparisons.atomic import file_name
-from heuristic.errors import InputError
-from reports import jobs
-from reports.terminal.words import echo, is_quiet, tell
+from fotismos.comparisons.atomic import file_name
+from fotismos.heuristic.errors import InputError
+from fotismos.reports import jobs
+from fotismos.reports.terminal.words import echo, is_quiet, tell
 
 
 @jobs.command()
@@ -105,15 +105,15 @@ def check(
         raise InputError(f"{', '.join(others)}: pictures are not rendered. Omit it, or --picture.")
     patterns = _places(baseline, pictures)
     inputs = list(baseline.glob("*")) if baseline.is_dir() else [baseline]
-    from reports.ci import summary as summaries  # loaded late: --help needs no metrics
+    from fotismos.reports.ci import summary as summaries  # loaded late: --help needs no metrics
 
     summaries.require_free(junit, summary, [*scenes, *inputs])
     with jobs.pool(timeout, max(len(scenes), len(inputs)), workers, scheduler) as pool:
         pool.start()
-        from reference.records import to_json
-        from reports.ci import checks
-        from reports.files import results
-        from reports.page import page
+        from fotismos.reference.records import to_json
+        from fotismos.reports.ci import checks
+        from fotismos.reports.files import results
+        from fotismos.reports.page import page
 
         place = ""
         if update:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from reports import jobs
-from reports.run import batch
-from reports.terminal.words import echo, is_quiet
+from fotismos.reports import jobs
+from fotismos.reports.run import batch
+from fotismos.reports.terminal.words import echo, is_quiet
 
 if TYPE_CHECKING:
-    from heuristic.errors import FotismosError
-    from reports.page.scene_view import SceneView
+    from fotismos.heuristic.errors import FotismosError
+    from fotismos.reports.page.scene_view import SceneView
 
 
 @jobs.command()
@@ -88,7 +88,9 @@ def compare(
     request = jobs.request(rendering)
     has_summary = max_visible is not None or junit is not None or summary is not None
     if has_summary:
-        from reports.ci.summary import require_free  # loaded late: most comparisons need no CI
+        from fotismos.reports.ci.summary import (
+            require_free,  # loaded late: most comparisons need no CI
+        )
 
         named = [rendering["heuristic"] or "", *rendering["image"]]
         files = (word.partition(":")[0] for word in named)
@@ -99,7 +101,7 @@ def compare(
         folder: Path, views: Sequence[SceneView], errors: Mapping[str, FotismosError]
     ) -> None:
         """Print the gates, and write the files for CI."""
-        from reports.ci import summary as ci  # loaded late: most comparisons need no CI
+        from fotismos.reports.ci import summary as ci  # loaded late: most comparisons need no CI
 
         nonlocal code
         ci.require_free(junit, summary, [])  # nor what this command wrote

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from heuristic.errors import InputError
-from reports import jobs
-from reports.terminal.words import tell, tell_where
+from fotismos.heuristic.errors import InputError
+from fotismos.reports import jobs
+from fotismos.reports.terminal.words import tell, tell_where
 
 if TYPE_CHECKING:
-    from comparisons.cost.cost_record import Cost
-    from comparisons.options import Options
+    from fotismos.comparisons.cost.cost_record import Cost
+    from fotismos.comparisons.options import Options
 
 
 @jobs.command()
@@ -53,9 +53,9 @@ def cost(
         raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
     words = (jobs.request(rendering), rounds, at, is_measured)
     records = jobs.results_of(output, "cost", timeout, [scene], measured, *words)
-    from reference.records import to_json
-    from reports.files.results import PAGE
-    from reports.terminal import cost_tables
+    from fotismos.reference.records import to_json
+    from fotismos.reports.files.results import PAGE
+    from fotismos.reports.terminal import cost_tables
 
     ((folder, record),) = records.items()
     if as_json:
@@ -75,10 +75,10 @@ def measured(
     progress: Any,
 ) -> Cost:
     """Study what each step of accuracy costs, and write its files."""
-    from comparisons.case import open_case
-    from comparisons.cost.cost import cost
-    from comparisons.cost.measure import Effort
-    from reports.run import cost_files
+    from fotismos.comparisons.case import open_case
+    from fotismos.comparisons.cost.cost import cost
+    from fotismos.comparisons.cost.measure import Effort
+    from fotismos.reports.run import cost_files
 
     case = open_case(name, request)
     effort = Effort() if rounds is None else Effort(rounds=rounds)

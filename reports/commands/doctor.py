@@ -6,22 +6,21 @@ import tomllib
 from collections.abc import Iterable, Iterator
 from importlib import metadata
 from importlib.util import find_spec
-from pathlib import Path
 
 import click
 
-from comparisons.processes.pool import Task
-from heuristic import llvm
-from heuristic.errors import InstallationError
-from heuristic.program import __version__, installation
-from reports import jobs
+from fotismos.comparisons.processes.pool import Task
+from fotismos.heuristic import llvm
+from fotismos.heuristic.errors import InstallationError
+from fotismos.heuristic.program import ROOT, __version__, installation
+from fotismos.reports import jobs
 
 TIMEOUT_S = 300
 """Seconds for a test rendering, which takes about ten if no kernel is compiled yet."""
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
 
-PROJECT = Path(__file__).parents[2] / "pyproject.toml"
+PROJECT = ROOT / "pyproject.toml"
 
 CHANGES = {
     "mitsuba": "The documentation's figures, baselines and kept images were made with the pinned"
@@ -65,12 +64,12 @@ def examine(variants: Iterable[str]) -> Iterator[str]:
 
 def rendered(variant: str) -> str:
     """Render a small figure in a variant, and return that it renders."""
-    from reference.scene.graph import set_variant
+    from fotismos.reference.scene.graph import set_variant
 
     set_variant(variant)
-    from comparisons.compare import compare
-    from comparisons.gallery.builtin import builtin
-    from comparisons.options import Options
+    from fotismos.comparisons.compare import compare
+    from fotismos.comparisons.gallery.builtin import builtin
+    from fotismos.comparisons.options import Options
 
     compare(builtin("fig-8-9").source(), Options(spp=2, resolution=(16, 16)))
     return "renders"
@@ -81,7 +80,7 @@ def shaded() -> str:
 
     The extra that this needs may be absent: the rest works without it.
     """
-    from heuristic import glsl
+    from fotismos.heuristic import glsl
 
     if find_spec("moderngl") is None:
         command = installation("moderngl")
@@ -97,7 +96,7 @@ def shaded() -> str:
 
 def compared() -> float:
     """Return how far the compiled colour differences are from colour-science's."""
-    from comparisons.departure import definitions
+    from fotismos.comparisons.departure import definitions
 
     apart = definitions.farthest()
     if not apart <= definitions.AGREEMENT:

@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Any
 
-from comparisons.options import Options
-from reports import jobs
-from reports.terminal.words import tell_where
+from fotismos.comparisons.options import Options
+from fotismos.reports import jobs
+from fotismos.reports.terminal.words import tell_where
 
 
 @jobs.command()
@@ -32,9 +32,9 @@ def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
 
 def exported(name: str, request: Options, place: Path, progress: Any) -> None:
     """Write the files that another program needs to render a scene."""
-    from comparisons.case import open_case
-    from comparisons.plain_scene import plain_scene
-    from reports.files import export_files
+    from fotismos.comparisons.case import open_case
+    from fotismos.comparisons.plain_scene import plain_scene
+    from fotismos.reports.files import export_files
 
     case = open_case(name, request)
     scene = plain_scene(case.source, case.options)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from reports import jobs
-from reports.terminal.words import tell, tell_where
+from fotismos.reports import jobs
+from fotismos.reports.terminal.words import tell, tell_where
 
 if TYPE_CHECKING:
-    from comparisons.fit.fit_record import FitRecord
-    from comparisons.options import Options
+    from fotismos.comparisons.fit.fit_record import FitRecord
+    from fotismos.comparisons.options import Options
 
 
 @jobs.command()
@@ -60,9 +60,9 @@ def fit(
     """  # noqa: D301 click reads the \b as: keep these lines
     choices = {"loss": loss, "form": form}
     records = jobs.results_of(output, "fit", timeout, scenes, fitted, jobs.request(words), choices)
-    from reference.records import plain
-    from reports.files.results import PAGE
-    from reports.run import fit_files
+    from fotismos.reference.records import plain
+    from fotismos.reports.files.results import PAGE
+    from fotismos.reports.run import fit_files
 
     if as_json:
         click.echo(json.dumps(plain([*records.values()]), indent=2, ensure_ascii=False))
@@ -77,10 +77,10 @@ def fitted(
     name: str, request: Options, words: dict[str, str], place: Path, progress: Any
 ) -> FitRecord:
     """Fit the heuristic to a scene, and write the fit's files; ``words`` are the command's."""
-    from comparisons.case import open_case
-    from comparisons.fit.fit import fit
-    from heuristic.materials import FORMS
-    from reports.run import fit_files
+    from fotismos.comparisons.case import open_case
+    from fotismos.comparisons.fit.fit import fit
+    from fotismos.heuristic.materials import FORMS
+    from fotismos.reports.run import fit_files
 
     case = open_case(name, request)
     command = case.command("fit", **words)

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from comparisons.processes.pool import Task
-from reports import jobs
-from reports.terminal.words import tell, verbose_option
+from fotismos.comparisons.processes.pool import Task
+from fotismos.reports import jobs
+from fotismos.reports.terminal.words import tell, verbose_option
 
 if TYPE_CHECKING:
-    from comparisons.cost.cost import Choice
-    from comparisons.options import Options
-    from reports.terminal.plan_lines import PlanReport
+    from fotismos.comparisons.cost.cost import Choice
+    from fotismos.comparisons.options import Options
+    from fotismos.reports.terminal.plan_lines import PlanReport
 
 
 @jobs.command()
@@ -42,8 +42,8 @@ def plan(scene: str, as_json: bool, within: float | None, timeout: float, **rend
     """  # noqa: D301 click reads the \b as: keep these lines
     with jobs.pool(timeout) as pool:
         pool.start()
-        from reference.records import to_json
-        from reports.terminal import cost_tables, plan_lines, progress
+        from fotismos.reference.records import to_json
+        from fotismos.reports.terminal import cost_tables, plan_lines, progress
 
         lines: Iterable[str]
         request, code = jobs.request(rendering), 0
@@ -65,9 +65,9 @@ def plan(scene: str, as_json: bool, within: float | None, timeout: float, **rend
 
 def planned(name: str, request: Options) -> PlanReport:
     """Return the plan of a scene."""
-    from comparisons.case import open_case
-    from comparisons.prepared import prepare
-    from reports.terminal.plan_lines import plan_report
+    from fotismos.comparisons.case import open_case
+    from fotismos.comparisons.prepared import prepare
+    from fotismos.reports.terminal.plan_lines import plan_report
 
     case = open_case(name, request)
     return plan_report(case.name, prepare(case.source, case.options), case.variant)
@@ -75,8 +75,8 @@ def planned(name: str, request: Options) -> PlanReport:
 
 def chosen(name: str, request: Options, within: float, progress: Any) -> Choice:
     """Measure the methods of a scene, and name the fastest that passes at a tolerance."""
-    from comparisons.case import open_case
-    from comparisons.cost.cost import choose
+    from fotismos.comparisons.case import open_case
+    from fotismos.comparisons.cost.cost import choose
 
     case = open_case(name, request)
     return choose(case.source, within, case.options, progress)

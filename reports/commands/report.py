@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from comparisons.processes.pool import Task, Turn
-from reports import jobs
-from reports.run import batch
+from fotismos.comparisons.processes.pool import Task, Turn
+from fotismos.reports import jobs
+from fotismos.reports.run import batch
 
 if TYPE_CHECKING:
-    from comparisons.hard_cases import HardCases
+    from fotismos.comparisons.hard_cases import HardCases
 
 QUICK = {"resolution": (64, 64), "spp": 16}
 """The defaults of ``--quick``."""
@@ -56,7 +56,7 @@ def report(
       fotismos report --quick --open
       fotismos report --resolution 128x128 -o small --figures
     """  # noqa: D301 click reads the \b as: keep these lines
-    from comparisons.gallery.builtin import SCENES
+    from fotismos.comparisons.gallery.builtin import SCENES
 
     if quick:
         rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
@@ -73,8 +73,8 @@ def report(
 
 def hard_cases(folder: Path) -> tuple[HardCases, float]:
     """Evaluate the hard cases; return them, and the seconds that it took in its turn."""
-    from comparisons.hard_cases import collect
-    from reports.files import results
+    from fotismos.comparisons.hard_cases import collect
+    from fotismos.reports.files import results
 
     with Turn(folder, folder / results.TABLES):
         begin = perf_counter()

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import click
 
-from reports import jobs
-from reports.terminal.words import tell
+from fotismos.reports import jobs
+from fotismos.reports.terminal.words import tell
 
 
 @jobs.command()
@@ -29,11 +29,11 @@ def study(
       fotismos study my_study.toml --scheduler tcp://head:8786 -o results
     """  # noqa: D301 click reads the \b as: keep these lines
     # Here, because start-up needs neither Mitsuba nor SciPy.
-    from comparisons.processes.pool import Task
-    from comparisons.study import design, running
-    from reports.files.results import hold_results, own
-    from reports.run import study_files
-    from reports.terminal import progress
+    from fotismos.comparisons.processes.pool import Task
+    from fotismos.comparisons.study import design, running
+    from fotismos.reports.files.results import hold_results, own
+    from fotismos.reports.run import study_files
+    from fotismos.reports.terminal import progress
 
     chosen = design.read(file)
     with hold_results(output / "study", [(chosen.name, file)], jobs.command_line()) as (folder,):

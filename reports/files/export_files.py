@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from comparisons.plain_scene import PlainScene, Triangles
-from reports.files import images, results
+from fotismos.comparisons.plain_scene import PlainScene, Triangles
+from fotismos.reports.files import images, results
 
 README = """# {name}, for another program
 

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from comparisons import atomic
-from comparisons.comparison import Images
-from comparisons.departure import marks
-from comparisons.departure.blocks import shrunk
-from comparisons.departure.colour import CHROMATICITIES, to_srgb
-from comparisons.departure.metrics import LEADING, RATIO, drawn
+from fotismos.comparisons import atomic
+from fotismos.comparisons.comparison import Images
+from fotismos.comparisons.departure import marks
+from fotismos.comparisons.departure.blocks import shrunk
+from fotismos.comparisons.departure.colour import CHROMATICITIES, to_srgb
+from fotismos.comparisons.departure.metrics import LEADING, RATIO, drawn
 
 Bytes = NDArray[np.uint8]
 

@@ -5,7 +5,8 @@ each file is replaced atomically. Nothing in a folder without the mark is overwr
 The output folder itself may hold files of others: its mark lists the files that fotismos wrote
 there, with digests, and nothing else in it is overwritten. One command at a time writes to a
 folder, and it tidies no folder that another one has locked. A scene's record is removed first and
-written last (:mod:`reports.run.scene`): without it, the scene is unfinished, and begins again.
+written last (:mod:`fotismos.reports.run.scene`): without it, the scene is unfinished, and begins
+again.
 """
 
 import errno
@@ -27,10 +28,10 @@ import msgspec
 from filelock import FileLock, Timeout
 from msgspec import Meta
 
-from comparisons import atomic
-from comparisons.case import file_of, name_of
-from heuristic.errors import InputError, OutputError
-from reference.records import VERSION, Machine, Record, Versions
+from fotismos.comparisons import atomic
+from fotismos.comparisons.case import file_of, name_of
+from fotismos.heuristic.errors import InputError, OutputError
+from fotismos.reference.records import VERSION, Machine, Record, Versions
 
 START = perf_counter()
 
@@ -55,7 +56,7 @@ ASSIGNING_S = 10.0
 """Seconds to wait for commands that are choosing their folders, which takes milliseconds."""
 
 PARTIAL_NAME = re.compile(rf"\..+\.\d+{re.escape(atomic.PARTIAL)}")
-"""Names of partial files, see :func:`comparisons.atomic.replacing`."""
+"""Names of partial files, see :func:`fotismos.comparisons.atomic.replacing`."""
 
 WITHOUT_LOCKS = {errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP}
 """Errors of file systems without locks, where no command is kept out."""

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from comparisons.departure import marks
-from comparisons.departure.metrics import LEADING, METRICS, drawn
-from reference.records import Record, plain
-from reports.files.images import HALF_MAX
+from fotismos.comparisons.departure import marks
+from fotismos.comparisons.departure.metrics import LEADING, METRICS, drawn
+from fotismos.reference.records import Record, plain
+from fotismos.reports.files.images import HALF_MAX
 
 STEP = 4
 """Half floats are rounded to multiples of this code, by up to 0.2 %, which packs better."""
@@ -53,7 +53,7 @@ class Embedded(Record):
 
 
 def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
-    """Encode the channels (H, W) of :func:`reports.files.images.channels`, so page and file agree.
+    """Encode the channels (H, W) of ``images.channels``, so that page and file agree.
 
     ``counted`` are the pixels in the statistics. Of the standard error, the largest channel stays.
     """

@@ -17,21 +17,28 @@ from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
-from comparisons.departure.colour import BT709, rgb_to_xyz
-from comparisons.departure.criterion import LIMIT, TOLERANCE, decide
-from comparisons.departure.metrics import LEADING, LOG2_EPSILON, METRICS, RATIO, THRESHOLDS, drawn
-from reference.records import plain
-from reports import glossary, verdict
-from reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT
-from reports.files import images
-from reports.files.results import DETAILS, Failure, RunRecord
-from reports.page.scene_view import Before, SceneView, WhyView
-from reports.page.templating import HELP, rendered
-from reports.terminal.words import difference
+from fotismos.comparisons.departure.colour import BT709, rgb_to_xyz
+from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, decide
+from fotismos.comparisons.departure.metrics import (
+    LEADING,
+    LOG2_EPSILON,
+    METRICS,
+    RATIO,
+    THRESHOLDS,
+    drawn,
+)
+from fotismos.reference.records import plain
+from fotismos.reports import glossary, verdict
+from fotismos.reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT
+from fotismos.reports.files import images
+from fotismos.reports.files.results import DETAILS, Failure, RunRecord
+from fotismos.reports.page.scene_view import Before, SceneView, WhyView
+from fotismos.reports.page.templating import HELP, rendered
+from fotismos.reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
-    from comparisons.comparison import Attribution, ComparisonRecord
-    from comparisons.hard_cases import HardCases
+    from fotismos.comparisons.comparison import Attribution, ComparisonRecord
+    from fotismos.comparisons.hard_cases import HardCases
 
 TITLE = "Textbook shading against physically based rendering"
 

@@ -6,10 +6,10 @@ from typing import Any
 
 from msgspec import field
 
-from comparisons.comparison import ComparisonRecord
-from reference.records import Record, plain
-from reports.charts.vega import Figure
-from reports.page.embedding import Embedded
+from fotismos.comparisons.comparison import ComparisonRecord
+from fotismos.reference.records import Record, plain
+from fotismos.reports.charts.vega import Figure
+from fotismos.reports.page.embedding import Embedded
 
 
 class EffectMap(Record):
@@ -55,8 +55,8 @@ class LiveView(TermsView):
     """The page's data of the points that it can shade again; ``missing`` says why there are none.
 
     ``grid`` has planes as differences to the row above, and ``tops`` their largest sizes; ``rays``
-    are those of :class:`comparisons.pixel_terms.LivePoints`. ``fit`` is the mean ΔE2000 that a fit
-    of the scene reached, with its width and height.
+    are those of :class:`fotismos.comparisons.pixel_terms.LivePoints`. ``fit`` is the mean ΔE2000
+    that a fit of the scene reached, with its width and height.
     """
 
     rays: list = field(default_factory=list)
@@ -67,10 +67,10 @@ class LiveView(TermsView):
 class CostView(Record):
     """A page's data of a study.
 
-    ``record`` is a :class:`comparisons.cost.cost_record.Cost`, whose type few pages need to load.
-    ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are sentences on
-    its sums and on the machine, ``unreached`` one on more samples; ``colours`` are those of the
-    effects.
+    ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, whose type few pages need
+    to load. ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are
+    sentences on its sums and on the machine, ``unreached`` one on more samples; ``colours`` are
+    those of the effects.
     """
 
     record: Any

@@ -13,11 +13,11 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from comparisons.departure.regions import Region
-from reference.records import plain
-from reports import verdict
-from reports.files import images
-from reports.terminal.words import difference, number, parameter, percent, seconds
+from fotismos.comparisons.departure.regions import Region
+from fotismos.reference.records import plain
+from fotismos.reports import verdict
+from fotismos.reports.files import images
+from fotismos.reports.terminal.words import difference, number, parameter, percent, seconds
 
 TEMPLATES = Path(__file__).parent / "templates"
 

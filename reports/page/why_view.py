@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.departure.colour import Viewing
-from comparisons.departure.metrics import LEADING
-from comparisons.hybrids.attribution import dominating
-from reports.charts.theme import EFFECT_COLOURS
-from reports.page.embedding import COUNTED, encode, packed
-from reports.page.scene_view import EffectMap, LiveView, TermsView, WhyView
+from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.hybrids.attribution import dominating
+from fotismos.reports.charts.theme import EFFECT_COLOURS
+from fotismos.reports.page.embedding import COUNTED, encode, packed
+from fotismos.reports.page.scene_view import EffectMap, LiveView, TermsView, WhyView
 
 if TYPE_CHECKING:
-    from comparisons.pixel_terms import LivePoints, TermGrid
+    from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
 
 LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789a"))
 """Codes of the map: no effect, a pixel that does not count, and the effects' places."""
@@ -67,7 +67,7 @@ def terms_view(grid: TermGrid) -> TermsView:
 
     A cosine ``c`` has the code ``65535 (1 + c) / 2``; a value ``v`` ≥ 0 has
     ``65535 sqrt(v / top)``, with the plane's ``top``, and is off by at most ``top`` / 65000. The
-    planes are packed like those of images (:mod:`reports.page.embedding`).
+    planes are packed like those of images (:mod:`fotismos.reports.page.embedding`).
     ``templates/viewer/terms.js`` reads them.
     """
     seen = grid.material >= 0

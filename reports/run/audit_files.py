@@ -7,15 +7,15 @@ from typing import Any
 
 import altair as alt
 
-from comparisons.audit.checks import Audit, Checked
-from heuristic.heuristics import in_file
-from reference import records
-from reports.charts import vega
-from reports.charts.theme import FAINT, Spec
-from reports.files import results
-from reports.page.templating import rendered
-from reports.terminal import tables
-from reports.terminal.words import number
+from fotismos.comparisons.audit.checks import Audit, Checked
+from fotismos.heuristic.heuristics import in_file
+from fotismos.reference import records
+from fotismos.reports.charts import vega
+from fotismos.reports.charts.theme import FAINT, Spec
+from fotismos.reports.files import results
+from fotismos.reports.page.templating import rendered
+from fotismos.reports.terminal import tables
+from fotismos.reports.terminal.words import number
 
 WIDTH = 270
 """Pixels of a plot: with its axis it fits a phone."""

@@ -14,18 +14,18 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from comparisons.processes.pool import Pool, Task
-from heuristic.errors import FotismosError, InputError, InstallationError, OutputError
-from reports import jobs
-from reports.jobs import Job
-from reports.terminal.words import remark, tell, tell_where
+from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.heuristic.errors import FotismosError, InputError, InstallationError, OutputError
+from fotismos.reports import jobs
+from fotismos.reports.jobs import Job
+from fotismos.reports.terminal.words import remark, tell, tell_where
 
 if TYPE_CHECKING:
-    from comparisons.hard_cases import HardCases
-    from comparisons.options import Options
-    from reports.files.results import Failure, RunRecord
-    from reports.page.scene_view import SceneView
-    from reports.terminal.progress import Bar
+    from fotismos.comparisons.hard_cases import HardCases
+    from fotismos.comparisons.options import Options
+    from fotismos.reports.files.results import Failure, RunRecord
+    from fotismos.reports.page.scene_view import SceneView
+    from fotismos.reports.terminal.progress import Bar
 
 SCENE, HARD_CASES = 8.0, 1.0
 """Relative times of a scene and of the hard cases, to estimate the time left."""
@@ -64,15 +64,15 @@ class Batch:
 
     def failures(self) -> list[Failure]:
         """The scenes that could not be compared, in order."""
-        from reports.files.results import Failure
+        from fotismos.reports.files.results import Failure
 
         errors = self.errors
         return [Failure(place, str(errors[place])) for place in self.places if place in errors]
 
     def record(self) -> RunRecord:
         """The record of the run, with its stages until now."""
-        from comparisons.comparison import machine, versions
-        from reports.files.results import START, RunRecord
+        from fotismos.comparisons.comparison import machine, versions
+        from fotismos.reports.files.results import START, RunRecord
 
         other = perf_counter() - START - sum(self.stages.values())
         return RunRecord(
@@ -85,8 +85,8 @@ class Batch:
 
     def write_page(self, is_interrupted: bool = False, run: RunRecord | None = None) -> None:
         """Write the page and its details, at the end with the record of the run."""
-        from reports.files import results
-        from reports.page import page
+        from fotismos.reports.files import results
+        from fotismos.reports.page import page
 
         begin, path = perf_counter(), self.folder / results.PAGE
         state, done = "", f"{self.done} of {len(self.places)} scenes are done"
@@ -134,10 +134,10 @@ def run(
     """
     with pool as pool:
         pool.start()
-        from comparisons.departure.criterion import checked_threshold
-        from reports.files import results
-        from reports.files.results import FIGURES, START, TABLES
-        from reports.terminal import progress
+        from fotismos.comparisons.departure.criterion import checked_threshold
+        from fotismos.reports.files import results
+        from fotismos.reports.files.results import FIGURES, START, TABLES
+        from fotismos.reports.terminal import progress
 
         checked_threshold(job.within)
         requests = dict(zip(scenes, jobs.requests(job.request, scenes), strict=True))
@@ -184,9 +184,9 @@ def _compare(
     stages: tuple[str, ...],
 ) -> None:
     """Collect the views and errors of scenes, and the hard cases."""
-    from comparisons.case import name_of
-    from reports.run import scene
-    from reports.terminal import tables
+    from fotismos.comparisons.case import name_of
+    from fotismos.reports.run import scene
+    from fotismos.reports.terminal import tables
 
     tasks = [
         Task(place, scene.compare, call, bar.of(name_of(call[0]), stages))
@@ -217,7 +217,7 @@ def _compare(
 def _require_inputs_apart(request: Options, places: Sequence[Path]) -> None:
     """Refuse pictures in a folder whose files are about to be replaced."""
     for word in request.image:
-        from comparisons import pictures  # loaded late: few comparisons have any
+        from fotismos.comparisons import pictures  # loaded late: few comparisons have any
 
         path, _ = pictures.parts(word)
         if path.resolve().parent in [place.resolve() for place in places]:
@@ -229,10 +229,10 @@ def _require_inputs_apart(request: Options, places: Sequence[Path]) -> None:
 
 def _write(batch: Batch, is_interrupted: bool = False) -> None:
     """Write the page, record and tables of all scenes as far as possible, and print the results."""
-    from reference.records import to_json
-    from reports import verdict
-    from reports.files import results
-    from reports.terminal import tables
+    from fotismos.reference.records import to_json
+    from fotismos.reports import verdict
+    from fotismos.reports.files import results
+    from fotismos.reports.terminal import tables
 
     views, folder = batch.ordered, batch.folder
     records = [view.record for view in views]

@@ -6,24 +6,24 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reference import records
-from reports import glossary
-from reports.charts import theme, vega
-from reports.files import images, results
-from reports.page.scene_view import CostView
-from reports.page.templating import HELP, rendered
-from reports.terminal.cost_tables import busy, closure, together, unreached
+from fotismos.reference import records
+from fotismos.reports import glossary
+from fotismos.reports.charts import theme, vega
+from fotismos.reports.files import images, results
+from fotismos.reports.page.scene_view import CostView
+from fotismos.reports.page.templating import HELP, rendered
+from fotismos.reports.terminal.cost_tables import busy, closure, together, unreached
 
 if TYPE_CHECKING:
-    from comparisons.cost.cost import Study
-    from comparisons.cost.cost_record import Cost
+    from fotismos.comparisons.cost.cost import Study
+    from fotismos.comparisons.cost.cost_record import Cost
 
 FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BSDFs"
 
 
 def documents(study: Study) -> dict[str, bytes]:
     """Return the named files of a study: charts, and pictures of methods with its exposure."""
-    from reports.charts import cost_charts  # Altair takes half a second to import
+    from fotismos.reports.charts import cost_charts  # Altair takes half a second to import
 
     record = study.record
     pictures = {f"cost-method-{_plain(name)}": image for name, image in study.methods.items()}
@@ -60,7 +60,7 @@ def write(place: Path, study: Study) -> None:
 
 def figure(record: Cost) -> vega.Figure:
     """Return the chart of a study: error against time."""
-    from reports.charts import cost_charts  # Altair takes half a second to import
+    from fotismos.reports.charts import cost_charts  # Altair takes half a second to import
 
     note = "; ".join([FAMILIES, *cost_charts.reading(record)]) + "."
     return vega.figure("Error against time", cost_charts.error_over_time(record), note)

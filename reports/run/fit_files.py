@@ -4,16 +4,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from comparisons.departure.criterion import TOLERANCE, decide
-from comparisons.departure.metrics import LEADING, drawn
-from comparisons.fit.fit import Fit
-from comparisons.fit.fit_record import FitRecord, FormFit
-from reference.records import to_json
-from reports.files import images, results
-from reports.page.templating import rendered
-from reports.terminal import tables
-from reports.terminal.words import percent
-from reports.verdict import EXACT
+from fotismos.comparisons.departure.criterion import TOLERANCE, decide
+from fotismos.comparisons.departure.metrics import LEADING, drawn
+from fotismos.comparisons.fit.fit import Fit
+from fotismos.comparisons.fit.fit_record import FitRecord, FormFit
+from fotismos.reference.records import to_json
+from fotismos.reports.files import images, results
+from fotismos.reports.page.templating import rendered
+from fotismos.reports.terminal import tables
+from fotismos.reports.terminal.words import percent
+from fotismos.reports.verdict import EXACT
 
 Cells = Sequence[str]
 """One row of a table."""

@@ -11,25 +11,25 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 from msgspec import structs
 
-from comparisons import atomic
-from comparisons.comparison import CAUSES, ComparisonRecord
-from comparisons.departure.metrics import LEADING, METRICS, drawn
-from comparisons.processes.pool import Turn
-from heuristic import program
-from heuristic.heuristics import named
-from reference.records import VERSION, Record, plain, to_json
-from reports.files import images, results
-from reports.page import embedding
-from reports.page.scene_view import LiveView, SceneView, TermsView
+from fotismos.comparisons import atomic
+from fotismos.comparisons.comparison import CAUSES, ComparisonRecord
+from fotismos.comparisons.departure.metrics import LEADING, METRICS, drawn
+from fotismos.comparisons.processes.pool import Turn
+from fotismos.heuristic import program
+from fotismos.heuristic.heuristics import named
+from fotismos.reference.records import VERSION, Record, plain, to_json
+from fotismos.reports.files import images, results
+from fotismos.reports.page import embedding
+from fotismos.reports.page.scene_view import LiveView, SceneView, TermsView
 
 if TYPE_CHECKING:
-    from comparisons.case import Case
-    from comparisons.comparison import Comparison, Images
-    from comparisons.cost.cost import Study
-    from comparisons.pixel_terms import LivePoints
-    from reference.rendering.renderer import Progress
-    from reports.jobs import Job
-    from reports.page.scene_view import WhyView
+    from fotismos.comparisons.case import Case
+    from fotismos.comparisons.comparison import Comparison, Images
+    from fotismos.comparisons.cost.cost import Study
+    from fotismos.comparisons.pixel_terms import LivePoints
+    from fotismos.reference.rendering.renderer import Progress
+    from fotismos.reports.jobs import Job
+    from fotismos.reports.page.scene_view import WhyView
 
 RECORD, PICTURE, VIEW = "comparison.json", "comparison.exr", "view.json"
 
@@ -48,7 +48,7 @@ def compare(
     name: str, folder: Path, place: str, job: Job, progress: Progress
 ) -> tuple[SceneView, Seconds]:
     """Compare a scene and write its files to ``folder/place``, unless it is finished there."""
-    from comparisons.case import open_case
+    from fotismos.comparisons.case import open_case
 
     with Turn(folder, folder / results.TABLES) as turn:
         begin = perf_counter()
@@ -58,7 +58,7 @@ def compare(
         spent = {"finished scenes": perf_counter() - begin}
         if view is not None:
             return view, spent
-        import comparisons.compare  # loaded late: a finished scene needs none
+        import fotismos.comparisons.compare  # loaded late: a finished scene needs none
 
         def in_turn(*state: Any) -> None:
             """Show progress, after other processes have measured."""
@@ -66,20 +66,20 @@ def compare(
             progress(*state)
 
         begin, source, options = perf_counter(), case.source, case.options
-        comparison = comparisons.compare.compare(
+        comparison = fotismos.comparisons.compare.compare(
             source, options, in_turn, case.command(), job.with_causes, turn.alone()
         )
         spent = _stages(comparison.record, perf_counter() - begin)
         study, causes = None, comparison.causes
         if case.word in job.ladders and causes:
-            from comparisons.cost.cost import quick  # loaded late: for a handful of scenes
+            from fotismos.comparisons.cost.cost import quick  # loaded late: for a handful of scenes
 
             begin, command = perf_counter(), case.command("cost")
             study = quick(source, options, causes, progress, command, turn.alone())
             spent["methods"] = perf_counter() - begin
         begin = perf_counter()
         if job.figures:  # first, since the record marks the scene as finished
-            from reports.charts import figures
+            from fotismos.reports.charts import figures
 
             figures.write_scene(folder / results.FIGURES, place, comparison)
         view = write(folder, place, comparison, study, key)
@@ -109,15 +109,15 @@ def key_of(case: Case, job: Job) -> str | None:
     place, options, versions, and the sources of fotismos where it runs from a checkout. What a
     script reads is not known.
     """
-    from comparisons.comparison import versions
-    from reference.scene.source import digest
+    from fotismos.comparisons.comparison import versions
+    from fotismos.reference.scene.source import digest
 
     code = named(case.options.heuristic).digest()
     if Path(case.word).suffix == ".py" or code is None:
         return None
     files = []
     if case.options.image:
-        from comparisons import pictures  # loaded late: few have any
+        from fotismos.comparisons import pictures  # loaded late: few have any
 
         files = [pictures.parts(word)[0] for word in case.options.image]
     parts: dict[str, Any] = {
@@ -147,7 +147,9 @@ def load(place: Path, key: str | None) -> SceneView | None:
             return None
         view = found.view
         if view.cost:
-            from comparisons.cost.cost_record import Cost  # loaded late: few scenes have a study
+            from fotismos.comparisons.cost.cost_record import (
+                Cost,  # loaded late: few scenes have a study
+            )
 
             record = msgspec.convert(view.cost.record, Cost, builtin_types=())
             view = structs.replace(view, cost=structs.replace(view.cost, record=record))
@@ -186,7 +188,7 @@ def write(
     }
     linked: tuple[str, ...] = (RECORD, PICTURE)
     if study:
-        from reports.run import cost_files
+        from fotismos.reports.run import cost_files
 
         made |= cost_files.documents(study)
         linked = (*linked, "cost.json")
@@ -228,7 +230,7 @@ def _terms(comparison: Comparison) -> TermsView | None:
     """Return the terms at pixels for the page, or why there are none."""
     if comparison.terms is None:
         return TermsView(missing=comparison.no_terms) if comparison.no_terms else None
-    from reports.page.why_view import terms_view  # loaded late: --no-why traces none
+    from fotismos.reports.page.why_view import terms_view  # loaded late: --no-why traces none
 
     return terms_view(comparison.terms)
 
@@ -237,7 +239,7 @@ def _live(points: LivePoints | str) -> LiveView | None:
     """Return the points that the page shades again, or why it does not."""
     if isinstance(points, str):
         return LiveView(missing=points) if points else None
-    from reports.page.why_view import live_view  # loaded late: --no-why traces none
+    from fotismos.reports.page.why_view import live_view  # loaded late: --no-why traces none
 
     return live_view(points)
 
@@ -260,7 +262,7 @@ def _why(comparison: Comparison) -> WhyView | None:
     causes = comparison.causes
     if causes is None:
         return None
-    from reports.page.why_view import why_view  # loaded late: it needs what finds causes
+    from fotismos.reports.page.why_view import why_view  # loaded late: it needs what finds causes
 
     previews = [causes.previews[each.effects] for each in causes.record.hybrids]
     return why_view(causes.maps, causes.counted, previews, comparison.record.viewing)

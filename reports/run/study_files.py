@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from comparisons.study import dataset
-from comparisons.study.design import StudyFile
-from reports.charts import study_charts, vega
-from reports.files import results
+from fotismos.comparisons.study import dataset
+from fotismos.comparisons.study.design import StudyFile
+from fotismos.reports.charts import study_charts, vega
+from fotismos.reports.files import results
 
 FIGURES = "figures"
 

@@ -1,1 +1,1 @@
-"""The published schemas, made from the types of the records: ``python -m reports.schemas``."""
+"""The published schemas, made from the records' types: ``python -m fotismos.reports.schemas``."""

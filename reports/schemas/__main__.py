@@ -1,4 +1,4 @@
-"""Write the published schemas: ``python -m reports.schemas``."""
+"""Write the published schemas: ``python -m fotismos.reports.schemas``."""
 
 import inspect
 import re
@@ -8,14 +8,14 @@ from typing import Any
 
 import msgspec
 
-from comparisons.audit.checks import Audit
-from comparisons.check.measurement import Baseline, laid_out
-from comparisons.check.pictures import PictureBaseline
-from comparisons.comparison import ComparisonRecord
-from comparisons.cost.cost_record import Cost
-from comparisons.fit.fit_record import FitRecord
-from reports.ci.checks import Checks
-from reports.files.results import RunRecord
+from fotismos.comparisons.audit.checks import Audit
+from fotismos.comparisons.check.measurement import Baseline, laid_out
+from fotismos.comparisons.check.pictures import PictureBaseline
+from fotismos.comparisons.comparison import ComparisonRecord
+from fotismos.comparisons.cost.cost_record import Cost
+from fotismos.comparisons.fit.fit_record import FitRecord
+from fotismos.reports.ci.checks import Checks
+from fotismos.reports.files.results import RunRecord
 
 FOLDER = Path(__file__).parent
 

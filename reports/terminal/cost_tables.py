@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
-from comparisons.cost.front import Reach, reach, sufficient
-from comparisons.departure.criterion import TOLERANCE
-from comparisons.departure.metrics import LEADING
-from reports.glossary import meanings
-from reports.terminal.tables import printed
-from reports.terminal.words import number, parameter, seconds
+from fotismos.comparisons.cost.front import Reach, reach, sufficient
+from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.reports.glossary import meanings
+from fotismos.reports.terminal.tables import printed
+from fotismos.reports.terminal.words import number, parameter, seconds
 
 if TYPE_CHECKING:
-    from comparisons.cost.cost import Choice
-    from comparisons.cost.cost_record import Cost, Point
-    from reference.records import Estimated
+    from fotismos.comparisons.cost.cost import Choice
+    from fotismos.comparisons.cost.cost_record import Cost, Point
+    from fotismos.reference.records import Estimated
 
 Rows: TypeAlias = Iterator[Sequence[str]]
 

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 
 from msgspec.structs import asdict
 
-from comparisons.prepared import Prepared
-from reference.planning.effects import Decision, labelled
-from reference.planning.plan import Plan
-from reference.records import VERSION, Amount, Record
-from reports.terminal.tables import printed
+from fotismos.comparisons.prepared import Prepared
+from fotismos.reference.planning.effects import Decision, labelled
+from fotismos.reference.planning.plan import Plan
+from fotismos.reference.records import VERSION, Amount, Record
+from fotismos.reports.terminal.tables import printed
 
 
 class PlannedEffect(Record):

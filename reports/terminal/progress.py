@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from reports.terminal.words import level, visible
+from fotismos.reports.terminal.words import level, visible
 
 SPEED_OVER_S = 600.0
 """Seconds over which the speed is averaged to estimate the time left: scenes differ."""

@@ -11,13 +11,13 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from comparisons.comparison import ComparisonRecord, NoiseTarget, PictureRecord
-from comparisons.departure.criterion import TOLERANCE, share_above
-from comparisons.departure.metrics import LEADING
-from heuristic.heuristics import PHONG
-from reference.records import plain
-from reports.files import results
-from reports.terminal.words import number, percent, seconds, visible
+from fotismos.comparisons.comparison import ComparisonRecord, NoiseTarget, PictureRecord
+from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.heuristic.heuristics import PHONG
+from fotismos.reference.records import plain
+from fotismos.reports.files import results
+from fotismos.reports.terminal.words import number, percent, seconds, visible
 
 #: Characters per line of a printed table; longer cells are folded.
 WIDTH = 120

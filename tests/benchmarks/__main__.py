@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from heuristic.errors import FotismosError
+from fotismos.heuristic.errors import FotismosError
 
 # Each module here is a benchmark, with `run(rounds)`.
 BENCHMARKS = [

@@ -9,17 +9,17 @@ from dataclasses import replace
 import numpy as np
 from scipy import special
 
-from comparisons.case import open_case
+from fotismos.comparisons.case import open_case
 
-from comparisons.options import Options  # isort: skip  it finds LLVM first
+from fotismos.comparisons.options import Options  # isort: skip  it finds LLVM first
 
-from comparisons.check.moved import sidak
-from comparisons.check.pictures import Repeats, means
-from comparisons.departure.colour import DEFAULT_VIEWING, from_srgb, to_srgb
-from comparisons.departure.flip import ldr_flip
-from comparisons.prepared import prepare
-from reference.rendering.renderer import pass_seed
-from reports.terminal.tables import markdown
+from fotismos.comparisons.check.moved import sidak
+from fotismos.comparisons.check.pictures import Repeats, means
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, from_srgb, to_srgb
+from fotismos.comparisons.departure.flip import ldr_flip
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.rendering.renderer import pass_seed
+from fotismos.reports.terminal.tables import markdown
 
 HEIGHT, WIDTH, BATCH, LEVEL, FACTOR = 48, 64, 25, 0.01, 1.01322
 SHAPE, COUNTS, AXES = (HEIGHT, WIDTH, 1, BATCH), (2, 4, 8), (0, 1, 2)

@@ -19,7 +19,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from heuristic import Material, PointLight, llvm, shade  # isort: skip  it finds LLVM first
+from fotismos.heuristic import Material, PointLight, llvm, shade  # isort: skip  it finds LLVM first
 
 import drjit as dr
 from drjit.llvm import Array3f

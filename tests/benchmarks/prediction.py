@@ -11,12 +11,12 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from comparisons.case import open_case
+from fotismos.comparisons.case import open_case
 
-from comparisons.options import Options  # isort: skip  it finds LLVM first
+from fotismos.comparisons.options import Options  # isort: skip  it finds LLVM first
 
-from comparisons.cost.cost import cost
-from comparisons.cost.measure import Effort
+from fotismos.comparisons.cost.cost import cost
+from fotismos.comparisons.cost.measure import Effort
 
 SCENES = ("fig-8-9", "fig-6-10", "plastic-spheres", "cornell-box")
 TARGET = 1280, 720

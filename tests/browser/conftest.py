@@ -10,17 +10,17 @@ import pytest
 from msgspec import structs
 from playwright.sync_api import sync_playwright
 
-from comparisons.comparison import Comparison
-from comparisons.cost.cost import Study
-from comparisons.departure import regions
-from comparisons.departure.metrics import THRESHOLDS, drawn, log2_luminance_ratio
-from comparisons.departure.regions import Region
-from reference.records import Machine, Pixels, plain
-from reference.rendering.gbuffer import ObjectIds
-from reports.files import results
-from reports.files.results import Failure, RunRecord
-from reports.page import page
-from reports.run import scene
+from fotismos.comparisons.comparison import Comparison
+from fotismos.comparisons.cost.cost import Study
+from fotismos.comparisons.departure import regions
+from fotismos.comparisons.departure.metrics import THRESHOLDS, drawn, log2_luminance_ratio
+from fotismos.comparisons.departure.regions import Region
+from fotismos.reference.records import Machine, Pixels, plain
+from fotismos.reference.rendering.gbuffer import ObjectIds
+from fotismos.reports.files import results
+from fotismos.reports.files.results import Failure, RunRecord
+from fotismos.reports.page import page
+from fotismos.reports.run import scene
 from tests import cost_records, records, term_grids
 
 WIDTH, HEIGHT = 48, 32

@@ -1,7 +1,7 @@
 """The page of an audit in a browser: accessible, narrow enough, and usable by keyboard."""
 
-from comparisons.audit.checks import audit
-from reports.run import audit_files
+from fotismos.comparisons.audit.checks import audit
+from fotismos.reports.run import audit_files
 from tests.browser.conftest import Visitor
 from tests.browser.test_page_at_large import violations
 

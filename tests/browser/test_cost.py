@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from comparisons.hybrids.attribution import dominating
-from reports.charts import theme
+from fotismos.comparisons.hybrids.attribution import dominating
+from fotismos.reports.charts import theme
 from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
 from tests.cost_records import HEIGHT as ROWS
 from tests.cost_records import WIDTH as COLUMNS

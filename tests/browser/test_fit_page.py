@@ -1,9 +1,9 @@
 """The page of a fit in a browser: accessible, and narrow enough for a phone."""
 
-from comparisons.fit.fit import fit
-from comparisons.gallery.builtin import builtin
-from comparisons.options import Options
-from reports.run import fit_files
+from fotismos.comparisons.fit.fit import fit
+from fotismos.comparisons.gallery.builtin import builtin
+from fotismos.comparisons.options import Options
+from fotismos.reports.run import fit_files
 from tests.browser.test_page_at_large import violations
 
 

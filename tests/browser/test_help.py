@@ -2,7 +2,7 @@
 
 import pytest
 
-from reports import glossary
+from fotismos.reports import glossary
 from tests.browser.conftest import NOISY_ID
 from tests.browser.test_page_at_large import PHONE, VIEWS
 

@@ -7,15 +7,15 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons import pixel_terms
-from comparisons.departure.colour import BT709, Viewing, rgb_to_xyz
-from comparisons.departure.metrics import LEADING
-from heuristic import DirectionalLight, Material, PointLight, SpotLight, shade
-from reference.records import plain
-from reference.rendering.gbuffer import image_size, pixel_rays
-from reference.rendering.renderer import variant
-from reports.page.templating import TEMPLATES
-from reports.page.why_view import live_view
+from fotismos.comparisons import pixel_terms
+from fotismos.comparisons.departure.colour import BT709, Viewing, rgb_to_xyz
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.heuristic import DirectionalLight, Material, PointLight, SpotLight, shade
+from fotismos.reference.records import plain
+from fotismos.reference.rendering.gbuffer import image_size, pixel_rays
+from fotismos.reference.rendering.renderer import variant
+from fotismos.reports.page.templating import TEMPLATES
+from fotismos.reports.page.why_view import live_view
 from tests.browser.conftest import EXACT, NOISY, NOISY_ID
 from tests.browser.test_page_at_large import PHONE, violations
 from tests.test_pixel_terms import prepared

@@ -3,9 +3,9 @@
 import pytest
 from playwright.sync_api import expect
 
-from reports.notebook import HEIGHT, Shown
-from reports.page import page
-from reports.run import scene
+from fotismos.reports.notebook import HEIGHT, Shown
+from fotismos.reports.page import page
+from fotismos.reports.run import scene
 from tests.browser.conftest import EXACT, exact
 
 SEEN = "document.documentElement.dataset.view"

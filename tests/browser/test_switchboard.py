@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.metrics import LEADING
 from tests.browser.conftest import NOISY_ID
 from tests.browser.test_page_at_large import PHONE
 from tests.cost_records import EFFECTS, HYBRIDS

@@ -2,7 +2,7 @@
 
 import pytest
 
-from reports.page.page import render
+from fotismos.reports.page.page import render
 from tests import records
 from tests.browser.conftest import EXACT, FAILED, NOISY, NOISY_ID
 from tests.browser.test_page_at_large import PHONE

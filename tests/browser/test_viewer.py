@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from comparisons.departure.metrics import log2_luminance_ratio
+from fotismos.comparisons.departure.metrics import log2_luminance_ratio
 from tests.browser.conftest import EXACT, HEIGHT, NOISY, NOISY_ID, WIDTH
 
 SCENE = f"#scene={NOISY_ID}"

@@ -6,8 +6,8 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from comparisons.gallery.builtin import SCENES
-from reports.terminal import tables
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.reports.terminal import tables
 from tests.witnesses import test_closed_forms, test_povray, test_radiance
 from tests.witnesses.witness import Witness, deviation
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from comparisons.plain_scene import PlainScene, Triangles
+from fotismos.comparisons.plain_scene import PlainScene, Triangles
 from tests.witnesses.povray import document, triple
 
 NEAR = 1e-3

@@ -22,7 +22,7 @@ import mitsuba as mi
 import numpy as np
 import pyradiance
 
-from comparisons.plain_scene import camera
+from fotismos.comparisons.plain_scene import camera
 
 FOLDER = Path(pyradiance.__file__).parent
 OPTIONS = "-h -fff -w -u+ -aa 0 -ad 1 -as 0 -lr 99 -lw 0 -dt 0 -dc 1 -dr 0 -ds 0 -dj 1 -st 0"

@@ -6,12 +6,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from comparisons.case import open_case
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from comparisons.plain_scene import plain_scene
-from comparisons.prepared import prepare
-from heuristic import kernel
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.plain_scene import plain_scene
+from fotismos.comparisons.prepared import prepare
+from fotismos.heuristic import kernel
 from tests.witnesses import povray, povray_scenes
 
 pytestmark = [

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from comparisons.case import open_case
-from comparisons.gallery.builtin import SCENES
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from reference.rendering.renderer import passes
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.rendering.renderer import passes
 from tests import parts
 from tests.witnesses import radiance, stage
 from tests.witnesses.witness import BLOCKS, CHANCE, ROUNDING, means

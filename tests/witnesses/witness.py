@@ -12,10 +12,10 @@ from functools import cache
 import numpy as np
 from scipy import stats
 
-from comparisons.case import open_case
-from comparisons.options import Options
-from comparisons.prepared import prepare
-from reference.rendering.renderer import passes
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.reference.rendering.renderer import passes
 
 BLOCKS = 4
 """Blocks along each side of the image, whose means are looked at too: the shape counts."""

@@ -4,31 +4,31 @@ It comes before Mitsuba and Dr.Jit: it tells Dr.Jit where LLVM is. Each name is 
 first used.
 """
 
-import heuristic  # isort: skip  it finds LLVM before Dr.Jit is imported
+from fotismos import heuristic  # isort: skip  it finds LLVM before Dr.Jit is imported
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from comparisons.cost.cost_record import Method
-    from comparisons.departure.metrics import Metric
-    from heuristic.errors import FotismosError, InputError
-    from heuristic.heuristics import Heuristic, Parameter, Range
-    from heuristic.kernel import shade
-    from heuristic.lights import DirectionalLight, PointLight, SpotLight
-    from heuristic.materials import Material
-    from reports.notebook import audit, check, compare, cost, declare, fit, plan
+    from fotismos.comparisons.cost.cost_record import Method
+    from fotismos.comparisons.departure.metrics import Metric
+    from fotismos.heuristic.errors import FotismosError, InputError
+    from fotismos.heuristic.heuristics import Heuristic, Parameter, Range
+    from fotismos.heuristic.kernel import shade
+    from fotismos.heuristic.lights import DirectionalLight, PointLight, SpotLight
+    from fotismos.heuristic.materials import Material
+    from fotismos.reports.notebook import audit, check, compare, cost, declare, fit, plan
 
 __version__ = heuristic.__version__
 register = heuristic.register
 
 HOMES = heuristic.HOMES | {
-    "FotismosError": "heuristic.errors",
-    "InputError": "heuristic.errors",
-    "Method": "comparisons.cost.cost_record",
-    "Metric": "comparisons.departure.metrics",
+    "FotismosError": "fotismos.heuristic.errors",
+    "InputError": "fotismos.heuristic.errors",
+    "Method": "fotismos.comparisons.cost.cost_record",
+    "Metric": "fotismos.comparisons.departure.metrics",
     **dict.fromkeys(
-        ("audit", "check", "compare", "cost", "declare", "fit", "plan"), "reports.notebook"
+        ("audit", "check", "compare", "cost", "declare", "fit", "plan"), "fotismos.reports.notebook"
     ),
 }
 """Where names come from when they are first used."""
