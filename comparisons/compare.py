@@ -184,18 +184,16 @@ def _compare(
 
         picture = pictures.picture_record(heuristic, ready.scene, options, images)
     done("metrics")
-    traced: tuple[TermGrid | None, str] = (
-        None,
-        "Terms are traced with --why, in Python with why=True.",
-    )
+    terms: TermGrid | None = None
+    no_terms = "Terms are traced with --why, in Python with why=True."
     live: LivePoints | str = "It needs --why."
     if why:
         from fotismos.comparisons import pixel_terms  # loaded late: --no-why traces none
 
-        traced = pixel_terms.trace(ready.heuristic, options)
+        terms, no_terms = pixel_terms.trace(ready.heuristic, options)
         live = pixel_terms.live(ready.heuristic, options)
-        terms = pixel_terms.layers(ready.heuristic, options, images.heuristic)
-        images = replace(images, terms=terms)
+        layers = pixel_terms.layers(ready.heuristic, options, images.heuristic)
+        images = replace(images, terms=layers)
         done("terms")
     mistakes: tuple[str, ...] = ()
     if not options.image and not heuristics.named(options.heuristic).is_own:
@@ -230,7 +228,8 @@ def _compare(
         mistakes=mistakes,
         **numbers,
     )
-    return Comparison(record, images, *traced, live), ready
+    comparison = Comparison(record=record, images=images, terms=terms, no_terms=no_terms, live=live)
+    return comparison, ready
 
 
 def _times(heuristic: Any, reference: Renderer, options: Options) -> TimeSpent:
@@ -286,7 +285,14 @@ def render(
     difference = sums[2].estimate(np.float32)
     error = sums[1].standard_error(np.float32)
     heuristic, reference = (total.mean(np.float32) for total in sums[:2])
-    return Estimates(heuristic, reference, error, difference, done, stop)
+    return Estimates(
+        heuristic=heuristic,
+        reference=reference,
+        standard_error=error,
+        difference=difference,
+        passes=done,
+        stop=stop,
+    )
 
 
 def is_checked(done: int, passes: int) -> bool:

@@ -61,7 +61,9 @@ def machine() -> Machine:
         lines = []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     processor = names[0] if names else platform.processor() or platform.machine()
-    return Machine(processor, cores(), f"{platform.system()} {platform.machine()}")
+    return Machine(
+        processor=processor, cores=cores(), system=f"{platform.system()} {platform.machine()}"
+    )
 
 
 class Significant(Record):
@@ -276,7 +278,7 @@ class Deviations(Record):
     largest: dict[str, Amount]
 
 
-class ComparisonRecord(Record, kw_only=True):
+class ComparisonRecord(Record):
     """One scene by textbook shading (heuristic) and by physically based rendering (reference).
 
     Times are in seconds; linear values are in units of display white; every number is finite.

@@ -382,7 +382,14 @@ def picture_record(
     expected += [picture_edges(image) for image in (template, images.reference)]
     shift, edges = measure(np.mean(half.images, axis=0), expected)
     files, ratio = options.image, ratios(shown, reference)
-    record = PictureRecord(files, options.transfer, len(files), shift, edges, ratio)
+    record = PictureRecord(
+        files=files,
+        transfer=options.transfer,
+        repeats=len(files),
+        shift=shift,
+        edges=edges,
+        ratio=ratio,
+    )
     odd = describe(record, images.heuristic, images.reference, images.counted)
     return structs.replace(record, odd=tuple(odd))
 

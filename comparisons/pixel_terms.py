@@ -301,11 +301,11 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
         return {name: np.ravel(v).tolist() for name, v in fields.items()} | {"name": emitter.id()}
 
     return LivePoints(
-        {name: plane.reshape(size[::-1]) for name, plane in planes.items()},
-        materials,
-        tuple(map(numbers, emitters)),
-        [points.colours(each)[corners].tolist() for each in film],
-        options.polygon_shading is Interpolation.FLAT,
+        planes={name: plane.reshape(size[::-1]) for name, plane in planes.items()},
+        materials=materials,
+        lights=tuple(map(numbers, emitters)),
+        rays=[points.colours(each)[corners].tolist() for each in film],
+        is_flat=options.polygon_shading is Interpolation.FLAT,
     )
 
 
@@ -321,7 +321,15 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
     lights = [points.light(emitter, shape) for emitter in emitters]
     cos_view = points.floats(dr.dot(points.normal, points.view)).reshape(shape)
     places = places.reshape(shape)
-    grid = TermGrid(resolution, columns, rows, materials, places, cos_view, tuple(lights))
+    grid = TermGrid(
+        resolution=resolution,
+        columns=columns,
+        rows=rows,
+        materials=materials,
+        material=places,
+        cos_view=cos_view,
+        lights=tuple(lights),
+    )
     if len(lights) <= LIGHTS:
         return grid
     images = [grid.light_image(light) for light in lights]
@@ -391,7 +399,9 @@ class _Points:
         number, *values = row
         k_i, k_a, k_d, k_s, ambient = (_colour(values[i : i + 3]) for i in (0, 3, 6, 9, 14))
         name, form = self.known.bsdfs[int(number)].id(), FORMS[int(values[13])]
-        return TermMaterial(name, k_i, k_a, k_d, k_s, values[12], form, ambient)
+        return TermMaterial(
+            name=name, k_i=k_i, k_a=k_a, k_d=k_d, k_s=k_s, n=values[12], form=form, ambient=ambient
+        )
 
     def light(self, emitter: Any, shape: tuple[int, int]) -> GridLight:
         """Return a light at all points."""
@@ -409,10 +419,16 @@ class _Points:
         brightest = int(np.argmax(intensity))
         scale = np.hstack(list(map(self.colours, arriving)))[:, brightest]
         scale /= intensity[brightest] or 1.0
-        each = (scale, self.floats(cos_incidence), self.floats(dr.dot(toward, self.view)))
-        arrays = (*each, self.select(lobe))
-        colours = map(_colour, np.split(intensity, 2))
-        return GridLight(emitter.id(), *colours, *(a.reshape(shape) for a in arrays))
+        cos_view = self.floats(dr.dot(toward, self.view))
+        return GridLight(
+            name=emitter.id(),
+            intensity=_colour(intensity[:3]),
+            specular_intensity=_colour(intensity[3:]),
+            attenuation=scale.reshape(shape),
+            cos_incidence=self.floats(cos_incidence).reshape(shape),
+            cos_view=cos_view.reshape(shape),
+            lobe=self.select(lobe).reshape(shape),
+        )
 
 
 # --- As images ---------------------------------------------------------------------------------

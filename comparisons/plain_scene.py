@@ -73,16 +73,16 @@ def plain_scene(source: Source, options: Options) -> PlainScene:
     bsdfs = list(dict.fromkeys(shape.bsdf() for shape in scene.shapes()))
     point = dr.zeros(mi.SurfaceInteraction3f)
     return PlainScene(
-        source.name,
-        camera(scene),
-        tuple(
+        name=source.name,
+        camera=camera(scene),
+        shapes=tuple(
             triangles_of(shape, bsdfs.index(shape.bsdf()), options.tessellation)
             for shape in scene.shapes()
         ),
-        tuple(material_of(bsdf, number, scene) for number, bsdf in enumerate(bsdfs)),
-        tuple(light_of(lamp, point) for lamp in lamps(scene)),
-        tuple(numbers(mi.Color3f(scene.integrator().ambient.eval(point)))),
-        _layers(scene),
+        materials=tuple(material_of(bsdf, number, scene) for number, bsdf in enumerate(bsdfs)),
+        lights=tuple(light_of(lamp, point) for lamp in lamps(scene)),
+        ambient=tuple(numbers(mi.Color3f(scene.integrator().ambient.eval(point)))),
+        layers=_layers(scene),
     )
 
 
@@ -144,7 +144,14 @@ def triangles_of(shape: mi.Shape, material: int, resolution: int | None) -> Tria
     assert positions is not None
     assert faces is not None
     normals = None if mesh.has_face_normals() else normals
-    return Triangles(shape.id(), positions, normals, texcoords, faces, material)
+    return Triangles(
+        name=shape.id(),
+        positions=positions,
+        normals=normals,
+        texcoords=texcoords,
+        faces=faces,
+        material=material,
+    )
 
 
 def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict:

@@ -104,9 +104,13 @@ class Prepared:
         asks_for_volumes = pair.media or pair.integrator in ("volpath", "volpathmis")
         if plan.integrator == "volpath" and not asks_for_volumes:
             used = "volpath: others err on curved shapes behind hidden lamps"
-            overrides.append(Override("integrator", pair.integrator or "path", used))
+            overrides.append(
+                Override(what="integrator", given=pair.integrator or "path", used=used)
+            )
         if pair.rr_depth is not None and pair.rr_depth != plan.rr_depth:
-            overrides.append(Override("rr_depth", str(pair.rr_depth), str(plan.rr_depth)))
+            overrides.append(
+                Override(what="rr_depth", given=str(pair.rr_depth), used=str(plan.rr_depth))
+            )
         return tuple(overrides)
 
     def caution(self) -> str:

@@ -126,10 +126,10 @@ def of_text(word: str, text: str) -> Heuristic:
     shader.compiled(2)
     renderer, is_software = device()
     heuristic = Heuristic(
-        word,
-        shader,
-        Path(word).stem + (", software GPU" if is_software else ""),
-        frozenset(name for name in INPUTS if name in shader.words),
+        name=word,
+        shade=shader,
+        label=Path(word).stem + (", software GPU" if is_software else ""),
+        needs=frozenset(name for name in INPUTS if name in shader.words),
         parameters=uniforms(text),
         traced=False,
         remarks=(
@@ -330,7 +330,8 @@ def uniforms(text: str) -> tuple[Parameter, ...]:
     """Return the parameters: ``uniform float NAME = DEFAULT;  // LOW to HIGH``."""
     matches = [match for line in text.splitlines() if (match := _PARAMETER.match(line))]
     return tuple(
-        Parameter(match[1], float(match[2]), float(match[3]), float(match[4])) for match in matches
+        Parameter(name=match[1], default=float(match[2]), low=float(match[3]), high=float(match[4]))
+        for match in matches
     )
 
 

@@ -182,7 +182,15 @@ class Point:
         none = type(self.arguments.position)(0)
         extent = light.extent or Extent(none.x, none, none)
         distance = reach + getattr(light, "shell", 0)
-        return LightAtPoint(toward, distance, diffuse, specular, extent, reach, self)
+        return LightAtPoint(
+            toward=toward,
+            distance=distance,
+            intensity=diffuse,
+            specular_intensity=specular,
+            extent=extent,
+            _reach=reach,
+            _point=self,
+        )
 
     def require(self, name: str) -> None:
         """Raise InputError for an input that is not among the heuristic's needs."""
@@ -316,7 +324,14 @@ class Heuristic:
     ) -> Array:
         """Return the colour at points; InputError if a user's heuristic fails or returns none."""
         tuned = SimpleNamespace(**parameters)
-        point = Point(self.needs, arguments, uv, tuned, prepared, wavelengths)
+        point = Point(
+            needs=self.needs,
+            arguments=arguments,
+            _uv=uv,
+            parameters=tuned,
+            prepared=prepared,
+            wavelengths=wavelengths,
+        )
         if self.is_own:
             return self.shade(point)
         return pkgutil.resolve_name(SHADED)(self.name, self.shade, point)
@@ -393,5 +408,5 @@ def content_digest(files: Iterable[Path]) -> str:
 
 
 _READ = frozenset(INPUTS) - {"uv", "visible"}
-PHONG = Heuristic("phong", Point.textbook, "Phong", _READ)
-BLINN = Heuristic("blinn", Point.textbook, "Blinn", _READ, form="blinn")
+PHONG = Heuristic(name="phong", shade=Point.textbook, label="Phong", needs=_READ)
+BLINN = Heuristic(name="blinn", shade=Point.textbook, label="Blinn", needs=_READ, form="blinn")

@@ -175,10 +175,10 @@ def shade(point: Point) -> Array:
 
 
 HEMISPHERE = Heuristic(
-    "hemisphere-ambient",
-    shade,
-    "hemisphere ambient light",
-    frozenset(INPUTS) - {"uv", "visible"},
+    name="hemisphere-ambient",
+    shade=shade,
+    label="hemisphere ambient light",
+    needs=frozenset(INPUTS) - {"uv", "visible"},
     prepare=prepare,
     refuse=refuse,
 )

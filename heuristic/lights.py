@@ -101,7 +101,7 @@ class Light:
         if visible is not None:
             is_seen = visible(toward, distance)
             colours = [dr.select(is_seen, colour, 0) for colour in colours]
-        return Arrival(toward, colours[0], colours[-1], distance)
+        return Arrival(toward=toward, diffuse=colours[0], specular=colours[-1], distance=distance)
 
     def rays(self, position: Position) -> tuple[Direction, Number, list[Colour]]:
         """Return ``L`` (6.26), ``d``, and intensities times ``f_att`` (6.1, 8.6) and cone (6.3)."""

@@ -88,7 +88,7 @@ def light_map(scene: Any, light: Any, resolution: int) -> DepthImage:
     origin = centre + frame.s * x + frame.t * y - frame.n * size
     depths = _traced(scene, origin, frame.n)
     dr.eval(depths, frame)
-    return DepthImage(resolution, depths, centre, frame, size)
+    return DepthImage(resolution=resolution, depths=depths, centre=centre, frame=frame, radius=size)
 
 
 def box(scene: Any) -> tuple[Doubles, Doubles]:
@@ -175,18 +175,18 @@ def _is_lit(point: Point, light: Any, image: DepthImage) -> Any:
     return distance * (1 - LEAST) <= dr.gather(mi.Float, image.depths, texel)
 
 
-RESOLUTION = Parameter("resolution", 512, 16, 2048, prepared=True)
+RESOLUTION = Parameter(name="resolution", default=512, low=16, high=2048, prepared=True)
 """Texels along a side of the image."""
 
-BIAS = Parameter("bias", 0.75, 0.0, 8.0)
+BIAS = Parameter(name="bias", default=0.75, low=0.0, high=8.0)
 """Height above the surface, in texels: half a diagonal is enough for planes."""
 
 MAP = Heuristic(
-    "shadow-map",
-    shade,
-    "shadow map",
-    frozenset(INPUTS) - {"uv", "visible"},
-    (RESOLUTION, BIAS),
-    prepare,
+    name="shadow-map",
+    shade=shade,
+    label="shadow map",
+    needs=frozenset(INPUTS) - {"uv", "visible"},
+    parameters=(RESOLUTION, BIAS),
+    prepare=prepare,
     refuse=refuse,
 )

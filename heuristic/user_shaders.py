@@ -138,7 +138,9 @@ def of_function(function: Any, name: str, label: str = "") -> Heuristic:
     def shade(point: Point) -> Any:
         return function(point, **{each: getattr(point.parameters, each) for each in names})
 
-    everything = Heuristic(name, shade, label, frozenset(INPUTS), parameters)
+    everything = Heuristic(
+        name=name, shade=shade, label=label, needs=frozenset(INPUTS), parameters=parameters
+    )
     read = examine(everything)
     needs = {part.partition(".")[0] for part in read} & set(INPUTS)
     return replace(everything, needs=frozenset(needs), reads=read)
@@ -166,7 +168,9 @@ def _parameter(function: Callable[..., Any], one: inspect.Parameter) -> Paramete
     parts = one.annotation, *get_args(one.annotation)
     bounds = next((part for part in parts if isinstance(part, Range)), Range(-inf, inf))
     try:
-        return Parameter(one.name, float(one.default), bounds.low, bounds.high)
+        return Parameter(
+            name=one.name, default=float(one.default), low=bounds.low, high=bounds.high
+        )
     except InputError as error:
         raise InputError(f"{place_of(function)}: {error}") from error
 
@@ -305,20 +309,26 @@ def trial_points(heuristic: Heuristic) -> Point:
     )
     intensity = mi.Spectrum(mi.Float(np.full(POINTS, 0.8)))
     arguments = ShadingArguments(
-        mi.Vector3f(position.T),
-        mi.Vector3f(normal.T),
-        mi.Vector3f(view.T),
-        material,
-        [
+        position=mi.Vector3f(position.T),
+        normal=mi.Vector3f(normal.T),
+        view=mi.Vector3f(view.T),
+        material=material,
+        lights=[
             PointLight((2.0, 1.0, 3.0), intensity, (0, 0, 1)),
             DirectionalLight((1.0, 2.0, -1.0), intensity),
         ],
-        colour(0.5),
-        lambda toward, distance: numbers(0, 1) > 0.5,
+        ambient=colour(0.5),
+        visible=lambda toward, distance: numbers(0, 1) > 0.5,
     )
     uv = mi.Point2f(numbers(0, 1), numbers(0, 1))
     parameters = {each.name: mi.Float(each.default) for each in heuristic.parameters}
-    return _TrialPoint(heuristic.needs, arguments, uv, SimpleNamespace(**parameters), {})
+    return _TrialPoint(
+        needs=heuristic.needs,
+        arguments=arguments,
+        _uv=uv,
+        parameters=SimpleNamespace(**parameters),
+        prepared={},
+    )
 
 
 def _require(

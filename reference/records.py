@@ -38,9 +38,19 @@ Resolution = Annotated[tuple[Size, Size], Meta(description="Width and height in 
 Versions = Annotated[dict[str, str], Meta(description="Versions that a result depends on.")]
 
 
-# mypy does not know that `frozen` is inherited.
-@dataclass_transform(frozen_default=True, field_specifiers=(msgspec.field,))
-class Record(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class RecordType(msgspec.StructMeta):
+    """The type of records: all their fields are keywords, which msgspec does not inherit."""
+
+    def __new__(
+        cls, name: str, bases: tuple[type, ...], namespace: dict[str, Any], **config: Any
+    ) -> "RecordType":
+        made: RecordType = super().__new__(cls, name, bases, namespace, kw_only=True, **config)
+        return made
+
+
+# mypy does not know that `frozen` and `kw_only` are inherited.
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(msgspec.field,))
+class Record(msgspec.Struct, metaclass=RecordType, frozen=True, forbid_unknown_fields=True):
     """A type that is written as a JSON object."""
 
 

@@ -315,7 +315,9 @@ def pool(
     from fotismos.comparisons.processes import cluster
 
     # As a context it gives a Cluster, which does what a Pool does.
-    ready = Ready(level(), None, os.getcwd(), shlex.join(program.program()))
+    ready = Ready(
+        level=level(), threads=None, folder=os.getcwd(), program=shlex.join(program.program())
+    )
     return cast(Pool, cluster.connected(scheduler, ready))
 
 
@@ -344,7 +346,12 @@ def results_of(
             progress.shown() as bar,
         ):
             tasks = [
-                Task(place.name, work, (scene, *words, place), bar.of(place.name))
+                Task(
+                    name=place.name,
+                    function=work,
+                    arguments=(scene, *words, place),
+                    progress=bar.of(place.name),
+                )
                 for place, scene in zip(places, scenes, strict=True)
             ]
             return {folder / each.name: done.result() for each, done in processes.each(tasks)}

@@ -174,7 +174,17 @@ def test_json_follows_its_schema_and_a_lost_metric_is_not_tested(run, baselines_
 
 
 def test_names_that_xml_and_utf_8_forbid_are_shown():
-    move = Move("dE2000", None, None, 2.0, 3.0, 0.1, 9.0, 1e-8, 1e-7)
+    move = Move(
+        quantity="dE2000",
+        half=None,
+        block=None,
+        before=2.0,
+        after=3.0,
+        error=0.1,
+        standard_errors=9.0,
+        p=1e-8,
+        p_corrected=1e-7,
+    )
     made = checks.CheckRecord(
         baseline="a\x00\udcff<b>.json", scene="s", status="failed", seconds=1.0, moved=(move,)
     )

@@ -79,7 +79,7 @@ def test_page_and_terminal_say_which_sample_count_would_pass(study):
         f"No measured method passes at ΔE2000 2. About {ceil(spp)} samples per pixel of full plan"
         " would;"
     )
-    enough = structs.replace(record.points[2], tolerance=MeanError(1.0, 0.9, 1.1))
+    enough = structs.replace(record.points[2], tolerance=MeanError(mean=1.0, low=0.9, high=1.1))
     for points, is_said in ((record.points, True), ((*record.points, enough), False)):
         changed = structs.replace(record, points=points)
         text = "\n".join(cost_tables.lines(changed))

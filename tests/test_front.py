@@ -191,7 +191,7 @@ def by_law(name, left, noise, per_sample, counts=(4, 16, 64)):
     for spp in counts:
         tolerance = np.hypot(left, noise / np.sqrt(spp))
         point = made(name, spp, per_sample * spp, 1.0, 0.01)
-        near = MeanError(tolerance, 0.99 * tolerance, 1.01 * tolerance)
+        near = MeanError(mean=tolerance, low=0.99 * tolerance, high=1.01 * tolerance)
         found.append(structs.replace(point, tolerance=near))
     return found
 

@@ -87,7 +87,7 @@ def test_intervals_on_shapes_tell_the_spread_of_replicates():
     found = {row.name: row for row in rows}
     still, noisy = found["still"], found["noisy"]
     assert (still.pixels, noisy.pixels) == (3, 2)
-    assert still.removes[0] == sums.Estimated(2.0, 2.0 - 3 * BIAS, 2.0 + 3 * BIAS)
+    assert still.removes[0] == sums.Estimated(value=2.0, low=2.0 - 3 * BIAS, high=2.0 + 3 * BIAS)
     error = spread.std(ddof=1) / np.sqrt(len(spread))
     expected = sums.student(spread.mean(), error, len(spread), 3 * BIAS)
     assert noisy.removes[0].value == pytest.approx(expected.value)
@@ -141,7 +141,9 @@ def test_effects_are_taken_where_the_pixels_of_a_shape_lie():
     carriers, places = regions.find_objects(error, counted, owners)
     effects = {"shadow": np.array([[3.0, 0], [3, 0]]), "gloss": np.array([[0.0, 2], [0, 2]])}
     images = records.images(4, 4, objects=places, materials=places)
-    boxes = [regions.Region(x, 1, 2, 2, share=0.5, mean_dE2000=1.0) for x in (0, 2)]
+    boxes = [
+        regions.Region(x=x, y=1, width=2, height=2, share=0.5, mean_dE2000=1.0) for x in (0, 2)
+    ]
     record = records.record(objects=carriers, materials=carriers, regions=tuple(boxes))
     found = named(records.Comparison(record, images), effects)
     assert {each.name: each.effect for each in found.objects} == {

@@ -36,7 +36,9 @@ def test_a_docstring_describes_the_attributes_in_the_schema():
 
 
 def test_what_was_written_is_read():
-    assert records.read(Toy, records.to_json(Toy("red", 0.5)), "toy.json") == Toy("red", 0.5)
+    assert records.read(Toy, records.to_json(Toy(colour="red", sheen=0.5)), "toy.json") == Toy(
+        colour="red", sheen=0.5
+    )
 
 
 @pytest.mark.parametrize(
@@ -61,8 +63,10 @@ def test_what_is_not_such_a_record_is_refused(text, expected):
 
 
 def test_a_record_of_version_2_in_which_nothing_changed_is_read():
-    text = records.to_json(Toy("red", 0.5)).replace('"record_version": 3', '"record_version": 2')
-    assert records.read(Toy, text, "toy.json") == Toy("red", 0.5)
+    text = records.to_json(Toy(colour="red", sheen=0.5)).replace(
+        '"record_version": 3', '"record_version": 2'
+    )
+    assert records.read(Toy, text, "toy.json") == Toy(colour="red", sheen=0.5)
 
 
 @pytest.mark.parametrize("name", schemas.PUBLISHED)

@@ -54,9 +54,9 @@ def study(*points):
         cost_record.Point(
             method=name,
             spp=spp,
-            seconds=Estimated(ms / 1e3, 0.95 * ms / 1e3, 1.05 * ms / 1e3),
-            error=MeanError(1.0, 1.0, 1.0),
-            tolerance=MeanError(tolerance, tolerance, 1.01 * tolerance),
+            seconds=Estimated(value=ms / 1e3, low=0.95 * ms / 1e3, high=1.05 * ms / 1e3),
+            error=MeanError(mean=1.0, low=1.0, high=1.0),
+            tolerance=MeanError(mean=tolerance, low=tolerance, high=1.01 * tolerance),
         )
         for name, spp, ms, tolerance in (kernel, *points)
     ]

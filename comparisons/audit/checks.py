@@ -78,7 +78,7 @@ class MaterialCurves(Record):
     ] = ()
 
 
-class Audit(Record, kw_only=True):
+class Audit(Record):
     """What holds for one heuristic or BSDF."""
 
     record_version: int = VERSION
@@ -278,7 +278,7 @@ def _checked(
     name: str, holds: bool | None, value: float | None, expected: str, worst: str
 ) -> Checked:
     verdict: Any = {True: "holds", False: "does not hold", None: "not asked"}[holds]
-    return Checked(name, verdict, value, expected, worst)
+    return Checked(name=name, verdict=verdict, value=value, expected=expected, worst=worst)
 
 
 def _largest(

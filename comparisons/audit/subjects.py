@@ -233,9 +233,14 @@ def shaded(
     values = {each.name: each.default for each in heuristic.parameters} | dict(values or {})
     position, normal, view = (mi.Vector3f(_single(np.broadcast_to(v, (3, count)))) for v in place)
     arguments = ShadingArguments(
-        position, normal, view, PairedMaterial(**made, form=heuristic.form or "phong"), lights,
-        mi.Spectrum(ambient), lambda toward, distance: dr.full(mi.Bool, True, count),
-    )  # fmt: skip
+        position=position,
+        normal=normal,
+        view=view,
+        material=PairedMaterial(**made, form=heuristic.form or "phong"),
+        lights=lights,
+        ambient=mi.Spectrum(ambient),
+        visible=lambda toward, distance: dr.full(mi.Bool, True, count),
+    )
     parameters = {name: mi.Float(value) for name, value in values.items()}
     return mi.Spectrum(heuristic.evaluate(arguments, mi.Point2f(0.5), parameters, prepared))
 

@@ -150,7 +150,7 @@ def measure_scene(
     heuristic, reference = images.mean(axis=0)
     caution = require_light(heuristic, reference, ready.counted, source.name, options)
     pictures = {"heuristic": heuristic, "reference": reference}
-    return MeasuredScene(numbers, pictures, spp, caution)
+    return MeasuredScene(measurement=numbers, pictures=pictures, spp=spp, caution=caution)
 
 
 def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
@@ -160,7 +160,9 @@ def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
     the jackknife's. Metrics are not linear, and noise raises them: compare only measurements with
     equal numbers of passes and samples.
     """
-    metrics = dict.fromkeys((*METRICS, RATIO.name), MetricAmount(0.0, 0.0, 0.0))
+    metrics = dict.fromkeys(
+        (*METRICS, RATIO.name), MetricAmount(value=0.0, error=0.0, noise_floor=0.0)
+    )
     if counted.any():
         metrics = _metrics(images, counted, viewing)
     halves = {half: _half(images[:, index]) for index, half in enumerate(HALVES)}
@@ -189,7 +191,7 @@ def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metri
         for name, metric in METRICS.items()
     }
     return {
-        name: MetricAmount(float(value), float(error), floors.get(name))
+        name: MetricAmount(value=float(value), error=float(error), noise_floor=floors.get(name))
         for name, value, error in zip((*METRICS, RATIO.name), values, errors, strict=True)
     }
 
@@ -230,7 +232,7 @@ LARGEST = float(np.finfo(np.float32).max)
 """Largest number: images are in single precision, and squares of errors must not overflow."""
 
 
-class Baseline(Record, kw_only=True, omit_defaults=True):
+class Baseline(Record, omit_defaults=True):
     """Measurements of one scene, from independent passes of both halves."""
 
     record_version: int
@@ -251,7 +253,12 @@ class Baseline(Record, kw_only=True, omit_defaults=True):
 
     def measured(self) -> Measurement:
         """Return the measurement."""
-        return Measurement(self.passes, self.metrics, self.heuristic, self.reference)
+        return Measurement(
+            passes=self.passes,
+            metrics=self.metrics,
+            heuristic=self.heuristic,
+            reference=self.reference,
+        )
 
     def text(self) -> str:
         """Return the file's content."""

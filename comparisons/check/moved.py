@@ -249,4 +249,4 @@ def check(
             f" by {new[1]}. Write it again with --update."
         )
     moves = differences(before, after)
-    return Check(before, now, moves, tuple(moved(moves, level)), level)
+    return Check(before=before, now=now, moves=moves, moved=tuple(moved(moves, level)), level=level)

@@ -161,7 +161,12 @@ def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
         spread = np.maximum(block_sums(d * d, side) - total**2 / pixels, 0.0)
         square = r * np.maximum(block_sums(noise, side), spread * noise.any(axis=(0, 1, 2)))
         old, new = (block_sums(each.mean, side) / pixels for each in (before, after))
-        return Means(old, new, np.sqrt(square) / pixels, 1.0 / (1.0 / f + r / pixels))
+        return Means(
+            before=old,
+            after=new,
+            error=np.sqrt(square) / pixels,
+            freedom=1.0 / (1.0 / f + r / pixels),
+        )
 
     return over(max(d.shape[:2])), over(SIDE)
 
@@ -180,7 +185,7 @@ def _total(values: NDArray) -> Array:
 # --- Baselines -----------------------------------------------------------------------------------
 
 
-class PictureBaseline(Record, kw_only=True):
+class PictureBaseline(Record):
     """Repeats of a picture; the mean and the variance of each pixel are in an EXR beside it.
 
     Attributes
@@ -237,9 +242,14 @@ class PictureCheck:
 
     def smallest_changes(self) -> SmallestChanges:
         """Return the smallest changes that the check catches."""
-        mean, blocks = (each.limit(self.level) for each in (self.picture, self.blocks))
-        changes = mean[0, 0], np.median(blocks, axis=(0, 1)), blocks.max(axis=(0, 1))
-        return SmallestChanges(POWER, *(colour(each) for each in changes))
+        whole = self.picture.limit(self.level)
+        blocks = self.blocks.limit(self.level)
+        return SmallestChanges(
+            power=POWER,
+            mean=colour(whole[0, 0]),
+            block=colour(np.median(blocks, axis=(0, 1))),
+            noisiest=colour(blocks.max(axis=(0, 1))),
+        )
 
     def cause(self) -> str:
         """Return the sentence on factors or offsets that leave nothing moved, or else on where.
@@ -274,7 +284,9 @@ def check_pictures(before: Repeats, after: Repeats, level: float) -> PictureChec
     require_one_size((before.mean, after.mean))
     picture, blocks = means(before, after)
     moves = moved([*_moves(picture, level), *_moves(blocks, level, is_block=True)], level)
-    return PictureCheck(before, after, picture, blocks, tuple(moves), level)
+    return PictureCheck(
+        before=before, after=after, picture=picture, blocks=blocks, moved=tuple(moves), level=level
+    )
 
 
 def colour(values: Array) -> Colour:
@@ -286,13 +298,24 @@ def colour(values: Array) -> Colour:
 def _moves(tested: Means, level: float, is_block: bool = False) -> Iterator[Move]:
     p = tested.p()
     corrected = sidak(p, tested.tests)
-    arrays = tested.before, tested.after, tested.error, p, corrected
     for row, column, channel in np.argwhere(tested.moved(level)).tolist():
-        before, after, error, *chances = (float(each[row, column, channel]) for each in arrays)
+        index = row, column, channel
+        before = float(tested.before[index])
+        after = float(tested.after[index])
+        error = float(tested.error[index])
         block = (row + 1, column + 1) if is_block else None
-        name = f"mean {'RGB'[channel]}" + (f", block {row + 1},{column + 1}" if block else "")
-        errors = (after - before) / error if error > 0 else None
-        yield Move(name, None, block, before, after, error, errors, *chances)
+        yield Move(
+            quantity=f"mean {'RGB'[channel]}"
+            + (f", block {row + 1},{column + 1}" if block else ""),
+            half=None,
+            block=block,
+            before=before,
+            after=after,
+            error=error,
+            standard_errors=(after - before) / error if error > 0 else None,
+            p=float(p[index]),
+            p_corrected=float(corrected[index]),
+        )
 
 
 def _interval(value: float, half: float) -> str:

@@ -101,7 +101,7 @@ def cost(
         attribution=attribution(found, known),
         closure=known.record.closure,
         viewing=options.viewing,
-        pixels=Pixels(int(counted.sum()), counted.size),
+        pixels=Pixels(counted=int(counted.sum()), total=counted.size),
         machine=machine(),
         versions=versions(),
         command=command,
@@ -171,12 +171,19 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
     effects = (
         EffectCost(**structs.asdict(one), adds_s=adds(one.effect)) for one in causes.record.effects
     )
-    seconds = takes(first.name), takes(last.name), adds("")
-    errors = causes.record.departure, causes.record.resolution
-    return CostAttribution(tuple(effects), *errors, *seconds, found.size, SPP)
+    return CostAttribution(
+        effects=tuple(effects),
+        departure=causes.record.departure,
+        size=causes.record.resolution,
+        kernel_s=takes(first.name),
+        plan_s=takes(last.name),
+        renderer_s=adds(""),
+        resolution=found.size,
+        spp=SPP,
+    )
 
 
-class Choice(Record, kw_only=True):
+class Choice(Record):
     """The answer of ``fotismos plan --within``.
 
     Attributes

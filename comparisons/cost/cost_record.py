@@ -3,7 +3,6 @@
 from typing import Annotated, Literal
 
 from msgspec import Meta
-from msgspec.structs import astuple
 
 from fotismos.comparisons.comparison import Contribution, MeanError
 from fotismos.comparisons.departure.colour import Viewing
@@ -71,7 +70,7 @@ class Method(Record):
         return self.family == "kernel"
 
 
-class TimedMethod(Method, kw_only=True):
+class TimedMethod(Method):
     """A method and its time: ``overhead_s + per_sample_s * samples`` for one image.
 
     Attributes
@@ -99,8 +98,13 @@ class TimedMethod(Method, kw_only=True):
 
     def seconds(self, samples: int) -> Estimated:
         """Return the time of an image with some samples over all pixels."""
-        ends = zip(astuple(self.overhead_s), astuple(self.per_sample_s), strict=True)
-        return Estimated(*(max(fixed + samples * each, 0.0) for fixed, each in ends))
+        fixed = self.overhead_s
+        slope = self.per_sample_s
+        return Estimated(
+            value=max(fixed.value + samples * slope.value, 0.0),
+            low=max(fixed.low + samples * slope.low, 0.0),
+            high=max(fixed.high + samples * slope.high, 0.0),
+        )
 
 
 class Point(Record):
@@ -143,7 +147,7 @@ class Converged(Record):
     noise_floor: Annotated[float, Meta(description="Mean ΔE2000 of its noise alone.", ge=0)]
 
 
-class EffectCost(Contribution, kw_only=True):
+class EffectCost(Contribution):
     """What simulating one effect removes, and the seconds that it adds to an image."""
 
     adds_s: Estimated
@@ -181,7 +185,7 @@ class CostAttribution(Record):
     spp: Size
 
 
-class Cost(Record, kw_only=True):
+class Cost(Record):
     """What accuracy costs in time on one scene; times are in seconds for one image.
 
     Attributes

@@ -111,5 +111,5 @@ def reach(points: Sequence[Point], tolerance: float) -> Reach | None:
         room, spp = tolerance**2 - left, None
         if room > 0:
             spp = max(ceil(more.spp * (square - left) / room), more.spp + 1)
-        found.append(Reach(name, sqrt(left), spp))
+        found.append(Reach(method=name, left=sqrt(left), spp=spp))
     return min(found, key=lambda one: (one.spp is None, one.spp or one.left), default=None)

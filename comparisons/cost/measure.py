@@ -188,17 +188,23 @@ def measure_ladder(
         size=size,
         reference=reference,
         converged=Converged(
-            ready.plan.integrator,
-            ready.plan.max_depth,
-            REFERENCE_SPP * reference.passes,
-            reference.passes,
-            judge(reference.mean + reference.noise)[0],
+            integrator=ready.plan.integrator,
+            max_depth=ready.plan.max_depth,
+            spp=REFERENCE_SPP * reference.passes,
+            passes=reference.passes,
+            noise_floor=judge(reference.mean + reference.noise)[0],
         ),
         methods=methods,
         points=tuple(
-            Point(one.name, spp, one.seconds(spp * size[0] * size[1]), *errors[one.name, spp])
-            for one in methods
-            for spp in counts[one.name]
+            Point(
+                method=method.name,
+                spp=spp,
+                seconds=method.seconds(spp * size[0] * size[1]),
+                error=errors[method.name, spp][0],
+                tolerance=errors[method.name, spp][1],
+            )
+            for method in methods
+            for spp in counts[method.name]
         ),
         lines=found,
         steps=steps,
@@ -290,7 +296,7 @@ def _mean_errors(errors: ArrayLike) -> tuple[MeanError, MeanError]:
     each = np.asarray(errors)
     means, halves = each.mean(axis=0), SURE * each.std(axis=0, ddof=1) / sqrt(len(each))
     mean, tolerance = (
-        MeanError(float(m), float(m - half), float(m + half))
+        MeanError(mean=float(m), low=float(m - half), high=float(m + half))
         for m, half in zip(means, halves, strict=True)
     )
     return mean, tolerance
@@ -340,8 +346,17 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
         renderers, judge, renderers, MEASURED_ROUNDS, options.seed, progress, "measuring"
     )
     resize(scene, found.size)
-    return tuple(
-        Point(name, spp, Estimated(min(took), min(took), max(took)), *errors[name, spp])
-        for (name, spp), renderer in renderers.items()
-        if (took := renderer.times[-MEASURED_ROUNDS:])
-    )
+    points = []
+    for (name, spp), renderer in renderers.items():
+        took = renderer.times[-MEASURED_ROUNDS:]
+        error, tolerance = errors[name, spp]
+        points.append(
+            Point(
+                method=name,
+                spp=spp,
+                seconds=Estimated(value=min(took), low=min(took), high=max(took)),
+                error=error,
+                tolerance=tolerance,
+            )
+        )
+    return tuple(points)

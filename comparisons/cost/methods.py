@@ -267,17 +267,18 @@ class Ladder:
         }
         for label, change in changes.items():
             if label in effects:
-                before, kernel = kernel, structs.replace(kernel, **change)
-                yield Step(label, 1.0, self._named(before), self._named(kernel))
+                before = self._named(kernel)
+                kernel = structs.replace(kernel, **change)
+                yield Step(effect=label, weight=1.0, before=before, after=self._named(kernel))
         others = [effect for effect in effects if effect not in changes]
         for order in (others, others[::-1]):
             plans = [
                 self._named(self._form(structs.replace(FULL_PLAN, without=tuple(order[place:]))))
                 for place in range(len(order) + 1)
             ]
-            yield Step("", 0.5, self._named(kernel), plans[0])
+            yield Step(effect="", weight=0.5, before=self._named(kernel), after=plans[0])
             for label, before, after in zip(order, plans, plans[1:], strict=False):
-                yield Step(label, 0.5, before, after)
+                yield Step(effect=label, weight=0.5, before=before, after=after)
 
     def _named(self, form: Method) -> Method:
         """Return the ladder's method of a form, or the form with a name."""

@@ -86,7 +86,13 @@ def _line(counts: NDArray, wall: NDArray, per_sample: Draws, processors: float) 
     between = int(np.argmin(np.abs(counts - counts[-1] / 4)))
     chord = np.interp(counts[between], counts[[0, -1]], wall[[0, -1], 0])
     bend = float(wall[between, 0] / chord - 1)
-    return Line(overhead, per_sample, processors, bend, float(wall[0, 0]))
+    return Line(
+        overhead=overhead,
+        per_sample=per_sample,
+        processors=processors,
+        bend=bend,
+        shortest=float(wall[0, 0]),
+    )
 
 
 def interval(values: ArrayLike, unseen: float) -> Estimated:
@@ -96,7 +102,9 @@ def interval(values: ArrayLike, unseen: float) -> Estimated:
     value = float(values[0])
     below, above = max(value - low, 0.0), max(high - value, 0.0)
     return Estimated(
-        value, value - float(np.hypot(below, unseen)), value + float(np.hypot(above, unseen))
+        value=value,
+        low=value - float(np.hypot(below, unseen)),
+        high=value + float(np.hypot(above, unseen)),
     )
 
 

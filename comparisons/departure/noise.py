@@ -111,8 +111,12 @@ def _fields(metric: Metric, value: float, low: float, high: float, shares: Array
     shares[1] = np.minimum.accumulate(shares[1])
     shares[2] = np.maximum.accumulate(shares[2][::-1])[::-1]
     shares[0] = np.clip(np.minimum.accumulate(shares[0]), *shares[1:])
-    rows = np.column_stack([metric.visible, shares.T]).tolist()
-    visible = tuple(VisibleShare(*row) for row in rows)
+    visible = tuple(
+        VisibleShare(threshold=threshold, value=share, low=lowest, high=highest)
+        for threshold, (share, lowest, highest) in zip(
+            metric.visible, shares.T.tolist(), strict=True
+        )
+    )
     return {"debiased": value, "low": low, "high": high, "visible": visible}
 
 

@@ -49,7 +49,7 @@ class Region(Record):
     ] = None
 
 
-class ObjectShare(Region, kw_only=True):
+class ObjectShare(Region):
     """A shape or a material: the box of its pixels, and its part of the departure.
 
     Attributes

@@ -134,9 +134,9 @@ def summarise_log2_luminance(
         ratio[rows] = log2_luminance_ratio(test[rows], reference[rows])
     values = ratio[np.asarray(mask, bool)]
     if not values.size:
-        return RatioSummary(0.0, 0.0, 0.0, 0.0), ratio
+        return RatioSummary(mean=0.0, p05=0.0, p50=0.0, p95=0.0), ratio
     p05, p50, p95 = map(float, np.percentile(values, (5, 50, 95)))
-    return RatioSummary(float(values.mean(dtype=np.float64)), p05, p50, p95), ratio
+    return RatioSummary(mean=float(values.mean(dtype=np.float64)), p05=p05, p50=p50, p95=p95), ratio
 
 
 def noise_floor(

@@ -137,15 +137,22 @@ def fit(
         viewing=options.viewing,
         pairing=options.pairing,
         loss={"name": loss, "unit": LOSSES[loss].unit},
-        pixels=Pixels(int(rendered.counted.sum()), rendered.counted.size),
-        fits=tuple(one for one, _, _ in fits),
+        pixels=Pixels(counted=int(rendered.counted.sum()), total=rendered.counted.size),
+        fits=tuple(form for form, _, _ in fits),
         best=best,
         warnings=tuple(ready.warnings()),
         versions=versions(),
         time={"rendering_s": rendering, "fitting_s": perf_counter() - begin - rendering},
         command=command,
     )
-    return Fit(record, rendered.before, rendered.reference.mean, *fits[best][1:])
+    _, after, maps = fits[best]
+    return Fit(
+        record=record,
+        before=rendered.before,
+        reference=rendered.reference.mean,
+        after=after,
+        maps=maps,
+    )
 
 
 def _completed(options: Options) -> Options:
@@ -205,7 +212,15 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
     before, reference, difference = (total.estimate() for total in sums)
     seeds = tuple(pass_seed(options.seed, number) for number in range(ready.passes))
     counted, viewing = ready.counted, options.viewing
-    return RenderedHalves(ready, seeds, before.mean, reference, difference, counted, viewing)
+    return RenderedHalves(
+        ready=ready,
+        seeds=seeds,
+        before=before.mean,
+        reference=reference,
+        difference=difference,
+        counted=counted,
+        viewing=viewing,
+    )
 
 
 def _best(
@@ -224,10 +239,10 @@ def _best(
     physical = physical_materials(rendered.ready.pair.physical)
     materials = tuple(
         FittedMaterial(
-            name,
-            physical.get(name),
-            fitted.reached[owner],
-            tuple(
+            name=name,
+            reference=physical.get(name),
+            pixels=fitted.reached[owner],
+            parameters=tuple(
                 parameter_record(fitted, place, x, certainties, covariance)
                 for place, parameter in enumerate(fitted.parameters)
                 if parameter.owner == owner
@@ -293,5 +308,5 @@ def departures(
         )
         before, after_fit = (metric.mean(values[counted]) for values in (first, maps[name]))
         floor = noise_floor(metric, reference, rendered.difference.noise, counted, viewing)
-        by_metric[name] = FitDeparture(before, after_fit, floor)
+        by_metric[name] = FitDeparture(before=before, after=after_fit, noise_floor=floor)
     return by_metric, maps

@@ -38,7 +38,7 @@ class FitDeparture(Record):
     noise_floor: Amount
 
 
-class FittedParameter(Record, kw_only=True):
+class FittedParameter(Record):
     """A parameter as the chapters name it, or of a heuristic's own; of a texture, factors on it."""
 
     name: str
@@ -67,7 +67,7 @@ class FittedMaterial(Record):
     parameters: tuple[FittedParameter, ...]
 
 
-class FormFit(Record, kw_only=True):
+class FormFit(Record):
     """The best fit of one form of the lobe, or of the parameters of a heuristic."""
 
     form: Annotated[str, Meta(description="``phong`` or ``blinn``, or the heuristic.")]
@@ -86,7 +86,7 @@ class FormFit(Record, kw_only=True):
     converged: Annotated[bool, Meta(description="Whether the search that found them did.")]
 
 
-class FitRecord(Record, kw_only=True):
+class FitRecord(Record):
     """The heuristic parameters nearest to one scene's reference, and the remaining error."""
 
     record_version: int = VERSION

@@ -258,23 +258,58 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
     fitted: list[FitParameter] = []
     low, high = EXPONENTS
     for owner, material in enumerate(surface.materials):
-        phong = Phong(material.k_d, material.k_s, material.n, material.form, material.normalised)
+        phong = Phong(
+            k_d=material.k_d,
+            k_s=material.k_s,
+            n=material.n,
+            form=material.form,
+            normalised=material.normalised,
+        )
         paired = {"k_a": material.k_a, "k_d": material.k_d, "k_s": tuple(specular_albedo(phong))}
         if isinstance(surface.ambient, int):  # no ambient light
             del paired["k_a"]
         for name, colour in paired.items():
             if name in surface.samples[owner]:
                 value = float(colour[0])
-                fitted.append(FitParameter(name, owner, value, 0.0, LARGEST_FACTOR, is_factor=True))
+                fitted.append(
+                    FitParameter(
+                        name=name,
+                        owner=owner,
+                        paired=value,
+                        low=0.0,
+                        high=LARGEST_FACTOR,
+                        is_factor=True,
+                    )
+                )
             elif np.ptp(colour) <= 1e-6 * max(colour):
-                fitted.append(FitParameter(name, owner, float(max(colour)), 0.0, 1.0))
+                fitted.append(
+                    FitParameter(
+                        name=name, owner=owner, paired=float(max(colour)), low=0.0, high=1.0
+                    )
+                )
             else:
                 fitted += [
-                    FitParameter(name, owner, float(value), 0.0, 1.0, tuple(tint), channel)
+                    FitParameter(
+                        name=name,
+                        owner=owner,
+                        paired=float(value),
+                        low=0.0,
+                        high=1.0,
+                        tint=tuple(tint),
+                        channel=channel,
+                    )
                     for value, tint, channel in zip(colour, np.eye(3), "RGB", strict=True)
                 ]
         n = exponent_of(alpha_of(material.n, material.form), form)
-        fitted.append(FitParameter("n", owner, log(min(max(n, low), high)), log(low), log(high)))
+        fitted.append(
+            FitParameter(
+                name="n",
+                owner=owner,
+                paired=log(min(max(n, low), high)),
+                low=log(low),
+                high=log(high),
+            )
+        )
     return tuple(fitted)
 
 
@@ -392,7 +427,7 @@ class OwnModel:
         self, renderer: Renderer, heuristic: Heuristic, seeds: Sequence[int], counted: NDArray
     ) -> None:
         self.parameters = tuple(
-            FitParameter(each.name, 0, each.default, each.low, each.high)
+            FitParameter(name=each.name, owner=0, paired=each.default, low=each.low, high=each.high)
             for each in heuristic.parameters
         )
         self.form, self.names = heuristic.name, (heuristic.name,)

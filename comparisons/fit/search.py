@@ -86,12 +86,18 @@ def _perceptual_derivative(rgb, viewing):
 
 
 LOSSES = {
-    "perceptual": Loss("ΔE (CAM16-UCS)", cam16ucs_unclipped, _perceptual_derivative, 0.05, 0.1),
+    "perceptual": Loss(
+        unit="ΔE (CAM16-UCS)",
+        coordinates=cam16ucs_unclipped,
+        derivative=_perceptual_derivative,
+        threshold=0.05,
+        rounding=0.1,
+    ),
     "linear": Loss(
-        "white",
-        lambda rgb, _: rgb,
-        lambda rgb, _: np.broadcast_to(np.eye(3), (len(rgb), 3, 3)),
-        5e-4,
+        unit="white",
+        coordinates=lambda rgb, _: rgb,
+        derivative=lambda rgb, _: np.broadcast_to(np.eye(3), (len(rgb), 3, 3)),
+        threshold=5e-4,
     ),
 }
 

@@ -133,8 +133,13 @@ def _physical() -> Iterator[BuiltIn]:
         ("cornell-box", "The Cornell box: a lamp, shadows and colour bleeding", False),
     ):  # fmt: skip
         make = partial(_spectral if is_spectral else _scene, name.replace("-", "_"))
-        variants = ("llvm_ad_spectral", "llvm_ad_rgb") if is_spectral else ("llvm_ad_rgb",)
-        yield BuiltIn(name, title, make, *variants)
+        yield BuiltIn(
+            name=name,
+            title=title,
+            make=make,
+            variant="llvm_ad_spectral" if is_spectral else "llvm_ad_rgb",
+            heuristic_variant="llvm_ad_rgb" if is_spectral else None,
+        )
 
 
 SCENES = {scene.name: scene for scene in (*_figures(), *_chapter_six(), *_physical())}

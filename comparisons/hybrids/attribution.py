@@ -254,7 +254,8 @@ def attribute(
     )
     closure = jackknifed(left.mean(axis=1), bias)
     hybrids = [
-        Hybrid(labels(effects, each), float(found[0].mean())) for each, found in errors.items()
+        Hybrid(effects=labels(effects, each), error=float(found[0].mean()))
+        for each, found in errors.items()
     ]
 
     def filled(values: NDArray) -> NDArray[np.float64]:
@@ -270,7 +271,7 @@ def attribute(
         record=Attribution(
             effects=contributions,
             departure=float(departure[0].mean()),
-            closure=MeanError(*structs.astuple(closure)),
+            closure=MeanError(mean=closure.value, low=closure.low, high=closure.high),
             implementation=float(rounding.mean()),
             resolution=meter.counted.shape[::-1],
             spp=images.spp,

@@ -201,7 +201,9 @@ def parse(text: str, name: str = "study", folder: Path = Path()) -> StudyFile:
         raise InputError("there are no parts: give at least one [[part]] table.")
     for figure in figures:
         _check_figure(figure, parts)
-    return StudyFile(name, title, tuple(parts.values()), text, figures)
+    return StudyFile(
+        name=name, title=title, parts=tuple(parts.values()), text=text, figures=figures
+    )
 
 
 def _converted(content: Any, kind: Any, where: str) -> Any:

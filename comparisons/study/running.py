@@ -101,7 +101,9 @@ def _points(part: StudyPart) -> Iterator[StudyPoint]:
     content = [own, code, versions()]
     identity = sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
     for number, values in enumerate(points):
-        yield StudyPoint(part, number, values, identity, code is not None)
+        yield StudyPoint(
+            part=part, number=number, values=values, identity=identity, reusable=code is not None
+        )
 
 
 def _check(part: StudyPart, points: list[Point]) -> None:

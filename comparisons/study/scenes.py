@@ -53,21 +53,49 @@ class StudyParameter:
 
 
 ROUGHPLASTIC = {
-    "alpha": StudyParameter("1", 0.02, 1, 0.3, "roughness of roughplastic: root mean square slope"),
-    "int_ior": StudyParameter("1", 1.05, 4, 1.5, "index of refraction of roughplastic"),
-    "reflectance": StudyParameter("1", 0, 1, 0.5, "diffuse reflectance of roughplastic"),
+    "alpha": StudyParameter(
+        unit="1",
+        low=0.02,
+        high=1,
+        default=0.3,
+        meaning="roughness of roughplastic: root mean square slope",
+    ),
+    "int_ior": StudyParameter(
+        unit="1", low=1.05, high=4, default=1.5, meaning="index of refraction of roughplastic"
+    ),
+    "reflectance": StudyParameter(
+        unit="1", low=0, high=1, default=0.5, meaning="diffuse reflectance of roughplastic"
+    ),
 }
 PHONG = {
-    "n": StudyParameter("1", 0, 1e4, 9, "Phong's exponent"),
-    "k_d": StudyParameter("1", 0, 1, 0.5, "diffuse coefficient of Phong's model"),
-    "k_s": StudyParameter("1", 0, 1e4, 0.5, "specular coefficient of Phong's model"),
+    "n": StudyParameter(unit="1", low=0, high=1e4, default=9, meaning="Phong's exponent"),
+    "k_d": StudyParameter(
+        unit="1", low=0, high=1, default=0.5, meaning="diffuse coefficient of Phong's model"
+    ),
+    "k_s": StudyParameter(
+        unit="1", low=0, high=1e4, default=0.5, meaning="specular coefficient of Phong's model"
+    ),
 }
-LIGHT_ANGLE = StudyParameter("deg", 0, 89, 45, "angle of the light to the normal")
-PHASE_ANGLE = StudyParameter(
-    "deg", 0, 90, 45, "angle between the light and the viewer at the centre"
+LIGHT_ANGLE = StudyParameter(
+    unit="deg", low=0, high=89, default=45, meaning="angle of the light to the normal"
 )
-LIGHT_SIZE = StudyParameter("deg", 0.1, 120, 2, "angular diameter of the lamp, from the centre")
-WALL_ALBEDO = StudyParameter("1", 0, 0.95, 0.5, "reflectance of the walls")
+PHASE_ANGLE = StudyParameter(
+    unit="deg",
+    low=0,
+    high=90,
+    default=45,
+    meaning="angle between the light and the viewer at the centre",
+)
+LIGHT_SIZE = StudyParameter(
+    unit="deg",
+    low=0.1,
+    high=120,
+    default=2,
+    meaning="angular diameter of the lamp, from the centre",
+)
+WALL_ALBEDO = StudyParameter(
+    unit="1", low=0, high=0.95, default=0.5, meaning="reflectance of the walls"
+)
 
 
 def bsdf(point: Point) -> Dict:
@@ -150,7 +178,9 @@ studied through paths to their parameters."""
 RENDERED: dict[str, Callable[[Point, Dict], Dict]] = {"sphere": _sphere, "enclosure": _enclosure}
 """What makes the dictionaries of study scenes from a point and a BSDF."""
 
-UNLIMITED = StudyParameter("", -inf, inf, 0, "a parameter of the scene, by its path")
+UNLIMITED = StudyParameter(
+    unit="", low=-inf, high=inf, default=0, meaning="a parameter of the scene, by its path"
+)
 """Any parameter of a user's scene."""
 
 # --- A flat surface ------------------------------------------------------------------------------

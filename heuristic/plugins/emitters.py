@@ -103,7 +103,8 @@ def define() -> dict[str, Any]:
             if "shell" in self.names and props.get("shell", 0.0) > 0:
                 self._keep(props, "shell", mi.Float, 0.0)
             if "extent" in self.names:
-                self.extent = Extent(*(kind(props.get(name, 0.0)) for name, kind in sizes.items()))
+                read = {name: kind(props.get(name, 0.0)) for name, kind in sizes.items()}
+                self.extent = Extent(**read)
                 dr.make_opaque(self.extent)
             self.m_flags = +mi.EmitterFlags.DeltaPosition
             if self.model is DirectionalLight:

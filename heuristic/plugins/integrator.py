@@ -134,9 +134,14 @@ def define() -> dict[str, Any]:
         def model_at(self, scene: Scene, si: Interaction) -> Callable[..., Colour]:
             """Return the heuristic as a function of the arguments of the kernel's ``shade``."""
             prepared = self.known(scene).prepared
-            return lambda *arguments: self.model.evaluate(
-                ShadingArguments(*arguments), si.uv, self.parameters, prepared, si.wavelengths
-            )
+
+            def evaluate(*arguments: Any) -> Colour:
+                shading = ShadingArguments._make(arguments)
+                return self.model.evaluate(
+                    shading, si.uv, self.parameters, prepared, si.wavelengths
+                )
+
+            return evaluate
 
         def known(self, scene: Scene) -> Self:
             """Return the integrator with ``materials`` and ``prepared`` of a scene.

@@ -324,7 +324,7 @@ def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic,
         for target, value in zip(targets, getattr(of_roughplastic(plastic), part), strict=True):
             if abs(value - target) > MATCHING_TOLERANCE * max(target, 1e-3):
                 what = f"{part} albedo at normal incidence"
-                missed[part, target] = Miss(what, float(target), float(value))
+                missed[part, target] = Miss(what=what, wanted=float(target), reached=float(value))
     return plastic, tuple(missed.values())
 
 

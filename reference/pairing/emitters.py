@@ -51,7 +51,12 @@ def to_heuristic(
         if shape is not None:
             graph.detach(shape, key)
         light = LightNode(
-            graph, index, shape, geometry, hide_emitters=hide_emitters, replaced=replaced
+            graph=graph,
+            index=index,
+            shape=shape,
+            geometry=geometry,
+            hide_emitters=hide_emitters,
+            replaced=replaced,
         )
         if light.plugin == "point" and shape is None:
             place, intensity = mi.ScalarPoint3d(*light.position()), light.value("intensity", 1.0)

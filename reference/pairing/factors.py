@@ -124,9 +124,10 @@ class Replacements:
     misses: list[Miss] = field(default_factory=list)
     lost: list[Unrepresentable] = field(default_factory=list)
 
-    def lose(self, *words: str) -> None:
+    def lose(self, name: str, plugin: str, lost: str, nearest: str) -> None:
         """Record what has no form in the heuristic model, see :class:`Unrepresentable`."""
-        self.lost.append(Unrepresentable(*words))
+        record = Unrepresentable(name=name, plugin=plugin, lost=lost, nearest=nearest)
+        self.lost.append(record)
 
     def bsdf(self, name: str, given: str, derived: str, parameters: dict, note: str = "") -> None:
         """Record the partner of a BSDF; a tuple of equal components becomes one number."""
@@ -134,13 +135,19 @@ class Replacements:
             key: value[0] if isinstance(value, tuple) and len(set(value)) == 1 else value
             for key, value in parameters.items()
         }
-        self.bsdfs.append(BsdfPair(name, given, derived, short, note))
+        self.bsdfs.append(
+            BsdfPair(name=name, given=given, derived=derived, parameters=short, note=note)
+        )
 
     def emitter(
         self, name: str, given: str, derived: str, factor: float, exact: bool = True, note: str = ""
     ) -> None:
         """Record the partner of a light."""
-        self.emitters.append(EmitterPair(name, given, derived, factor, exact, note))
+        self.emitters.append(
+            EmitterPair(
+                name=name, given=given, derived=derived, factor=factor, exact=exact, note=note
+            )
+        )
 
 
 def alpha_of(n: float, form: str = "phong") -> float:

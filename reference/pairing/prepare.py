@@ -49,9 +49,9 @@ class Settings:
     occlusion: bool = False
     overridden: list[Override] = field(default_factory=list)
 
-    def override(self, *words: str) -> None:
+    def override(self, what: str, given: str, used: str) -> None:
         """Record a setting that is not used, see :class:`Override`."""
-        self.overridden.append(Override(*words))
+        self.overridden.append(Override(what=what, given=given, used=used))
 
 
 def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -> Settings:

@@ -74,7 +74,14 @@ def probe(bsdf: mi.BSDF) -> Albedos | None:
     alpha = float(np.mean([part[4] for part in parts]))
     if not np.isfinite([*reflected, *diffuse, *passed, *scattered, alpha]).all():
         return None
-    return Albedos(reflected, diffuse, np.maximum(reflected - diffuse, 0), passed, scattered, alpha)
+    return Albedos(
+        reflected=reflected,
+        diffuse=diffuse,
+        specular=np.maximum(reflected - diffuse, 0),
+        passed=passed,
+        scattered=scattered,
+        alpha=alpha,
+    )
 
 
 def with_values(graph: Graph, index: int, **changes: Any) -> Albedos | None:

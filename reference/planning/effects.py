@@ -84,7 +84,7 @@ class Effect:
 
     def decision(self, called_for: bool, kind: str, evidence: str) -> Decision:
         """Return a decision on the effect."""
-        return Decision(self.label, called_for, f"{kind}: {evidence}")
+        return Decision(name=self.label, called_for=called_for, rule=f"{kind}: {evidence}")
 
     def differs(self, facts: Facts, called_for: bool) -> bool:
         """Return whether the two halves differ in it, given whether the scene calls for it."""

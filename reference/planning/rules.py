@@ -78,7 +78,9 @@ class PruningRule:
             objections = ((p.sentence, p.against(facts)) for p in self.premises)
             premise, fault = next((pair for pair in objections if pair[1] is not None), ("", None))
             evidence = self.absent if fault is None else fault
-            facts.rule_results[self.name] = RuleResult(self.name, fault is None, premise, evidence)
+            facts.rule_results[self.name] = RuleResult(
+                name=self.name, applies=fault is None, premise=premise, evidence=evidence
+            )
         return facts.rule_results[self.name]
 
     def objection(self, facts: Facts) -> str | None:

@@ -59,8 +59,9 @@ def _define(_variant: str) -> None:
 
         def __init__(self, props):
             super().__init__(props)
-            own = (props.get(name, value) for name, value in Transport()._asdict().items())
-            self.transports = (Transport(*own),)
+            defaults = Transport()._asdict()
+            given = {name: props.get(name, value) for name, value in defaults.items()}
+            self.transports = (Transport(**given),)
             self.environment_albedo = None
             """An `AlbedoTable` (:mod:`fotismos.reference.pairing.probe`) in place of samples of the
             environment, for one BSDF and nothing that hides it; set after construction."""

@@ -100,7 +100,11 @@ def gbuffer(scene: Scene, width: int = GRID, height: int = GRID) -> GBuffer:
     shape = dr.select(si.instance != None, si.instance, si.shape)  # noqa: E711  of pointers
     shapes = _object_ids(shape, seen)
     return GBuffer(
-        points, normals, seen, shapes, _named_apart(_object_ids(si.bsdf(), seen), shapes)
+        position=points,
+        normal=normals,
+        hit=seen,
+        shape=shapes,
+        bsdf=_named_apart(_object_ids(si.bsdf(), seen), shapes),
     )
 
 

@@ -136,7 +136,12 @@ class Accumulator:
 
     def estimate(self, dtype: type = float) -> Estimate:
         """Return the estimate so far; the number of passes should be even and at least 2."""
-        return Estimate(self.mean(dtype), self.standard_error(dtype), self.noise(dtype), self.count)
+        return Estimate(
+            mean=self.mean(dtype),
+            standard_error=self.standard_error(dtype),
+            noise=self.noise(dtype),
+            passes=self.count,
+        )
 
 
 class DifferenceSums(Accumulator):
@@ -169,7 +174,14 @@ class DifferenceSums(Accumulator):
         places, blocks, total = self._sample
         shape = (len(sizes), len(places), 3)
         sampled = int(blocks.max()) + 1 if len(blocks) else 0
-        grouped = Grouped(means.reshape(shape), sizes, places, blocks, sampled, total)
+        grouped = Grouped(
+            means=means.reshape(shape),
+            sizes=sizes,
+            places=places,
+            blocks=blocks,
+            sampled=sampled,
+            total=total,
+        )
         plain = super().estimate(dtype)
         return DifferenceEstimate(**vars(plain), third=third, grouped=grouped)
 
@@ -230,7 +242,7 @@ def student(value: float, error: float, count: int, bias: float = 0.0) -> Estima
     from scipy.special import stdtrit  # scipy.stats takes a second to import
 
     half = hypot(float(stdtrit(count - 1, 0.5 + LEVEL / 2)) * error, bias)
-    return Estimated(value, value - half, value + half)
+    return Estimated(value=value, low=value - half, high=value + half)
 
 
 def jackknifed(values: ArrayLike, bias: float = 0.0) -> Estimated:

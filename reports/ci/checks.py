@@ -52,7 +52,7 @@ class VersionChange(Record):
     after: str
 
 
-class CheckRecord(Record, kw_only=True, omit_defaults=True):
+class CheckRecord(Record, omit_defaults=True):
     """The result for one baseline; without numbers if it was not compared."""
 
     # Made by functions, which `omit_defaults` does not omit.
@@ -114,7 +114,7 @@ class CheckRecord(Record, kw_only=True, omit_defaults=True):
         return f"versions since the baseline: {changes}" if changes else ""
 
 
-class Checks(Record, kw_only=True):
+class Checks(Record):
     """The results of one command."""
 
     record_version: int = VERSION
@@ -212,7 +212,7 @@ def _checked(file: BaselineFile, case: Case, level: float, progress: Progress | 
 def _record(file: BaselineFile, status: Any, found: Check, begin: float) -> CheckRecord:
     now = versions()
     changed = {
-        name: VersionChange(old, now.get(name, "none"))
+        name: VersionChange(before=old, after=now.get(name, "none"))
         for name, old in file.baseline.versions.items()
         if now.get(name) != old
     }
@@ -227,7 +227,7 @@ def _record(file: BaselineFile, status: Any, found: Check, begin: float) -> Chec
         tested=len(found.moves),
         significance=found.level,
         moved=found.moved,
-        metrics={name: Change(old.value, after[name].value) for name, old in metrics},
+        metrics={name: Change(before=old.value, after=after[name].value) for name, old in metrics},
         versions=changed or None,
     )
 
@@ -351,7 +351,12 @@ def _each(
     """Return the result of each baseline, in order; its path is the first argument."""
     results = {}
     with progress.shown() as bar:
-        tasks = [Task(call[0].name, function, call, bar.of(call[0].stem)) for call in calls]
+        tasks = [
+            Task(
+                name=call[0].name, function=function, arguments=call, progress=bar.of(call[0].stem)
+            )
+            for call in calls
+        ]
         for task, outcome in pool.each(tasks):
             path, error = task.arguments[0], outcome.exception()
             results[path] = (failed(path, error), None) if error else outcome.result()

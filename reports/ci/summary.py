@@ -71,10 +71,10 @@ def gates(
         return []
     return [
         Gate(
-            record.scene,
-            bound,
-            verdict.share(record, threshold),
-            decide(record.metrics[LEADING.name].visible, threshold, bound),
+            scene=record.scene,
+            bound=bound,
+            found=verdict.share(record, threshold),
+            state=decide(record.metrics[LEADING.name].visible, threshold, bound),
         )
         for record in records
     ]

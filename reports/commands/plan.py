@@ -50,7 +50,9 @@ def plan(scene: str, as_json: bool, within: float | None, timeout: float, **rend
         if within is not None:
             with progress.shown() as bar:
                 words = (scene, request, within)
-                result = pool.do(Task(scene, chosen, words, bar.of(scene)))
+                result = pool.do(
+                    Task(name=scene, function=chosen, arguments=words, progress=bar.of(scene))
+                )
             lines, code = cost_tables.choice_lines(result), int(result.chosen is None)
         else:
             result = pool.do(Task(scene, planned, (scene, request)))

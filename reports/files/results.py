@@ -69,7 +69,7 @@ class Failure(Record):
     error: str
 
 
-class RunRecord(Record, kw_only=True):
+class RunRecord(Record):
     """What one command did, besides the records of its scenes: ``run.json``."""
 
     command: str

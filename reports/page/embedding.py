@@ -88,7 +88,7 @@ def packed(planes: Mapping[str, Codes], block: int = 1) -> Embedded:
     signed = ((steps << 1) ^ (steps >> 15)).view(np.uint16)  # small steps of both signs are small
     halves = np.stack([signed & 0xFF, signed >> 8]).astype(np.uint8)
     data = base64.b64encode(zlib.compress(halves.tobytes())).decode("ascii")
-    return Embedded(width, height, block, tuple(planes), data)
+    return Embedded(width=width, height=height, block=block, names=tuple(planes), data=data)
 
 
 def encode(values: ArrayLike, step: int = STEP) -> Codes:

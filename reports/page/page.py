@@ -57,7 +57,7 @@ Runs = list[tuple[int, str]]
 """Texts by the place of the threshold from which each holds."""
 
 
-class PageScene(SceneView, kw_only=True):
+class PageScene(SceneView):
     """A scene in the page: its name in the address, and ``(effect, colour, part)`` of its error."""
 
     id: str

@@ -52,14 +52,14 @@ def why_view(
         map="".join(LETTERS[int(place)] for place in places.ravel()),
     )
     if len(previews) < 2:
-        return WhyView(found)
+        return WhyView(effects=found)
     times = len(previews[0]) // len(counted)
     planes = {"flags": np.uint16(COUNTED) * counted.repeat(times, axis=0).repeat(times, axis=1)}
     for place, each in enumerate(previews):
         layers = {c: each[..., i] for i, c in enumerate("RGB")}
         layers[LEADING.name] = LEADING(each, previews[-1], viewing)
         planes |= {f"{place}.{c}": encode(values, ROUNDED) for c, values in layers.items()}
-    return WhyView(found, packed(planes))
+    return WhyView(effects=found, pictures=packed(planes))
 
 
 def terms_view(grid: TermGrid) -> TermsView:

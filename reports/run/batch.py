@@ -67,7 +67,11 @@ class Batch:
         from fotismos.reports.files.results import Failure
 
         errors = self.errors
-        return [Failure(place, str(errors[place])) for place in self.places if place in errors]
+        return [
+            Failure(scene=place, error=str(errors[place]))
+            for place in self.places
+            if place in errors
+        ]
 
     def record(self) -> RunRecord:
         """The record of the run, with its stages until now."""
@@ -147,7 +151,9 @@ def run(
             _require_inputs_apart(job.request, [folder / place for place in places])
             for name in (TABLES, FIGURES) if job.figures else (TABLES,):
                 results.own(folder / name)
-            batch = Batch(folder, places, on_page, command, job.within)
+            batch = Batch(
+                folder=folder, places=places, on_page=on_page, command=command, within=job.within
+            )
             batch.stages["start-up"] = perf_counter() - START
             calls = {
                 place: (scene, folder, place, replace(job, request=requests[scene]))
@@ -189,7 +195,12 @@ def _compare(
     from fotismos.reports.terminal import tables
 
     tasks = [
-        Task(place, scene.compare, call, bar.of(name_of(call[0]), stages))
+        Task(
+            name=place,
+            function=scene.compare,
+            arguments=call,
+            progress=bar.of(name_of(call[0]), stages),
+        )
         for place, call in calls.items()
     ]
     bar.begin("scenes", len(tasks), SCENE)

@@ -202,7 +202,7 @@ def write(
     digests = {file: _digest(content) for file, content in made.items()}
     digests[PICTURE] = results.digest_of(place / PICTURE)
     results.clear(place, earlier - digests.keys())
-    finished = Finished(view, digests)
+    finished = Finished(view=view, digests=digests)
     atomic.Entry(place / VIEW, key or "none").save(plain(finished))
     results.write(place / RECORD, made[RECORD])
     return view

@@ -25,7 +25,7 @@ class PlannedEffect(Record):
     cost: str
 
 
-class PlanReport(Plan, kw_only=True):
+class PlanReport(Plan):
     """The output of ``fotismos plan --json``."""
 
     scene: str
@@ -51,8 +51,15 @@ def plan_report(scene: str, ready: Prepared, variant: str) -> PlanReport:
 def _planned(decision: Decision) -> PlannedEffect:
     effect = labelled(decision.name)
     rule, _, evidence = decision.rule.partition(": ")
-    forms = effect.heuristic, effect.reference, effect.cost
-    return PlannedEffect(effect.label, decision.called_for, rule, evidence, *forms)
+    return PlannedEffect(
+        name=effect.label,
+        called_for=decision.called_for,
+        rule=rule,
+        evidence=evidence,
+        heuristic=effect.heuristic,
+        reference=effect.reference,
+        cost=effect.cost,
+    )
 
 
 def plan_lines(plan: PlanReport) -> Iterator[str]:
