@@ -138,7 +138,8 @@ class Entry:
     """
 
     def __init__(self, path: str | Path, key: str) -> None:
-        self.path, self.key = Path(path), key
+        self.path = Path(path)
+        self.key = key
 
     def load(self) -> dict[str, Any] | None:
         """Return the mapping; None if there is none, it is damaged, or it has another key.

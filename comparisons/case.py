@@ -15,7 +15,8 @@ from fotismos.reference.planning.plan import wants_spectra
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Script, Source
 
-RGB, SPECTRAL = "llvm_ad_rgb", "llvm_ad_spectral"
+RGB = "llvm_ad_rgb"
+SPECTRAL = "llvm_ad_spectral"
 
 SUFFIXES = (".xml", ".py")
 """Suffixes of scene files: Mitsuba's, and Python's."""

@@ -125,9 +125,11 @@ def _computed_twice(comparison: Comparison) -> Comparison:
     """Note how far colour differences are from those of colour-science, and warn if it is far."""
     from fotismos.comparisons.departure import definitions
 
-    shown, record = comparison.images, comparison.record
+    shown = comparison.images
+    record = comparison.record
     some = np.random.default_rng(0).permutation(np.flatnonzero(shown.counted))[:COMPUTED_TWICE]
-    first, second = (half.reshape(-1, 3)[some] for half in (shown.heuristic, shown.reference))
+    first = shown.heuristic.reshape(-1, 3)[some]
+    second = shown.reference.reshape(-1, 3)[some]
     distances = {name: values.ravel()[some] for name, values in shown.maps.items()}
     largest = definitions.deviations(first, second, distances, record.viewing)
     warnings = [
@@ -160,11 +162,13 @@ def _compare(
         """Note the time of a stage, without what is counted elsewhere."""
         nonlocal begin
         now = perf_counter()
-        stages[stage], begin = now - begin - elsewhere, now
+        stages[stage] = now - begin - elsewhere
+        begin = now
 
     ready = guarded(source, options)
     heuristic: Any = ready.heuristic  # a renderer, or pictures in its place
-    reference, guard = ready.reference, ready.guard
+    reference = ready.reference
+    guard = ready.guard
     assert guard is not None
     done("scene and pairing", ready.planning_seconds + guard.seconds)
     stages |= {"planning": ready.planning_seconds, "guard": guard.seconds}
@@ -234,7 +238,8 @@ def _compare(
 
 def _times(heuristic: Any, reference: Renderer, options: Options) -> TimeSpent:
     """Return the times of both halves, without stages; the time of a picture is not known."""
-    ratio, reason = None, "a picture's time is not known"
+    ratio = None
+    reason = "a picture's time is not known"
     if not options.image:
         ratio, reason = timing.measure(heuristic, reference, options.seed)
     return TimeSpent(
@@ -261,7 +266,8 @@ def render(
     ``counted`` (H, W) are the pixels whose noise counts.
     """
     sums = Accumulator(MEAN), Accumulator(DEVIATION), DifferenceSums(counted)
-    done, reached = 0, None
+    done = 0
+    reached = None
     loop = passes((ready.heuristic, ready.reference), options.seed, ready.passes, progress=progress)
     for one in loop:
         add_difference(sums, one.images)
@@ -312,10 +318,12 @@ def noise_percentile(
 
     The noise is that of the difference of the halves, in which shared noise cancels.
     """
-    reference, noise = sums[1].mean(np.float32), sums[2].noise(np.float32)
+    reference = sums[1].mean(np.float32)
+    noise = sums[2].noise(np.float32)
     if not noise[counted].any():
         return 0.0
-    distance, distances = leading_distance(viewing), []
+    distance = leading_distance(viewing)
+    distances = []
     for rows in bands(len(counted)):
         truth = reference[rows][counted[rows]].astype(np.float64)
         distances.append(distance(truth + noise[rows][counted[rows]], truth))
@@ -329,10 +337,12 @@ def _measure(
 
     The relevant uncertainty is that of the difference, in which shared noise cancels.
     """
-    test, reference = estimates.heuristic, estimates.reference
+    test = estimates.heuristic
+    reference = estimates.reference
     noise = estimates.difference.noise
     counted = surface.hit
-    metrics, maps = {}, {}
+    metrics = {}
+    maps = {}
     for name, metric in METRICS.items():
         metrics[name], distances = statistics.summarise(
             metric, test, reference, counted, options.viewing, noise, estimates.difference.grouped

@@ -116,12 +116,14 @@ def by_kernel(setting: Setting) -> NDArray[np.float32]:
     return np.array(value + dr.zeros(Float, len(columns[0][0])))
 
 
-LIGHT, NORMAL = (1.0, 2.0, 4.0), (0.1, 0.2, 0.9)
+LIGHT = (1.0, 2.0, 4.0)
+NORMAL = (0.1, 0.2, 0.9)
 
 
 def _about_mirror(angle: NDArray) -> NDArray:
     """Return views at angles from the mirror image of :data:`LIGHT` about :data:`NORMAL`."""
-    light, normal = (unit(np.array(v, np.float32).astype(float)) for v in (LIGHT, NORMAL))
+    light = unit(np.array(LIGHT, np.float32).astype(float))
+    normal = unit(np.array(NORMAL, np.float32).astype(float))
     mirror = 2 * (light @ normal) * normal - light
     side = unit(np.cross(mirror, (0.3, 0.5, -0.8)))
     return np.cos(angle)[:, None] * mirror + np.sin(angle)[:, None] * side

@@ -48,7 +48,8 @@ class PictureHalf:
     """
 
     def __init__(self, images: list[np.ndarray], half: Renderer) -> None:
-        self.images, self.half = images, half
+        self.images = images
+        self.half = half
         self.variant = half.variant
         self.times: list[float] = []
         self.compilation = 0.0
@@ -189,7 +190,8 @@ def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> Inp
 
 def _require_plain(path: Path, header: Mapping[str, Any]) -> None:
     """Require a whole picture in BT.709."""
-    data, display = (np.array(header[name]).tolist() for name in ("dataWindow", "displayWindow"))
+    data = np.array(header["dataWindow"]).tolist()
+    display = np.array(header["displayWindow"]).tolist()
     if data != display:
         sizes = (
             f"{right - left + 1}x{bottom - top + 1} from ({left}, {top})"
@@ -245,7 +247,8 @@ def _counted(wrong: np.ndarray) -> str:
 TEMPLATE_SPP = 16
 """Samples per pixel of the image whose edges are compared with a picture's."""
 
-REACH, FINER = 8, 4
+REACH = 8
+FINER = 4
 """Largest shift considered in pixels, at most a quarter of the picture's smaller side; and rays
 along each side of a pixel."""
 
@@ -294,7 +297,8 @@ def _shift(edges: np.ndarray, seen: np.ndarray) -> Place:
     highest = float(table[y, x])
     if highest < LEAST:
         return None, highest
-    down, right = y - reach + _vertex(table[:, x], y), x - reach + _vertex(table[y], x)
+    down = y - reach + _vertex(table[:, x], y)
+    right = x - reach + _vertex(table[y], x)
     return (float(right), float(down)), highest
 
 
@@ -303,7 +307,8 @@ def _correlation(seen: np.ndarray, edges: np.ndarray, down: int, right: int) -> 
     height, width = edges.shape
     a = seen[max(down, 0) : height + down, max(right, 0) : width + right]
     b = edges[max(-down, 0) : height - down, max(-right, 0) : width - right]
-    a, b = a - a.mean(), b - b.mean()
+    a = a - a.mean()
+    b = b - b.mean()
     size = np.sqrt((a * a).sum() * (b * b).sum())
     return float((a * b).sum() / size) if size > 0 else 0.0
 
@@ -360,11 +365,14 @@ def factor_of_pi(level: float) -> str:
 
 # --- Sentences ---------------------------------------------------------------------------------
 
-SHIFT, LEVEL, TINT = 0.5, 2.0, 0.05
+SHIFT = 0.5
+LEVEL = 2.0
+TINT = 0.05
 """Smallest shift in pixels, factor of brightness, and relative difference of the channels' factors
 that are reported."""
 
-BLOCK, EVEN = 8, 0.2
+BLOCK = 8
+EVEN = 0.2
 """A tint is the white's if it spreads by this share at most over blocks of this side in pixels."""
 
 BETTER = 0.5
@@ -375,13 +383,16 @@ def picture_record(
     half: PictureHalf, scene: mi.Scene, options: Options, images: Images
 ) -> PictureRecord:
     """Return the record of the pictures that replace a heuristic half, with its warnings."""
-    shown, reference = (each[images.counted] for each in (images.heuristic, images.reference))
+    shown = images.heuristic[images.counted]
+    reference = images.reference[images.counted]
     half.half.spp = TEMPLATE_SPP
-    template, (height, width) = np.array(half.half.render(0), float), images.counted.shape
+    template = np.array(half.half.render(0), float)
+    (height, width) = images.counted.shape
     expected = [geometry_edges(scene, width, height)]
     expected += [picture_edges(image) for image in (template, images.reference)]
     shift, edges = measure(np.mean(half.images, axis=0), expected)
-    files, ratio = options.image, ratios(shown, reference)
+    files = options.image
+    ratio = ratios(shown, reference)
     record = PictureRecord(
         files=files,
         transfer=options.transfer,
@@ -447,7 +458,8 @@ def _in_pixels(shift: float, ahead: str, back: str) -> str:
 
 def _white(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> Iterator[str]:
     """Yield a tint that is the same everywhere; wrong shading varies over the picture."""
-    shown, expected = (_blocks(each, counted) for each in (picture, reference))
+    shown = _blocks(picture, counted)
+    expected = _blocks(reference, counted)
     logs = np.log(shown / expected)
     logs -= logs.mean(axis=1, keepdims=True)
     tint = np.median(logs, axis=0)
@@ -484,9 +496,11 @@ def _other_reading(picture: np.ndarray, reference: np.ndarray, counted: np.ndarr
 
 def _distance(image: np.ndarray, reference: np.ndarray) -> float:
     """Return the relative RMS difference after the best factor on an image."""
-    image, reference = np.asarray(image, float), np.asarray(reference, float)
+    image = np.asarray(image, float)
+    reference = np.asarray(reference, float)
     # Clipped near display white, or highlights alone would decide.
-    image, reference = (np.minimum(each, 4 * each.mean() + 1e-9) for each in (image, reference))
+    image = np.minimum(image, 4 * image.mean() + 1e-9)
+    reference = np.minimum(reference, 4 * reference.mean() + 1e-9)
     factor = np.sum(image * reference) / max(np.sum(image * image), 1e-30)
     return float(
         np.sqrt(np.mean((factor * image - reference) ** 2) / np.mean(reference**2 + 1e-12))

@@ -164,10 +164,8 @@ class TermGrid:
 
     def light_image(self, light: GridLight) -> NDArray[np.float64]:
         """Return one light's terms, (H, W, 3); 0 where no shaded surface is seen."""
-        k_d, k_s = (
-            np.array([getattr(material, name) for material in self.materials] + [(0.0, 0.0, 0.0)])
-            for name in ("k_d", "k_s")
-        )
+        k_d = np.array([material.k_d for material in self.materials] + [(0.0, 0.0, 0.0)])
+        k_s = np.array([material.k_s for material in self.materials] + [(0.0, 0.0, 0.0)])
         diffuse = k_d[self.material] * np.maximum(light.cos_incidence, 0)[..., None]
         specular = k_s[self.material] * light.lobe[..., None]
         reflected = light.intensity * diffuse + light.specular_intensity * specular
@@ -176,7 +174,8 @@ class TermGrid:
     def _light(self, light: GridLight, material: TermMaterial, place: tuple) -> LightTerms:
         arrays = ("attenuation", "cos_incidence", "cos_view", "lobe")
         here = vars(light) | {name: float(getattr(light, name)[place]) for name in arrays}
-        n_l, fading = here["cos_incidence"], here["attenuation"]
+        n_l = here["cos_incidence"]
+        fading = here["attenuation"]
         return LightTerms(
             **here,
             cos_reflection=2 * n_l * float(self.cos_view[place]) - here["cos_view"],
@@ -265,7 +264,8 @@ def _without_sum(half: Renderer, options: Options) -> str:
 
 def _live(half: Renderer, options: Options) -> LivePoints | str:
     scene = half.scene
-    emitters, sensor = lamps(scene), scene.sensors()[0]
+    emitters = lamps(scene)
+    sensor = scene.sensors()[0]
     if len(emitters) > LIVE_LIGHTS:
         return f"There are more than {LIVE_LIGHTS} lights."
     if not isinstance(sensor, mi.ProjectiveCamera):
@@ -273,11 +273,13 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
     size = shrunk(image_size(scene), LIVE_SIDE)
     ray = pixel_rays(scene, size, *np.meshgrid(*map(np.arange, size)))
     ahead = sensor.world_transform() @ mi.Vector3f(0, 0, 1)
-    film, corners = (ray.o, ray.d / dr.dot(ray.d, ahead)), [0, size[0] - 1, -size[0]]
+    film = (ray.o, ray.d / dr.dot(ray.d, ahead))
+    corners = [0, size[0] - 1, -size[0]]
     points = _Points(scene, half.integrator, ray)
     if not points.hit.any():
         return "No pixel’s centre sees a shaded surface."
-    (materials, places), vectors = points.materials(), dict[str, NDArray]()
+    (materials, places) = points.materials()
+    vectors = dict[str, NDArray]()
     if len(materials) > MATERIALS:
         vectors["k_d"] = points.select(lambda material: points.colours(material.k_d))
         has_ambient = points.colours(points.ambient).any()  # else k_a, too, does not matter
@@ -334,7 +336,8 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
         return grid
     images = [grid.light_image(light) for light in lights]
     order = np.argsort([-image.sum() for image in images], kind="stable")
-    strongest, others = sorted(order[:LIGHTS]), sum(images[number] for number in order[LIGHTS:])
+    strongest = sorted(order[:LIGHTS])
+    others = sum(images[number] for number in order[LIGHTS:])
     return replace(grid, lights=tuple(lights[number] for number in strongest), others=others)
 
 
@@ -397,8 +400,13 @@ class _Points:
 
     def _material(self, row: list[float]) -> TermMaterial:
         number, *values = row
-        k_i, k_a, k_d, k_s, ambient = (_colour(values[i : i + 3]) for i in (0, 3, 6, 9, 14))
-        name, form = self.known.bsdfs[int(number)].id(), FORMS[int(values[13])]
+        k_i = _colour(values[0 : 0 + 3])
+        k_a = _colour(values[3 : 3 + 3])
+        k_d = _colour(values[6 : 6 + 3])
+        k_s = _colour(values[9 : 9 + 3])
+        ambient = _colour(values[14 : 14 + 3])
+        name = self.known.bsdfs[int(number)].id()
+        form = FORMS[int(values[13])]
         return TermMaterial(
             name=name, k_i=k_i, k_a=k_a, k_d=k_d, k_s=k_s, n=values[12], form=form, ambient=ambient
         )
@@ -447,8 +455,10 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
     """
     if _without_sum(half, options):
         return {}
-    integrator, scene = half.integrator, half.scene
-    hidden, images = integrator.hide_emitters, dict.fromkeys(TERMS, 0 * whole)
+    integrator = half.integrator
+    scene = half.scene
+    hidden = integrator.hide_emitters
+    images = dict.fromkeys(TERMS, 0 * whole)
     with variant(half.variant):
         bsdfs = integrator.known(scene).materials.bsdfs
         there = {*(k for bsdf in bsdfs for k in bsdf.present), *["k_i"] * bool(scene.environment())}
@@ -466,7 +476,8 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
         finally:
             del integrator.model_at, integrator.shares
             integrator.hide_emitters = hidden
-    together, rest = sum(images.values()), whole
+    together = sum(images.values())
+    rest = whole
     for name in names[:-1]:
         share = np.divide(images[name], together, out=0 * whole, where=together != 0)
         images[name] = whole * share.clip(0, 1)

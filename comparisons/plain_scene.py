@@ -88,7 +88,8 @@ def plain_scene(source: Source, options: Options) -> PlainScene:
 
 def _layers(scene: Scene) -> dict[str, np.ndarray]:
     """Trace the rays through the pixel centres."""
-    seen, ids = gbuffer(scene, *image_size(scene)), [shape.id() for shape in scene.shapes()]
+    seen = gbuffer(scene, *image_size(scene))
+    ids = [shape.id() for shape in scene.shapes()]
     numbers = [ids.index(name) + 1 if name in ids else 0 for name in seen.shape.names]
     shape = np.array([*numbers, 0], np.float32)[seen.shape.places]
     return {"P": seen.position, "N": seen.normal, "shape": shape}
@@ -114,7 +115,8 @@ def camera(scene: mi.Scene) -> dict:
     width, height = (int(side) for side in sensor.film().crop_size())
     to_world = np.array(values["to_world"].matrix, float).reshape(4, 4, -1)[..., 0]
     x_fov = numbers(values["x_fov"])[0]
-    near, far = float(sensor.near_clip()), float(sensor.far_clip())
+    near = float(sensor.near_clip())
+    far = float(sensor.far_clip())
     scale = 1 / tan(radians(x_fov) / 2)
     depth = far - near
     projection = [

@@ -63,7 +63,8 @@ def schedule(
     passes = max(2, min(plan.passes, spp // 4 // 2 * 2))
     each = max(1, spp // passes)
     if each > largest:
-        each, passes = largest, max(2, -(-spp // largest // 2) * 2)
+        each = largest
+        passes = max(2, -(-spp // largest // 2) * 2)
     return each, passes
 
 
@@ -95,7 +96,8 @@ class Prepared:
     @property
     def overridden(self) -> tuple[Override, ...]:
         """The settings of the scene that are not used, and what is used instead."""
-        pair, plan = self.pair, self.plan
+        pair = self.pair
+        plan = self.plan
         used = f"{plan.sampler}, {self.reference.spp * self.passes} samples per pixel"
         overrides = [
             structs.replace(entry, used=used) if entry.what == "sampler" else entry
@@ -129,7 +131,8 @@ class Prepared:
 
     def plan_record(self, passes: int) -> Plan:
         """Return the plan with the samples and passes that were rendered."""
-        spp, reads = self.reference.spp * passes, named(self.pair.shading).inputs
+        spp = self.reference.spp * passes
+        reads = named(self.pair.shading).inputs
         return structs.replace(
             self.plan, spp=spp, passes=passes, heuristic_reads=reads, guard=self.guard
         )
@@ -181,7 +184,8 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
     gc.collect()
     spp, passes = schedule(chosen, width * height, options.spp, options.noise)
     if len(options.image) > 1:  # a pass for each repeat
-        spp, passes = max(1, spp * passes // len(options.image)), len(options.image)
+        spp = max(1, spp * passes // len(options.image))
+        passes = len(options.image)
     return Prepared(
         pair=pair,
         plan=chosen,

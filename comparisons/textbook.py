@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-NAIVE, EXACT = np.float32, np.longdouble
+NAIVE = np.float32
+EXACT = np.longdouble
 
 
 def dot(a: NDArray, b: NDArray) -> NDArray:
@@ -80,7 +81,8 @@ def shade(setting: Setting, dtype: Any) -> NDArray:
     s = setting
     with np.errstate(all="ignore"):
         normal, view, offset = _vectors(s, dtype)
-        normal, view = unit(normal), unit(view)
+        normal = unit(normal)
+        view = unit(view)
         distance = np.sqrt(dot(offset, offset))
         toward = offset / distance
         cosine = dot(normal, toward)[..., 0]
@@ -114,7 +116,8 @@ def shade_exactly(setting: Setting) -> NDArray:
 
 def _vectors(s: Setting, dtype: Any) -> tuple[NDArray, NDArray, NDArray]:
     """Return normal, view, and the way to the light."""
-    normal, view, light, position = (
-        np.asarray(each).astype(dtype) for each in (s.normal, s.view, s.light, s.position)
-    )
+    normal = np.asarray(s.normal).astype(dtype)
+    view = np.asarray(s.view).astype(dtype)
+    light = np.asarray(s.light).astype(dtype)
+    position = np.asarray(s.position).astype(dtype)
     return normal, view, light - position

@@ -15,7 +15,8 @@ from fotismos.reference.rendering.sums import student
 WARM = 1
 """Passes that do not count: the first one compiles, or wakes the threads."""
 
-FEWEST, MOST = 3, 48
+FEWEST = 3
+MOST = 48
 """Pairs of passes that make a ratio."""
 
 BATCHES = 6

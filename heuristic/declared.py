@@ -19,7 +19,8 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
     """
 
     def __init__(self, kind: str, group: str, **own: str) -> None:
-        self.kind, self.group = kind, group
+        self.kind = kind
+        self.group = group
         self._own: dict[str, Any] = {name.replace("_", "-"): place for name, place in own.items()}
         self.added: dict[str, Declaration] = {}
         self._is_loaded = False

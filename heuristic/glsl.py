@@ -149,7 +149,8 @@ class Shader:
     """
 
     def __init__(self, file: str, text: str) -> None:
-        self.file, self.text = file, text
+        self.file = file
+        self.text = text
         code = bare(text)
         self.words = frozenset(re.findall(r"\b[A-Za-z_]\w*", code))
         match = _SHADE.search(code)
@@ -226,7 +227,8 @@ class Shader:
 
         One buffer holds the floats, each for all points before the next.
         """
-        readings, number = [], 0
+        readings = []
+        number = 0
         for name, size in self.fields(lights).items():
             parts = [f"fotismos_read({number + part}, index)" for part in range(size)]
             is_mask = " > 0.5" if name.endswith(".visible") else ""

@@ -42,10 +42,8 @@ LOADERS = {
 }
 """Functions that read a user's file by its suffix, imported when a name has it."""
 
-OF_FUNCTION, SHADED = (
-    "fotismos.heuristic.user_shaders:of_function",
-    "fotismos.heuristic.user_shaders:shaded",
-)
+OF_FUNCTION = "fotismos.heuristic.user_shaders:of_function"
+SHADED = "fotismos.heuristic.user_shaders:shaded"
 """Make a heuristic of a function, and call and check a user's; imported as late."""
 
 _FILE = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)

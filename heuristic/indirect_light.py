@@ -59,7 +59,8 @@ def weighted_mean(arriving: Doubles, k_d: Doubles) -> Doubles:
 
     ``k_d`` times it has the same mean over the image as ``k_d`` times the arriving light.
     """
-    weight, total = k_d.sum(axis=0), (arriving * k_d).sum(axis=0)
+    weight = k_d.sum(axis=0)
+    total = (arriving * k_d).sum(axis=0)
     return np.asarray(np.divide(total, weight, out=np.zeros_like(total), where=weight > 0))
 
 
@@ -139,7 +140,8 @@ def fit(normal: Doubles, arriving: Doubles, k_d: Doubles, up: Doubles) -> tuple[
     be negative it is 0, and the other alone keeps the mean.
     """
     cosine = (normal @ up)[:, None]
-    total, mean = k_d.sum(axis=0), weighted_mean(arriving, k_d)
+    total = k_d.sum(axis=0)
+    mean = weighted_mean(arriving, k_d)
     share = np.divide(k_d, total, out=np.zeros_like(k_d), where=total > 0)
     middle = (share * cosine).sum(axis=0)
     spread = (share * (cosine - middle) ** 2).sum(axis=0) + EVENNESS

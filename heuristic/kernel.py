@@ -143,7 +143,8 @@ def sum_lights(
         for name, part in parts.items():
             # A sum of thousands would lose terms below its last digit (Neumaier).
             sums[name] = numerics.add(*sums[name], part) if name in sums else (part, 0)
-    diffuse, specular = (sums.get(name, (None, 0)) for name in ("diffuse", "specular"))
+    diffuse = sums.get("diffuse", (None, 0))
+    specular = sums.get("specular", (None, 0))
     return numerics.summed(*diffuse), numerics.summed(*specular)
 
 

@@ -8,8 +8,10 @@ import numpy as np
 
 from fotismos.heuristic.convention import Array, Direction, Mesh, Position, Vector
 
-POSITIONS, NORMALS = "vertex_positions", "vertex_normals"
-TEXCOORDS, FACES = "vertex_texcoords", "faces"
+POSITIONS = "vertex_positions"
+NORMALS = "vertex_normals"
+TEXCOORDS = "vertex_texcoords"
+FACES = "faces"
 """The arrays of a mesh, by their names in ``mitsuba.traverse``."""
 
 

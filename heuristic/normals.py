@@ -111,7 +111,8 @@ def unit(vector: Vector) -> Direction:
 
 def unit_cross(a: Vector, b: Vector) -> Direction:
     """Return ``a x b / |a x b|``, and zero where the two are parallel or one is zero."""
-    a, b = _scaled(a), _scaled(b)
+    a = _scaled(a)
+    b = _scaled(b)
     product = cross(a, b)
     limit = dr.square(PARALLEL_STEPS * dr.epsilon(a))
     is_turned = dr.squared_norm(product) > limit * dr.squared_norm(a) * dr.squared_norm(b)
@@ -140,7 +141,9 @@ def shorter_edges(a: Vector, b: Vector, c: Vector) -> tuple[Vector, Vector]:
     Any two give the same cross product. In a needle the two long edges are nearly parallel, and
     their product is lost to rounding, while the short one is at a large angle to both.
     """
-    square_a, square_b, square_c = (dr.squared_norm(edge) for edge in (a, b, c))
+    square_a = dr.squared_norm(a)
+    square_b = dr.squared_norm(b)
+    square_c = dr.squared_norm(c)
     omit_a = (square_a > square_b) & (square_a > square_c)
     omit_b = square_b > square_c  # matters only if a stays
     first = dr.select(omit_a, b, dr.select(omit_b, c, a))

@@ -100,7 +100,8 @@ def log2_of(value: Any, complement: Number) -> Number:
         rest = dr.select(exponent == 0, -complement, dr.fma(value, to_mantissa, -1))
         return dr.fma(rest, _polynomial(rest, _LOG2), type(value)(exponent))
     rounded = 1 - complement
-    is_far, is_same = complement > 0.5, rounded == 1
+    is_far = complement > 0.5
+    is_same = rounded == 1
     quotient = dr.select(is_far | is_same, 1, complement / dr.select(is_same, 1, 1 - rounded))
     logarithm = dr.log2(dr.select(is_far, value, rounded)) * quotient
     return dr.select(is_same, -complement / _LN_2, logarithm)
@@ -252,9 +253,12 @@ def _inverse_root_power(square: Number) -> Number:
         usable = 0 < square < inf
         return 2.0 ** (-round(log2(square) / 2)) if usable else 2.0 ** (-513 if square else 511)
     if _is_single(square):
-        integer, magic, mask = dr.uint32_array_t(type(square)), 0x5F3759DF, 0x7F800000
+        integer = dr.uint32_array_t(type(square))
+        magic = 0x5F3759DF
+        mask = 0x7F800000
     else:
-        integer, magic = dr.uint64_array_t(type(square)), 0x5FE6EB50C7B537A9
+        integer = dr.uint64_array_t(type(square))
+        magic = 0x5FE6EB50C7B537A9
         mask = 0x7FF0000000000000
     bits = dr.reinterpret_array(integer, square)
     return dr.reinterpret_array(type(square), (integer(magic) - (bits >> 1)) & mask)

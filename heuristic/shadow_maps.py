@@ -59,10 +59,8 @@ class DepthImage:
         if self.frame is None:
             distance = dr.norm(offset)
             return distance, distance * (2 / size), _cube_texel(offset, size)
-        x, y = (
-            dr.clip(mi.Int32(dr.floor((place / self.radius + 1) * (size / 2))), 0, size - 1)
-            for place in (offset.x, offset.y)
-        )
+        x = dr.clip(mi.Int32(dr.floor((offset.x / self.radius + 1) * (size / 2))), 0, size - 1)
+        y = dr.clip(mi.Int32(dr.floor((offset.y / self.radius + 1) * (size / 2))), 0, size - 1)
         return offset.z, self.radius * (2 / size), mi.UInt32(y * size + x)
 
 
@@ -77,14 +75,13 @@ def light_map(scene: Any, light: Any, resolution: int) -> DepthImage:
         depths = _traced(scene, centre + toward * start, toward) + start
         dr.eval(depths, centre)
         return DepthImage(resolution, depths, centre)
-    centre, size = mi.Point3f(((low + high) / 2).tolist()), mi.Float(radius)
+    centre = mi.Point3f(((low + high) / 2).tolist())
+    size = mi.Float(radius)
     dr.make_opaque(centre, size)
     frame = mi.Frame3f(dr.normalize(mi.Vector3f(light.direction)))
     texel = dr.arange(mi.UInt32, resolution**2)
-    x, y = (
-        (2 * (mi.Float(part) + 0.5) / resolution - 1) * size
-        for part in (texel % resolution, texel // resolution)
-    )
+    x = (2 * (mi.Float(texel % resolution) + 0.5) / resolution - 1) * size
+    y = (2 * (mi.Float(texel // resolution) + 0.5) / resolution - 1) * size
     origin = centre + frame.s * x + frame.t * y - frame.n * size
     depths = _traced(scene, origin, frame.n)
     dr.eval(depths, frame)
@@ -116,8 +113,10 @@ def _traced(scene: Any, origin: Any, toward: Any) -> Any:
 def _cube_direction(size: int) -> Any:
     """Return the directions of all texels of a cube: side after side, row after row."""
     texel = dr.arange(mi.UInt32, 6 * size**2)
-    side, inside = texel // size**2, texel % size**2
-    u, v = (2 * (mi.Float(part) + 0.5) / size - 1 for part in (inside % size, inside // size))
+    side = texel // size**2
+    inside = texel % size**2
+    u = 2 * (mi.Float(inside % size) + 0.5) / size - 1
+    v = 2 * (mi.Float(inside // size) + 0.5) / size - 1
     major = dr.select(side % 2 == 0, mi.Float(1), -1)
     axis = side // 2
     return dr.select(
@@ -138,7 +137,8 @@ def _cube_texel(place: Any, size: int) -> Any:
     axis = dr.select(is_x, mi.UInt32(0), dr.select(is_y, mi.UInt32(1), 2))
     side = 2 * axis + dr.select(major >= 0, mi.UInt32(0), 1)
     inverse = dr.select(major != 0, 1 / abs(major), 0)
-    x, y = (mi.UInt32(dr.clip((part * inverse + 1) * (0.5 * size), 0, size - 1)) for part in (u, v))
+    x = mi.UInt32(dr.clip((u * inverse + 1) * (0.5 * size), 0, size - 1))
+    y = mi.UInt32(dr.clip((v * inverse + 1) * (0.5 * size), 0, size - 1))
     return (side * size + y) * size + x
 
 

@@ -150,7 +150,8 @@ def attenuation_root(
         inverse = 1 / dr.select(is_away, distance, 1)
     if numerics.is_number(k0, 0) and numerics.is_number(k1, 0):
         return dr.select(is_away, inverse * _inverse_root(float_type(k2), at_zero), at_zero)
-    first, last = float_type(k0), float_type(k2)
+    first = float_type(k0)
+    last = float_type(k2)
     is_far = last * distance >= numerics.at_least(first * inverse, float_type(k1))
     is_far &= is_away & (last > 0)
     place = dr.select(is_far, inverse, distance)

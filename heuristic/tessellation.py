@@ -122,12 +122,15 @@ def _cells(resolution: int) -> dict[Any, tuple[int, int]]:
 def _tessellated(shape: Shape, kind: Any, columns: int, rows: int) -> Mesh:
     """Evaluate a shape at the corners of a grid of cells, and join them by triangles."""
     index = dr.arange(mi.UInt32, (columns + 1) * (rows + 1))
-    column, row = index % (columns + 1), index // (columns + 1)
+    column = index % (columns + 1)
+    row = index // (columns + 1)
     uv = mi.Point2f(mi.Float(column) / columns, mi.Float(row) / rows)
     points, surface_normals = _surface(shape, kind, _closed(kind, uv))
     cell = dr.arange(mi.UInt32, columns * rows)
     first = cell + cell // columns
-    second, third, fourth = first + 1, first + columns + 2, first + columns + 1
+    second = first + 1
+    third = first + columns + 2
+    fourth = first + columns + 1
     corners = mi.Vector3u(
         dr.concat([first, first]), dr.concat([second, third]), dr.concat([third, fourth])
     )
@@ -145,17 +148,16 @@ def _surface(shape: Shape, kind: Any, uv: Array) -> tuple[Position, Direction]:
     if kind in (mi.ShapeType.Cylinder, mi.ShapeType.Disk):
         # Mitsuba finds the point with a ray, which may miss the rim; the shape is straight across.
         along_u = kind == mi.ShapeType.Disk
-        low, high = (
-            _evaluated(shape, mi.Point2f(s, uv.y) if along_u else mi.Point2f(uv.x, s))
-            for s in (0.25, 0.75)
-        )
+        low = _evaluated(shape, mi.Point2f(0.25, uv.y) if along_u else mi.Point2f(uv.x, 0.25))
+        high = _evaluated(shape, mi.Point2f(0.75, uv.y) if along_u else mi.Point2f(uv.x, 0.75))
         points = dr.lerp(low.p, high.p, 2 * (uv.x if along_u else uv.y) - 0.5)
         normals = low.n
     else:
         si = _evaluated(shape, uv)
         # Mitsuba's rectangle ignores its orientation in its parametrisation.
         flipped = kind == mi.ShapeType.Rectangle and shape.has_flipped_normals()
-        points, normals = si.p, -si.n if flipped else si.n
+        points = si.p
+        normals = -si.n if flipped else si.n
     everywhere = dr.zeros(mi.Vector3f, dr.width(uv))  # plane shapes have a single normal
     return mi.Vector3f(points), mi.Vector3f(normals) + everywhere
 
@@ -173,7 +175,8 @@ def _evaluated(shape: Shape, uv: Array) -> Interaction:
 
 def _closed(kind: Any, uv: Array) -> Array:
     """Make both ends of a circle, and all meridians at a pole or centre, meet in one point."""
-    full_turn_u, full_turn_v = dr.select(uv.x < 1, uv.x, 0), dr.select(uv.y < 1, uv.y, 0)
+    full_turn_u = dr.select(uv.x < 1, uv.x, 0)
+    full_turn_v = dr.select(uv.y < 1, uv.y, 0)
     if kind == mi.ShapeType.Sphere:
         return mi.Point2f(dr.select((uv.y > 0) & (uv.y < 1), full_turn_u, 0), uv.y)
     if kind == mi.ShapeType.Cylinder:

@@ -32,8 +32,12 @@ def contained(path: Path) -> Iterator[set[Path]]:
     the block, the files of those modules. A process that the code forks ends here instead of
     continuing alongside its parent.
     """
-    pid, folder, environment = os.getpid(), os.getcwd(), dict(os.environ)
-    arguments, places, modules = list(sys.argv), list(sys.path), set(sys.modules)
+    pid = os.getpid()
+    folder = os.getcwd()
+    environment = dict(os.environ)
+    arguments = list(sys.argv)
+    places = list(sys.path)
+    modules = set(sys.modules)
     umask = os.umask(0o022)
     os.umask(umask)
     numpy_errors = np.geterr()
@@ -49,7 +53,8 @@ def contained(path: Path) -> Iterator[set[Path]]:
         np.seterr(**numpy_errors)
         os.environ.clear()
         os.environ.update(environment)
-        sys.argv[:], sys.path[:] = arguments, places
+        sys.argv[:] = arguments
+        sys.path[:] = places
         for name in set(sys.modules) - modules:
             module = sys.modules[name]
             file = getattr(module, "__file__", None)

@@ -69,7 +69,8 @@ _known: dict[tuple[str, Path, str | None], Heuristic] = {}
 def from_file(word: str) -> Heuristic:
     """Return the heuristic that a word names, for the current variant of Mitsuba."""
     name, function = in_file(word) or (word, "")
-    path, function = Path(name), function or FUNCTION
+    path = Path(name)
+    function = function or FUNCTION
     key = word, path.resolve(), mi.variant()
     known = _known.get(key)
     if known is None or known.code != content_digest(known.files):
@@ -217,7 +218,8 @@ def shaded(name: str, shade: Callable[[Point], Any], point: Point) -> Any:
     if not (depth == 1 or (depth == 2 and dr.size_v(value) == components)):
         raise InputError(f"{returned} a value {type_of(value)}; {expected}.")
     if not dr.flag(dr.JitFlag.SymbolicScope):
-        width, points = dr.width(value), dr.width(point.arguments.position)
+        width = dr.width(value)
+        points = dr.width(point.arguments.position)
         if width not in (1, points):
             raise InputError(f"{returned} {width} values for {points} points; {expected}.")
     return mi.Spectrum(value)

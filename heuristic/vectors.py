@@ -120,7 +120,8 @@ def local_lobe(form: str, is_moderate: bool, wi: Direction, wo: Direction) -> Co
     Same as :func:`lobe`, for directions above the horizon.
     """
     unit = normalise if is_moderate else numerics.wide_unit
-    view, toward = unit(wi), unit(wo)
+    view = unit(wi)
+    toward = unit(wo)
     vector = type(view)
     if form == "blinn":
         sides = vector(0, 0, 1), unit(view + toward)

@@ -110,7 +110,8 @@ def sentence(
     """Return what to do about a scene at a tolerance: nothing that fails the criterion itself."""
     if record.caution:
         return record.caution
-    lead, found = record.metrics[LEADING.name], share(record, threshold)
+    lead = record.metrics[LEADING.name]
+    found = share(record, threshold)
     match decision(record, threshold):
         case "pass":
             return "Exact, as far as can be seen." if lead.high <= EXACT else "Nothing to do."

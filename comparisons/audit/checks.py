@@ -26,7 +26,8 @@ from fotismos.reference.records import VERSION, Amount, Record, Versions
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 89.0)
 """Degrees from the normal."""
 
-LIGHTS, VIEWS = (0.0, 30.0, 60.0), tuple(np.arange(-88.0, 89.0, 2.0).tolist())
+LIGHTS = (0.0, 30.0, 60.0)
+VIEWS = tuple(np.arange(-88.0, 89.0, 2.0).tolist())
 """Of lobes: degrees from the normal, in the plane of incidence; the light's side is negative."""
 
 PICTURED = 0.3
@@ -174,9 +175,11 @@ def all_checks(
 
 def curve(subject: Subject, material: str) -> MaterialCurves:
     """Return the albedos of a white material over the angles, and its lobes."""
-    response, alpha = partial(subject.response, material), subject.materials[material]
+    response = partial(subject.response, material)
+    alpha = subject.materials[material]
     lights = LIGHTS if alpha in (None, PICTURED) else ()
-    angles, by = furnace.both_sides(ANGLES, subject.eta), (subject.grid, subject.eta)
+    angles = furnace.both_sides(ANGLES, subject.eta)
+    by = (subject.grid, subject.eta)
     return MaterialCurves(
         material=material,
         alpha=alpha,
@@ -231,7 +234,8 @@ def horizon(subject: Subject) -> Checked:
     """Check that no value jumps as a light along x sets."""
     polar, azimuth = np.meshgrid(np.linspace(0, 80, 33), np.linspace(0, 180, 61))
     view = furnace.direction(np.deg2rad(polar.ravel()), np.deg2rad(azimuth.ravel()))
-    above, below = (np.tile([[1.0], [0.0], [z]], view.shape[1]) for z in (GRAZING, -GRAZING))
+    above = np.tile([[1.0], [0.0], [GRAZING]], view.shape[1])
+    below = np.tile([[1.0], [0.0], [(-GRAZING)]], view.shape[1])
     jumps = {
         material: np.abs(
             subject.response(material, above, view) - subject.response(material, below, view)
@@ -248,7 +252,8 @@ def light_from_below(subject: Subject) -> Checked:
         return _checked("light from below", None, None, "0", "it transmits light")
     degrees = np.linspace(91, 180, 90), np.arange(0, 181, 20.0), np.array([0.0, 30, 60, 80])
     polar, azimuth, viewer = (np.deg2rad(each.ravel()) for each in np.meshgrid(*degrees))
-    light, view = furnace.direction(polar, azimuth), furnace.direction(viewer, 0 * viewer)
+    light = furnace.direction(polar, azimuth)
+    view = furnace.direction(viewer, 0 * viewer)
     shown = {material: subject.response(material, light, view) for material in subject.materials}
     value, worst = _largest(shown, light, view)
     return _checked("light from below", value <= 1e-5, value, "0", worst)
@@ -296,11 +301,13 @@ def _largest(
 STEP = 0.02
 """Step of a finite difference, relative to the number."""
 
-QUANTILE, AGREES = 0.9, 0.05
+QUANTILE = 0.9
+AGREES = 0.05
 """Largest relative difference at this quantile of the points: others may lie at kinks, where the
 two rightly differ."""
 
-FAINT, NOTHING = 1e-3, 1e-5
+FAINT = 1e-3
+NOTHING = 1e-5
 """Derivatives below the former share of the largest are judged by their absolute difference; if all
 are below the latter, they are rounding errors."""
 
@@ -328,7 +335,8 @@ def disagreement(centre: float, shade: Any) -> float:
         dr.set_grad(number, 1.0)
         automatic = np.array(dr.forward_to(value), float)
     # Richardson's extrapolation of two central differences.
-    wide, narrow = (_central(shade, centre, step * centre) for step in (STEP, STEP / 2))
+    wide = _central(shade, centre, STEP * centre)
+    narrow = _central(shade, centre, (STEP / 2) * centre)
     finite = np.broadcast_to((4 * narrow - wide) / 3, len(automatic))
     size = np.maximum(np.abs(automatic), np.abs(finite))
     if not np.isfinite(size).all():
@@ -340,5 +348,6 @@ def disagreement(centre: float, shade: Any) -> float:
 
 
 def _central(shade: Any, centre: float, step: float) -> np.ndarray:
-    above, below = (np.array(dr.detach(shade(mi.Float(centre + h))), float) for h in (step, -step))
+    above = np.array(dr.detach(shade(mi.Float(centre + step))), float)
+    below = np.array(dr.detach(shade(mi.Float(centre + (-step)))), float)
     return (above - below) / (2 * step)

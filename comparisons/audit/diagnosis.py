@@ -146,10 +146,12 @@ def _fit(terms: Array, values: Array, counts: Array) -> TermFit:
     if not np.isfinite(values).all():
         return np.zeros((3, 4)), np.inf
     weights = counts / (np.abs(values) + np.median(np.abs(values)) + 1e-9)
-    coefficients, left = [], []
+    coefficients = []
+    left = []
     for channel in range(3):
         weight = weights[:, channel]
-        matrix, target = (terms[:, :, channel] * weight).T, values[:, channel] * weight
+        matrix = (terms[:, :, channel] * weight).T
+        target = values[:, channel] * weight
         size = np.sqrt((matrix**2).mean(axis=0)) + 1e-12
         solved = np.linalg.lstsq(matrix / size, target, rcond=1e-9)[0] / size
         coefficients.append(solved)

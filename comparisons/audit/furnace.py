@@ -39,7 +39,8 @@ def of_bsdf(bsdf: Any) -> Response:
 def evaluate(bsdf: Any, light: NDArray, view: NDArray) -> Any:
     """Return a BSDF's response as a Dr.Jit array; Mitsuba's ``wi`` is the viewer's side."""
     count = max(light.shape[1], view.shape[1])
-    toward, wi = (mi.Vector3f(np.broadcast_to(each, (3, count))) for each in (light, view))
+    toward = mi.Vector3f(np.broadcast_to(light, (3, count)))
+    wi = mi.Vector3f(np.broadcast_to(view, (3, count)))
     si = dr.zeros(mi.SurfaceInteraction3f, count)
     si.wi = wi
     if mi.is_spectral:
@@ -161,7 +162,8 @@ def asymmetries(response: Response, a: NDArray, b: NDArray, eta: float | None = 
 
 def describe(light: np.ndarray, view: np.ndarray, place: int) -> str:
     """Describe a pair of directions (3, N): angles from the normal, and the azimuth between."""
-    light, view = (each[:, place % each.shape[1]] for each in (light, view))
+    light = light[:, place % light.shape[1]]
+    view = view[:, place % view.shape[1]]
     polar = [np.degrees(np.arctan2(np.hypot(each[0], each[1]), each[2])) for each in (light, view)]
     about = np.degrees(np.arctan2(light[1], light[0]) - np.arctan2(view[1], view[0])) % 360
     return (

@@ -69,7 +69,8 @@ class Subject(ABC):
         Values that are not finite, or negative, are noted and count as 0.
         """
         count = max(light.shape[1], view.shape[1])
-        light, view = (np.broadcast_to(each, (3, count)) for each in (light, view))
+        light = np.broadcast_to(light, (3, count))
+        view = np.broadcast_to(view, (3, count))
         values = np.broadcast_to(self.evaluate(material, light, view), (3, count))
         self.note(material, values, (light, view))
         return np.where(np.isfinite(values) & (values > 0), values, 0.0)
@@ -117,7 +118,8 @@ def white(form: str) -> dict[str, dict[str, float]]:
         n = factors.exponent_of(alpha, form)
         lobe = float(terms.normalisation(form, n))
         plastic = albedo.of_roughplastic(albedo.RoughPlastic((1.0, 1.0, 1.0), alpha, 1.5))
-        diffuse, specular = float(plastic.diffuse[0]), float(plastic.specular[0])
+        diffuse = float(plastic.diffuse[0])
+        specular = float(plastic.specular[0])
         rough = {"base_color": 1.0, "n": n, "alpha": alpha, "ior": 1.5}
         glossy = {"k_a": diffuse, "k_d": diffuse, "k_s": specular * lobe, "metallic": 0.0, **rough}
         metal = {"k_a": 1.0, "k_d": 0.0, "k_s": lobe, "metallic": 1.0, **rough}
@@ -206,7 +208,8 @@ class ShadingSubject(Subject):
         normal: np.ndarray = UP,
         values: Mapping[str, Any] | None = None,
     ) -> Any:
-        place, lights = (0 * UP, normal, view), [] if light is None else [light]
+        place = (0 * UP, normal, view)
+        lights = [] if light is None else [light]
         values = self.values | dict(values or {})
         return shaded(self.heuristic, place, material, lights, 0.0, values, self.prepared)
 
@@ -261,7 +264,8 @@ def _sun(toward: np.ndarray) -> DirectionalLight:
 
 def _within(parameter: heuristics.Parameter, value: float) -> float | None:
     """Return a value with room for differences on both sides; None if there is none."""
-    low, high = max(parameter.low, -1e6), min(parameter.high, 1e6)
+    low = max(parameter.low, -1e6)
+    high = min(parameter.high, 1e6)
     inner = min(max(value, low + 0.1 * (high - low)), high - 0.1 * (high - low))
     centre = value if low < 0.9 * value and 1.1 * value < high else inner
     return centre or None
@@ -315,7 +319,9 @@ def registered(word: str) -> str:
     """Return the name of a plugin; run the file of one that is named ``FILE.py:NAME``."""
     if (place := heuristics.in_file(word)) is None:
         return word
-    path, name, variant = Path(place[0]), place[1], mi.variant()
+    path = Path(place[0])
+    name = place[1]
+    variant = mi.variant()
     content = f"that calls mitsuba.register_bsdf(NAME, class) in variant {variant}, as FILE.py:NAME"
     with contained(path):
         user_shaders.names_of(path, content)

@@ -35,7 +35,8 @@ from fotismos.reference.rendering.renderer import Progress, passes
 from fotismos.reference.rendering.sums import jackknife_error
 from fotismos.reference.scene.source import Source
 
-PASSES, MOST_PASSES = 16, 1024
+PASSES = 16
+MOST_PASSES = 1024
 """The former are enough for a t-test, corrected for a hundred quantities, to detect five standard
 errors; images of the latter are in memory at once."""
 
@@ -180,7 +181,8 @@ def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metri
         ]
         return (*means, log2_luminance_ratio(test[counted], reference[counted]).mean())
 
-    count, total = len(images), images.sum(axis=0)
+    count = len(images)
+    total = images.sum(axis=0)
     values = departure(total / count)
     errors = jackknife_error([departure((total - one) / (count - 1)) for one in images])
     signs = np.where(np.arange(count) % 2, -1.0, 1.0)
@@ -202,7 +204,8 @@ def _half(images: Array) -> Half:
     def estimate(values: Array) -> tuple[NDArray, NDArray]:
         return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(len(values))
 
-    whole, blocks = estimate(images.mean(axis=(1, 2))), estimate(block_means(images))
+    whole = estimate(images.mean(axis=(1, 2)))
+    blocks = estimate(block_means(images))
     rows = zip(*(part.tolist() for part in blocks), strict=True)
     plain = [
         [{"mean": mean, "error": error} for mean, error in zip(*row, strict=True)] for row in rows
@@ -341,9 +344,11 @@ def laid_out(value: Any, depth: int = 0, before: str = "") -> str:
         return line
     indent = "  " * (depth + 1)
     if isinstance(value, dict):
-        keys, items = [f"{json.dumps(key)}: " for key in value], list(value.values())
+        keys = [f"{json.dumps(key)}: " for key in value]
+        items = list(value.values())
     else:
-        keys, items = [""] * len(value), list(value)
+        keys = [""] * len(value)
+        items = list(value)
     lines = [
         indent + key + laid_out(item, depth + 1, indent + key)
         for key, item in zip(keys, items, strict=True)

@@ -122,8 +122,10 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     if before.passes != after.passes or any(old[0] != new[0] for old, new in pairs):
         raise ValueError("measurements with different passes or quantities cannot be compared")
     count = before.passes
-    x, errors = (np.array([[old[i], new[i]] for old, new in pairs]) for i in (3, 4))
-    difference, total = x[:, 1] - x[:, 0], (errors**2).sum(axis=1)
+    x = np.array([[old[3], new[3]] for old, new in pairs])
+    errors = np.array([[old[4], new[4]] for old, new in pairs])
+    difference = x[:, 1] - x[:, 0]
+    total = (errors**2).sum(axis=1)
     known = {name: metric.rounding for name, metric in METRICS.items()}
     known[RATIO.name] = RATIO.rounding
     rounding = np.array([known.get(old[0], LINEAR_ROUNDING) for old, _ in pairs])
@@ -179,7 +181,8 @@ def where_moved(before: Array, after: Array, count: int) -> str:
         return "moved in the mean of the image, but in no single block"
     change = np.abs(after - before).sum(axis=-1)
     row, column = np.unravel_index(change.argmax(), change.shape)
-    old, new = (float(luminance(colours[row, column])) for colours in (before, after))
+    old = float(luminance(before[row, column]))
+    new = float(luminance(after[row, column]))
     most = f"most in row {row + 1}, column {column + 1}, from luminance {old:.3g} to {new:.3g}"
     return f"moved in {count} of {change.size} blocks, {most}"
 
@@ -204,7 +207,8 @@ class Check:
 
     def blocks(self, half: str) -> tuple[Array, Array]:
         """Return the colours of a half's blocks before and now, (rows, columns, 3)."""
-        before, after = (getattr(one, half) for one in (self.before, self.now.measurement))
+        before = getattr(self.before, half)
+        after = getattr(self.now.measurement, half)
         return before.means(), after.means()
 
     def causes(self) -> list[str]:
@@ -219,7 +223,8 @@ class Check:
 
     def _where(self, half: str, moves: Sequence[Move]) -> str:
         old, new = self.blocks(half)
-        before, after = luminance(old), luminance(new)
+        before = luminance(old)
+        after = luminance(new)
         ratios = after[before > DARK] / before[before > DARK]
         is_one = ratios.size and np.ptp(ratios) <= ALIKE * abs(ratios.mean())
         if is_one and abs(ratios.mean() - 1) > ALIKE:
@@ -242,7 +247,8 @@ def check(
     """
     now = measure_scene(source, options, before.passes, progress)
     after = now.measurement.of(before.metrics)
-    old, new = (one.reference.means().shape for one in (before, after))
+    old = before.reference.means().shape
+    new = after.reference.means().shape
     if old != new:
         raise InputError(
             f"{source.name}: the baseline has {old[0]} by {old[1]} blocks, but the scene {new[0]}"

@@ -49,11 +49,13 @@ from fotismos.comparisons.pictures import require_one_size
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import VERSION, Amount, Record, Resolution, Share
 
-SIDE, TILES = 16, 8
+SIDE = 16
+TILES = 8
 """Side in pixels of the blocks that are tested; tiles of whole blocks along the longer side of the
 picture, at most."""
 
-POWER, QUANTILE = 0.95, 1.645
+POWER = 0.95
+QUANTILE = 1.645
 """The chance with which the smallest visible change is caught, and its quantile."""
 
 
@@ -72,7 +74,9 @@ class Repeats:
     @classmethod
     def of(cls, images: Iterable[ArrayLike]) -> "Repeats":
         """Return the statistics of images (H, W, 3, ...) of one size, in one pass over them."""
-        mean, squares, known = np.zeros(()), np.zeros(()), set()
+        mean = np.zeros(())
+        squares = np.zeros(())
+        known = set()
         sums: list[Array] = []
         for count, image in enumerate(images, start=1):
             values = np.asarray(image, np.float64)
@@ -147,8 +151,10 @@ def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
 
     The baseline has at least two repeats; ``after`` may be one, whose noise is taken for equal.
     """
-    m, n = before.count, after.count
-    first, second = (m - 1) / (m + n - 2), (n - 1) / (m + n - 2)
+    m = before.count
+    n = after.count
+    first = (m - 1) / (m + n - 2)
+    second = (n - 1) / (m + n - 2)
     d = after.mean - before.mean
     noise = (1.0 / m + 1.0 / n) * (first * before.variance + second * after.variance)
     r = np.maximum(first * before.correlation + second * after.correlation, 1.0)
@@ -160,7 +166,8 @@ def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
         total = block_sums(d, side)
         spread = np.maximum(block_sums(d * d, side) - total**2 / pixels, 0.0)
         square = r * np.maximum(block_sums(noise, side), spread * noise.any(axis=(0, 1, 2)))
-        old, new = (block_sums(each.mean, side) / pixels for each in (before, after))
+        old = block_sums(before.mean, side) / pixels
+        new = block_sums(after.mean, side) / pixels
         return Means(
             before=old,
             after=new,
@@ -258,8 +265,10 @@ class PictureCheck:
         channel is ``Σ w (y − x) / Σ w``, and its factor ``1 + Σ w z (y − x) / Σ w z x``, where z is
         the mean of all repeats.
         """
-        m, n = self.before.count, self.after.count
-        old, new = self.blocks.before, self.blocks.after
+        m = self.before.count
+        n = self.after.count
+        old = self.blocks.before
+        new = self.blocks.after
         weight = 1.0 / np.maximum(self.blocks.error, self.blocks.rounding) ** 2
         level = weight * (m * old + n * new) / (m + n)
         found = []

@@ -73,12 +73,15 @@ def cost(
     render there. ``causes`` are those of the scene, if known.
     """
     progress = progress or (lambda *_: None)
-    options, effort = options or Options(), effort or Effort()
+    options = options or Options()
+    effort = effort or Effort()
     if at:
         size = options.resolution or reduced(source, options.changed(resolution=at), WIDTH)
         require(source.name, at, size, is_measured)
     found = measure_ladder(source, options, effort, progress, at=at, alone=alone)
-    options, ready, ladder = found.options, found.ready, found.ladder
+    options = found.options
+    ready = found.ready
+    ladder = found.ladder
     counted = ready.counted
     predicted = at_size(found.points, found.methods, at) if at else ()
     measured = measure_at(found, at, progress) if at and is_measured else ()
@@ -152,7 +155,8 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
     ``causes`` may be of another size.
     """
     samples = SPP * found.size[0] * found.size[1]
-    first, last = found.steps[0].before, found.steps[-1].after
+    first = found.steps[0].before
+    last = found.steps[-1].after
 
     def adds(effect: str) -> Any:
         return times.difference(

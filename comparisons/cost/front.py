@@ -24,8 +24,10 @@ def is_below(one: Interval, other: Interval) -> bool:
 
 def beats(one: Point, other: Point) -> bool:
     """Return whether a point is clearly faster or more accurate, and not clearly the opposite."""
-    faster, better = is_below(one.seconds, other.seconds), is_below(one.error, other.error)
-    slower, worse = is_below(other.seconds, one.seconds), is_below(other.error, one.error)
+    faster = is_below(one.seconds, other.seconds)
+    better = is_below(one.error, other.error)
+    slower = is_below(other.seconds, one.seconds)
+    worse = is_below(other.error, one.error)
     return (faster and not worse) or (better and not slower)
 
 
@@ -106,9 +108,11 @@ def reach(points: Sequence[Point], tolerance: float) -> Reach | None:
         if len(own) < 2:
             continue
         fewer, more = own[-2:]
-        step, square = more.spp - fewer.spp, more.tolerance.mean**2
+        step = more.spp - fewer.spp
+        square = more.tolerance.mean**2
         left = max(square - (fewer.tolerance.mean**2 - square) * fewer.spp / step, 0.0)
-        room, spp = tolerance**2 - left, None
+        room = tolerance**2 - left
+        spp = None
         if room > 0:
             spp = max(ceil(more.spp * (square - left) / room), more.spp + 1)
         found.append(Reach(method=name, left=sqrt(left), spp=spp))

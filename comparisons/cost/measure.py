@@ -50,10 +50,12 @@ LARGEST_CERTAIN = 16
 MEASURED_ROUNDS = 7
 """Rounds at the size of a prediction."""
 
-WIDTH, QUICK_WIDTH = 128, 64
+WIDTH = 128
+QUICK_WIDTH = 64
 """Default width of an image in pixels: the time of a sample does not depend on it."""
 
-REFERENCE_SPP, REFERENCE_PASSES = 64, 16
+REFERENCE_SPP = 64
+REFERENCE_PASSES = 16
 """Samples per pixel of each pass of the converged reference, and passes at least."""
 
 MOST_SAMPLES = 2**24
@@ -220,7 +222,8 @@ def converged(
     width, height = size or image_size(ready.scene)
     spp = min(REFERENCE_SPP, LARGEST_PASS // (width * height))
     renderer = Renderer(ready.scene, integrator, spp, "reference image", size)
-    total, count = Accumulator(), max(REFERENCE_PASSES, ready.plan.passes)
+    total = Accumulator()
+    count = max(REFERENCE_PASSES, ready.plan.passes)
     stream = Stream.OTHER_SIDE
     for one in passes([renderer], seed, count, stream=stream, progress=progress, stage="reference"):
         total.add(one.images[0])
@@ -294,7 +297,8 @@ def rendered(
 
 def _mean_errors(errors: ArrayLike) -> tuple[MeanError, MeanError]:
     each = np.asarray(errors)
-    means, halves = each.mean(axis=0), SURE * each.std(axis=0, ddof=1) / sqrt(len(each))
+    means = each.mean(axis=0)
+    halves = SURE * each.std(axis=0, ddof=1) / sqrt(len(each))
     mean, tolerance = (
         MeanError(mean=float(m), low=float(m - half), high=float(m + half))
         for m, half in zip(means, halves, strict=True)
@@ -332,7 +336,8 @@ def timed_method(
 
 def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Point, ...]:
     """Render each method with its fewest samples at another size."""
-    scene, options = found.ready.scene, found.options
+    scene = found.ready.scene
+    options = found.options
     reference = converged(found.ready, options.seed, progress, size)
     judge = judge_by(reference, gbuffer(scene, *size).hit, options.viewing)
     renderers = {

@@ -144,10 +144,12 @@ class Ladder:
     ) -> None:
         if options.polygon_shading is not Interpolation.PHONG and options.tessellation is None:
             options = options.changed(tessellation=RESOLUTION)
-        self.ready, self.options = ready, options
+        self.ready = ready
+        self.options = options
         self.pairs = Pairs(source, options, ready)
         self.scenes = HybridScenes(self.pairs.plain(), ready.plan, ready.scene)
-        plan, differences = ready.plan, set(self.scenes.differences)
+        plan = ready.plan
+        differences = set(self.scenes.differences)
         # If both halves have shadows, a method without them differs from both.
         shadows = {OCCLUSION} if plan.calls_for(OCCLUSION) else set()
         self._effects = frozenset(effect.label for effect in differences | shadows)
@@ -200,8 +202,10 @@ class Ladder:
 
         The name of a kernel includes a heuristic other than Phong.
         """
-        plainest, heuristic = alike[0 if form.is_kernel else -1], named(self.options.heuristic)
-        name, names = plainest.name, tuple(method.name for method in alike)
+        plainest = alike[0 if form.is_kernel else -1]
+        heuristic = named(self.options.heuristic)
+        name = plainest.name
+        names = tuple(method.name for method in alike)
         if form.is_kernel and heuristic is not PHONG and not form.heuristic:
             name = f"{name}: {heuristic.label}"
             names = (name, *names)
@@ -229,7 +233,8 @@ class Ladder:
         if method.is_kernel:
             found = (refusals.get(name) for name in (method.interpolation.value, method.heuristic))
             return next(filter(None, found), "")
-        depth, own = method.max_depth, self.ready.plan.scene_depth
+        depth = method.max_depth
+        own = self.ready.plan.scene_depth
         is_there = depth is None or own == UNLIMITED or depth <= own
         return "" if is_there else f"the scene's own paths end at depth {own}"
 

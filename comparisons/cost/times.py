@@ -100,7 +100,8 @@ def interval(values: ArrayLike, unseen: float) -> Estimated:
     values = np.asarray(values, float)
     low, high = np.quantile(values, (0.025, 0.975))
     value = float(values[0])
-    below, above = max(value - low, 0.0), max(high - value, 0.0)
+    below = max(value - low, 0.0)
+    above = max(high - value, 0.0)
     return Estimated(
         value=value,
         low=value - float(np.hypot(below, unseen)),
@@ -116,7 +117,8 @@ def ratio(line: Line, to: Line) -> Estimated:
 
 def difference(steps: Iterable[tuple[float, Line, Line]], samples: int) -> Estimated:
     """Return the seconds that steps ``(weight, before, after)`` add to an image of some samples."""
-    total, unseen = np.zeros(1 + DRAWS), []
+    total = np.zeros(1 + DRAWS)
+    unseen = []
     for weight, before, after in steps:
         total = total + weight * (after.per_sample - before.per_sample)
         unseen += [weight * line.per_sample[0] for line in (before, after)]

@@ -42,11 +42,15 @@ CHROMATICITIES = tuple(value for place in BT709 for value in place)
 BT2020 = ((0.708, 0.292), (0.170, 0.797), (0.131, 0.046), (0.3127, 0.3290))
 
 # CIE 15: below this ratio to white, lightness is linear; and its slope there.
-_EPSILON, _SLOPE = (24 / 116) ** 3, 841 / 108
+_EPSILON = (24 / 116) ** 3
+_SLOPE = 841 / 108
 
 # ITU-R BT.2100-2: the PQ curve, and the matrices of ICtCp.
-_PQ_M1, _PQ_M2 = 2610 / 16384, 2523 / 32
-_PQ_C1, _PQ_C2, _PQ_C3 = 3424 / 4096, 2413 / 128, 2392 / 128
+_PQ_M1 = 2610 / 16384
+_PQ_M2 = 2523 / 32
+_PQ_C1 = 3424 / 4096
+_PQ_C2 = 2413 / 128
+_PQ_C3 = 2392 / 128
 _LMS = np.array([[1688, 2146, 262], [683, 2951, 462], [99, 309, 3688]]) / 4096
 _ICTCP = np.array([[2048, 2048, 0], [6610, -13613, 7003], [17933, -17390, -543]]) / 4096
 
@@ -58,7 +62,9 @@ _M16 = np.array(
         [-0.002079, 0.048952, 0.953127],
     ]
 )
-_F, _C, _N_C = 1.0, 0.69, 1.0
+_F = 1.0
+_C = 0.69
+_N_C = 1.0
 
 
 class Viewing(Record):
@@ -131,7 +137,8 @@ def rgb_to_xyz(primaries: tuple[tuple[float, float], ...]) -> Array:
     It follows from the primaries at full precision: white is exactly D65, so greys have no chroma.
     """
     xyz = np.array([[x / y, 1.0, (1.0 - x - y) / y] for x, y in primaries])
-    colours, white = xyz[:-1].T, xyz[-1]
+    colours = xyz[:-1].T
+    white = xyz[-1]
     return colours * np.linalg.solve(colours, white)
 
 
@@ -161,7 +168,8 @@ def _to_cam16ucs(viewing: Viewing, largest: float = 1.0) -> Formula:
         1.0 / achromatic, _C * (1.48 + n**0.5), 50_000.0 / 13.0 * _N_C * induction,
         (1.64 - 0.29**n) ** 0.73 * level**0.25,
     )  # fmt: skip
-    sensitivity, scales = Array3f64(*map(opaque, gain * level / 100.0)), tuple(map(opaque, numbers))
+    sensitivity = Array3f64(*map(opaque, gain * level / 100.0))
+    scales = tuple(map(opaque, numbers))
     return lambda rgb: _cam16ucs(times(_M16, 100.0 * shown(rgb)) * sensitivity, *scales)
 
 
@@ -174,12 +182,14 @@ def _cam16ucs(
     """
     power = dr.power(dr.abs(cones), 0.42)
     red, green, blue = dr.mulsign(400.0 * power / (power + 27.13), cones)
-    a, b = red - (12.0 * green - blue) / 11.0, (red + green - 2.0 * blue) / 9.0
+    a = red - (12.0 * green - blue) / 11.0
+    b = (red + green - 2.0 * blue) / 9.0
     light = 2.0 * red + green + 0.05 * blue
     j = _signed_power(light * dimming, exponent)
     size = dr.sqrt(a * a + b * b)
     has_hue = size > 0.0
-    cosine, sine = dr.select(has_hue, a / size, 1.0), dr.select(has_hue, b / size, 0.0)
+    cosine = dr.select(has_hue, a / size, 1.0)
+    sine = dr.select(has_hue, b / size, 0.0)
     eccentricity = (cos(2.0) * cosine - sin(2.0) * sine + 3.8) / 4.0
     t = chromatic * eccentricity * size / (red + green + 1.05 * blue + 0.305)
     colourfulness = _signed_power(t, 0.9) * _signed_power(j, 0.5) * level
@@ -195,17 +205,23 @@ def delta_e_00(first: Array3f64, second: Array3f64) -> Float64:
     """Return ΔE00 between CIE L*a*b* colours, with k_L = k_C = k_H = 1."""
     chroma = [dr.sqrt(a * a + b * b) for _, a, b in (first, second)]
     stretch = 1.5 - 0.5 * _saturation((chroma[0] + chroma[1]) / 2.0)
-    (l1, a1, b1), (l2, a2, b2) = first, second
-    c1, c2 = (dr.sqrt(dr.square(a * stretch) + b * b) for a, b in ((a1, b1), (a2, b2)))
-    h1, h2 = (_hue(a * stretch, b) for a, b in ((a1, b1), (a2, b2)))
-    has_hues, turn, total = c1 * c2 != 0.0, h2 - h1, h1 + h2
+    (l1, a1, b1) = first
+    (l2, a2, b2) = second
+    c1 = dr.sqrt(dr.square(a1 * stretch) + b1 * b1)
+    c2 = dr.sqrt(dr.square(a2 * stretch) + b2 * b2)
+    h1 = _hue(a1 * stretch, b1)
+    h2 = _hue(a2 * stretch, b2)
+    has_hues = c1 * c2 != 0.0
+    turn = h2 - h1
+    total = h1 + h2
     # Tolerate rounding for opposite hues, 180 apart; beyond, the difference jumps.
     wide = dr.abs(turn) > 180.0 + 1e-9
     turn = dr.select(wide, turn - dr.mulsign(Float64(360.0), turn), turn)
     turn = dr.select(has_hues, turn, 0.0)
     middle = total + dr.select(wide, dr.select(total < 360.0, 360.0, -360.0), 0.0)
     hue = dr.select(has_hues, middle / 2.0, total)
-    lightness, mean = (l1 + l2) / 2.0, (c1 + c2) / 2.0
+    lightness = (l1 + l2) / 2.0
+    mean = (c1 + c2) / 2.0
     t = (
         1.0
         - 0.17 * _cosine(hue - 30.0)
@@ -281,7 +297,8 @@ class Distance:
     formula: Callable[[Array3f64, Array3f64], Float64]
 
     def __call__(self, a: ArrayLike, b: ArrayLike) -> Array:
-        a, b = np.asarray(a), np.asarray(b)
+        a = np.asarray(a)
+        b = np.asarray(b)
         if not a.size:
             return np.zeros(a.shape[:-1])
         return np.array(self.formula(_colours(a), _colours(b))).reshape(a.shape[:-1])
@@ -296,7 +313,8 @@ def _colours(pixels: Array) -> Array3f64:
 
 def _displayed(viewing: Viewing, white: float = 1.0) -> Formula:
     """Return a function from linear RGB to the XYZ that a display shows; Y of white is 1."""
-    exposure, largest = opaque(viewing.exposure), opaque(white)
+    exposure = opaque(viewing.exposure)
+    largest = opaque(white)
     matrix = rgb_to_xyz(BT709)
     return lambda rgb: times(matrix, dr.clip(rgb * exposure, 0.0, largest))
 
@@ -304,7 +322,8 @@ def _displayed(viewing: Viewing, white: float = 1.0) -> Formula:
 @Space
 def lab(viewing: Viewing) -> Formula:
     """CIE L*a*b* (D65, 2°) of linear RGB as displayed; L* is 0 to 100."""
-    shown, white = _displayed(viewing), rgb_to_xyz(BT709).sum(axis=1)
+    shown = _displayed(viewing)
+    white = rgb_to_xyz(BT709).sum(axis=1)
     return lambda rgb: xyz_to_lab(shown(rgb), white)
 
 

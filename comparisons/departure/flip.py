@@ -56,7 +56,9 @@ _SENSITIVITY = (((1.0, 0.0047),), ((1.0, 0.0053),), ((34.1, 0.04), (13.5, 0.025)
 _FEATURE = 0.082
 """Section 4.2: width of the detectors of edges and points, in degrees."""
 
-_POWER, _KNEE, _KNEE_SHOWN = 0.7, 0.4, 0.95
+_POWER = 0.7
+_KNEE = 0.4
+_KNEE_SHOWN = 0.95
 _ACES = (0.9036, 0.018, 0.8748, 0.354, 0.14)
 """ACES by Narkowicz at an exposure of 0.6: ``x (a x + b) / (x (c x + d) + e)``."""
 
@@ -106,7 +108,8 @@ def exposures(reference: Array) -> tuple[float, float]:
         return 0.0, 0.0
     middle = np.median(light)
     middle = middle if middle > DARKEST else np.median(lit)
-    start, stop = (float(np.log2(SHOWN / y)) for y in (light.max(), middle))
+    start = float(np.log2(SHOWN / light.max()))
+    stop = float(np.log2(SHOWN / middle))
     return start, min(stop, start + MOST_STOPS)
 
 
@@ -180,12 +183,15 @@ class _Eye:
             np.sum([share * _across(_down(plane, band), band) for share, band in parts], axis=0)
             for plane, parts in zip(planes, self.blurs, strict=True)
         ]
-        light, smooth = planes[0], _down(planes[0], self.smooth)
-        slope, curvature = (
-            dr.hypot(
-                _values(_across(smooth, band)), _values(_across(_down(light, band), self.smooth))
-            )
-            for band in (self.edge, self.point)
+        light = planes[0]
+        smooth = _down(planes[0], self.smooth)
+        slope = dr.hypot(
+            _values(_across(smooth, self.edge)),
+            _values(_across(_down(light, self.edge), self.smooth)),
+        )
+        curvature = dr.hypot(
+            _values(_across(smooth, self.point)),
+            _values(_across(_down(light, self.point), self.smooth)),
         )
         result = _hunted(Array3f(*map(_values, blurred))), slope, curvature
         dr.eval(result)
@@ -207,7 +213,8 @@ def _blurs(parts: tuple[tuple[float, float], ...], degrees: Array) -> Blurs:
 
 def _balanced(weights: Array) -> Array:
     """Scale weights so that the positive ones add up to 1, and the negative ones to -1."""
-    above, below = np.maximum(weights, 0.0), np.maximum(-weights, 0.0)
+    above = np.maximum(weights, 0.0)
+    below = np.maximum(-weights, 0.0)
     return above / float(above.sum()) - below / float(below.sum())
 
 
@@ -243,7 +250,8 @@ def _values(plane: Plane) -> Float32:
 
 def _error(truth: Seen, shown: Seen) -> Plane:
     """Return FLIP (N,) of what is seen of two images."""
-    (first, *edges), (second, *others) = truth, shown
+    (first, *edges) = truth
+    (second, *others) = shown
     slopes, curvatures = (dr.abs(a - b) for a, b in zip(edges, others, strict=True))
     feature = sqrt(sqrt(0.5)) * dr.sqrt(dr.maximum(slopes, curvatures))
     colour = _redistributed(_apart(first, second))

@@ -50,13 +50,16 @@ from fotismos.comparisons.departure.colour import Array
 from fotismos.reference.rendering.renderer import require_finite
 from fotismos.reference.rendering.sums import BLOCK, DifferenceEstimate
 
-LEVEL, BLOCK_LEVEL = 0.05, 0.01
+LEVEL = 0.05
+BLOCK_LEVEL = 0.01
 VISIBLE = 2.0
 FEWEST = 4
 """Passes: a third moment needs three, and one more shows its scatter."""
 
-MARKED, UNDETERMINED = 1.0, 0.5
-ABSOLUTE_ROUNDING, RELATIVE_ROUNDING = 1e-6, 1e-5
+MARKED = 1.0
+UNDETERMINED = 0.5
+ABSOLUTE_ROUNDING = 1e-6
+RELATIVE_ROUNDING = 1e-5
 
 _NORMAL = 1e6
 """Degrees of freedom of variances that are practically known."""
@@ -80,13 +83,15 @@ def find(
     is in the unit of `VISIBLE`. ``exact`` says that only the positions of camera rays are random,
     and both images share them. ``level`` replaces `LEVEL`; blocks take the same share of it.
     """
-    test, counted = np.asarray(test), np.asarray(counted, bool)
+    test = np.asarray(test)
+    counted = np.asarray(counted, bool)
     require_finite(difference.mean, "mean difference")
     require_finite(difference.standard_error, "standard error of the difference")
     marks = np.zeros(counted.shape, np.float32)
     beyond = counted.copy()
     for rows in bands(len(counted)):
-        mean, shown = difference.mean[rows], test[rows]
+        mean = difference.mean[rows]
+        shown = test[rows]
         size = np.maximum(np.abs(shown), np.abs(shown - mean))
         rounding = np.maximum(ABSOLUTE_ROUNDING, RELATIVE_ROUNDING * size)
         beyond[rows] &= np.any(np.abs(mean) > rounding, axis=-1)
@@ -162,7 +167,8 @@ class _Around:
     def of(cls, difference: DifferenceEstimate, counted: NDArray[np.bool_]) -> "_Around":
         parts = [_sums(difference, counted, rows) for rows in bands(len(counted))]
         pixels, mean, variance, squares, *skewed = map(np.concatenate, zip(*parts, strict=True))
-        third, moved = np.array(skewed[:2]), np.array(skewed[2:])
+        third = np.array(skewed[:2])
+        moved = np.array(skewed[2:])
         # If noise is large on both sides, the cubes of one would hide those of the other.
         one_sided = ratio(neighbourhood(third, 1), neighbourhood(moved, 1))
         largest = one_sided.max(axis=(1, 2))[:, None, None]
@@ -212,7 +218,8 @@ def _sums(difference: DifferenceEstimate, counted: NDArray[np.bool_], rows: slic
     and above 0, without sign; and of the variances of the pixels that have them.
     """
     here = counted[rows, :, None]
-    variance, third = _variance(difference, rows) * here, difference.third[rows] * here
+    variance = _variance(difference, rows) * here
+    third = difference.third[rows] * here
     skewed = [np.maximum(-third, 0.0), np.maximum(third, 0.0)]
     moved = [variance * (third < 0.0), variance * (third > 0.0)]
     plain = [here * np.ones(3), difference.mean[rows] * here, variance, variance**2]
@@ -243,7 +250,8 @@ class _Pixels:
     ) -> "_Pixels":
         """Return the pixels of some rows that are in a mask (H, W) of the whole image."""
         mask = mask[rows]
-        mean, own = difference.mean[rows][mask], _variance(difference, rows)[mask]
+        mean = difference.mean[rows][mask]
+        own = _variance(difference, rows)[mask]
         blocks = slice(rows.start // BLOCK, -(-rows.stop // BLOCK))
         near = around.pooled_freedom, around.quantile, around.pooled_variance
         prior, quantile, pooled, *sizes = (

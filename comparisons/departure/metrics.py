@@ -134,7 +134,8 @@ class Metric:
         function = self.function
 
         def distances(test: Array) -> Floats:
-            shown, truth = (np.asarray(image, np.float64) for image in (test, reference))
+            shown = np.asarray(test, np.float64)
+            truth = np.asarray(reference, np.float64)
             return function(shown, truth, viewing)[where]
 
         return distances

@@ -82,13 +82,15 @@ class VisibleShare(Record):
 
 def exactly(metric: Metric, values: Floats) -> dict[str, Any]:
     """Return the fields of a summary of distances (N,) without noise."""
-    mean, shares = metric.mean(values), shares_above(values, metric.visible)
+    mean = metric.mean(values)
+    shares = shares_above(values, metric.visible)
     return _fields(metric, mean, mean, mean, np.array([shares] * 3))
 
 
 def roughly(metric: Metric, values: Floats, noise: Floats) -> dict[str, Any]:
     """Debias distances (N,), given those from noise alone, by the triangle inequality."""
-    mean, floor = metric.mean(values), metric.mean(noise)
+    mean = metric.mean(values)
+    floor = metric.mean(noise)
     shares = [
         shares_above(distances, metric.visible)
         for distances in (
@@ -151,7 +153,8 @@ def debiased(
     ]
     error = float(np.hypot(jackknife_error(left_out), sampling_error(whole.added, grouped)))
     # The bias comes from the sample, the value that it is subtracted from is over all pixels.
-    measured, added = _mean(metric, raw), whole.raw - whole.clean
+    measured = _mean(metric, raw)
+    added = whole.raw - whole.clean
     middle = max(measured - added, 0.0)
     half = student(0.0, error, count).high
     half += whole.gap / 2.0 + np.sqrt(middle**2 + CURVATURE * whole.noise**2) - middle
@@ -237,14 +240,17 @@ class _Extrapolated:
     def of(
         cls, metric: Metric, distances: Distances, grouped: Grouped, chosen: Sequence[int]
     ) -> "_Extrapolated":
-        means, sizes = grouped.means[chosen], grouped.sizes[chosen]
+        means = grouped.means[chosen]
+        sizes = grouped.sizes[chosen]
         mean = np.average(means, axis=0, weights=sizes)
         added_noise = np.tensordot(contrasts(sizes), means, 1)
         plain, *noisy = distances(np.concatenate([mean[None], mean + added_noise]))
         pixels = grouped.by_block(np.ones(len(plain)))
-        before, after = grouped.by_block(plain), grouped.by_block(np.mean(noisy, axis=0))
+        before = grouped.by_block(plain)
+        after = grouped.by_block(np.mean(noisy, axis=0))
         if metric.linear:
-            added, gap = grouped.by_block(np.mean(np.square(noisy), axis=0) - plain**2), 0.0
+            added = grouped.by_block(np.mean(np.square(noisy), axis=0) - plain**2)
+            gap = 0.0
             noise = 0.0
         else:
             pair = plain**2, np.mean(np.square(noisy), axis=0)

@@ -28,7 +28,8 @@ CELLS = 48
 CONTRAST = 1.25
 """A region's mean error must exceed this many times the image's."""
 
-MOST, LEAST_SHARE = 4, 0.04
+MOST = 4
+LEAST_SHARE = 0.04
 """Number of regions, at most, and the least share of the image's error in each."""
 
 MOST_OBJECTS = 24
@@ -74,11 +75,13 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
     """
     counted = np.asarray(counted, bool)
     error = np.where(counted, np.asarray(error), 0.0)
-    total, pixels = error.sum(dtype=np.float64), counted.sum()
+    total = error.sum(dtype=np.float64)
+    pixels = counted.sum()
     if not total > 0.0:
         return ()
     cell = -(-max(error.shape) // CELLS)
-    sums, sizes = (block_sums(image.astype(np.float64), cell) for image in (error, counted))
+    sums = block_sums(error.astype(np.float64), cell)
+    sizes = block_sums(counted.astype(np.float64), cell)
     worth = sums - CONTRAST * total / pixels * sizes
     boxes: list[Region] = []
     while len(boxes) < MOST:
@@ -86,7 +89,8 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
         if not value > 0.0:
             break
         worth[rows, columns] = -total  # no box that touches these is worth anything
-        down, across = (slice(part.start * cell, part.stop * cell) for part in (rows, columns))
+        down = slice(rows.start * cell, rows.stop * cell)
+        across = slice(columns.start * cell, columns.stop * cell)
         inside = np.zeros_like(counted)
         inside[down, across] = counted[down, across]
         amount = error[down, across].sum(dtype=np.float64)
@@ -109,7 +113,8 @@ def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
     best = (-np.inf, 0, 0, 0)
     for column, strip in enumerate(strips.T):
         fresh = running <= 0.0
-        running, start = np.where(fresh, strip, running + strip), np.where(fresh, column, start)
+        running = np.where(fresh, strip, running + strip)
+        start = np.where(fresh, column, start)
         pair = int(running.argmax())
         best = max(best, (float(running[pair]), pair, int(start[pair]), column), key=itemgetter(0))
     value, pair, first, last = best
@@ -118,8 +123,10 @@ def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
 
 def bounds(mask: NDArray[np.bool_]) -> dict[str, Any]:
     """Return ``x, y, width, height`` of the box around a mask (H, W) of at least one pixel."""
-    y, x = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
-    width, height = int(x[-1] - x[0] + 1), int(y[-1] - y[0] + 1)
+    y = np.flatnonzero(mask.any(axis=1))
+    x = np.flatnonzero(mask.any(axis=0))
+    width = int(x[-1] - x[0] + 1)
+    height = int(y[-1] - y[0] + 1)
     return {"x": int(x[0]), "y": int(y[0]), "width": width, "height": height}
 
 
@@ -138,7 +145,8 @@ def find_objects(
     if len(ranked) > MOST_OBJECTS:
         ranked = ranked[: MOST_OBJECTS - 1]
     rows = np.full(len(owners.names) + 1, len(ranked))
-    rows[ranked], rows[-1] = np.arange(len(ranked)), -1
+    rows[ranked] = np.arange(len(ranked))
+    rows[-1] = -1
     found = rows[places]
     names = [owners.names[place] for place in ranked]
     if len(present) > len(names):

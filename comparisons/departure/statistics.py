@@ -108,7 +108,8 @@ def summarise(
     if factor != 1.0:
         after = _numbers(metric, exposed)
         if after["mean"] > numbers["mean"]:
-            factor, after = 1.0, numbers
+            factor = 1.0
+            after = numbers
     clean = None
     if not noise_alone.any():
         clean = exactly(metric, values)
@@ -190,7 +191,8 @@ EXPOSURE_STOPS = 6.0
 """Largest exposure in stops, up or down, in the search for the best one."""
 
 # Pixels for the search of the best exposure, and for bracketing it.
-_SEARCH_PIXELS, _BRACKET_PIXELS = 16_384, 2_048
+_SEARCH_PIXELS = 16_384
+_BRACKET_PIXELS = 2_048
 
 
 def best_exposure(
@@ -222,7 +224,8 @@ def best_exposure(
     count = min(len(places), _SEARCH_PIXELS)
     chosen = np.random.default_rng(0).choice(len(places), count, replace=False)
     drawn = np.unravel_index(places[chosen], mask.shape)
-    shown, truth = (image[drawn].astype(np.float64) for image in (test, reference))
+    shown = test[drawn].astype(np.float64)
+    truth = reference[drawn].astype(np.float64)
     distances = metric.against(truth, ..., viewing)
 
     def mean_at(stops: float) -> float:
@@ -244,7 +247,8 @@ def least_squares_factor(test: Array, reference: Array) -> float:
     """Return ``Σ test·reference / Σ test²``, or 1 if that is not positive."""
     energy = overlap = 0.0
     for rows in _rows(test):
-        shown, truth = (np.asarray(image[rows], np.float64) for image in (test, reference))
+        shown = np.asarray(test[rows], np.float64)
+        truth = np.asarray(reference[rows], np.float64)
         energy += float(np.vdot(shown, shown))
         overlap += float(np.vdot(shown, truth))
     return overlap / energy if energy > 0.0 and overlap > 0.0 else 1.0

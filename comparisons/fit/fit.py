@@ -122,7 +122,8 @@ def fit(
             models = [PhongModel(surface, form, rendered.counted.ravel()) for form in forms]
             fits = [_best(rendered, each, form_starts, LOSSES[loss]) for each in models]
     else:
-        half, seeds = rendered.ready.heuristic, rendered.seeds
+        half = rendered.ready.heuristic
+        seeds = rendered.seeds
         own = OwnModel(half, heuristic, seeds, rendered.counted)
         fits = [_best(rendered, own, own_starts, LOSSES[loss])]
     best = min(range(len(fits)), key=lambda place: fits[place][0].loss)
@@ -180,7 +181,8 @@ def _completed(options: Options) -> Options:
             f"heuristic {heuristic.name} has no parameters to fit. Declare one with its bounds:"
             f" {advice}."
         )
-    resolution, spp = options.resolution or RESOLUTION, options.spp or SPP
+    resolution = options.resolution or RESOLUTION
+    spp = options.spp or SPP
     return options.changed(resolution=resolution, spp=spp, allow_empty=False)
 
 
@@ -211,7 +213,8 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
         add_difference(sums, one.images)
     before, reference, difference = (total.estimate() for total in sums)
     seeds = tuple(pass_seed(options.seed, number) for number in range(ready.passes))
-    counted, viewing = ready.counted, options.viewing
+    counted = ready.counted
+    viewing = options.viewing
     return RenderedHalves(
         ready=ready,
         seeds=seeds,
@@ -272,7 +275,8 @@ def form_starts(objective: Objective) -> list[NDArray]:
     The latter are the best in linear RGB.
     """
     phong: Any = objective.model
-    paired, (low, high) = model.start(phong.parameters), model.bounds(phong.parameters)
+    paired = model.start(phong.parameters)
+    (low, high) = model.bounds(phong.parameters)
     at_n = np.array([parameter.name == "n" for parameter in phong.parameters])
     linear = phong.linear
     starts = [paired]
@@ -291,8 +295,10 @@ def own_starts(objective: Objective) -> list[NDArray]:
     """Return the defaults of a heuristic's parameters, and places within their bounds."""
     parameters = objective.model.parameters
     default = np.array([each.paired for each in parameters])
-    reach, (low, high) = REACH * np.maximum(np.abs(default), 1.0), model.bounds(parameters)
-    low, high = np.maximum(low, default - reach), np.minimum(high, default + reach)
+    reach = REACH * np.maximum(np.abs(default), 1.0)
+    (low, high) = model.bounds(parameters)
+    low = np.maximum(low, default - reach)
+    high = np.minimum(high, default + reach)
     return [default, *np.random.default_rng(0).uniform(low, high, (OWN_STARTS, len(default)))]
 
 
@@ -300,13 +306,16 @@ def departures(
     rendered: RenderedHalves, after: NDArray
 ) -> tuple[dict[str, FitDeparture], dict[str, NDArray]]:
     """Return the departures by metric, and the metrics' maps (H, W) after the fit."""
-    reference, counted, viewing = rendered.reference.mean, rendered.counted, rendered.viewing
-    by_metric, maps = {}, {}
+    reference = rendered.reference.mean
+    counted = rendered.counted
+    viewing = rendered.viewing
+    by_metric = {}
+    maps = {}
     for name, metric in drawn().items():
-        first, maps[name] = (
-            metric(image, reference, viewing) for image in (rendered.before, after)
-        )
-        before, after_fit = (metric.mean(values[counted]) for values in (first, maps[name]))
+        first = metric(rendered.before, reference, viewing)
+        maps[name] = metric(after, reference, viewing)
+        before = metric.mean(first[counted])
+        after_fit = metric.mean(maps[name][counted])
         floor = noise_floor(metric, reference, rendered.difference.noise, counted, viewing)
         by_metric[name] = FitDeparture(before=before, after=after_fit, noise_floor=floor)
     return by_metric, maps

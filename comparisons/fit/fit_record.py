@@ -141,27 +141,32 @@ def parameter_record(
     covariance: NDArray,
 ) -> FittedParameter:
     """Return one parameter at the best vector ``x``, ``k_s`` and ``n`` in the chapters' units."""
-    parameter, certainty = model.parameters[place], certainties[place]
-    value, spread = float(x[place]), COVERAGE * sqrt(covariance[place, place])
+    parameter = model.parameters[place]
+    certainty = certainties[place]
+    value = float(x[place])
+    spread = COVERAGE * sqrt(covariance[place, place])
     raw: tuple[float, ...] = (parameter.paired, value, value - spread, value + spread)
     limits: tuple[float, ...] = (parameter.low, parameter.high)
     phong = model if isinstance(model, PhongModel) else None
     if phong and parameter.name == "n":
-        raw, limits = tuple(map(exp, raw)), tuple(map(exp, limits))
+        raw = tuple(map(exp, raw))
+        limits = tuple(map(exp, limits))
     elif (
         phong
         and parameter.name == "k_s"
         and not phong.surface.materials[parameter.owner].normalised
     ):
-        at_n, step = phong.place_of_exponent(parameter.owner), 1e-5
-        per_albedo, below, above = (
-            normalisation(phong.form, exp(x[at_n] + shift)) for shift in (0, -step, step)
-        )
+        at_n = phong.place_of_exponent(parameter.owner)
+        step = 1e-5
+        per_albedo = normalisation(phong.form, exp(x[at_n] + 0))
+        below = normalisation(phong.form, exp(x[at_n] + (-step)))
+        above = normalisation(phong.form, exp(x[at_n] + step))
         slopes = np.zeros(len(x))
         slopes[[place, at_n]] = per_albedo, value * (above - below) / (2 * step)
         spread = COVERAGE * sqrt(max(slopes @ covariance @ slopes, 0))
         at_pairing = normalisation(phong.form, exp(phong.parameters[at_n].paired))
-        k_s, limits = value * per_albedo, (0.0, per_albedo)
+        k_s = value * per_albedo
+        limits = (0.0, per_albedo)
         raw = parameter.paired * at_pairing, k_s, k_s - spread, k_s + spread
         if not certainty.reason and certainties[at_n].reason and value > AT_BOUND:
             reason = "follows from its albedo and n, which is not identifiable"

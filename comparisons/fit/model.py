@@ -107,7 +107,8 @@ class Surface:
 
     def pixels(self, owner: int, values: Colour) -> NDArray[np.float64]:
         """Return the image (N, 3) of one value for each sample of a material."""
-        pixel, count = self.samples[owner]["pixel"], len(self.fixed)
+        pixel = self.samples[owner]["pixel"]
+        count = len(self.fixed)
         rgb = np.broadcast_to(np.atleast_2d(np.array(values, np.float64)), (3, len(pixel)))
         sums = [np.bincount(pixel, channel, count) for channel in rgb]
         return np.stack(sums, axis=1) / self.samples_per_pixel
@@ -119,14 +120,16 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
     The half has Phong shading and a box filter.
     """
     with variant(renderer.variant):
-        shading, scene = renderer.integrator, renderer.scene
+        shading = renderer.integrator
+        scene = renderer.scene
         bsdfs = SceneMaterials(scene, prune=False).bsdfs
         names = _names(scene, bsdfs)
         _require_fittable(names, bsdfs)
         eye = _eye(shading)
         eyes = Renderer(scene, eye, renderer.spp, "heuristic samples")
         fixed: Any = 0.0
-        passes, samples_per_pixel = [], 0
+        passes = []
+        samples_per_pixel = 0
         for seed in seeds:
             image = np.array(eyes.render(seed), np.float64)
             fixed = fixed + image / len(seeds)
@@ -139,7 +142,8 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
             samples_per_pixel += spp
         eye.seen = None
         whole = {key: np.concatenate([one[key] for one in passes], axis=-1) for key in passes[0]}
-        facing, material = whole.pop("facing"), whole.pop("material")
+        facing = whole.pop("facing")
+        material = whole.pop("material")
         samples = []
         for owner, bsdf in enumerate(bsdfs):
             without = set(COEFFICIENTS) - set(_textured(bsdf))
@@ -203,7 +207,8 @@ def _eye(shading):
                     seen[f"light {len(seen) - before}"] = visible = test(toward, distance)
                     return visible
 
-                before, place = len(seen), mi.Vector3f(si.p)
+                before = len(seen)
+                place = mi.Vector3f(si.p)
                 lights = shading.lights(scene, si, active)
                 shade(place, place, place, Material(k_d=1), lights, 0, keep)
             dr.schedule(seen)
@@ -230,7 +235,8 @@ def _described(bsdf):
         # The scene's numbers are the shortest decimals of single precision.
         return tuple(float(str(np.float32(value))) for value in np.ravel(values))
 
-    point, coefficients = dr.zeros(mi.SurfaceInteraction3f), dict.fromkeys(COEFFICIENTS, (1.0,) * 3)
+    point = dr.zeros(mi.SurfaceInteraction3f)
+    coefficients = dict.fromkeys(COEFFICIENTS, (1.0,) * 3)
     for name in set(COEFFICIENTS) - set(_textured(bsdf)):
         coefficients[name] = plain(mi.Color3f(getattr(bsdf, name).eval(point)))
     return Material(**coefficients, n=plain(bsdf.n)[0], form=bsdf.form, normalised=bsdf.normalised)
@@ -323,7 +329,9 @@ class PhongModel:
     def __init__(
         self, surface: Surface, form: str, counted: NDArray | None = None, vector: Any = None
     ) -> None:
-        self.surface, self.form, self.names = surface, form, surface.names
+        self.surface = surface
+        self.form = form
+        self.names = surface.names
         self.counted = np.ones(len(surface.fixed), bool) if counted is None else counted
         seen = (np.unique(samples["pixel"]) for samples in surface.samples)
         self.reached = [int(self.counted[pixels].sum()) for pixels in seen]
@@ -363,7 +371,8 @@ class PhongModel:
         result = np.empty((len(x), *self.surface.fixed.shape))
         albedo = self.coefficients(x, "k_s")
         for place, parameter in enumerate(self.parameters):
-            owner, name = parameter.owner, parameter.name
+            owner = parameter.owner
+            name = parameter.name
             if name in ("k_a", "k_d"):
                 result[place] = self._basis(owner, name) * parameter.tint
                 continue
@@ -430,9 +439,12 @@ class OwnModel:
             FitParameter(name=each.name, owner=0, paired=each.default, low=each.low, high=each.high)
             for each in heuristic.parameters
         )
-        self.form, self.names = heuristic.name, (heuristic.name,)
+        self.form = heuristic.name
+        self.names = (heuristic.name,)
         self.reached = [int(counted.sum())]
-        self._renderer, self._seeds, self._counted = renderer, seeds, counted
+        self._renderer = renderer
+        self._seeds = seeds
+        self._counted = counted
         self._kept = lru_cache(maxsize=2 + len(self.parameters))(self._rendered)
 
     def whole(self, x: NDArray) -> NDArray:
@@ -450,7 +462,8 @@ class OwnModel:
 
     def _rendered(self, x: tuple[float, ...], by: int | None = None) -> NDArray:
         """Return the mean of the passes, or of their derivatives by one parameter."""
-        integrator, scene = self._renderer.integrator, self._renderer.scene
+        integrator = self._renderer.integrator
+        scene = self._renderer.scene
         total = np.zeros(())
         with variant(self._renderer.variant):
             values = {one.name: mi.Float(v) for one, v in zip(self.parameters, x, strict=True)}

@@ -36,7 +36,8 @@ from scipy.optimize import lsq_linear
 from fotismos.comparisons.departure.colour import Viewing, cam16ucs_unclipped
 from fotismos.comparisons.fit.model import bounds
 
-STEP, SMALLEST_STEP = 1e-4, 1e-8
+STEP = 1e-4
+SMALLEST_STEP = 1e-8
 """Relative step of the finite differences of colour spaces; their own error is its square."""
 
 FOLLOWED = 2
@@ -45,10 +46,12 @@ FOLLOWED = 2
 SMOOTH = 1.0
 """Rounding, in the loss's unit, of the loss that a search goes through first."""
 
-LARGEST_COUNT, LARGEST_DAMPING = 60, 1e12
+LARGEST_COUNT = 60
+LARGEST_DAMPING = 1e12
 """Evaluations of one search, and the damping at which it ends."""
 
-TOLERANCE, SMALLEST_GAIN = 1e-7, 1e-14
+TOLERANCE = 1e-7
+SMALLEST_GAIN = 1e-14
 """A search has converged when a step is expected to lower the loss by less than this part of it, or
 by less than the latter, in its own unit, for images that the model can make exactly."""
 
@@ -111,7 +114,10 @@ class Objective:
     """
 
     def __init__(self, model: Any, reference: NDArray, loss: Loss, viewing: Viewing) -> None:
-        self.model, self.reference, self.loss, self.viewing = model, reference, loss, viewing
+        self.model = model
+        self.reference = reference
+        self.loss = loss
+        self.viewing = viewing
         self._target = loss.coordinates(reference, viewing)
 
     def smoothed(self) -> "Objective":
@@ -126,7 +132,8 @@ class Objective:
     def value_of(self, image: NDArray) -> float:
         """Return the loss of an image (N, 3)."""
         differences = self.loss.coordinates(image, self.viewing) - self._target
-        square, c = np.sum(differences**2, axis=1), self.loss.rounding
+        square = np.sum(differences**2, axis=1)
+        c = self.loss.rounding
         # The same as sqrt(d^2 + c^2) - c, without the difference of like numbers.
         values = square / (np.sqrt(square + c * c) + c) if isfinite(c) else square / 2
         return float(values.mean())
@@ -137,7 +144,8 @@ class Objective:
         ``d / s`` (N, K) and ``I / s - d d^T / s^3`` (N, K, K), with ``s = sqrt(d^2 + c^2)``, and
         the derivatives of the coordinates by the parameters (N, K, P).
         """
-        image, c = self.model.image(x), self.loss.rounding
+        image = self.model.image(x)
+        c = self.loss.rounding
         d = self.loss.coordinates(image, self.viewing) - self._target
         jacobian = self.loss.derivative(image, self.viewing) @ self.model.columns(x).transpose(
             1, 2, 0
@@ -175,7 +183,8 @@ def search(objective: Objective, starts: Sequence[NDArray]) -> tuple[NDArray, fl
 def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, bool]:
     """Return the minimum that a search from ``x`` finds, its loss, and whether it converged."""
     low, high = bounds(objective.model.parameters)
-    loss, damping = objective.value(x), 1e-3
+    loss = objective.value(x)
+    damping = 1e-3
     gradient, second = objective.quadratic(x)
     for _ in range(1, LARGEST_COUNT):
         damped = second + damping * np.diag(np.diag(second))
@@ -186,7 +195,8 @@ def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, bool]:
         trial = np.clip(x + step, low, high)
         gained = loss - objective.value(trial)
         if gained > 0:
-            x, loss = trial, loss - gained
+            x = trial
+            loss = loss - gained
             gradient, second = objective.quadratic(x)
             damping *= 0.1 if gained > 0.5 * expected else 1
         if gained <= 0.1 * expected:
@@ -230,7 +240,8 @@ def identify(
     parameters not identifiable or at a bound.
     """
     low, high = bounds(objective.model.parameters)
-    near, threshold = AT_BOUND * (high - low), objective.loss.threshold
+    near = AT_BOUND * (high - low)
+    threshold = objective.loss.threshold
     at_bound = (x - low < near) | (high - x < near)
     root = np.sqrt(np.maximum(pixels, 1))
     _, curvature, jacobian = objective.changes(x)
@@ -257,7 +268,8 @@ def identify(
         if shows[number] < threshold:
             reason = "does not show in the image"
         elif not determined[number]:
-            reason, place = "others make up for it", int(free[:number].sum())
+            reason = "others make up for it"
+            place = int(free[:number].sum())
             shares = np.abs(inverse[place] / inverse[place, place])
             others = zip(np.flatnonzero(free).tolist(), shares, strict=True)
             partners = tuple(i for i, share in others if i != number and share > PARTNER)

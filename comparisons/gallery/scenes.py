@@ -31,7 +31,8 @@ def _sphere(**bsdf):
 
 
 def _textbook(viewer, field_of_view=40.0, /, **content):
-    sensor, integrator = _camera(viewer, field_of_view), {"type": "heuristic"}
+    sensor = _camera(viewer, field_of_view)
+    integrator = {"type": "heuristic"}
     return {"type": "scene", "integrator": integrator, "sensor": sensor, **content}
 
 

@@ -56,16 +56,22 @@ from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, pa
 from fotismos.reference.rendering.sums import block_numbers, jackknifed
 from fotismos.reference.scene.source import Source
 
-WIDTH, NARROW, MANY = 48, 32, 64
+WIDTH = 48
+NARROW = 32
+MANY = 64
 """Width of the images that causes are found in, at most, and that for more than MANY lights or
 shapes: each sample takes longer there."""
 
-REPLICATES, SPP, FEW_SPP, EXACT_SPP = 4, 64, 32, 16
+REPLICATES = 4
+SPP = 64
+FEW_SPP = 32
+EXACT_SPP = 16
 """Replicates of each image, samples per pixel of each, those for MANY lights or shapes, and those
 where plans are exact: only the pixel filter needs them. With 16 instead of 64, skewed noise left
 2 % of the Cornell box's departure in the closure."""
 
-EXACT_EFFECTS, ORDERS = 4, 8
+EXACT_EFFECTS = 4
+ORDERS = 8
 """Largest number of effects for which every subset is rendered, and orders drawn for more."""
 
 BIAS = 0.005
@@ -78,7 +84,8 @@ LEAST = 1.0
 ALSO = 0.5
 """Share of what the first effect removes: a second one that removes as much is named too."""
 
-NONE, UNCOUNTED = -1, -2
+NONE = -1
+UNCOUNTED = -2
 
 Player = TypeVar("Player", bound=Hashable)
 """An effect; in tests of the sums, any name."""
@@ -95,7 +102,8 @@ def explained(
 
     If they cannot be found, a warning says why.
     """
-    begin, record = perf_counter(), comparison.record
+    begin = perf_counter()
+    record = comparison.record
     try:
         clean = comparison.images.reference, comparison.images.reference_stderr
         causes = find(ready, source, options, progress, clean)
@@ -158,7 +166,8 @@ class ErrorMeter:
     """
 
     def __init__(self, groups: NDArray, counted: NDArray[np.bool_], viewing: Viewing) -> None:
-        self.viewing, self.counted = viewing, counted
+        self.viewing = viewing
+        self.counted = counted
         self._groups = np.asarray(groups)[:, counted].astype(float)
         _, self._blocks = np.unique(block_numbers(counted), return_inverse=True)
 
@@ -182,10 +191,8 @@ class ErrorMeter:
                 LEADING.difference(reference, shown)
                 for reference, shown in zip(references, self._noisier(images[chosen]), strict=True)
             )
-            before, after = (
-                np.bincount(self._blocks, each).astype(float)
-                for each in (plain, np.mean(noisy, axis=0))
-            )
+            before = np.bincount(self._blocks, plain).astype(float)
+            after = np.bincount(self._blocks, np.mean(noisy, axis=0)).astype(float)
             found.append(plain * ratio(without_noise(before, after), before)[self._blocks])
         return np.stack(found)
 
@@ -202,7 +209,8 @@ class ErrorMeter:
 
     def _noisier(self, images: NDArray, sign: int = 1) -> list[NDArray]:
         """Return the coordinates of the mean of images (n, N, 3), and of it with added noise."""
-        mean, noise = images.mean(axis=0), np.tensordot(contrasts(np.ones(len(images))), images, 1)
+        mean = images.mean(axis=0)
+        noise = np.tensordot(contrasts(np.ones(len(images))), images, 1)
         shown = (mean, *(mean + sign * each for each in noise))
         return [LEADING.coordinates(pixels, self.viewing) for pixels in shown]
 
@@ -218,7 +226,8 @@ def attribute(
 
     ``shapes`` are what each pixel sees; ``seed`` draws the orders. For ``clean`` see :func:`find`.
     """
-    effects, everything = images.effects, frozenset(images.effects)
+    effects = images.effects
+    everything = frozenset(images.effects)
     nothing: frozenset[Effect] = frozenset()
     # One rendering makes many images, so all that the sums will ask for are rendered at once.
     sets = [nothing, *(frozenset({effect}) for effect in effects)]
@@ -240,7 +249,8 @@ def attribute(
 
     gains, sampling_errors, drawn = shares(effects, error, seed, EXACT_EFFECTS, ORDERS)
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
-    departure, left = error(nothing), error(everything)
+    departure = error(nothing)
+    left = error(everything)
     bias = BIAS * float(departure[0].mean())
     contributions = tuple(
         Contribution(
@@ -297,7 +307,8 @@ def by_object(
 ) -> tuple[ObjectContribution, ...]:
     """Return what the effects remove on each shape, the one with most of the departure first."""
     found, places = find_objects(departure, counted, shapes)
-    rows, count = places[counted], len(found)
+    rows = places[counted]
+    count = len(found)
     gains = [means(each, rows, count) for each in removed.values()]
     remaining = means(left, rows, count)
     return tuple(
@@ -333,7 +344,8 @@ def shares(
     ``orders`` are drawn, an even number of at least 4.
     """
     players = tuple(players)
-    is_exact, rng = len(players) <= exact_players, np.random.default_rng(seed)
+    is_exact = len(players) <= exact_players
+    rng = np.random.default_rng(seed)
     walks: list[Sequence[int]] = [*permutations(range(len(players)))] if is_exact else []
     while not is_exact and len(walks) < orders:
         order = rng.permutation(len(players)).tolist()
@@ -374,7 +386,8 @@ def named(comparison: Comparison, effects: Mapping[str, NDArray]) -> ComparisonR
 
     ``effects`` are ``{name: (h, w)}``, the ΔE2000 that each removes; the maps may be smaller.
     """
-    record, images = comparison.record, comparison.images
+    record = comparison.record
+    images = comparison.images
     maps = {name: _enlarged(values, images.counted.shape) for name, values in effects.items()}
 
     def in_region(region: Region) -> dict[str, float]:

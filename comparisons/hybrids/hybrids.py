@@ -76,7 +76,8 @@ class Pairs:
     """
 
     def __init__(self, source: Source, options: Options, ready: Prepared) -> None:
-        self.options, self.ready = options, ready
+        self.options = options
+        self.ready = ready
         self.heuristic_variant = options.heuristic_variant or ready.reference.variant
         self._source = source
         key = ready.reference.variant, options.polygon_shading, options.tessellation
@@ -98,7 +99,8 @@ class Pairs:
 
         ``differences`` are those of the pair with the scene's own geometry, in this variant.
         """
-        options, found = self.options, set(differences)
+        options = self.options
+        found = set(differences)
         if options.polygon_shading is not Interpolation.PHONG or options.tessellation is not None:
             found.add(POLYGONS)
         if self.heuristic_variant != self.ready.reference.variant:
@@ -122,7 +124,9 @@ class HybridScenes:
     """
 
     def __init__(self, pair: Pair, plan: Plan, scene: Scene) -> None:
-        self.pair, self.plan, self.scene = pair, plan, scene
+        self.pair = pair
+        self.plan = plan
+        self.scene = scene
         self.facts = Facts.of(pair, scene)
         self.differences = tuple(
             effect for effect in EFFECTS if effect.differs(self.facts, plan.calls_for(effect))
@@ -209,8 +213,12 @@ class HybridImages:
         seed: int,
         size: tuple[int, int],
     ) -> None:
-        self.replicates, self.spp, self.size = replicates, spp, size
-        self._pairs, self._ready, self._seed = pairs, pairs.ready, seed
+        self.replicates = replicates
+        self.spp = spp
+        self.size = size
+        self._pairs = pairs
+        self._ready = pairs.ready
+        self._seed = seed
         self._variant = pairs.ready.reference.variant
         self._scenes = {self._variant: scenes}
         self._known: dict[frozenset[Effect], NDArray] = {}
@@ -253,7 +261,8 @@ class HybridImages:
         """
         if not effects:
             return self.kernel
-        found, own = self.plugin(effects), OF_KERNEL.intersection(self.effects)
+        found = self.plugin(effects)
+        own = OF_KERNEL.intersection(self.effects)
         if own <= set(effects):
             return found
         return found + (self._kernel(own.intersection(effects)) - self.plain_kernel)
@@ -270,7 +279,8 @@ class HybridImages:
 
     def _kernel(self, effects: frozenset[Effect]) -> NDArray:
         """Return the image of the kernel with some of :data:`OF_KERNEL`."""
-        pairs, scene = self._pairs, self._ready.heuristic.scene
+        pairs = self._pairs
+        scene = self._ready.heuristic.scene
         if effects not in self._kernels:
             with variant(pairs.heuristic_variant):
                 if effects:
@@ -317,7 +327,8 @@ class HybridImages:
 
         The channels of a pass are those of ``count`` images.
         """
-        (width, height), whole = self.size, image_size(renderer.scene)
+        (width, height) = self.size
+        whole = image_size(renderer.scene)
         renderer.size = self.finer * width, self.finer * height
         loop = passes([renderer], self._seed, self.replicates, stream=Stream.REPLICATES)
         made = np.stack([np.array(one.images[0]) for one in loop])
@@ -360,7 +371,8 @@ class HybridImages:
         def deviation(centred: NDArray) -> NDArray[np.float64]:
             return np.sqrt(np.maximum(uniform_filter(covariance(centred, centred), 3), 0))
 
-        beyond, other = full.mean(axis=0) - picture, full - full.mean(axis=0)
+        beyond = full.mean(axis=0) - picture
+        other = full - full.mean(axis=0)
         known = deviation(other)
         unknown = np.hypot(known, error.mean(axis=-1))
         quiet = []

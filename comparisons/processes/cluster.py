@@ -50,7 +50,8 @@ class Cluster(Pool):
     """
 
     def __init__(self, client: Any, prepare: Callable[[], object]) -> None:
-        self._client, self._prepare = client, prepare
+        self._client = client
+        self._prepare = prepare
 
     def start(self) -> None:
         """Do nothing: workers run already."""
@@ -68,7 +69,8 @@ class Cluster(Pool):
         from distributed import as_completed
         from distributed.client import FutureCancelledError
 
-        waiting, by_key = iter(tasks), dict[str, Task]()
+        waiting = iter(tasks)
+        by_key = dict[str, Task]()
 
         def submit(some: Iterable[Task]) -> list[Any]:
             futures = []
@@ -83,7 +85,8 @@ class Cluster(Pool):
         workers = max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
         queue = as_completed(submit(islice(waiting, AHEAD * workers)))
         for future in queue:
-            task, outcome = by_key.pop(future.key), Future[Any]()
+            task = by_key.pop(future.key)
+            outcome = Future[Any]()
             try:
                 outcome.set_result(future.result())
             except FutureCancelledError as error:

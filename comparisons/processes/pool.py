@@ -79,7 +79,9 @@ class Pool:
     def __init__(
         self, count: int, prepare: Callable[[], object] = tuple, limit_s: float = inf
     ) -> None:
-        self._count, self._prepare, self._limit_s = count, prepare, limit_s
+        self._count = count
+        self._prepare = prepare
+        self._limit_s = limit_s
         self._idle: list[Worker] = []
         self._busy: list[Worker] = []
 
@@ -126,7 +128,9 @@ class Pool:
 
     def end(self) -> None:
         """End the processes, whatever they are doing."""
-        workers, self._idle, self._busy = self._idle + self._busy, [], []
+        workers = self._idle + self._busy
+        self._idle = []
+        self._busy = []
         for worker in workers:
             worker.end()
 
@@ -301,7 +305,8 @@ class Turn:
     """
 
     def __init__(self, folder: Path, gate: Path) -> None:
-        self._folder, self._gate = folder, gate
+        self._folder = folder
+        self._gate = gate
 
     def __enter__(self) -> Self:
         self._file = os.open(self._folder, os.O_RDONLY)

@@ -60,7 +60,8 @@ HALVES = {
 
 def results() -> dict[str, Column]:
     """Return the columns of results, including the departure in each metric."""
-    name, label = LEADING.name, LEADING.label
+    name = LEADING.name
+    label = LEADING.label
     numbers = {
         "heuristic": f"mean of the heuristic image, {LUMINANCE}",
         "reference": f"mean of the reference, {LUMINANCE}",
@@ -106,7 +107,8 @@ def measure(
     """
     summary, _ = statistics.summarise(LEADING, heuristic, reference, counted, noise=noise)
     ratio, _ = statistics.summarise_log2_luminance(heuristic, reference, counted)
-    test, truth = heuristic[counted], reference[counted]
+    test = heuristic[counted]
+    truth = reference[counted]
     means = {
         name: metric.mean(metric.against(reference, counted, DEFAULT_VIEWING)(heuristic))
         for name, metric in METRICS.items()

@@ -89,7 +89,8 @@ class Levels:
         """Return the values at ``u``, an array of numbers in [0, 1); listed ones equally often."""
         if not self.is_range:
             return np.array(self.values)[(u * len(self.values)).astype(int)]
-        low, high = self.values[0], self.values[-1]
+        low = self.values[0]
+        high = self.values[-1]
         return low * (high / low) ** u if self.is_log else low + (high - low) * u
 
 
@@ -217,7 +218,8 @@ def _part(raw: dict[str, Any], where: str, folder: Path) -> StudyPart:
     chosen = {name: value for name, value in raw.items() if name in SETTABLE}
     rest = {name: value for name, value in raw.items() if name not in SETTABLE}
     table = _converted(rest, PartTable, where)
-    scene, is_file = table.scene, Path(table.scene).suffix in SUFFIXES
+    scene = table.scene
+    is_file = Path(table.scene).suffix in SUFFIXES
     try:
         options = DEFAULTS.changed(**chosen)
     except InputError as error:
@@ -254,7 +256,8 @@ def _all_levels(table: PartTable, where: str) -> dict[str, Levels]:
         raise InputError(f"{where}: no parameters are given. Name some in [part.parameters].")
     known = {name: UNLIMITED for name in raw if name.startswith(OWN)}
     if table.scene in SCENES:
-        phong, plastic = (set(raw) & set(material) for material in (PHONG, ROUGHPLASTIC))
+        phong = set(raw) & set(PHONG)
+        plastic = set(raw) & set(ROUGHPLASTIC)
         if phong and plastic:
             raise InputError(
                 f"{where}: {', '.join(sorted(phong | plastic))} belong to two materials. Give those"

@@ -141,7 +141,8 @@ def run(
     saved = {key: (entry.load() or {}).get("row") for key, entry in entries.items()}
     results = {key: row for key, row in saved.items() if row and row["error"] is None}
     left = {point.key: point for point in points if point.key not in results}
-    total, report = len(points), progress or (lambda *_: None)
+    total = len(points)
+    report = progress or (lambda *_: None)
     begin = total - len(left)
     report("points", begin, total)
     tasks = [Task(f"points of {each.part.name}", row, (each,)) for each in left.values()]
@@ -194,13 +195,15 @@ def _rendered(point: StudyPoint) -> Row:
     if part.scene not in SCENES:
         source = source.edited(partial(set_values, values=in_scene))
     ready = guarded(source, part.options)
-    spp, scene = max(1, (part.options.spp or 0) // PASSES), ready.scene
+    spp = max(1, (part.options.spp or 0) // PASSES)
+    scene = ready.scene
     ready.heuristic.spp = spp
     parameters = mi.traverse(ready.heuristic.integrator)
     for name, value in own.items():
         parameters[name] = value
     parameters.update()
-    renderers, plans = [ready.heuristic], _plans(ready.plan)
+    renderers = [ready.heuristic]
+    plans = _plans(ready.plan)
     for stage in plans.values():
         integrator = physical_integrator(stage, scene, ready.pair.hide_emitters)
         renderers.append(Renderer(scene, integrator, spp, "reference image"))

@@ -34,10 +34,12 @@ Dict: TypeAlias = dict[str, Any]
 
 Vector: TypeAlias = tuple[float, float, float]
 
-CAMERA_DISTANCE, LIGHT_DISTANCE = 8.0, 10.0
+CAMERA_DISTANCE = 8.0
+LIGHT_DISTANCE = 10.0
 """For ``sphere``, in radii: a lamp of any size is behind the camera."""
 
-ROOM, CEILING = 4.0, 3.9
+ROOM = 4.0
+CEILING = 3.9
 """For ``enclosure``, in radii: half the room's side, and the lamp's height."""
 
 
@@ -185,10 +187,12 @@ UNLIMITED = StudyParameter(
 
 # --- A flat surface ------------------------------------------------------------------------------
 
-HEIGHTS, AZIMUTHS = 240, 120
+HEIGHTS = 240
+AZIMUTHS = 120
 """Directions of the quadrature over half the hemisphere; the other half is symmetric."""
 
-VIEW_HEIGHTS, VIEW_AZIMUTHS = 96, 64
+VIEW_HEIGHTS = 96
+VIEW_AZIMUTHS = 64
 
 PEAK_STEP = 0.05
 """Degrees between the directions searched for a lobe's peak."""
@@ -204,7 +208,8 @@ def material(
         grey = (values["reflectance"],) * 3
         plastic = RoughPlastic(grey, values["alpha"], values["int_ior"])
         return to_phong(plastic, convention), plastic, ()
-    k_d, k_s = ((values[name],) * 3 for name in ("k_d", "k_s"))
+    k_d = (values["k_d"],) * 3
+    k_s = (values["k_s"],) * 3
     phong = Phong(k_d, k_s, values["n"])
     if not any(k_s):  # pairing makes it plain diffuse, not roughplastic
         return phong, RoughPlastic(k_d, 1.0, 1.0), ()
@@ -238,12 +243,11 @@ def heuristic_radiance(
     Directions (3, N) are of light and viewer. Display-linear: a white diffuse surface that faces
     the light has the value 1.
     """
-    sun, place = DirectionalLight(-mi.Vector3f(light), 1.0), (0 * furnace.UP, furnace.UP, view)
+    sun = DirectionalLight(-mi.Vector3f(light), 1.0)
+    place = (0 * furnace.UP, furnace.UP, view)
     lobe = {"k_s": phong.k_s[0], "n": phong.n}
-    total, specular = (
-        np.array(shaded(heuristics.PHONG, place, lobe | {"k_d": k_d}, [sun]), float)[0]
-        for k_d in (phong.k_d[0], 0.0)
-    )
+    total = np.array(shaded(heuristics.PHONG, place, lobe | {"k_d": phong.k_d[0]}, [sun]), float)[0]
+    specular = np.array(shaded(heuristics.PHONG, place, lobe | {"k_d": 0.0}, [sun]), float)[0]
     return total, specular
 
 
@@ -303,7 +307,8 @@ def lobe(point: Point, convention: Convention) -> tuple[dict[str, float], np.nda
     """
     phong, plastic, _ = material(tuple(point.items()), convention)
     angle = point["light_angle"]
-    plane, mirror = direction(np.arange(0, 90, PEAK_STEP), 0.0), direction(angle, 0.0)
+    plane = direction(np.arange(0, 90, PEAK_STEP), 0.0)
+    mirror = direction(angle, 0.0)
     parts = (views(), hemisphere()[0], plane, mirror)
     view = np.concatenate(parts, axis=1)
     light = np.broadcast_to(direction(angle, 180.0), view.shape)

@@ -91,7 +91,9 @@ class SceneMaterials:
     def __init__(
         self, scene: Scene, prune: bool = True, form: str | None = None, physical: bool = False
     ):
-        self.prune, self.form, self.physical = prune, form, physical
+        self.prune = prune
+        self.form = form
+        self.physical = physical
         self.bsdfs = list(dict.fromkeys(_bsdfs(scene)))
         places = {}
         for number, bsdf in enumerate(self.bsdfs):

@@ -142,7 +142,8 @@ def define() -> dict[str, Any]:
             toward, intensity, _, distance = self.light(it, active).illuminate(mi.Vector3f(it.p))
             ds = dr.zeros(mi.DirectionSample3f)
             ds.d, ds.dist = toward, FAR if isinstance(distance, float) else distance
-            ds.p, ds.n = it.p + toward * ds.dist, -toward
+            ds.p = it.p + toward * ds.dist
+            ds.n = -toward
             ds.time = it.time
             ds.pdf = 1.0
             ds.delta = True

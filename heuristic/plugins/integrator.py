@@ -112,7 +112,8 @@ def define() -> dict[str, Any]:
         def seen_side(self, scene: Scene, si: Interaction, active: Mask) -> tuple[Direction, Mask]:
             """Return the normal of the side that is seen, and whether that side is shaded."""
             materials = self.known(scene).materials
-            normal, twosided = materials.normal(si, active), materials.twosided(si, active)
+            normal = materials.normal(si, active)
+            twosided = materials.twosided(si, active)
             if twosided is not False:
                 normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
             return normal, twosided | (si.wi.z > 0)
@@ -159,7 +160,8 @@ def define() -> dict[str, Any]:
                 self.prepared = self.model.prepared(scene, self.numbers)
                 dr.sync_thread()
                 self.preparation = perf_counter() - begin if self.model.prepare else 0.0
-                self.parts, self.values = parts, self.numbers
+                self.parts = parts
+                self.values = self.numbers
             return self
 
         def prepare(self, scene: Scene) -> None:
@@ -233,7 +235,8 @@ def _through_layers(integrator: Any, scene: Scene, ray: Any, active: Mask) -> tu
     ``C = sum_j c_j prod_(i < j) T_i``: each surface adds its light ``c_j``, which includes its
     opacity, behind the transmittances ``T_i`` of those before it.
     """
-    colour, throughput = mi.Spectrum(0), mi.Spectrum(1)
+    colour = mi.Spectrum(0)
+    throughput = mi.Spectrum(1)
     hit_any = mi.Bool(False)
     layer = mi.UInt32(0)
     while active & (layer < LAYERS):

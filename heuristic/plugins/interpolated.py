@@ -44,12 +44,14 @@ def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
     it: ``p``, ``n``, ``sh_frame.n``, ``uv``, ``shape`` and ``prim_index``. GOURAUD has no such
     points on a mesh with ``face_normals``.
     """
-    corners, points = meshes.faces(mesh), meshes.positions(mesh)
+    corners = meshes.faces(mesh)
+    points = meshes.positions(mesh)
     uv = meshes.texture_coordinates(mesh)
     face = dr.arange(mi.UInt32, mesh.face_count())
     if interpolation is Interpolation.FLAT:
         si = dr.zeros(mi.SurfaceInteraction3f, mesh.face_count())
-        points, uv = _mean(points, corners), None if uv is None else _mean(uv, corners)
+        points = _mean(points, corners)
+        uv = None if uv is None else _mean(uv, corners)
         si.n = tessellation.face_normals(mesh)
         si.prim_index = face
     else:
@@ -90,7 +92,8 @@ def shade_mesh(
     Colours are RGB or single numbers: Mitsuba 3.9.1 reads attributes of 1 or 3 components.
     """
     si = shading_points(mesh, interpolation)
-    position, normal = mi.Vector3f(si.p), mi.Vector3f(si.n)
+    position = mi.Vector3f(si.p)
+    normal = mi.Vector3f(si.n)
     view = mi.Vector3f(viewer) - position
     # Terms that do not depend on the position are a single number until spread out.
     everywhere = dr.zeros(mi.Float, dr.width(position))

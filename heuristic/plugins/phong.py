@@ -94,7 +94,8 @@ def define() -> dict[str, Any]:
             ``k_s`` is that of a lobe without normalisation, 0 for a mirror. With ``physical`` the
             material is a :class:`fotismos.heuristic.materials.PairedMaterial`.
             """
-            form, n = form or self.form, self.exponent(si, active)
+            form = form or self.form
+            n = self.exponent(si, active)
             coefficients = {
                 name: getattr(self, name).eval(si, active)
                 for name in (self.present if prune else self.kernel_terms)
@@ -154,7 +155,9 @@ def define() -> dict[str, Any]:
             sample1 = dr.select(passes, 0, (sample1 - probability) / (1 - probability))
             reflected, weight = self._reflected(ctx, si, sample1, sample2, active & ~passes)
             straight = dr.zeros(mi.BSDFSample3f)
-            straight.wo, straight.eta, straight.pdf = -si.wi, 1.0, probability
+            straight.wo = -si.wi
+            straight.eta = 1.0
+            straight.pdf = probability
             straight.sampled_component = mi.UInt32(2)
             straight.sampled_type = mi.UInt32(+mi.BSDFFlags.Null)
             passed = self.transmittance.eval(si, passes) / probability
@@ -239,7 +242,8 @@ def define() -> dict[str, Any]:
             self.kernel_terms = [k for k in COEFFICIENTS if k != "k_s" or not self.is_mirror]
             self.present = {k for k in self.kernel_terms if may_be_nonzero(getattr(self, k))}
             # The lobe or mirror, the diffuse part and the null component, in this order.
-            front, back = mi.BSDFFlags.FrontSide, mi.BSDFFlags.BackSide
+            front = mi.BSDFFlags.FrontSide
+            back = mi.BSDFFlags.BackSide
             sides = front | (back if self.twosided else 0)
             flags = mi.BSDFFlags
             self.specular = flags.DeltaReflection if self.is_mirror else flags.GlossyReflection
@@ -280,7 +284,8 @@ def define() -> dict[str, Any]:
 
         def _albedos(self, si: Interaction, active: Mask) -> tuple[Number, Number]:
             """Return the albedo of the two parts at normal incidence, the mean over channels."""
-            k_d, k_s = (dr.mean(k.eval(si, active)) for k in (self.k_d, self.k_s))
+            k_d = dr.mean(self.k_d.eval(si, active))
+            k_s = dr.mean(self.k_s.eval(si, active))
             if self.is_mirror or self.normalised:
                 return k_d, k_s
             return k_d, k_s * (1 / terms.normalisation(self.form, self.exponent(si, active)))

@@ -51,7 +51,8 @@ ROWS = 64
 COSINES = np.maximum(np.linspace(0, 1, ROWS, dtype=np.float32), np.float32(1e-6))
 SINES = np.sqrt(1 - COSINES * COSINES)
 
-COARSE, FINE = 32, 128
+COARSE = 32
+FINE = 128
 """Nodes along each axis of a rule: few into the denser side, many out of it."""
 
 LEAST_SPREAD = 0.01
@@ -60,7 +61,8 @@ LEAST_SPREAD = 0.01
 LITERAL_IOR = 1.5
 SMALLEST_IOR = exp(1e-4)
 """Reflects 2.5e-9 at normal incidence; Mitsuba rejects an IOR of 1."""
-LARGEST_IOR, LARGEST_SMOOTH_IOR = 10.0, 3.8
+LARGEST_IOR = 10.0
+LARGEST_SMOOTH_IOR = 3.8
 """A larger specular albedo is recorded as missed. Above the second, by Mitsuba's fit, a smooth coat
 returns more from within than arrives."""
 
@@ -166,7 +168,8 @@ def ior_of_lobe(plastic: RoughPlastic, albedo: float) -> float:
 
     if albedo <= 0:
         return LITERAL_IOR
-    low, high = log(SMALLEST_IOR - 1), log(largest - 1)
+    low = log(SMALLEST_IOR - 1)
+    high = log(largest - 1)
     if distance(high) <= 0:
         return largest
     if distance(low) >= 0:
@@ -256,9 +259,11 @@ def _sums(distribution: str, alpha: float, eta: float, size: int, is_refracted: 
     cosine = dr.dot(incident, facet)
     reflected, inside, _, inverse = mi.fresnel(cosine, dr.opaque(mi.Float, eta))
     if is_refracted:
-        leaving, share = mi.refract(incident, facet, inside, inverse), 1 - reflected
+        leaving = mi.refract(incident, facet, inside, inverse)
+        share = 1 - reflected
     else:
-        leaving, share = mi.reflect(incident, facet), reflected
+        leaving = mi.reflect(incident, facet)
+        share = reflected
     leaves = (leaving.z < 0) if is_refracted else (leaving.z > 0)
     value = dr.select(leaves & (share > 0), share * facets.smith_g1(leaving, facet), 0)
     return np.array(dr.block_sum(value * weight, size * size // 2), float)
@@ -304,7 +309,8 @@ def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic,
         rho, misses = up_to_1("diffuse reflectance", phong.k_d)
         return RoughPlastic(rho, alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
 
-    diffuse, specular = np.array(phong.k_d), specular_albedo(phong)
+    diffuse = np.array(phong.k_d)
+    specular = specular_albedo(phong)
     strength = max(phong.k_s)
     red, green, blue = (k_s / strength for k_s in phong.k_s)
     white = RoughPlastic(
@@ -352,5 +358,6 @@ def to_phong(plastic: RoughPlastic, convention: Convention) -> Phong:
     n = exponent_of(plastic.alpha)
     reflected = of_roughplastic(plastic)
     k_s = reflected.specular * normalisation("phong", n)
-    (red, green, blue), lobe = reflected.diffuse.tolist(), k_s.tolist()
+    (red, green, blue) = reflected.diffuse.tolist()
+    lobe = k_s.tolist()
     return Phong((red, green, blue), (lobe[0], lobe[1], lobe[2]), n)

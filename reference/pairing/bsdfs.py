@@ -17,7 +17,8 @@ from fotismos.reference.pairing.factors import Convention, Miss, Phong, Replacem
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph, properties
 
-BSDF, TEXTURE = mi.ObjectType.BSDF, mi.ObjectType.Texture
+BSDF = mi.ObjectType.BSDF
+TEXTURE = mi.ObjectType.Texture
 
 REFLECTANCES: dict[str, dict[str, float]] = {
     "phong": {"k_d": 0.0, "k_s": 0.0},
@@ -164,7 +165,8 @@ def to_heuristic(context: Context, replaced: Replacements) -> None:
         for _, index in graph.children(shape, BSDF):
             context.nearest(index)
     for index, material in sorted(context.done.items()):
-        label, plugin = graph.label(index), graph.plugin(index)
+        label = graph.label(index)
+        plugin = graph.plugin(index)
         if plugin in WRAPPERS:
             continue
         if plugin != "phong":
@@ -180,10 +182,12 @@ def to_heuristic(context: Context, replaced: Replacements) -> None:
 def to_physical(graph: Graph, convention: Convention, replaced: Replacements) -> None:
     """Replace every ``phong`` of the graph by its :func:`physical_partner`."""
     for index in graph.nodes(BSDF, "phong"):
-        label, before = graph.label(index), graph.props(index)
+        label = graph.label(index)
+        before = graph.props(index)
         plugin, parameters, misses = physical_partner(graph, index, convention)
         replaced.misses += misses
-        (low, high), ior = PLASTICS, parameters.get("int_ior", 1.5) / parameters.get("ext_ior", 1.0)
+        (low, high) = PLASTICS
+        ior = parameters.get("int_ior", 1.5) / parameters.get("ext_ior", 1.0)
         note = f"no real plastic has the index {ior:.3g}: they have {low:g} to {high:g}"
         note = "" if low <= ior <= high else note
         recorded = {"reflectance": _base(before)} if plugin == "diffuse" else parameters
@@ -244,7 +248,8 @@ def is_mirror(props: mi.Properties) -> bool:
 
 def itself(context: Context, index: int) -> NearestPhong:
     """``phong``: itself; physically its :func:`physical_partner`."""
-    props, physical = context.graph.props(index), {}
+    props = context.graph.props(index)
+    physical = {}
     if context.for_users:
         plugin, own, _ = physical_partner(context.graph, index, context.convention)
         if plugin == "diffuse":
@@ -252,7 +257,8 @@ def itself(context: Context, index: int) -> NearestPhong:
         elif plugin == "conductor":
             physical = context.physical(own["specular_reflectance"], SMALLEST_ALPHA, metallic=1.0)
         else:
-            alpha, ior = own.get("alpha", SMALLEST_ALPHA), own["int_ior"] / own["ext_ior"]
+            alpha = own.get("alpha", SMALLEST_ALPHA)
+            ior = own["int_ior"] / own["ext_ior"]
             physical = context.physical(own["diffuse_reflectance"], alpha, ior)
     names = ("k_i", "k_a", "k_d", "k_s", "n", "form", "normalised", "twosided", "transmittance")
     fields = {name: props[name] for name in (*names, "tilt") if name in props}

@@ -59,10 +59,12 @@ def to_heuristic(
             replaced=replaced,
         )
         if light.plugin == "point" and shape is None:
-            place, intensity = mi.ScalarPoint3d(*light.position()), light.value("intensity", 1.0)
+            place = mi.ScalarPoint3d(*light.position())
+            intensity = light.value("intensity", 1.0)
             light.replace(heuristic("heuristic_point", position=place, intensity=intensity))
         elif light.plugin == "directional" and shape is None:
-            travel, intensity = mi.ScalarVector3f(*light.travel()), light.value("irradiance", 1.0)
+            travel = mi.ScalarVector3f(*light.travel())
+            intensity = light.value("irradiance", 1.0)
             light.replace(heuristic("heuristic_directional", direction=travel, intensity=intensity))
         else:
             from fotismos.reference.pairing import (
@@ -83,7 +85,8 @@ def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements
             replaced.lose(light.label, light.plugin, SECOND_INTENSITY, nearest)
         if light.plugin == "heuristic_point":
             factor, note = level(light, lambda travel: 1.0, lambda travel: 1.0, 1.0)
-            place, intensity = mi.ScalarPoint3d(*light.position()), light.scaled_intensity(factor)
+            place = mi.ScalarPoint3d(*light.position())
+            intensity = light.scaled_intensity(factor)
             props = properties("point", position=place, intensity=intensity)
             light.replace(props, factor, not note, note)
         elif light.plugin == "heuristic_directional":
@@ -132,7 +135,8 @@ def add_environment(
     A physical surface has one diffuse reflectance. The ``matched`` radiance is ``I_a k_a / k_d``,
     by least squares if materials differ; the ``literal`` one is ``I_a``.
     """
-    ratio, exact = np.ones(3), True
+    ratio = np.ones(3)
+    exact = True
     if convention is Convention.MATCHED:
         ratio, exact = _ambient_ratio(graph)
     level = values.plain(ambient)
@@ -147,10 +151,9 @@ def add_environment(
 def _ambient_ratio(graph: Graph) -> tuple[np.ndarray, bool]:
     """Return ``k_a / k_d`` per channel by least squares, and whether it fits all materials."""
     phongs = graph.nodes(mi.ObjectType.BSDF, "phong")
-    k_a, k_d, k_s = (
-        np.array([values.colour(graph, i, key, 0.0) for i in phongs]).reshape(-1, 3)
-        for key in ("k_a", "k_d", "k_s")
-    )
+    k_a = np.array([values.colour(graph, i, "k_a", 0.0) for i in phongs]).reshape(-1, 3)
+    k_d = np.array([values.colour(graph, i, "k_d", 0.0) for i in phongs]).reshape(-1, 3)
+    k_s = np.array([values.colour(graph, i, "k_s", 0.0) for i in phongs]).reshape(-1, 3)
     # Without a diffuse part the reflectance is k_a itself.
     has_part = np.logical_or(k_d.any(axis=1, keepdims=True), k_s.any(axis=1, keepdims=True))
     k_d = np.where(has_part, k_d, k_a)

@@ -30,9 +30,10 @@ from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.scene.graph import Graph, properties
 from fotismos.reference.scene.source import Source
 
-BSDF, INTEGRATOR, MEDIUM, SHAPE = (
-    getattr(mi.ObjectType, kind) for kind in ("BSDF", "Integrator", "Medium", "Shape")
-)
+BSDF = mi.ObjectType.BSDF
+INTEGRATOR = mi.ObjectType.Integrator
+MEDIUM = mi.ObjectType.Medium
+SHAPE = mi.ObjectType.Shape
 
 
 class Pairing(Record):
@@ -111,7 +112,9 @@ def _paired(
                 bare.detach(shape, key)
     geometry = cache(bare.instantiate)
 
-    model, half, replaced = named(heuristic), graph.copy(), Replacements()
+    model = named(heuristic)
+    half = graph.copy()
+    replaced = Replacements()
     context = bsdfs.Context(half, convention, for_users=with_partners or not model.is_own)
     if any(half.plugin(index) not in bsdfs.RULES for index in half.nodes(BSDF)):
         from fotismos.reference.pairing import (

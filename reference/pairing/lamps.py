@@ -23,7 +23,8 @@ from fotismos.reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FA
 from fotismos.reference.pairing.lights import LightNode, heuristic, level
 from fotismos.reference.scene.graph import Reference, properties
 
-BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
+BSDF = mi.ObjectType.BSDF
+EMITTER = mi.ObjectType.Emitter
 
 
 def to_heuristic(light: LightNode) -> Any:
@@ -55,7 +56,9 @@ FLAT = 1 - 1e-4
 
 
 def _area(light: LightNode) -> None:
-    graph, shape, radiance = light.graph, light.shape, light.value("radiance", 1.0)
+    graph = light.graph
+    shape = light.shape
+    radiance = light.value("radiance", 1.0)
     if light.hide_emitters:
         # Mitsuba's integrators look through it, and the heuristic casts no shadows.
         graph.remove(shape)
@@ -75,11 +78,16 @@ def _area(light: LightNode) -> None:
     if flatness > FLATNESS:
         # On its axis L times the projected area, and pi L A in all: I_0 2 pi / (m + 1) of 6.4.
         flatness = 1.0 if flatness > FLAT else flatness
-        plugin, factor, form = "heuristic_spot", INTENSITY_FACTOR * area * flatness, ""
+        plugin = "heuristic_spot"
+        factor = INTENSITY_FACTOR * area * flatness
+        form = ""
         exponent = 2 * flatness - 1
         cone = {"direction": mi.ScalarVector3f(*normal), "cutoff": 90.0, "exponent": exponent}
     else:
-        plugin, factor, form, cone = "heuristic_point", CLOSED_LIGHT_FACTOR * area, "closed, ", {}
+        plugin = "heuristic_point"
+        factor = CLOSED_LIGHT_FACTOR * area
+        form = "closed, "
+        cone = {}
     if flatness < 1:  # its light leaves through the shape
         cone["shell"] = radius
     match graph.plugin(shape):
@@ -142,7 +150,8 @@ STEPS = 2048
 def exponent_for(cutoff: float, beam_width: float) -> float:
     """Return the ``m`` of 6.4 nearest to Mitsuba's fall-off at equal flux; angles in degrees."""
     theta, weight = _cone(cutoff)
-    target, flux = linear_falloff(theta, cutoff, beam_width), linear_flux(cutoff, beam_width)
+    target = linear_falloff(theta, cutoff, beam_width)
+    flux = linear_flux(cutoff, beam_width)
 
     def distance(log_m):
         m = np.expm1(log_m)
@@ -160,7 +169,8 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
     too, up to the cone's.
     """
     theta, weight = _cone(cutoff)
-    target, flux = power_falloff(theta, exponent), power_flux(cutoff, exponent)
+    target = power_falloff(theta, exponent)
+    flux = power_flux(cutoff, exponent)
 
     def distance(edge, beam_width):
         fitted = flux / linear_flux(edge, beam_width) * linear_falloff(theta, edge, beam_width)
@@ -233,9 +243,11 @@ def _spot_to_heuristic(light: LightNode) -> None:
 
 def spot_to_physical(light: LightNode) -> None:
     """Replace a heuristic spot by Mitsuba's nearest."""
-    position, axis = light.position(), np.ravel(light.value("direction", (0, 0, 1))).astype(float)
+    position = light.position()
+    axis = np.ravel(light.value("direction", (0, 0, 1))).astype(float)
     axis /= np.linalg.norm(axis)
-    cutoff, exponent = light.number("cutoff", 30.0), light.number("exponent", 0.0)
+    cutoff = light.number("cutoff", 30.0)
+    exponent = light.number("exponent", 0.0)
     edge, beam_width = cone_for(cutoff, exponent)
 
     def angle(travel):

@@ -228,6 +228,7 @@ def level(
         return derived_cone(travel) / distance**2
 
     place = light.position()
-    here, there = (light.surface().mean_irradiance(place, f) for f in (chapters, physical))
+    here = light.surface().mean_irradiance(place, chapters)
+    there = light.surface().mean_irradiance(place, physical)
     note = "same mean irradiance over the visible surface; only the fall-off's shape differs"
     return IRRADIANCE_PER_INTENSITY * (here / there if there > 0 else 1.0), note

@@ -124,7 +124,8 @@ def roughplastic(context: Context, index: int) -> NearestPhong:
     with ``nonlinear`` it is ``c rho / (1 - f rho)`` (``_of_base``); the lobe's is linear in
     ``specular_reflectance``.
     """
-    graph, base = context.graph, context.value(index, "diffuse_reflectance", 0.5)
+    graph = context.graph
+    base = context.value(index, "diffuse_reflectance", 0.5)
     coat = context.value(index, "specular_reflectance", 1.0)
     physical = _of_plastic(context, index, base)
     if values.plain(base) is not None and values.plain(coat) is not None:
@@ -157,9 +158,8 @@ def plastic(context: Context, index: int) -> NearestPhong:
     inside = values.index_of_refraction(graph, index, "int_ior", "polypropylene")
     outside = values.index_of_refraction(graph, index, "ext_ior", "air")
     nonlinear = context.value(index, "nonlinear", False)
-    (whole, mirror), (half, _) = (
-        albedo.of_smooth_plastic(level, inside, outside, nonlinear) for level in (1.0, 0.5)
-    )
+    (whole, mirror) = albedo.of_smooth_plastic(1.0, inside, outside, nonlinear)
+    (half, _) = albedo.of_smooth_plastic(0.5, inside, outside, nonlinear)
     k_d = _of_base(graph, base, whole, half)
     reflected = _tinted(context, index, mirror, "specular_reflectance")
     return NearestPhong(
@@ -181,9 +181,11 @@ def conductor(context: Context, index: int) -> NearestPhong:
     white = probe.measured(context.graph, index, specular_reflectance=1.0)
     reflected = _tinted(context, index, white.reflected, "specular_reflectance")
     if context.plugin(index) == "conductor":
-        alpha, lost = 0.0, [MIRROR]
+        alpha = 0.0
+        lost = [MIRROR]
     else:
-        alpha, lost = context.value(index, "alpha", white.alpha), []
+        alpha = context.value(index, "alpha", white.alpha)
+        lost = []
     lost += [("Fresnel reflection", "the reflectance at normal incidence, at all angles")]
     return NearestPhong(
         k_a=reflected,
@@ -209,7 +211,8 @@ def principled(context: Context, index: int) -> NearestPhong:
     specular = values.plain(context.value(index, "specular", 0.5))
     # Mitsuba's reading of `specular`, F0 = 0.08 specular, as an index.
     ior = 2 / (1 - sqrt(0.08 * specular)) - 1 if isinstance(specular, float) else 1.5
-    ior, metallic = context.value(index, "eta", ior), context.value(index, "metallic", 0.0)
+    ior = context.value(index, "eta", ior)
+    metallic = context.value(index, "metallic", 0.0)
     return NearestPhong(
         k_a=probed.reflected if values.plain(k_d) is not None else k_d,
         k_d=k_d,
@@ -310,7 +313,8 @@ def alike(
 
 def _beside(material: NearestPhong, other: NearestPhong) -> NearestPhong:
     """Return a material without its mirror if another has a lobe, since both share one ``n``."""
-    own, others = values.plain(material.n), values.plain(other.n)
+    own = values.plain(material.n)
+    others = values.plain(other.n)
     if others == inf and values.is_zero(material.k_s):
         return replace(material, n=inf)
     if own == inf != others and not values.is_zero(other.k_s):
@@ -333,7 +337,8 @@ def _normalised(graph: Graph, material: NearestPhong) -> NearestPhong:
 
 def twosided(context: Context, index: int) -> NearestPhong:
     """``twosided``: the phong's own parameter; of two BSDFs, each on its side."""
-    graph, inner = context.graph, context.inner(index)
+    graph = context.graph
+    inner = context.inner(index)
     if len(inner) == 1:
         return replace(inner[0], twosided=True)
     front, back = alike(graph, *inner[:2])
@@ -351,7 +356,8 @@ def twosided(context: Context, index: int) -> NearestPhong:
 
 def mask(context: Context, index: int) -> NearestPhong:
     """``mask``: coefficients times the opacity, the rest passes straight through (exact)."""
-    graph, (inner,) = context.graph, context.inner(index)
+    graph = context.graph
+    (inner,) = context.inner(index)
     opacity = context.value(index, "opacity", 0.5)
     reflected = {
         name: values.share(graph, getattr(inner, name), opacity) for name in ("k_a", "k_d", "k_s")
@@ -367,7 +373,8 @@ def blend(context: Context, index: int) -> NearestPhong:
 
     Exact if only one of the two has a lobe, or if the weight is 0 or 1.
     """
-    graph, inner = context.graph, context.inner(index)
+    graph = context.graph
+    inner = context.inner(index)
     first, second = alike(graph, *inner[:2])
     weight = context.value(index, "weight", 0.5)
     mixed = {
@@ -406,7 +413,8 @@ def normal_map(context: Context, index: int) -> NearestPhong:
 def bump_map(context: Context, index: int) -> NearestPhong:
     """``bumpmap``: the nested material, with the displaced surface's normal (exact as above)."""
     ((key, _),) = context.graph.children(index, TEXTURE)
-    scale, heights = float(context.value(index, "scale", 1.0)), context.graph.props(index)[key]
+    scale = float(context.value(index, "scale", 1.0))
+    heights = context.graph.props(index)[key]
     _require(context, index, heights, "eval_1_grad", "slope")
     return _tilted(context, index, heights=heights, scale=scale)
 

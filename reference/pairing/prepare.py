@@ -12,9 +12,11 @@ from fotismos.reference.records import Record
 from fotismos.reference.scene import checks, values
 from fotismos.reference.scene.graph import Graph, Reference, properties
 
-FILM, INTEGRATOR, SAMPLER, SENSOR, SHAPE = (
-    getattr(mi.ObjectType, kind) for kind in ("Film", "Integrator", "Sampler", "Sensor", "Shape")
-)
+FILM = mi.ObjectType.Film
+INTEGRATOR = mi.ObjectType.Integrator
+SAMPLER = mi.ObjectType.Sampler
+SENSOR = mi.ObjectType.Sensor
+SHAPE = mi.ObjectType.Shape
 
 PATHS = ("path", "volpath", "volpathmis")
 """Integrators with the same light as the reference: all paths up to a length."""
@@ -173,7 +175,8 @@ def _give_weights(graph, settings):
         child: shape for shape in graph.nodes(SHAPE) for _, child in graph.children(shape, kind)
     }
     for index in graph.nodes(kind):
-        props, name = graph.props(index), graph.label(owners.get(index, index))
+        props = graph.props(index)
+        name = graph.label(owners.get(index, index))
         if not props.get("sampling_weight", 1.0) > 0:
             settings.override(f"sampling_weight of {name}", f"{props['sampling_weight']:g}", "1")
             props["sampling_weight"] = 1.0
@@ -186,8 +189,10 @@ def _take_integrator(graph, settings):
         while nested := graph.children(index, INTEGRATOR):
             settings.override("integrator", graph.plugin(index), "the integrator inside it")
             index = nested[0][1]
-        plugin, props = graph.plugin(index), graph.props(index)
-        hidden, settings.integrator = props.get("hide_emitters", None), plugin
+        plugin = graph.plugin(index)
+        props = graph.props(index)
+        hidden = props.get("hide_emitters", None)
+        settings.integrator = plugin
         if plugin == "heuristic":
             settings.ambient = props.get("ambient", None)
             settings.occlusion = props.get("occlusion", False)

@@ -28,7 +28,8 @@ from fotismos.heuristic.errors import InputError
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph
 
-SAMPLES, SAMPLES_OF_LIGHTS = 8192, 65_536
+SAMPLES = 8192
+SAMPLES_OF_LIGHTS = 65_536
 NODES = 256
 """Cosines of an :class:`AlbedoTable`; at each the BSDF is sampled :data:`SAMPLES` times."""
 
@@ -178,15 +179,16 @@ def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple:
     beside = mi.Vector3f(sin(OFF_LOBE) * cos_phi, sin(OFF_LOBE) * sin_phi, cos(OFF_LOBE))
     level = bsdf.eval(mi.BSDFContext(), si, beside, True) * (pi / cos(OFF_LOBE))
     dr.eval(bs, weight, up, straight, level)  # one kernel for all values read below
-    reflected, passed, scattered, diffuse = (
-        np.array([np.mean(np.array(channel, float)) for channel in value])
-        for value in (
-            dr.select(up, weight, 0),
-            dr.select(~up & straight, weight, 0),
-            dr.select(~up & ~straight, weight, 0),
-            level,
-        )
+    reflected = np.array(
+        [np.mean(np.array(channel, float)) for channel in dr.select(up, weight, 0)]
     )
+    passed = np.array(
+        [np.mean(np.array(channel, float)) for channel in dr.select(~up & straight, weight, 0)]
+    )
+    scattered = np.array(
+        [np.mean(np.array(channel, float)) for channel in dr.select(~up & ~straight, weight, 0)]
+    )
+    diffuse = np.array([np.mean(np.array(channel, float)) for channel in level])
     diffuse = np.clip(diffuse, 0, reflected)
     return reflected, diffuse, passed, scattered, _width(bs, weight, up, diffuse)
 
@@ -229,7 +231,9 @@ def surface_mean(graph: Graph, shape: mi.Shape) -> Any:
     x, y = _lattice()
     sample = shape.sample_position(0.0, mi.Point2f(x, y))
     si = dr.zeros(mi.SurfaceInteraction3f, SAMPLES_OF_LIGHTS)
-    si.p, si.n, si.uv = sample.p, sample.n, sample.uv
+    si.p = sample.p
+    si.n = sample.n
+    si.uv = sample.uv
     si.wi = mi.Vector3f(0, 0, 1)
     means = [_channel_means(emitter.eval(_at(si, wavelengths))) for wavelengths in _wavelengths()]
     return as_value(graph, np.concatenate(means), emitted=True)
@@ -239,7 +243,8 @@ def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:
     """Return ``int L dw`` per channel, and the unit mean direction towards the light."""
     it = dr.zeros(mi.SurfaceInteraction3f, SAMPLES_OF_LIGHTS)
     x, y = _lattice()
-    means, toward = [], np.zeros(3)
+    means = []
+    toward = np.zeros(3)
     for wavelengths in _wavelengths():
         ds, weight = emitter.sample_direction(_at(it, wavelengths), mi.Point2f(x, y))
         weight = dr.select(dr.isfinite(weight) & (ds.pdf > 0), weight, 0)
@@ -290,5 +295,6 @@ class AlbedoTable:
         place = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)
         place = dr.clip(place, 0, NODES - 1)
         below = dr.minimum(mi.UInt32(place), NODES - 2)
-        low, high = (dr.gather(mi.Color3f, self.table, below + i) for i in (0, 1))
+        low = dr.gather(mi.Color3f, self.table, below + 0)
+        high = dr.gather(mi.Color3f, self.table, below + 1)
         return dr.select(mu > 0, dr.lerp(low, high, place - mi.Float(below)), 0)

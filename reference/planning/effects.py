@@ -200,7 +200,8 @@ def _inexact_lights(with_cone: bool) -> Callable[[Facts], list[str]]:
     """
 
     def sites(facts: Facts) -> list[str]:
-        heuristic, physical = facts.pair.heuristic, dict(facts.pair.physical.children(0, EMITTER))
+        heuristic = facts.pair.heuristic
+        physical = dict(facts.pair.physical.children(0, EMITTER))
         inexact = {light.name for light in facts.pair.pairing.emitters if not light.exact}
         return [
             key
@@ -332,7 +333,8 @@ def _inexact_surfaces(opaque: bool) -> Callable[[Facts], list[int]]:
     """Find the opaque shapes, or the others, whose two BSDFs differ; diffuse ones do not."""
 
     def sites(facts: Facts) -> list[int]:
-        graph, surfaces = facts.pair.physical, []
+        graph = facts.pair.physical
+        surfaces = []
         for shape in graph.nodes(SHAPE):
             shape_facts = facts.by_name.get(graph.props(shape).id())
             for _, bsdf in graph.children(shape, BSDF):

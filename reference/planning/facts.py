@@ -25,9 +25,10 @@ from fotismos.reference.pairing.lights import LightNode
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph
 
-BSDF, EMITTER, SENSOR, SHAPE = (
-    getattr(mi.ObjectType, kind) for kind in ("BSDF", "Emitter", "Sensor", "Shape")
-)
+BSDF = mi.ObjectType.BSDF
+EMITTER = mi.ObjectType.Emitter
+SENSOR = mi.ObjectType.Sensor
+SHAPE = mi.ObjectType.Shape
 
 PLANAR = ("perspective", "thinlens", "orthographic")
 """Sensors whose rays begin in one plane, within the convex hull of those at the film's corners and
@@ -98,7 +99,8 @@ def _disk(shape: mi.Shape) -> Geometry:
     """
     matrix = np.array(mi.traverse(shape)["to_world"].matrix, float).reshape(4, 4, -1)[:, :, 0]
     along_u, along_v, axis = matrix[:3, :3].T
-    across, length = np.cross(along_u, along_v), np.linalg.norm(axis)
+    across = np.cross(along_u, along_v)
+    length = np.linalg.norm(axis)
     if not abs(axis @ across) > ALIKE * length * np.linalg.norm(across):
         return UNKNOWN
     return Geometry(Form.FLAT, plane=(matrix[:3, 3], axis / length))
@@ -170,7 +172,8 @@ class ShapeFacts:
     @classmethod
     def of(cls, graph: Graph, index: int | None, shape: mi.Shape) -> "ShapeFacts":
         """Return the facts of a shape, given its node in the graph (None if it has none)."""
-        box, own = shape.bbox(), geometry(shape)
+        box = shape.bbox()
+        own = geometry(shape)
         nested = graph.children(index, BSDF) if index is not None else []
         bsdf = nested[0][1] if nested else None  # an instance has its group's
         opaque, front, back = _sides(graph, bsdf)
@@ -243,15 +246,21 @@ def _is_sampled_as_hit(graph: Graph, index: int | None, shape: mi.Shape) -> bool
 def _sides(graph: Graph, bsdf: int | None) -> tuple[bool, bool, bool]:
     if bsdf is None:
         return False, True, True
-    plugin, props = graph.plugin(bsdf), graph.props(bsdf)
+    plugin = graph.plugin(bsdf)
+    props = graph.props(bsdf)
     if plugin == "twosided":
         inner = [_sides(graph, child) for _, child in graph.children(bsdf, BSDF)]
         reflects = any(front or back for _, front, back in inner)
         return bool(inner) and all(one[0] for one in inner), reflects, reflects
-    reflectances, transmittances = REFLECTANCES.get(plugin), TRANSMITTANCES.get(plugin, {})
-    passes, reflects = (
-        any(values.may_be_nonzero(props.get(name, usual)) for name, usual in (of or {}).items())
-        for of in (transmittances, reflectances)
+    reflectances = REFLECTANCES.get(plugin)
+    transmittances = TRANSMITTANCES.get(plugin, {})
+    passes = any(
+        values.may_be_nonzero(props.get(name, usual))
+        for name, usual in (transmittances or {}).items()
+    )
+    reflects = any(
+        values.may_be_nonzero(props.get(name, usual))
+        for name, usual in (reflectances or {}).items()
     )
     if reflectances is None or passes:
         return False, True, True
@@ -282,10 +291,12 @@ class CameraFacts:
         is_still = sensor.shutter_open_time() == 0
         if plugin not in PLANAR:
             return cls(plugin, is_still=is_still)
-        film, border = sensor.film(), 0.0
+        film = sensor.film()
+        border = 0.0
         if film.sample_border():
             border = film.rfilter().border_size() / min(film.crop_size())
-        ends, steps = (-border, 1 + border), np.arange(EDGE) / EDGE
+        ends = (-border, 1 + border)
+        steps = np.arange(EDGE) / EDGE
         across = np.concatenate([steps, np.ones(EDGE), 1 - steps, np.zeros(EDGE)])
         lens = np.stack([across, np.roll(across, EDGE)])  # around the square's edge
         places = np.array([(x, y) for x in ends for y in ends]).T
@@ -309,7 +320,8 @@ class CameraFacts:
         ends = np.stack([shape.low, shape.high])
         corners = np.stack(np.meshgrid(*ends.T), axis=-1).reshape(8, 3)
         for direction in (*np.eye(3), self.axis):
-            box, begin = corners @ direction, self.origins @ direction
+            box = corners @ direction
+            begin = self.origins @ direction
             gap = max(box.min() - begin.max(), begin.min() - box.max())
             if gap > 1e-6 * max(np.abs(box).max(), np.abs(begin).max()):
                 return True
@@ -424,7 +436,8 @@ def _lights(graph: Graph) -> Iterator[LightFacts]:
         for _, child in graph.children(shape, EMITTER)
     }
     for index in graph.nodes(EMITTER):
-        plugin, name = graph.plugin(index), graph.label(index)
+        plugin = graph.plugin(index)
+        name = graph.label(index)
         if index in owners:
             yield LightFacts(name, plugin, shape=owners[index])
         else:

@@ -28,13 +28,15 @@ from fotismos.reference.rendering.renderer import Stream, pass_seed
 SHARE = 0.02
 """Share of the reference's samples that bounds the rays, within the next two limits."""
 
-FEWEST, MOST = 2**13, 2**20
+FEWEST = 2**13
+MOST = 2**20
 """Rays of the first look, and of all looks at most; the latter also of a decision."""
 
 TOLERANCE = 0.005
 """Share of the mean radiance; smaller departures are ignored."""
 
-LOOKING, DECIDING = 0.01, 1e-4
+LOOKING = 0.01
+DECIDING = 1e-4
 """Levels of the looks together, and of the decision; two-sided."""
 
 BATCHES = 32
@@ -108,10 +110,12 @@ def examine_plan(
     integrators = [physical_integrator(p, scene, hide_emitters) for p in (plan, whole)]
     seeds = (pass_seed(seed, number, Stream.PROBE) for number in range(2**31))
     sizes = _looks(int(min(max(FEWEST, SHARE * samples), MOST)))
-    pieces, rays = [], 0
+    pieces = []
+    rays = 0
     for size in sizes:
         pieces.append(radiances(scene, integrators, size - rays, seeds))
-        tally, rays = Tally.of(pieces), size
+        tally = Tally.of(pieces)
+        rays = size
         if tally.agrees(LOOKING):
             break
         if tally.departs(LOOKING / len(sizes)):
@@ -136,10 +140,12 @@ def radiances(scene: mi.Scene, integrators: list, count: int, seeds: Iterator[in
 
     The rays come from everywhere on the film and lens, like those of a picture.
     """
-    sensor, sampler = scene.sensors()[0], mi.load_dict({"type": "independent"})
+    sensor = scene.sensors()[0]
+    sampler = mi.load_dict({"type": "independent"})
     sampler.seed(dr.opaque(mi.UInt32, next(seeds)), count)
     wavelength = sampler.next_1d() if mi.is_spectral else mi.Float(0.5)
-    film, lens = sampler.next_2d(), sampler.next_2d()
+    film = sampler.next_2d()
+    lens = sampler.next_2d()
     ray, weight = sensor.sample_ray_differential(sensor.shutter_open(), wavelength, film, lens)
     values = []
     for integrator in integrators:

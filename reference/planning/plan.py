@@ -61,10 +61,12 @@ Depth = Annotated[
 ]
 
 STOCK_RR_DEPTH = 5
-SPP, PASSES = 512, 8
+SPP = 512
+PASSES = 8
 """64 samples per pass take half the time of 16 for the same noise."""
 
-EXACT_SPP, EXACT_PASSES = 64, 4
+EXACT_SPP = 64
+EXACT_PASSES = 4
 """Of plans whose only random numbers are the places of camera rays: only edges have noise, and four
 times as many samples move mean departures by 1e-5."""
 
@@ -233,7 +235,8 @@ def physical_integrator(plan: Plan, scene: Scene, hide_emitters: bool) -> Any:
 
 
 def _reference(facts: Facts) -> Plan:
-    pair, graph = facts.pair, facts.pair.physical
+    pair = facts.pair
+    graph = facts.pair.physical
     stock = Plan(
         effects=tuple(effect.decide(facts) for effect in EFFECTS),
         kernel_terms=facts.kernel_terms,
@@ -295,7 +298,8 @@ def wants_spectra(graph: Graph) -> bool:
 
     Tabulated spectra, black bodies and spectral films; not Mitsuba's daylight (``d65``).
     """
-    in_use, tabulated = graph.nodes_in_use(), ("regular", "irregular", "blackbody", "specfilm")
+    in_use = graph.nodes_in_use()
+    tabulated = ("regular", "irregular", "blackbody", "specfilm")
     return any(graph.plugin(index) in tabulated for index in in_use) or any(
         hasattr(value, "is_uniform") and not value.is_uniform()
         for index in in_use

@@ -244,19 +244,23 @@ class Boxes:
 
         The ways of parallel light lie in a box around the receiver and its box moved far away.
         """
-        low, high = self.low, self.high
+        low = self.low
+        high = self.high
         shining = np.array([shape.name == light.shape for shape in self.shapes], bool)
         if light.position is not None:
-            low, high = np.minimum(low, light.position), np.maximum(high, light.position)
+            low = np.minimum(low, light.position)
+            high = np.maximum(high, light.position)
         elif light.toward is not None:
             size = max(np.abs([low, high]).max(initial=1.0), 1.0)
             move = FAR * size * light.toward / np.linalg.norm(light.toward)
-            low, high = low + np.minimum(move, 0), high + np.maximum(move, 0)
+            low = low + np.minimum(move, 0)
+            high = high + np.maximum(move, 0)
         elif shining.any():
             low = np.minimum(low, self.low[shining][0])
             high = np.maximum(high, self.high[shining][0])
         else:  # an environment shines from everywhere that the receiver faces
-            low, high = np.full_like(low, -np.inf), np.full_like(high, np.inf)
+            low = np.full_like(low, -np.inf)
+            high = np.full_like(high, np.inf)
         hides = self.is_before & np.all(
             (low[:, None] <= self.high) & (self.low <= high[:, None]), axis=2
         )
@@ -331,7 +335,8 @@ NO_SECOND_REFLECTION = PruningRule(
 
 def _not_one(facts: Facts) -> str | None:
     graph = facts.pair.physical
-    shapes, bsdfs = len(graph.nodes(SHAPE)), len(graph.nodes(BSDF))
+    shapes = len(graph.nodes(SHAPE))
+    bsdfs = len(graph.nodes(BSDF))
     wrapped = [index for index in graph.nodes(BSDF) if graph.plugin(index) == "twosided"]
     if shapes != 1:
         return f"{shapes} shapes"

@@ -67,7 +67,9 @@ def _define(_variant: str) -> None:
             environment, for one BSDF and nothing that hides it; set after construction."""
 
         def sample(self, scene, sampler, ray, medium=None, active=True):
-            delta, lamps, others = [], [], []
+            delta = []
+            lamps = []
+            others = []
             for emitter in scene.emitters():
                 is_delta = mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta)
                 (delta if is_delta else others).append(emitter)
@@ -169,7 +171,8 @@ def _of_all(lights, is_delta, scene, si, bsdf, sampler, active, transports):
         point, direction, density, weight = sample_direction(si, sample, active)
         facing = active & (density > 0)
         reached = visibility(scene, si, point, facing, transports)
-        wo, context = si.to_local(direction), mi.BSDFContext()
+        wo = si.to_local(direction)
+        context = mi.BSDFContext()
         is_mixed = len({each.shadows for each in transports}) > 1
         evaluated = facing if is_mixed else reached[0]
         if is_weighted:

@@ -92,10 +92,8 @@ def gbuffer(scene: Scene, width: int = GRID, height: int = GRID) -> GBuffer:
     si = scene.ray_intersect(pixel_rays(scene, (width, height), *places))
     hit = si.is_valid()
     normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
-    points, normals = (
-        np.array(dr.select(hit, vector, 0)).T.reshape(height, width, 3)
-        for vector in (mi.Vector3f(si.p), normal)
-    )
+    points = np.array(dr.select(hit, mi.Vector3f(si.p), 0)).T.reshape(height, width, 3)
+    normals = np.array(dr.select(hit, normal, 0)).T.reshape(height, width, 3)
     seen = np.array(hit).reshape(height, width)
     shape = dr.select(si.instance != None, si.instance, si.shape)  # noqa: E711  of pointers
     shapes = _object_ids(shape, seen)
@@ -109,7 +107,9 @@ def gbuffer(scene: Scene, width: int = GRID, height: int = GRID) -> GBuffer:
 
 
 def _named_apart(materials: ObjectIds, shapes: ObjectIds) -> ObjectIds:
-    seen, unseen, times = materials.places >= 0, len(shapes.names), Counter(materials.names)
+    seen = materials.places >= 0
+    unseen = len(shapes.names)
+    times = Counter(materials.names)
     first = np.full(len(materials.names), unseen)
     np.minimum.at(first, materials.places[seen], shapes.places[seen])
 

@@ -118,7 +118,8 @@ class Renderer:
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             _reset(self.scene)
             dr.kernel_history_clear()
-            begin, used = perf_counter(), process_time()
+            begin = perf_counter()
+            used = process_time()
             try:
                 image = self._image(dr.opaque(mi.UInt32, seed))
                 dr.eval(image)
@@ -157,7 +158,10 @@ class Renderer:
     def sampled(self, spp: int) -> "Renderer":
         """Return the same renderer with another number of samples."""
         other = copy(self)
-        other.spp, other.times, other.processor_times, other.compilation = spp, [], [], 0.0
+        other.spp = spp
+        other.times = []
+        other.processor_times = []
+        other.compilation = 0.0
         return other
 
     def _image(self, seed):
@@ -341,7 +345,8 @@ def _wrong(image, right, what):
 
 def require_memory(name: str, width: int, height: int) -> None:
     """Reject an image that does not fit into memory."""
-    free, need = available_memory(), BASE + BYTES_A_PIXEL * width * height
+    free = available_memory()
+    need = BASE + BYTES_A_PIXEL * width * height
     if free is not None and need > free:
         raise InputError(
             f"{name}: an image of {width}x{height} pixels needs {need / 1e9:.2g} GB of memory, and"

@@ -31,7 +31,8 @@ SAMPLER = "rotated_multijitter"
 STOCK_SAMPLER = "independent"
 """The sampler of Mitsuba's examples."""
 
-_ALONG, _ACROSS = 0x68BC21EB, 0x02E5BE93
+_ALONG = 0x68BC21EB
+_ACROSS = 0x02E5BE93
 """Odd numbers that distinguish the permutations of one dimension."""
 
 

@@ -28,7 +28,9 @@ BLOCK = 8
 BLOCKS = 256
 """Blocks sampled, at most: 16,384 pixels, all of a 128 x 128 image. It bounds memory and time."""
 
-MEAN, DEVIATION, NOISE = ("mean",), ("mean", "squares"), ("mean", "squares", "signed")
+MEAN = ("mean",)
+DEVIATION = ("mean", "squares")
+NOISE = ("mean", "squares", "signed")
 """What an :class:`Accumulator` can sum."""
 
 
@@ -89,7 +91,8 @@ class Accumulator:
 
     def __init__(self, moments: Sequence[str] = NOISE):
         self.count = 0
-        self._moments, self._shape = tuple(moments), ()
+        self._moments = tuple(moments)
+        self._shape = ()
         self._sums: dict[str, Array] = {}
 
     def add(self, image: Any, less: Any = None) -> None:
@@ -165,7 +168,8 @@ class DifferenceSums(Accumulator):
 
     def estimate(self, dtype: type = float) -> DifferenceEstimate:
         """Return the estimate so far, like the base; the third cumulant in doubles."""
-        third, n = self._array("cubes"), self.count
+        third = self._array("cubes")
+        n = self.count
         # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, and of the mean 1/n² of it.
         third *= 1.0 / (n * (n - 1) * (n - 2)) if n >= 4 else 0.0
         sizes = np.bincount(np.arange(self.count) % GROUPS, minlength=GROUPS)

@@ -26,7 +26,9 @@ SMALLEST_RATIO = 1e-14
 PICTURES = ("filename", "bitmap", "data")
 CHILDREN = {"blendbsdf": (mi.ObjectType.BSDF, 2), "volume": (mi.ObjectType.Volume, 1)}
 
-ABOVE_0, ANY, INFINITY = float(np.nextafter(0, 1)), None, float("inf")
+ABOVE_0 = float(np.nextafter(0, 1))
+ANY = None
+INFINITY = float("inf")
 
 RANGES = (
     ("radius", "sphere cylinder", ANY, "a radius other than 0"),
@@ -74,7 +76,8 @@ def check(graph: Graph) -> None:
 
 def check_node(graph: Graph, index: int) -> None:
     """Reject values of one element that make no sense."""
-    props, plugin = graph.props(index), graph.plugin(index)
+    props = graph.props(index)
+    plugin = graph.plugin(index)
     for key, value in props.items():
         if isinstance(value, str) and (path := find_file(graph.resolver, value)):
             require_regular_file(f"{graph.name}: {graph.label(index)}", value, path)
@@ -144,7 +147,8 @@ def _is_invertible(matrix: np.ndarray) -> bool:
 
 
 def _missing(graph: Graph, index: int) -> Iterator[str]:
-    plugin, props = graph.plugin(index), graph.props(index)
+    plugin = graph.plugin(index)
+    props = graph.props(index)
     if plugin == "bitmap" and not any(key in props for key in PICTURES):
         yield f"it has no picture: give one of {', '.join(PICTURES)}."
     if plugin in CHILDREN:
@@ -171,10 +175,12 @@ def damage(graph: Graph, index: int) -> str:
     Mitsuba does not check whether the faces of PLY and serialized meshes name vertices that exist:
     it reads memory beyond them.
     """
-    plugin, path = graph.plugin(index), graph.file(index)
+    plugin = graph.plugin(index)
+    path = graph.file(index)
     if path is None:
         return ""
-    state, number = path.stat(), graph.props(index).get("shape_index", 0)
+    state = path.stat()
+    number = graph.props(index).get("shape_index", 0)
     stamp = state.st_mtime_ns, state.st_size, mi.variant()
     fault = _wrong_mesh(plugin, str(path), number, stamp)
     return f"{path}: {fault} Write the file again." if fault else ""
@@ -192,7 +198,8 @@ def _wrong_mesh(plugin: str, path: str, number: int, stamp: tuple) -> str:
         return ""
     if not mesh.face_count():
         return "it has no faces, which a shape must have."
-    faces, count = meshes.rows(mesh, meshes.FACES), mesh.vertex_count()
+    faces = meshes.rows(mesh, meshes.FACES)
+    count = mesh.vertex_count()
     if faces.max() >= count:
         return f"a face names vertex {faces.max()}, and there are {count}, numbered from 0."
     lost = ~np.isfinite(meshes.rows(mesh, meshes.POSITIONS)).all(axis=1)

@@ -71,7 +71,9 @@ class Graph:
 
     def _of(self, state: Any) -> "Graph":
         graph = Graph(self.name, self.config, state)
-        graph.folders, graph.kinds, graph.resolver = list(self.folders), self.kinds, self.resolver
+        graph.folders = list(self.folders)
+        graph.kinds = self.kinds
+        graph.resolver = self.resolver
         return graph
 
     def part(self, index: int) -> "Graph":
@@ -191,7 +193,8 @@ class Graph:
     def add(self, kind: Any, props: Any) -> int:
         """Add a node, and return its index."""
         node = Parser.SceneNode()
-        node.type, node.props = kind, props
+        node.type = kind
+        node.props = props
         self.state.nodes.append(node)
         return len(self.state.nodes) - 1
 
@@ -213,12 +216,14 @@ class Graph:
         """Give a node other properties; its id stays."""
         props.set_id(self.props(index).id())
         node = Parser.SceneNode(self.state.nodes[index])
-        node.type, node.props = self.kind(index), props
+        node.type = self.kind(index)
+        node.props = props
         self.state.nodes[index] = node
 
     def nodes_in_use(self, root: int = 0) -> list[int]:
         """Return the indices of the scene, or another node, and all nodes that it refers to."""
-        seen, queue = set(), [root]
+        seen = set()
+        queue = [root]
         while queue:
             index = queue.pop()
             if index in seen:

@@ -126,7 +126,8 @@ class Source:
 
     def _parsed(self, variant: str) -> Graph:
         config = Parser.ParserConfig(variant)
-        content, resolver = self.content, None
+        content = self.content
+        resolver = None
         if callable(content):
             self.made[:] = self.made or [content()]
             content = self.made[0]

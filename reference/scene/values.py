@@ -158,5 +158,6 @@ def _combined(graph: Graph, plugin: str, function: Callable, **operands: Any) ->
 def _same(a: Any, b: Any) -> bool:
     if isinstance(a, Reference) and isinstance(b, Reference):
         return a.index() == b.index()
-    one, other = plain(a), plain(b)
+    one = plain(a)
+    other = plain(b)
     return one is not None and other is not None and bool(np.all(np.equal(one, other)))

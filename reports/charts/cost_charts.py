@@ -12,7 +12,8 @@ from fotismos.comparisons.cost.cost_record import Cost
 from fotismos.reports.charts.theme import FAINT, Spec
 from fotismos.reports.charts.vega import specification
 
-WIDTH, HEIGHT = 560, 380
+WIDTH = 560
+HEIGHT = 380
 """Pixels of the plot, without the names to its right."""
 
 LABEL_GAP = 15
@@ -111,7 +112,8 @@ def _by_family(channel: Callable[..., Any], place: int) -> Any:
 
 def _domain(values: Sequence[float]) -> Ends:
     """Return the ends of a logarithmic axis: room on both sides of the values."""
-    low, high = max(min(values), LEAST_ERROR), max(*values, LEAST_ERROR)
+    low = max(min(values), LEAST_ERROR)
+    high = max(*values, LEAST_ERROR)
     room = 10 ** max(0.06 * log10(high / low), 0.05)
     return low / room, high * room
 
@@ -159,7 +161,8 @@ def _names_beside(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
         {**row, "beside": high * (low / high) ** (place / HEIGHT)}
         for row, place in zip(ordered, spread(heights, LABEL_GAP, HEIGHT), strict=True)
     ]
-    chart, beside = _charted(named, times, errors), _error("beside", errors)
+    chart = _charted(named, times, errors)
+    beside = _error("beside", errors)
     leading: Spec = {"color": "#9a9a9a", "strokeWidth": 0.7, "opacity": 0.6, "xOffset": 6}
     return [
         chart.mark_rule(**leading).encode(x2=alt.value(WIDTH + 10), y2="beside"),

@@ -25,7 +25,9 @@ FORMATS = ("svg", "pdf")
 TEXT_WIDTH = 6.9
 
 #: Inches: between panels, for the colour bar with its labels, and for the titles.
-GAP, BAR, HEADING = 0.08, 0.55, 0.22
+GAP = 0.08
+BAR = 0.55
+HEADING = 0.22
 
 #: Points, printed at that width.
 FONT_SIZE = 8
@@ -41,7 +43,8 @@ def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
 
 def strip(comparison: Comparison) -> Figure:
     """Return heuristic, reference and the map of the error with its colour bar, side by side."""
-    shown, metric = comparison.images, LEADING
+    shown = comparison.images
+    metric = LEADING
     exposure = comparison.record.viewing.exposure
     summary = comparison.record.metrics[metric.name]
     high = metric.map_range[1]

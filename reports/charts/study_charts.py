@@ -77,8 +77,10 @@ def chart(figure: StudyFigure, table: pa.Table, study: StudyFile) -> Spec:
 def _map(
     figure: StudyFigure, table: pa.Table, part: StudyPart, data: Sequence[Row]
 ) -> alt.TopLevelMixin:
-    (column,), names = figure.values, (figure.x, str(figure.y))
-    is_grid, is_word = part.design == "grid", isinstance(data[0][column], str)
+    (column,) = figure.values
+    names = (figure.x, str(figure.y))
+    is_grid = part.design == "grid"
+    is_word = isinstance(data[0][column], str)
     if is_grid:
         cells = _mean(data, names, column)
     else:
@@ -91,7 +93,8 @@ def _map(
     else:
         scale = alt.Scale(scheme="magma" if column.startswith("dE") else "viridis")
         colour = alt.Color("value:Q", title=_label(column).split(" "), scale=scale)
-    x, y = _axis(alt.X, table, names[0]), _axis(alt.Y, table, names[1])
+    x = _axis(alt.X, table, names[0])
+    y = _axis(alt.Y, table, names[1])
     if is_grid:
         x = x.type("ordinal").sort("ascending").axis(labelOverlap="greedy", labelAngle=0)
         y = y.type("ordinal").sort("descending").axis(labelOverlap="greedy")
@@ -112,7 +115,8 @@ def _map(
 def _lines(
     figure: StudyFigure, table: pa.Table, part: StudyPart, data: Sequence[Row]
 ) -> alt.TopLevelMixin:
-    columns, series = figure.values, figure.series
+    columns = figure.values
+    series = figure.series
     keys = (figure.x, series) if series else (figure.x,)
     values = [
         {**cell, "quantity": _label(column)}

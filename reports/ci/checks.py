@@ -139,7 +139,8 @@ def examine(
     compared as ``fotismos compare`` does, its files and ``check.json`` are written to ``folder``,
     and its part of the page is returned; else those of an earlier failure are deleted.
     """
-    begin, kept = perf_counter(), file.pictures()
+    begin = perf_counter()
+    kept = file.pictures()
     found = _checked(file, case, level, progress)
     if folder is not None:
         scene.remove(folder)
@@ -166,7 +167,8 @@ def update(
     progress: Progress | None = None,
 ) -> CheckRecord:
     """Measure again, and write the baseline if anything moved, or pictures are to be added."""
-    begin, old = perf_counter(), file.baseline
+    begin = perf_counter()
+    old = file.baseline
     found = _checked(file, case, level, progress)
     made = _record(file, "unchanged" if found.passed else "updated", found, begin)
     is_added = found.passed and with_pictures and not old.images
@@ -216,7 +218,8 @@ def _record(file: BaselineFile, status: Any, found: Check, begin: float) -> Chec
         for name, old in file.baseline.versions.items()
         if now.get(name) != old
     }
-    metrics, after = found.before.metrics.items(), found.now.measurement.metrics
+    metrics = found.before.metrics.items()
+    after = found.now.measurement.metrics
     return CheckRecord(
         baseline=file.path.as_posix(),
         scene=file.baseline.scene,
@@ -271,7 +274,8 @@ def update_pictures(
     path: Path, pattern: str, transfer: Any, level: float, progress: Progress | None = None
 ) -> tuple[CheckRecord, None]:
     """Write or replace the baseline of the pictures that match a pattern."""
-    begin, status = perf_counter(), "updated" if path.exists() else "created"
+    begin = perf_counter()
+    status = "updated" if path.exists() else "created"
     if path.exists():
         transfer = transfer or pictures.record_of(path).transfer
     repeats = pictures.read_repeats(pattern, transfer)
@@ -358,7 +362,8 @@ def _each(
             for call in calls
         ]
         for task, outcome in pool.each(tasks):
-            path, error = task.arguments[0], outcome.exception()
+            path = task.arguments[0]
+            error = outcome.exception()
             results[path] = (failed(path, error), None) if error else outcome.result()
     return [results[call[0]] for call in calls]
 
@@ -412,7 +417,8 @@ def update_one(
                 f"{path}: this is the baseline of {old.scene}, not of {scene}. Give another file"
                 f" for {scene}, or delete this one."
             )
-        scene, options = baselines.scene_from(old.scene, path), dict(old.options) | options
+        scene = baselines.scene_from(old.scene, path)
+        options = dict(old.options) | options
         if Options.of(options) == Options.of(old.options):
             return update(file, file.open(), significance, with_pictures, progress), None
         with_pictures = with_pictures or bool(old.images)

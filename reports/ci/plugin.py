@@ -68,7 +68,8 @@ def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
     from fotismos.reference.scene.graph import set_variant
     from fotismos.reports.ci.testing import Fotismos
 
-    before, variant = mi.variant(), getattr(request, "param", None)
+    before = mi.variant()
+    variant = getattr(request, "param", None)
     # A test may make a scene from Mitsuba's types, which needs a variant.
     set_variant(variant or before or "llvm_ad_rgb")
     yield Fotismos(

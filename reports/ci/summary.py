@@ -280,8 +280,10 @@ def lines(checks: Sequence[CheckRecord], level: float) -> Iterator[str]:
 
 def outcome(checks: Sequence[CheckRecord], level: float) -> str:
     """Return the line that says how it went."""
-    statuses, count = [made.status for made in checks], len(checks)
-    moved, errors = statuses.count("failed"), statuses.count("error")
+    statuses = [made.status for made in checks]
+    count = len(checks)
+    moved = statuses.count("failed")
+    errors = statuses.count("error")
     written = statuses.count("created") + statuses.count("updated")
     if written or "unchanged" in statuses:
         text = f"{written} of {count} baselines written"

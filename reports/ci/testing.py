@@ -182,7 +182,8 @@ def _other_options(
     recorded: Mapping[str, Any], given: Mapping[str, Any]
 ) -> dict[str, tuple[Any, Any]]:
     """Return ``{name: (baseline's, test's)}`` of the options in which they differ."""
-    old, new = (records.plain(Options.of(each)) for each in (recorded, given))
+    old = records.plain(Options.of(recorded))
+    new = records.plain(Options.of(given))
     return {
         name: (old.get(name), new.get(name)) for name in given if old.get(name) != new.get(name)
     }

@@ -89,7 +89,8 @@ def _folder_of(name: str) -> tuple[str, Path | None]:
 
     if (place := in_file(name)) is None:
         return name, None
-    file, function = Path(place[0]), place[1]
+    file = Path(place[0])
+    function = place[1]
     return "-".join(filter(None, (file.stem, function))), Path(name)
 
 

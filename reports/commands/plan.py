@@ -46,14 +46,16 @@ def plan(scene: str, as_json: bool, within: float | None, timeout: float, **rend
         from fotismos.reports.terminal import cost_tables, plan_lines, progress
 
         lines: Iterable[str]
-        request, code = jobs.request(rendering), 0
+        request = jobs.request(rendering)
+        code = 0
         if within is not None:
             with progress.shown() as bar:
                 words = (scene, request, within)
                 result = pool.do(
                     Task(name=scene, function=chosen, arguments=words, progress=bar.of(scene))
                 )
-            lines, code = cost_tables.choice_lines(result), int(result.chosen is None)
+            lines = cost_tables.choice_lines(result)
+            code = int(result.chosen is None)
         else:
             result = pool.do(Task(scene, planned, (scene, request)))
             lines = plan_lines.plan_lines(result)

@@ -64,10 +64,8 @@ def report(
     ladders = frozenset() if quick else LADDERS
     job = jobs.Job(request, figures, with_causes=True, fresh=fresh, within=within, ladders=ladders)
     rendered = jobs.pool(timeout, len(SCENES), workers, scheduler)
-    cases, on_page = (
-        Task("hard cases", hard_cases, (output,)),
-        jobs.open_page if is_opened else None,
-    )
+    cases = Task("hard cases", hard_cases, (output,))
+    on_page = jobs.open_page if is_opened else None
     batch.run(tuple(SCENES), output, job, rendered, cases, on_page)
 
 

@@ -28,13 +28,16 @@ Bytes = NDArray[np.uint8]
 QUALITY = 80
 
 #: Colour maps by purpose.
-ERROR_COLOURS, SIGNED_COLOURS = "magma", "RdBu_r"
+ERROR_COLOURS = "magma"
+SIGNED_COLOURS = "RdBu_r"
 
 #: Pixels of a thumbnail's longer side; cards show it at two thirds of that size.
 THUMBNAIL = 160
 
 #: Colours of `mask_map`: marked, not marked, not counted, undetermined (sRGB).
-MARKED, UNMARKED, UNCOUNTED = (213, 94, 0), (222, 226, 230), (130, 136, 143)
+MARKED = (213, 94, 0)
+UNMARKED = (222, 226, 230)
+UNCOUNTED = (130, 136, 143)
 UNDETERMINED = (240, 201, 119)
 
 

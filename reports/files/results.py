@@ -35,10 +35,14 @@ from fotismos.reference.records import VERSION, Machine, Record, Versions
 
 START = perf_counter()
 
-MARK, LOCK = ".fotismos", ".fotismos-lock"
+MARK = ".fotismos"
+LOCK = ".fotismos-lock"
 
-PAGE, DETAILS, RUN = "index.html", "details.html", "run.json"
-TABLES, FIGURES = "tables", "figures"
+PAGE = "index.html"
+DETAILS = "details.html"
+RUN = "run.json"
+TABLES = "tables"
+FIGURES = "figures"
 
 RESERVED = {
     PAGE, DETAILS, RUN, TABLES, FIGURES, "assets", "audit", "check", "cost", "departures", "export",

@@ -30,7 +30,9 @@ LEAST = 0.01
 LONGEST = 1024
 """Pixels; longer images are averaged over square blocks inside the page, never in the files."""
 
-SIGNIFICANT, COUNTED, UNDETERMINED = 1, 2, 4
+SIGNIFICANT = 1
+COUNTED = 2
+UNDETERMINED = 4
 """Bits of the plane "flags"."""
 
 Codes = NDArray[np.uint16]
@@ -80,7 +82,8 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
 def packed(planes: Mapping[str, Codes], block: int = 1) -> Embedded:
     """Return planes of codes (H, W) as the page holds them."""
     height, width = next(iter(planes.values())).shape
-    before, parts = np.zeros((height, width), np.uint16), []
+    before = np.zeros((height, width), np.uint16)
+    parts = []
     for name, codes in planes.items():
         parts.append((codes - before if name.endswith((".G", ".B")) else codes).ravel())
         before = codes
@@ -103,8 +106,10 @@ def _means(image: ArrayLike, block: int) -> NDArray[np.float64]:
     image = np.asarray(image, np.float64)
     if block == 1:
         return image
-    sums, areas = image, np.ones(image.shape)
+    sums = image
+    areas = np.ones(image.shape)
     for axis in (0, 1):
         places = np.arange(0, image.shape[axis], block)
-        sums, areas = (np.add.reduceat(part, places, axis=axis) for part in (sums, areas))
+        sums = np.add.reduceat(sums, places, axis=axis)
+        areas = np.add.reduceat(areas, places, axis=axis)
     return sums / areas

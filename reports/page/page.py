@@ -168,7 +168,8 @@ def _scene(view: SceneView, taken: set[str]) -> PageScene:
 
 
 def _scene_data(scene: PageScene) -> dict[str, Any]:
-    record, why = scene.record, scene.why
+    record = scene.record
+    why = scene.why
     return {
         "id": scene.id,
         "name": record.scene,
@@ -234,7 +235,8 @@ def _drawing() -> dict[str, Any]:
 def _identifier(name: str, taken: set[str]) -> str:
     """Return a name for a scene in the page's address: plain characters; added to `taken`."""
     word = "".join(c if (c.isascii() and c.isalnum()) or c in "-_." else "-" for c in name)
-    chosen, count = word or "scene", 1
+    chosen = word or "scene"
+    count = 1
     while chosen in taken:
         count += 1
         chosen = f"{word or 'scene'}-{count}"

@@ -86,7 +86,8 @@ def environment() -> Environment:
 def region_view(region: Region) -> str:
     """Return the part of the address that shows and selects a region."""
     zoom = round(min(16.0, REGION_SIZE / max(region.width, region.height)), 2)
-    x, y = region.x + region.width // 2, region.y + region.height // 2
+    x = region.x + region.width // 2
+    y = region.y + region.height // 2
     return f"zoom={zoom}&x={x}&y={y}&box={region.x},{region.y},{region.width},{region.height}"
 
 
@@ -97,7 +98,9 @@ def text_at(runs: Sequence[tuple[int, str]], place: int) -> str:
 
 def ink(colour: str) -> str:
     """Return black or white, whichever is easier to read on a colour ``#rrggbb``."""
-    red, green, blue = (int(colour[place : place + 2], 16) / 255 for place in (1, 3, 5))
+    red = int(colour[1 : 1 + 2], 16) / 255
+    green = int(colour[3 : 3 + 2], 16) / 255
+    blue = int(colour[5 : 5 + 2], 16) / 255
     return "#000" if 0.2126 * red**2.2 + 0.7152 * green**2.2 + 0.0722 * blue**2.2 > 0.18 else "#fff"
 
 

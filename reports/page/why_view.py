@@ -43,7 +43,8 @@ def why_view(
     statistics. ``previews`` are linear images of the hybrids, the last with all effects; their
     sides are a multiple of the maps'.
     """
-    places, names = dominating(maps, counted), tuple(maps)
+    places = dominating(maps, counted)
+    names = tuple(maps)
     found = EffectMap(
         width=places.shape[1],
         height=places.shape[0],
@@ -72,7 +73,8 @@ def terms_view(grid: TermGrid) -> TermsView:
     """
     seen = grid.material >= 0
     shiny = np.array([any(material.k_s) for material in grid.materials] + [False])[grid.material]
-    cosines, amounts = {"cos_view": grid.cos_view}, dict[str, NDArray]()
+    cosines = {"cos_view": grid.cos_view}
+    amounts = dict[str, NDArray]()
     for number, light in enumerate(grid.lights):
         cosines |= {
             f"{number}.cos_incidence": light.cos_incidence,
@@ -114,7 +116,8 @@ def live_view(points: LivePoints) -> LiveView:
     A value ``v`` has the code ``16383 (1 + v / top) / 2``, with the plane's ``top``.
     ``templates/viewer/shading.js`` reads them.
     """
-    tops, rows = {}, {}
+    tops = {}
+    rows = {}
     for name, plane in points.planes.items():
         plane = np.where(points.planes["material"], plane, 0.0)
         tops[name] = float(abs(plane).max()) or 1.0

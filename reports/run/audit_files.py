@@ -86,11 +86,15 @@ def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerCha
         shown = legend if len(names) > 1 else None
         return channel("of:N", title=of, sort=names, legend=shown, scale=scale)
 
-    below, above = (
-        alt.Chart(alt.Data(values=[row | {"order": place} for place, row in enumerate(each)]))
-        .mark_line(clip=True, strokeWidth=width)
+    below = (
+        alt.Chart(alt.Data(values=[row | {"order": place} for place, row in enumerate(faint)]))
+        .mark_line(clip=True, strokeWidth=1)
         .encode(x=x, y=y, order="order:Q", strokeDash=style(alt.StrokeDash, DASHES))
-        for each, width in ((faint, 1), (rows, 2))
+    )
+    above = (
+        alt.Chart(alt.Data(values=[row | {"order": place} for place, row in enumerate(rows)]))
+        .mark_line(clip=True, strokeWidth=2)
+        .encode(x=x, y=y, order="order:Q", strokeDash=style(alt.StrokeDash, DASHES))
     )
     layers = [below.encode(color=alt.value(FAINT)), above.encode(color=style(alt.Color, INKS))]
     return alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH // 2)

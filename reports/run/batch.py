@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from fotismos.reports.page.scene_view import SceneView
     from fotismos.reports.terminal.progress import Bar
 
-SCENE, HARD_CASES = 8.0, 1.0
+SCENE = 8.0
+HARD_CASES = 1.0
 """Relative times of a scene and of the hard cases, to estimate the time left."""
 
 SHARE = 0.1
@@ -92,8 +93,10 @@ class Batch:
         from fotismos.reports.files import results
         from fotismos.reports.page import page
 
-        begin, path = perf_counter(), self.folder / results.PAGE
-        state, done = "", f"{self.done} of {len(self.places)} scenes are done"
+        begin = perf_counter()
+        path = self.folder / results.PAGE
+        state = ""
+        done = f"{self.done} of {len(self.places)} scenes are done"
         if is_interrupted:
             state = f"Interrupted: {done}; the same command resumes the run."
         elif self.done < len(self.places):
@@ -245,9 +248,11 @@ def _write(batch: Batch, is_interrupted: bool = False) -> None:
     from fotismos.reports.files import results
     from fotismos.reports.terminal import tables
 
-    views, folder = batch.ordered, batch.folder
+    views = batch.ordered
+    folder = batch.folder
     records = [view.record for view in views]
-    run, errors = batch.record(), []
+    run = batch.record()
+    errors = []
     steps: list[Callable[[], object]] = [
         lambda: batch.write_page(is_interrupted, run),
         lambda: results.write(folder / results.RUN, to_json(batch.record())),

@@ -31,8 +31,10 @@ def page(fit: Fit) -> str:
 
     The pictures are tone-mapped; the map has the metric's fixed range.
     """
-    record, best = fit.record, fit.record.nearest
-    exposure, high = record.viewing.exposure, LEADING.map_range[1]
+    record = fit.record
+    best = fit.record.nearest
+    exposure = record.viewing.exposure
+    high = LEADING.map_range[1]
     shown = {
         "paired": images.tonemap(fit.before, exposure),
         "reference": images.tonemap(fit.reference, exposure),
@@ -97,7 +99,8 @@ def _departures(record: FitRecord) -> Iterator[Cells]:
         return name, *unsigned, loss if isinstance(loss, str) else f"{loss:.4g}"
 
     yield "mean of", *(metric.label for metric in drawn().values()), "loss"
-    nearest, first = record.nearest, record.fits[0]
+    nearest = record.nearest
+    first = record.fits[0]
     yield row("paired", first, "before", nearest.loss + nearest.parameter_error)
     for fit in record.fits:
         yield row(fit.form, fit, "after", fit.loss)
@@ -111,7 +114,8 @@ def _parameters(fit: FormFit) -> Iterator[Cells]:
     yield "material", "parameter", "paired", "fitted", "95 %, by noise", "note"
     owned = [(each.name, parameter) for each in fit.materials for parameter in each.parameters]
     for owner, parameter in owned:
-        interval, note = parameter.interval, "at its bound" if parameter.at_bound else ""
+        interval = parameter.interval
+        note = "at its bound" if parameter.at_bound else ""
         if parameter.reason:
             partners = f" ({', '.join(parameter.partners)})" if parameter.partners else ""
             note = f"not identifiable: {parameter.reason}{partners}"

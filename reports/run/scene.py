@@ -31,7 +31,9 @@ if TYPE_CHECKING:
     from fotismos.reports.jobs import Job
     from fotismos.reports.page.scene_view import WhyView
 
-RECORD, PICTURE, VIEW = "comparison.json", "comparison.exr", "view.json"
+RECORD = "comparison.json"
+PICTURE = "comparison.exr"
+VIEW = "view.json"
 
 Seconds = dict[str, float]
 """Wall time by stage of a run."""
@@ -65,16 +67,20 @@ def compare(
             turn.give_way()
             progress(*state)
 
-        begin, source, options = perf_counter(), case.source, case.options
+        begin = perf_counter()
+        source = case.source
+        options = case.options
         comparison = fotismos.comparisons.compare.compare(
             source, options, in_turn, case.command(), job.with_causes, turn.alone()
         )
         spent = _stages(comparison.record, perf_counter() - begin)
-        study, causes = None, comparison.causes
+        study = None
+        causes = comparison.causes
         if case.word in job.ladders and causes:
             from fotismos.comparisons.cost.cost import quick  # loaded late: for a handful of scenes
 
-            begin, command = perf_counter(), case.command("cost")
+            begin = perf_counter()
+            command = case.command("cost")
             study = quick(source, options, causes, progress, command, turn.alone())
             spent["methods"] = perf_counter() - begin
         begin = perf_counter()
@@ -177,7 +183,8 @@ def write(
     The record is removed first and written last. Files of an earlier result that this one does not
     have are deleted. With a key, :func:`load` finds the result.
     """
-    place, record = folder / name, comparison.record
+    place = folder / name
+    record = comparison.record
     results.own(place)
     earlier = _files(place)
     results.clear(place, (RECORD, VIEW))
@@ -215,7 +222,8 @@ def remove(place: Path) -> None:
 
 def view_of(comparison: Comparison) -> SceneView:
     """Return a comparison's part of the page without links."""
-    record, shown = comparison.record, comparison.images
+    record = comparison.record
+    shown = comparison.images
     return SceneView(
         record=record,
         thumbnails=images.thumbnails(shown, record.viewing.exposure),
@@ -249,7 +257,8 @@ def with_fit(view: SceneView, place: Path) -> SceneView:
     try:
         fit = json.loads((place / "fit.json").read_bytes())
         mean = fit["fits"][fit["best"]]["departure"][LEADING.name]["after"]
-        found, is_same = (mean, *fit["resolution"]), fit["scene"] == view.record.scene
+        found = (mean, *fit["resolution"])
+        is_same = fit["scene"] == view.record.scene
     except (OSError, ValueError, LookupError, TypeError):
         return view
     if view.live and is_same:

@@ -15,7 +15,8 @@ FIGURES = "figures"
 
 def write(study: StudyFile, table: pa.Table, folder: Path) -> tuple[Path, Path]:
     """Write dataset and figures, and return their places."""
-    place, figures = folder / f"{study.name}.parquet", folder / FIGURES
+    place = folder / f"{study.name}.parquet"
+    figures = folder / FIGURES
     results.write(place, dataset.file_of(table))
     with_result = {row["part"] for row in table.to_pylist() if row["error"] is None}
     for figure in study_charts.all_figures(study):

@@ -25,7 +25,8 @@ BENT = 0.1
 
 def lines(record: Cost) -> Iterator[str]:
     """Yield the lines of a study: methods, points, attribution, and what is predicted."""
-    reference, size = record.reference, sized(record.resolution)
+    reference = record.reference
+    size = sized(record.resolution)
     yield (
         f"{record.scene}, {size}, {record.rounds} rounds with {record.threads} threads on"
         f" {record.machine.processor}"
@@ -99,7 +100,8 @@ def unreached(record: Cost) -> str:
 
 def closure(record: Cost) -> str:
     """Return the sum of the attribution, and whether the rest is more than noise."""
-    left, departure = record.closure, record.attribution.departure
+    left = record.closure
+    departure = record.attribution.departure
     closes = left.low <= 0
     verdict = "no more than noise" if closes else "more than noise: some effect is missing"
     return (
@@ -114,8 +116,10 @@ def choice_lines(choice: Choice) -> Iterator[str]:
 
     Then what each method in the sentence is.
     """
-    size, within = sized(choice.resolution), f"{LEADING.label} {parameter(choice.within)}"
-    chosen, full = choice.chosen, choice.full
+    size = sized(choice.resolution)
+    within = f"{LEADING.label} {parameter(choice.within)}"
+    chosen = choice.chosen
+    full = choice.full
     is_smaller = choice.measured != choice.resolution
     measured = f"measured at {sized(choice.measured)}, " if is_smaller else ""
     if chosen is None:
@@ -193,7 +197,8 @@ def _off(record: Cost) -> Rows:
     forecasts = {(point.method, point.spp): point for point in record.predicted}
     for point in record.measured:
         forecast = forecasts[point.method, point.spp]
-        time, error = point.seconds.value, point.error.mean
+        time = point.seconds.value
+        error = point.error.mean
         yield (
             point.method,
             seconds(time),

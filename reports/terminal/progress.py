@@ -22,15 +22,20 @@ class Bar:
     def __init__(
         self, progress: Progress, unit: str = "passes", total: float | None = None
     ) -> None:
-        self._progress, self._unit = progress, unit
+        self._progress = progress
+        self._unit = unit
         self._whole = progress.add_task("", total=total) if total else None
         self._tasks: dict[Callable[..., None], TaskID] = {}
-        self._stage, self._done, self._count, self._weight = "", 0, 0, 0.0
+        self._stage = ""
+        self._done = 0
+        self._count = 0
+        self._weight = 0.0
 
     def of(self, scene: str, stages: tuple[str, ...] = ()) -> Callable[[str, int, int], None]:
         """Return the callback ``(stage, done, total)`` for one scene; ``stages`` are to come."""
         name = visible(scene)
-        task, current = self._progress.add_task(name, total=None), ""
+        task = self._progress.add_task(name, total=None)
+        current = ""
 
         def update(stage: str, done: int, total: int) -> None:
             nonlocal current
@@ -47,7 +52,10 @@ class Bar:
 
     def begin(self, stage: str, count: int, weight: float) -> None:
         """Begin a stage of the run: ``count`` tasks of a weight each."""
-        self._stage, self._done, self._count, self._weight = stage, 0, count, weight
+        self._stage = stage
+        self._done = 0
+        self._count = count
+        self._weight = weight
         self._advance(0.0)
 
     def over(self, update: Callable[..., None] | None, weight: float | None = None) -> None:

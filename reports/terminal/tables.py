@@ -167,7 +167,8 @@ def time_ratio(record: ComparisonRecord) -> str:
 
 def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:
     """Yield a picture's shift, and what is odd about it: all numbers depend on that."""
-    shift, ratio = picture.shift, ", ".join(f"{value:.3g}" for value in picture.ratio)
+    shift = picture.shift
+    ratio = ", ".join(f"{value:.3g}" for value in picture.ratio)
     place = "not known" if shift is None else f"{shift[0]:+.1f}, {shift[1]:+.1f} pixels"
     yield f"{record.scene}: {record.heuristic}"
     yield f"shift {place}; red, green, blue {ratio} times the reference's"
@@ -177,7 +178,8 @@ def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:
 
 def details(record: ComparisonRecord) -> Iterator[str]:
     """Yield the verbose lines of a scene: simulation, pairing, losses, warnings, times."""
-    plan, pairing = record.plan, record.pairing
+    plan = record.plan
+    pairing = record.pairing
     yield (
         f"{record.scene}: {plan.simulation}, {plan.spp} samples per pixel in {plan.passes} passes,"
         f" {plan.sampler}"
