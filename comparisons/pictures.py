@@ -387,7 +387,7 @@ def picture_record(
     reference = images.reference[images.counted]
     half.half.spp = TEMPLATE_SPP
     template = np.array(half.half.render(0), float)
-    (height, width) = images.counted.shape
+    height, width = images.counted.shape
     expected = [geometry_edges(scene, width, height)]
     expected += [picture_edges(image) for image in (template, images.reference)]
     shift, edges = measure(np.mean(half.images, axis=0), expected)

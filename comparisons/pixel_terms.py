@@ -278,7 +278,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
     points = _Points(scene, half.integrator, ray)
     if not points.hit.any():
         return "No pixel’s centre sees a shaded surface."
-    (materials, places) = points.materials()
+    materials, places = points.materials()
     vectors = dict[str, NDArray]()
     if len(materials) > MATERIALS:
         vectors["k_d"] = points.select(lambda material: points.colours(material.k_d))

@@ -49,7 +49,7 @@ def baselines() -> None:
 
 def fits() -> Iterator[str]:
     """Fit the figures of chapter 8, and yield the table of departures before and after."""
-    words = ("-P", "-m", "reports", "fit", *CHAPTER_8, "--json")
+    words = ("-P", "-m", "fotismos.reports", "fit", *CHAPTER_8, "--json")
     done = subprocess.run([sys.executable, *words], cwd=ROOT, check=True, capture_output=True)
     rows = []
     for record in msgspec.json.decode(done.stdout, type=list[FitRecord]):
@@ -68,7 +68,7 @@ def findings() -> None:
 
     file = ROOT / "studies/phong-roughplastic.toml"
     with TemporaryDirectory() as folder:
-        _run("reports", "study", str(file), "-o", folder)
+        _run("fotismos.reports", "study", str(file), "-o", folder)
         made = Path(folder, "study", file.stem)
         table = dataset.read(made / f"{file.stem}.parquet")
         atomic.write(file.with_suffix(".parquet"), dataset.file_of(table))

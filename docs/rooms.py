@@ -57,7 +57,7 @@ def way() -> list[str]:
             cli.main()
         with watched() as files, suppress(SystemExit):
             cli.main()
-    paths = [Path(file).relative_to(ROOT) for file in files]
+    paths = [Path(file).resolve().relative_to(ROOT) for file in files]
     return [str(path) for path in paths if path.parts[0] in FLOORS and path.suffix == ".py"]
 
 

@@ -124,11 +124,10 @@ class Material:
 
     >>> Material(k_d=(0.5, 0.4, 0.3), k_s=0.7, n=9).k_d
     (0.5, 0.4, 0.3)
-    >>> Material(k_d=-0.5)
+    >>> Material(k_d=-0.5)  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    fotismos.heuristic.errors.InputError: k_d = -0.5 is not allowed: give finite values of 0 or
-    more.
+    fotismos.heuristic.errors.InputError: k_d = -0.5 is not allowed: give finite values ...
     """
 
     k_i: Colour = 0

@@ -145,7 +145,7 @@ def test_a_pipe_and_a_folder_are_no_scenes(run, tmp_path, monkeypatch):
 
 
 def _start(folder, out):
-    words = [sys.executable, "-m", "reports", "compare", *scenes_in(folder), "-o", out]
+    words = [sys.executable, "-m", "fotismos.reports", "compare", *scenes_in(folder), "-o", out]
     words += ["--spp", "8", "--resolution", "16x16", "--no-why", "--workers", "1"]
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     return subprocess.Popen(

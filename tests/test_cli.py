@@ -107,7 +107,7 @@ def test_causes_that_cannot_be_found_leave_the_comparison_and_a_warning(
 )
 def test_python_without_docstrings_is_refused_before_any_work(level, code, message, tmp_path):
     words = ("audit", "--heuristic", "phong", "-o", tmp_path / "out")
-    done = python("-m", "reports", *words, PYTHONOPTIMIZE=level)
+    done = python("-m", "fotismos.reports", *words, PYTHONOPTIMIZE=level)
     assert (done.returncode, done.stderr.count("\n")) == (code, len(message) > 0)
     assert re.search(message, done.stderr)
     assert (tmp_path / "out").exists() == (code == 0)
@@ -116,7 +116,7 @@ def test_python_without_docstrings_is_refused_before_any_work(level, code, messa
 def test_any_date_of_building_is_ignored(scene_file, tmp_path):
     for date in ("x", "", "9" * 30):
         words = ("compare", scene_file, "-o", tmp_path / f"out{date}", "--figures", *SMALL)
-        done = python("-m", "reports", *words, "--no-why", SOURCE_DATE_EPOCH=date)
+        done = python("-m", "fotismos.reports", *words, "--no-why", SOURCE_DATE_EPOCH=date)
         assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -275,7 +275,15 @@ def test_a_backend_of_jupyter_that_is_not_installed_does_not_matter(tmp_path):
     """As in a cell ``!fotismos doctor``: the kernel passes its backend on."""
     surroundings = os.environ | {"PYTHONPATH": str(ROOT)}
     surroundings["MPLBACKEND"] = "module://not_installed.backend"
-    words = [sys.executable, "-P", "-m", "reports", "compare", "lambert-sphere", "--no-why"]
+    words = [
+        sys.executable,
+        "-P",
+        "-m",
+        "fotismos.reports",
+        "compare",
+        "lambert-sphere",
+        "--no-why",
+    ]
     sizes = ["--resolution", "8x8", "--spp", "4", "-o", str(tmp_path / "out")]
     ended = subprocess.run([*words, *sizes], env=surroundings, capture_output=True, text=True)
     assert (ended.returncode, ended.stderr) == (0, "")

@@ -49,7 +49,7 @@ FAULTS = (
 def started(folder, words, shell="", mark=""):
     """Start a command, marked so that all processes that come of it can be found."""
     return subprocess.Popen(
-        ["sh", "-c", f'{shell} "$@"', "sh", sys.executable, "-P", "-m", "reports", *words],
+        ["sh", "-c", f'{shell} "$@"', "sh", sys.executable, "-P", "-m", "fotismos.reports", *words],
         cwd=folder,
         env=os.environ | {"PYTHONPATH": str(ROOT), "FOTISMOS_MARK": mark},
         stdin=subprocess.DEVNULL,

@@ -6,7 +6,7 @@ from tests.programs import python
 
 LAZY = """
 import sys, fotismos
-print({"mitsuba", "drjit", "numpy", "reports"} & {*sys.modules})
+print({"mitsuba", "drjit", "numpy", "fotismos.reports"} & {*sys.modules})
 print(dir(fotismos) == fotismos.__all__, [n for n in fotismos.__all__ if not getattr(fotismos, n)])
 try:
     fotismos.nothing

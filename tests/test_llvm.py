@@ -87,7 +87,7 @@ def test_every_command_names_a_path_that_is_no_library(tmp_path):
 @pytest.mark.thorough
 def test_a_missing_system_library_is_named_by_every_command():
     for words in ("doctor", "compare fig-8-9"):
-        done = command(words, "from heuristic import llvm; llvm.ATOMIC = 'libabsent.so.1'")
+        done = command(words, "from fotismos.heuristic import llvm; llvm.ATOMIC = 'libabsent.so.1'")
         assert done.returncode == 2
         assert done.stderr.startswith("fotismos: error: Dr.Jit cannot be imported: libabsent.so.1")
         assert "apt-get install libatomic1" in done.stderr

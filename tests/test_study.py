@@ -366,7 +366,7 @@ def test_the_command_writes_dataset_and_figures(run, tmp_path):
 
 def test_a_study_sweeps_declared_parameters(rgb, written):
     written(
-        "from heuristic import Range\n"
+        "from fotismos.heuristic import Range\n"
         "def shade(point, gain: Range(0, 1) = 0.5): return gain * point.material.base_color\n"
     )
     more = f"{SMALL}\nheuristic = 'mine.py'"

@@ -270,7 +270,7 @@ MISTAKES = {
         r"^mine.py, line 1: 'gloss' has no number as its default.*gloss: Range\(0, 1\) = 0.5",
     ),
     "bounds": (
-        "from heuristic import Range\n"
+        "from fotismos.heuristic import Range\n"
         "def shade(point, gloss: Range(0, 1) = 2): return gloss\n",
         r"^mine.py, line 2: gloss = 2.0 is not allowed: give a value from 0 to 1",
     ),
@@ -396,7 +396,7 @@ def test_a_shader_does_not_change_how_numpy_handles_errors(rgb, run, written):
 
 def test_an_object_in_a_file_keeps_its_declaration(rgb, written):
     name = written(
-        "from heuristic import Heuristic, Parameter\n"
+        "from fotismos.heuristic import Heuristic, Parameter\n"
         "def glow(point): return point.parameters.level\n"
         "mine = Heuristic('x', glow, 'A glow', {'uv'}, (Parameter('level', 0.5, 0, 1),))\n"
     )

@@ -276,7 +276,7 @@ def form_starts(objective: Objective) -> list[NDArray]:
     """
     phong: Any = objective.model
     paired = model.start(phong.parameters)
-    (low, high) = model.bounds(phong.parameters)
+    low, high = model.bounds(phong.parameters)
     at_n = np.array([parameter.name == "n" for parameter in phong.parameters])
     linear = phong.linear
     starts = [paired]
@@ -296,7 +296,7 @@ def own_starts(objective: Objective) -> list[NDArray]:
     parameters = objective.model.parameters
     default = np.array([each.paired for each in parameters])
     reach = REACH * np.maximum(np.abs(default), 1.0)
-    (low, high) = model.bounds(parameters)
+    low, high = model.bounds(parameters)
     low = np.maximum(low, default - reach)
     high = np.minimum(high, default + reach)
     return [default, *np.random.default_rng(0).uniform(low, high, (OWN_STARTS, len(default)))]

@@ -327,7 +327,7 @@ class HybridImages:
 
         The channels of a pass are those of ``count`` images.
         """
-        (width, height) = self.size
+        width, height = self.size
         whole = image_size(renderer.scene)
         renderer.size = self.finer * width, self.finer * height
         loop = passes([renderer], self._seed, self.replicates, stream=Stream.REPLICATES)

@@ -103,8 +103,11 @@ def define() -> dict[str, Any]:
             if "shell" in self.names and props.get("shell", 0.0) > 0:
                 self._keep(props, "shell", mi.Float, 0.0)
             if "extent" in self.names:
-                read = {name: kind(props.get(name, 0.0)) for name, kind in sizes.items()}
-                self.extent = Extent(**read)
+                self.extent = Extent(
+                    radius=mi.Float(props.get("radius", 0.0)),
+                    u=mi.Vector3f(props.get("half_u", 0.0)),
+                    v=mi.Vector3f(props.get("half_v", 0.0)),
+                )
                 dr.make_opaque(self.extent)
             self.m_flags = +mi.EmitterFlags.DeltaPosition
             if self.model is DirectionalLight:

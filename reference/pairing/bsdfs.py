@@ -186,7 +186,7 @@ def to_physical(graph: Graph, convention: Convention, replaced: Replacements) ->
         before = graph.props(index)
         plugin, parameters, misses = physical_partner(graph, index, convention)
         replaced.misses += misses
-        (low, high) = PLASTICS
+        low, high = PLASTICS
         ior = parameters.get("int_ior", 1.5) / parameters.get("ext_ior", 1.0)
         note = f"no real plastic has the index {ior:.3g}: they have {low:g} to {high:g}"
         note = "" if low <= ior <= high else note

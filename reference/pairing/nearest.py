@@ -158,8 +158,8 @@ def plastic(context: Context, index: int) -> NearestPhong:
     inside = values.index_of_refraction(graph, index, "int_ior", "polypropylene")
     outside = values.index_of_refraction(graph, index, "ext_ior", "air")
     nonlinear = context.value(index, "nonlinear", False)
-    (whole, mirror) = albedo.of_smooth_plastic(1.0, inside, outside, nonlinear)
-    (half, _) = albedo.of_smooth_plastic(0.5, inside, outside, nonlinear)
+    whole, mirror = albedo.of_smooth_plastic(1.0, inside, outside, nonlinear)
+    half, _ = albedo.of_smooth_plastic(0.5, inside, outside, nonlinear)
     k_d = _of_base(graph, base, whole, half)
     reflected = _tinted(context, index, mirror, "specular_reflectance")
     return NearestPhong(

@@ -43,7 +43,7 @@ def _imports(printed):
 
 def _fotismos(*arguments, options=()):
     """Run a command, and return what it prints to standard error."""
-    command = [sys.executable, *options, "-P", "-m", "reports", *arguments]
+    command = [sys.executable, *options, "-P", "-m", "fotismos.reports", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode not in (0, 1):  # 1: a check failed
         raise SystemExit(done.stderr)
