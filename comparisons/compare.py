@@ -9,6 +9,7 @@ from __future__ import annotations
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from importlib import import_module
+from importlib.util import find_spec
 from threading import Thread
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -34,6 +35,7 @@ from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, lead
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded, require_light
 from fotismos.heuristic import heuristics
+from fotismos.heuristic.errors import InstallationError
 from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.gbuffer import GBuffer
 from fotismos.reference.rendering.renderer import Progress, Renderer, passes
@@ -93,6 +95,7 @@ def compare(
     rendering. Times are taken within the context ``alone``.
     """
     options = options or Options()
+    _require_colour_science()
     printed: list[str] = []
     with ExitStack() as formulas:
         if options.colour_science:
@@ -112,6 +115,16 @@ def compare(
 
             comparison = attribution.explained(comparison, ready, source, options, progress)
         return _computed_twice(comparison)
+
+
+def _require_colour_science() -> None:
+    """Raise `InstallationError` if another module named ``colour`` hides colour-science."""
+    spec = find_spec("colour")
+    if spec is not None and spec.submodule_search_locations is None:
+        raise InstallationError(
+            f"{spec.origin} hides colour-science, whose package is named colour, too. Rename that"
+            " file, or start Python with -P."
+        )
 
 
 def _load() -> None:
@@ -290,10 +303,9 @@ def render(
     # From here on images have single precision, like the files.
     difference = sums[2].estimate(np.float32)
     error = sums[1].standard_error(np.float32)
-    heuristic, reference = (total.mean(np.float32) for total in sums[:2])
     return Estimates(
-        heuristic=heuristic,
-        reference=reference,
+        heuristic=sums[0].mean(np.float32),
+        reference=sums[1].mean(np.float32),
         standard_error=error,
         difference=difference,
         passes=done,

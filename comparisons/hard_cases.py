@@ -95,7 +95,8 @@ def by_kernel(setting: Setting) -> NDArray[np.float32]:
     numbers = (np.reshape(v, (-1, 1)) for v in (s.n, s.intensity))
     columns = [np.ascontiguousarray(v.T) for v in np.broadcast_arrays(*vectors, *numbers)]
     position, normal, view, light = map(Array3f, columns[:4])
-    n, intensity = (Float(each[0]) for each in columns[4:])
+    n = Float(columns[-2][0])
+    intensity = Float(columns[-1][0])
     k0, k1, k2 = map(float, s.attenuation)
     lamp: PointLight | SpotLight
     if s.direction is None:

@@ -471,7 +471,8 @@ def _white(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> I
 
 def _blocks(image: np.ndarray, counted: np.ndarray) -> np.ndarray:
     """Return the mean colours (B, 3) of blocks, over the pixels that count; never quite black."""
-    height, width = (side // BLOCK * BLOCK for side in counted.shape)
+    height = counted.shape[0] // BLOCK * BLOCK
+    width = counted.shape[1] // BLOCK * BLOCK
     weighted = np.where(counted[..., None], image, 0)[:height, :width].astype(float)
     sums = weighted.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3).sum(axis=(1, 3))
     sums = sums.reshape(-1, 3)

@@ -344,10 +344,10 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
 def _pixels(resolution: tuple[int, int], lights: int) -> tuple[NDArray, NDArray]:
     """Return the columns and rows of the pixels in the middles of the cells."""
     longest = min(SIDE, int((VALUES / 2 / lights) ** 0.5) if lights > 2 else SIDE)
-    columns, rows = (
-        (2 * np.arange(count) + 1) * side // (2 * count)
-        for count, side in zip(shrunk(resolution, longest), resolution, strict=True)
-    )
+    across, down = shrunk(resolution, longest)
+    width, height = resolution
+    columns = (2 * np.arange(across) + 1) * width // (2 * across)
+    rows = (2 * np.arange(down) + 1) * height // (2 * down)
     return columns, rows
 
 
@@ -394,9 +394,9 @@ class _Points:
         return tuple(map(self._material, different.tolist())), numbers
 
     def _row(self, material: Material) -> NDArray[np.float64]:
-        k_i, k_a, k_d, k_s = (self.colours(getattr(material, name)) for name in COEFFICIENTS)
+        colours = [self.colours(getattr(material, name)) for name in COEFFICIENTS]
         form = np.full(len(self.hit), FORMS.index(material.form))
-        return np.column_stack((k_i, k_a, k_d, k_s, self.floats(material.n), form))
+        return np.column_stack((*colours, self.floats(material.n), form))
 
     def _material(self, row: list[float]) -> TermMaterial:
         number, *values = row

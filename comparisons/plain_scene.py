@@ -112,7 +112,7 @@ def camera(scene: mi.Scene) -> dict:
     offsets = [numbers(values[f"principal_point_offset_{axis}"])[0] for axis in ("x", "y")]
     if any(offsets):
         raise InputError(f"sensor {sensor.id()!r}: its principal point must be in the middle.")
-    width, height = (int(side) for side in sensor.film().crop_size())
+    width, height = map(int, sensor.film().crop_size())
     to_world = np.array(values["to_world"].matrix, float).reshape(4, 4, -1)[..., 0]
     x_fov = numbers(values["x_fov"])[0]
     near = float(sensor.near_clip())
@@ -141,8 +141,10 @@ def camera(scene: mi.Scene) -> dict:
 def triangles_of(shape: mi.Shape, material: int, resolution: int | None) -> Triangles:
     """Return a shape as the triangles of :func:`fotismos.heuristic.tessellation.to_mesh`."""
     mesh = to_mesh(shape, resolution or RESOLUTION)
-    parts = (meshes.POSITIONS, meshes.NORMALS, meshes.TEXCOORDS, meshes.FACES)
-    positions, normals, texcoords, faces = (meshes.rows(mesh, part) for part in parts)
+    positions = meshes.rows(mesh, meshes.POSITIONS)
+    normals = meshes.rows(mesh, meshes.NORMALS)
+    texcoords = meshes.rows(mesh, meshes.TEXCOORDS)
+    faces = meshes.rows(mesh, meshes.FACES)
     assert positions is not None
     assert faces is not None
     normals = None if mesh.has_face_normals() else normals

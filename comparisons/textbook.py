@@ -89,7 +89,7 @@ def shade(setting: Setting, dtype: Any) -> NDArray:
         reflection = mirrored(normal, toward, view)[..., 0]
         power = clamped(reflection) ** dtype(s.n)
         distance = distance[..., 0]
-        k0, k1, k2 = (dtype(k) for k in s.attenuation)
+        k0, k1, k2 = map(dtype, s.attenuation)
         arriving = dtype(s.intensity) / (k0 + k1 * distance + k2 * distance**2)
         if s.direction is not None:
             cos_axis = -dot(toward, unit(np.asarray(s.direction).astype(dtype)))[..., 0]
@@ -107,7 +107,7 @@ def shade_exactly(setting: Setting) -> NDArray:
     """
     value = shade(setting, EXACT)
     with np.errstate(all="ignore"):
-        normal, view, toward = (unit(vectors) for vectors in _vectors(setting, EXACT))
+        normal, view, toward = map(unit, _vectors(setting, EXACT))
         if setting.k_d == 0:
             value = np.where(mirrored(normal, toward, view)[..., 0] > 0, value, 0)
     exists = ~np.isnan(dot(toward, toward) + dot(normal, normal) + dot(view, view))[..., 0]

@@ -77,8 +77,10 @@ def _seen(scene: Any) -> tuple[Any, Any, Any]:
     Each point is repeated for its directions; where nothing is seen ``k_d`` is 0.
     """
     cells = (np.arange(GRID) + 0.5) / GRID
-    x, y = (np.repeat(side.ravel(), STRATA**2) for side in np.meshgrid(cells, cells))
-    place = mi.Point2f(mi.Float(x), mi.Float(y))
+    columns, rows = np.meshgrid(cells, cells)
+    x = mi.Float(np.repeat(columns.ravel(), STRATA**2))
+    y = mi.Float(np.repeat(rows.ravel(), STRATA**2))
+    place = mi.Point2f(x, y)
     ray, _ = scene.sensors()[0].sample_ray(0.0, 0.5, place, mi.Point2f(0.5))
     si = scene.ray_intersect(ray)
     active = si.is_valid()
@@ -155,7 +157,9 @@ def fit(normal: Doubles, arriving: Doubles, k_d: Doubles, up: Doubles) -> tuple[
 def prepare(scene: Any) -> tuple[Array, Array, list[float], bool]:
     """Return sky, ground, the upward direction, and whether they replace ``I_a``."""
     up = upward(scene)
-    sky, ground = (mi.Spectrum(end.tolist()) for end in fit(*gather(scene), up))
+    above, below = fit(*gather(scene), up)
+    sky = mi.Spectrum(above.tolist())
+    ground = mi.Spectrum(below.tolist())
     dr.make_opaque(sky, ground)  # as literals they would compile a kernel for every scene
     return sky, ground, up.tolist(), scene.environment() is not None
 

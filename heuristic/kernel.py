@@ -73,11 +73,10 @@ def shade(
     }
     materials.require_common_wavelengths(values | own)
     vector_type = type(position)
-    k_i, k_a, k_d, k_s, ambient = (
-        materials.as_array(value, vector_type) for value in values.values()
-    )
+    arrays = [materials.as_array(value, vector_type) for value in values.values()]
+    k_i, k_a, k_d, k_s, ambient = arrays
     # The type of a sum of all terms, whether or not each is there.
-    arrays = [type(value) for value in (k_i, k_a, k_d, k_s, ambient) if dr.is_array_v(value)]
+    arrays = [type(value) for value in arrays if dr.is_array_v(value)]
     float_type = dr.value_t(vector_type)
     total = (dr.expr_t(float_type, *arrays) if arrays else float_type)(0)
     if not materials.is_zero(material.k_i):

@@ -1,8 +1,11 @@
 """The public door: `import fotismos`."""
 
+import shutil
+
 import pytest
 
-from tests.programs import python
+from fotismos.heuristic.program import FOLDERS
+from tests.programs import ROOT, python
 
 LAZY = """
 import sys, fotismos
@@ -30,6 +33,28 @@ print(fotismos.declare(fotismos.Heuristic(name="grey", shade=lambda point: 0.5))
 print(fotismos.fit("fig-8-9", resolution=(12, 8), spp=4).scene)
 print(fotismos.check(BASELINE).status)
 """
+
+DIGEST = "from fotismos.heuristic import program; print(program.source_digest())"
+
+
+@pytest.mark.parametrize("room", FOLDERS[1:])
+def test_a_room_is_imported_from_the_package_alone(room):
+    done = python("-c", f"import {room}")
+    expected = f"ImportError: write `import fotismos.{room}` in place of `import {room}`"
+    assert done.stderr.splitlines()[-1] == expected
+
+
+@pytest.mark.parametrize("file", ["heuristic/terms.py", "fotismos/__init__.py"])
+def test_a_changed_source_changes_the_digest_that_decides_on_reuse(file, tmp_path):
+    for folder in FOLDERS:
+        shutil.copytree(ROOT / folder, tmp_path / folder, symlinks=True)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    before = python("-c", DIGEST, PYTHONPATH=str(tmp_path)).stdout
+    with (tmp_path / file).open("a") as source:
+        source.write("# changed\n")
+    after = python("-c", DIGEST, PYTHONPATH=str(tmp_path)).stdout
+    assert len(before) == len(after) == 65
+    assert before != after
 
 
 def test_the_door_is_lazy_and_has_all_its_names():

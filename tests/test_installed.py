@@ -63,3 +63,25 @@ def test_the_installed_commands_work(installed, tmp_path):
     program = "import fotismos; print(fotismos.plan('fig-8-9').integrator, fotismos.shade)"
     assert do(installed / "python", "-c", program).startswith("direct_all <function shade")
     assert "fotismos_variant" in do(installed / "python", "-m", "pytest", "--markers")
+
+
+def test_a_project_may_have_names_of_its_own(installed, tmp_path):
+    """Its folders and files are called like ours, and like colour-science's package."""
+    files = {
+        "reports/__init__.py": "OURS = True",
+        "heuristic.py": "raise ImportError('a file of the project')",
+        "tests/__init__.py": "",
+        "tests/test_reports.py": "import fotismos, reports\ndef test_it(): assert reports.OURS",
+        "colour.py": "RED = 1",
+        "ball.xml": SCENE,
+    }
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    small = ("--resolution", "8x8", "--spp", 4)
+    do(installed / "fotismos", "compare", "ball.xml", *small, folder=tmp_path)
+    assert (tmp_path / "out/ball/comparison.exr").is_file()
+    assert "1 passed" in do(installed / "python", "-m", "pytest", "-q", "tests", folder=tmp_path)
+    program = "import fotismos, reports; fotismos.compare('fig-8-9', resolution=(8, 8), spp=4)"
+    message = do(installed / "python", "-c", program, folder=tmp_path, code=1).splitlines()[-1]
+    assert "colour.py hides colour-science" in message

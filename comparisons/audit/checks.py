@@ -251,7 +251,8 @@ def light_from_below(subject: Subject) -> Checked:
     if subject.eta:
         return _checked("light from below", None, None, "0", "it transmits light")
     degrees = np.linspace(91, 180, 90), np.arange(0, 181, 20.0), np.array([0.0, 30, 60, 80])
-    polar, azimuth, viewer = (np.deg2rad(each.ravel()) for each in np.meshgrid(*degrees))
+    angles = np.deg2rad(np.stack(np.meshgrid(*degrees)).reshape(3, -1))
+    polar, azimuth, viewer = angles
     light = furnace.direction(polar, azimuth)
     view = furnace.direction(viewer, 0 * viewer)
     shown = {material: subject.response(material, light, view) for material in subject.materials}

@@ -190,7 +190,8 @@ def sample(along: Callable[[Array, Array, Array], Array]) -> Model:
         return random.uniform(0.05, 0.95, (POINTS, 3)).astype(np.float32).astype(float)
 
     position = random.uniform(-1, 1, (POINTS, 3))
-    normal, view = (unit(random.normal(size=(POINTS, 3))) for _ in range(2))
+    normal = unit(random.normal(size=(POINTS, 3)))
+    view = unit(random.normal(size=(POINTS, 3)))
     view *= np.sign(dot(normal, view))
     away = np.array(LAMPS)[:, None] - position
     distance = np.sqrt(dot(away, away))

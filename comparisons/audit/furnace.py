@@ -66,7 +66,8 @@ def sphere(azimuths: int, heights: int, edge: float = 1.0) -> tuple[NDArray, NDA
     nodes, weights = np.polynomial.legendre.leggauss(heights)
     lengths = np.diff(ends, axis=0) / 2
     u = (2 * np.arange(azimuths) + 1) / azimuths - 1
-    t, u = (grid.ravel() for grid in np.meshgrid(ends[:-1] + lengths * (1 + nodes), u))
+    grids = np.meshgrid(ends[:-1] + lengths * (1 + nodes), u)
+    t, u = np.reshape(grids, (2, -1))
     above = direction(np.arccos(1 - t * t), np.pi * (1 + u**3))
     solid_angle = np.tile((lengths * weights).ravel(), azimuths) * t * 12 * np.pi * u**2 / azimuths
     return np.stack([above, above * [[1], [1], [-1]]]), solid_angle

@@ -234,7 +234,8 @@ def shaded(
     made = {name: _opaque(value) for name, value in (known | dict(material)).items()}
     made |= {name: mi.Spectrum(made[name]) for name in COLOURS}
     values = {each.name: each.default for each in heuristic.parameters} | dict(values or {})
-    position, normal, view = (mi.Vector3f(_single(np.broadcast_to(v, (3, count)))) for v in place)
+    vectors = [mi.Vector3f(_single(np.broadcast_to(vector, (3, count)))) for vector in place]
+    position, normal, view = vectors
     arguments = ShadingArguments(
         position=position,
         normal=normal,
@@ -333,10 +334,12 @@ def registered(word: str) -> str:
 
 def _index(bsdf: Any) -> float:
     """Return the relative index of refraction below a BSDF, as its samples report it, or 1."""
-    one, *two = (mi.Float(each) for each in np.random.default_rng(0).random((3, 256)))
+    lobe, x, y = np.random.default_rng(0).random((3, 256))
     si = dr.zeros(mi.SurfaceInteraction3f, 256)
     si.wi = mi.Vector3f(0, 0, 1)
-    found, _ = bsdf.sample(mi.BSDFContext(), si, one, mi.Point2f(*two))
+    found, _ = bsdf.sample(
+        mi.BSDFContext(), si, mi.Float(lobe), mi.Point2f(mi.Float(x), mi.Float(y))
+    )
     return dr.max(dr.select(found.wo.z < 0, found.eta, 0))[0] or 1.0
 
 

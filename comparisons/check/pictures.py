@@ -181,7 +181,8 @@ def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
 def _tiles(image: Array) -> Array:
     """Return sums over whole tiles (rows, columns, ...); of a smaller picture, over itself."""
     side = SIDE * ceil(max(image.shape[:2]) / TILES / SIDE)
-    height, width = (max(length // side * side, side) for length in image.shape[:2])
+    height = max(image.shape[0] // side * side, side)
+    width = max(image.shape[1] // side * side, side)
     return block_sums(image[:height, :width], side)
 
 
@@ -300,8 +301,8 @@ def check_pictures(before: Repeats, after: Repeats, level: float) -> PictureChec
 
 def colour(values: Array) -> Colour:
     """Return an array (3,) as a colour."""
-    red, green, blue = (float(f"{value:.8g}") for value in values)
-    return red, green, blue
+    red, green, blue = values
+    return float(f"{red:.8g}"), float(f"{green:.8g}"), float(f"{blue:.8g}")
 
 
 def _moves(tested: Means, level: float, is_block: bool = False) -> Iterator[Move]:

@@ -299,11 +299,11 @@ def _mean_errors(errors: ArrayLike) -> tuple[MeanError, MeanError]:
     each = np.asarray(errors)
     means = each.mean(axis=0)
     halves = SURE * each.std(axis=0, ddof=1) / sqrt(len(each))
-    mean, tolerance = (
-        MeanError(mean=float(m), low=float(m - half), high=float(m + half))
-        for m, half in zip(means, halves, strict=True)
-    )
-    return mean, tolerance
+    lows = means - halves
+    highs = means + halves
+    error = MeanError(mean=float(means[0]), low=float(lows[0]), high=float(highs[0]))
+    tolerance = MeanError(mean=float(means[1]), low=float(lows[1]), high=float(highs[1]))
+    return error, tolerance
 
 
 def timed(

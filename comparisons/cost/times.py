@@ -66,9 +66,9 @@ def lines(measured: Mapping[str, Mapping[int, Rounds]], seed: int = 0) -> dict[s
     work: list[Draws] = []
     for name, own in measured.items():
         counts = np.array(sorted(own), float)
-        wall, processor = (
-            np.array([own[int(n)][kind] for n in counts])[:, drawn].min(axis=2) for kind in (0, 1)
-        )  # (counts, 1 + DRAWS)
+        # Each (counts, 1 + DRAWS).
+        wall = np.array([own[int(n)][0] for n in counts])[:, drawn].min(axis=2)
+        processor = np.array([own[int(n)][1] for n in counts])[:, drawn].min(axis=2)
         best[name] = counts, wall
         span = counts[-1] - counts[0]
         for found, times in ((slopes, wall), (work, processor)):

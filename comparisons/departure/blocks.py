@@ -49,8 +49,8 @@ def ratio(above: Array, below: Array) -> Array:
 def shrunk(sides: Sequence[int], longest: int) -> tuple[int, int]:
     """Return two sides of the same shape, of which the longer one is at most ``longest``."""
     scale = min(1.0, longest / max(sides))
-    first, second = (max(1, round(scale * side)) for side in sides)
-    return first, second
+    first, second = sides
+    return max(1, round(scale * first)), max(1, round(scale * second))
 
 
 def averaged(image: NDArray[np.floating], shape: Sequence[int]) -> Array:

@@ -250,10 +250,11 @@ def _values(plane: Plane) -> Float32:
 
 def _error(truth: Seen, shown: Seen) -> Plane:
     """Return FLIP (N,) of what is seen of two images."""
-    (first, *edges) = truth
-    (second, *others) = shown
-    slopes, curvatures = (dr.abs(a - b) for a, b in zip(edges, others, strict=True))
-    feature = sqrt(sqrt(0.5)) * dr.sqrt(dr.maximum(slopes, curvatures))
+    first, edge, point = truth
+    second, other_edge, other_point = shown
+    slope = dr.abs(edge - other_edge)
+    curvature = dr.abs(point - other_point)
+    feature = sqrt(sqrt(0.5)) * dr.sqrt(dr.maximum(slope, curvature))
     colour = _redistributed(_apart(first, second))
     # Equal colours are 0 apart, whatever the power.
     return np.array(dr.select(colour > 0.0, dr.power(colour, 1.0 - feature), 0.0))
@@ -275,7 +276,8 @@ def _apart(first: Array3f, second: Array3f) -> Float32:
 @lru_cache(maxsize=1)
 def _largest() -> float:
     """Return the distance of green and blue."""
-    green, blue = (Array3f(*column.tolist()) for column in _OPPONENT.T[1:])
+    green = Array3f(_OPPONENT.T[1].tolist())
+    blue = Array3f(_OPPONENT.T[2].tolist())
     return float(_apart(_hunted(green), _hunted(blue))[0])
 
 

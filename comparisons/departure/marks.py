@@ -253,10 +253,9 @@ class _Pixels:
         mean = difference.mean[rows][mask]
         own = _variance(difference, rows)[mask]
         blocks = slice(rows.start // BLOCK, -(-rows.stop // BLOCK))
-        near = around.pooled_freedom, around.quantile, around.pooled_variance
-        prior, quantile, pooled, *sizes = (
-            spread_out(values[blocks], mask.shape)[mask] for values in (*near, *around.sizes)
-        )
+        by_block = (around.pooled_freedom, around.quantile, around.pooled_variance, *around.sizes)
+        by_pixel = [spread_out(values[blocks], mask.shape)[mask] for values in by_block]
+        prior, quantile, pooled, *sizes = by_pixel
         freedom = prior + around.own_freedom
         moderated = (prior * pooled + around.own_freedom * own) / freedom
         return cls(mean, np.maximum(own, moderated), np.array(sizes), freedom, quantile)

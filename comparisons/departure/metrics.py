@@ -183,16 +183,19 @@ def drawn() -> dict[str, Metric]:
     return {name: metric for name, metric in METRICS.items() if metric.drawn}
 
 
+def _float(image: ArrayLike) -> Array:
+    values = np.asarray(image)
+    return values if values.dtype == np.float32 else values.astype(np.float64, copy=False)
+
+
 def checked_pair(test: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
     """Return both images as float64, or unchanged if float32.
 
     Shapes that differ or are not (..., 3) raise `InputError`, a NaN or an infinity
     `NonFiniteError`.
     """
-    test, reference = (
-        image if image.dtype == np.float32 else image.astype(np.float64, copy=False)
-        for image in (np.asarray(test), np.asarray(reference))
-    )
+    test = _float(test)
+    reference = _float(reference)
     if test.shape != reference.shape or test.shape[-1:] != (3,):
         raise InputError(
             f"images of shapes {test.shape} and {reference.shape} cannot be compared:"

@@ -102,7 +102,9 @@ def summarise(
         distances = metric.against(reference[rows], measured, viewing)
         for place, image in images.items():
             maps[place][rows][measured] = distances(image)
-    values, exposed, noise_alone = (each[mask] for each in maps)
+    values = maps[0][mask]
+    exposed = maps[1][mask]
+    noise_alone = maps[2][mask]
     numbers: dict[str, Any] = _numbers(metric, values)
     after = numbers
     if factor != 1.0:

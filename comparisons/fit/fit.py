@@ -211,7 +211,9 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
     halves = (ready.heuristic, ready.reference)
     for one in passes(halves, options.seed, ready.passes, progress=progress):
         add_difference(sums, one.images)
-    before, reference, difference = (total.estimate() for total in sums)
+    before = sums[0].estimate()
+    reference = sums[1].estimate()
+    difference = sums[2].estimate()
     seeds = tuple(pass_seed(options.seed, number) for number in range(ready.passes))
     counted = ready.counted
     viewing = options.viewing

@@ -397,10 +397,10 @@ class PhongModel:
         if value is None:
             return (self.surface.pixels(owner, 0.0),) * 2
         dr.forward_from(exponent)
-        parts = dr.detach(value), dr.grad(value)
-        dr.eval(*parts)
-        basis, slope = (self.surface.pixels(owner, part) for part in parts)
-        return basis, n * slope
+        basis = dr.detach(value)
+        slope = dr.grad(value)
+        dr.eval(basis, slope)
+        return self.surface.pixels(owner, basis), n * self.surface.pixels(owner, slope)
 
     def _shaded(self, owner, name, lights, ambient=0, **lobe):
         """Call the kernel with one coefficient of 1; None if no sample or light shows it."""

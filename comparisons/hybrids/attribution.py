@@ -187,10 +187,10 @@ class ErrorMeter:
         images = np.asarray(images)[:, self.counted].astype(float)
         found = []
         for chosen, references in self._references:
-            plain, *noisy = (
-                LEADING.difference(reference, shown)
-                for reference, shown in zip(references, self._noisier(images[chosen]), strict=True)
-            )
+            noisier = self._noisier(images[chosen])
+            differences = map(LEADING.difference, references, noisier)
+            plain = next(differences)
+            noisy = list(differences)
             before = np.bincount(self._blocks, plain).astype(float)
             after = np.bincount(self._blocks, np.mean(noisy, axis=0)).astype(float)
             found.append(plain * ratio(without_noise(before, after), before)[self._blocks])
@@ -274,8 +274,8 @@ def attribute(
         return whole
 
     previews = images.previews(errors, clean)
-    both = images.plain_kernel, images.plugin(nothing)
-    kernel, plugin = (images.pixels(each).mean(axis=0) for each in both)
+    kernel = images.pixels(images.plain_kernel).mean(axis=0)
+    plugin = images.pixels(images.plugin(nothing)).mean(axis=0)
     rounding = LEADING(plugin, kernel, meter.viewing)[meter.counted]
     return Causes(
         record=Attribution(
@@ -431,7 +431,7 @@ def in_words(found: Mapping[str, float]) -> str | None:
 
 
 def _enlarged(values, shape):
-    rows, columns = (
-        np.arange(large) * small // large for large, small in zip(shape, values.shape, strict=True)
-    )
+    height, width = shape
+    rows = np.arange(height) * values.shape[0] // height
+    columns = np.arange(width) * values.shape[1] // width
     return values[np.ix_(rows, columns)]

@@ -362,7 +362,8 @@ class HybridImages:
         count, height, width, _ = full.shape
         if clean is None or self.finer == 1 or len(clean[0]) < height:
             return [each.mean(axis=0) for each in images]
-        picture, error = (averaged(each, (height, width)) for each in clean)
+        picture = averaged(clean[0], (height, width))
+        error = averaged(clean[1], (height, width))
         error *= np.sqrt(height * width / clean[1][..., 0].size)
 
         def covariance(one: NDArray, other: NDArray) -> NDArray[np.float64]:

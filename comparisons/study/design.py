@@ -288,7 +288,8 @@ def _levels(raw: object, parameter: StudyParameter, is_grid: bool, where: str) -
             f"{where} has {', '.join(raw)}: give a range {', '.join(sorted(needed))} and, if you"
             " like, scale (linear or log)."
         )
-    low, high = (_checked(raw[end], parameter, f"{where}, {end}") for end in ("from", "to"))
+    low = _checked(raw["from"], parameter, f"{where}, from")
+    high = _checked(raw["to"], parameter, f"{where}, to")
     scale = _converted(raw.get("scale", "linear"), Literal["linear", "log"], f"{where}, scale")
     steps = _converted(raw.get("steps", 2), Steps, f"{where}, steps")
     is_log = scale == "log"

@@ -261,7 +261,8 @@ def reference_radiance(
         values = {name: getattr(plastic, name) for name in ("alpha", "int_ior", "ext_ior")}
         values |= {"type": "roughplastic", "diffuse_reflectance": diffuse["reflectance"]}
         bsdfs = [values | {"specular_reflectance": k} for k in (plastic.specular_reflectance[0], 0)]
-    total, diffuse = (furnace.of_bsdf(mi.load_dict(bsdf))(light, view)[0] for bsdf in bsdfs)
+    responses = [furnace.of_bsdf(mi.load_dict(bsdf))(light, view)[0] for bsdf in bsdfs]
+    total, diffuse = responses
     return total, total - diffuse
 
 

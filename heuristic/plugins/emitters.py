@@ -75,7 +75,6 @@ def define() -> dict[str, Any]:
         "cutoff": (mi.Float, 30.0),
         "exponent": (mi.Float, 0.0),
     }
-    sizes = {"radius": mi.Float, "half_u": mi.Vector3f, "half_v": mi.Vector3f}
     coefficients = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
 
     class HeuristicLight(mi.Emitter):

@@ -71,7 +71,9 @@ def define() -> dict[str, Any]:
         def __init__(self, props: Properties):
             super().__init__(props)
             self.k_i = emitted(props, "k_i", 0.0)
-            self.k_a, self.k_d, self.k_s = (coefficient(props, k) for k in ("k_a", "k_d", "k_s"))
+            self.k_a = coefficient(props, "k_a")
+            self.k_d = coefficient(props, "k_d")
+            self.k_s = coefficient(props, "k_s")
             self.transmittance = coefficient(props, "transmittance")
             self.tilt = props.get_texture("tilt") if "tilt" in props else None
             self.n = _exponent(props)

@@ -312,12 +312,13 @@ def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic,
     diffuse = np.array(phong.k_d)
     specular = specular_albedo(phong)
     strength = max(phong.k_s)
-    red, green, blue = (k_s / strength for k_s in phong.k_s)
+    red, green, blue = phong.k_s
+    tint = red / strength, green / strength, blue / strength
     white = RoughPlastic(
         (1.0, 1.0, 1.0),
         alpha_of(phong.n, phong.form),
         LITERAL_IOR,
-        specular_reflectance=(red, green, blue),
+        specular_reflectance=tint,
     )
     white = replace(white, int_ior=ior_of_lobe(white, max(specular)))
     if any(diffuse > of_roughplastic(white).diffuse):
@@ -338,9 +339,10 @@ def up_to_1(
     what: str, colour: tuple[float, float, float]
 ) -> tuple[tuple[float, float, float], tuple[Miss, ...]]:
     """Return a colour limited to 1, as a reflectance is, and what it misses."""
-    red, green, blue = (min(component, 1.0) for component in colour)
+    red, green, blue = colour
+    limited = min(red, 1.0), min(green, 1.0), min(blue, 1.0)
     missed = (component for component in dict.fromkeys(colour) if component > 1)
-    return (red, green, blue), tuple(Miss(what=what, wanted=c, reached=1.0) for c in missed)
+    return limited, tuple(Miss(what=what, wanted=c, reached=1.0) for c in missed)
 
 
 @lru_cache(maxsize=KEPT)

@@ -95,7 +95,8 @@ def _area(light: LightNode) -> None:
             cone["radius"] = np.sqrt(area / np.pi) / (2 if kind == "sphere" else 1)
         case "rectangle":
             matrix = np.array(mi.traverse(body)["to_world"].matrix, float).reshape(4, 4, -1)
-            cone["half_u"], cone["half_v"] = (mi.ScalarVector3f(*v) for v in matrix[:3, :2, 0].T)
+            cone["half_u"] = mi.ScalarVector3f(matrix[:3, 0, 0])
+            cone["half_v"] = mi.ScalarVector3f(matrix[:3, 1, 0])
     position = mi.ScalarPoint3f(*centroid)
     derived = heuristic(plugin, factor, **cone, position=position, intensity=radiance)
     derived.set_id(f"lamp ‘{graph.label(shape)}’")
@@ -110,7 +111,7 @@ ROOM = 1.02
 
 def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float], float]:
     cells = (np.arange(64) + 0.5) / 64
-    x, y = (axis.ravel() for axis in np.meshgrid(cells, cells))
+    x, y = np.reshape(np.meshgrid(cells, cells), (2, -1))
     sample = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))
     places = np.array(sample.p, float)
     centroid = places.mean(axis=1)

@@ -214,8 +214,9 @@ def level(
     The cones are factors of the light and of Mitsuba's in directions of travel (N, 3),
     ``flux_ratio`` is the light's flux over Mitsuba's, for the same intensity on the axis.
     """
-    defaults = (("k0", 1.0), ("k1", 0.0), ("k2", 0.0))
-    k0, k1, k2 = (light.number(key, default) for key, default in defaults)
+    k0 = light.number("k0", 1.0)
+    k1 = light.number("k1", 0.0)
+    k2 = light.number("k2", 0.0)
     clamped = light.value("clamped", False)
     if (k0, k1, k2) == INVERSE_SQUARE and not clamped:
         return IRRADIANCE_PER_INTENSITY * flux_ratio, ""

@@ -71,7 +71,7 @@ def probe(bsdf: mi.BSDF) -> Albedos | None:
     columns = [np.stack(column, 1) for column in zip(*(part[:4] for part in parts), strict=True)]
     if drawn is not None:
         columns = [np.interp(WAVELENGTHS, drawn.T.ravel(), column.ravel()) for column in columns]
-    reflected, diffuse, passed, scattered = (column.ravel() for column in columns)
+    reflected, diffuse, passed, scattered = map(np.ravel, columns)
     alpha = float(np.mean([part[4] for part in parts]))
     if not np.isfinite([*reflected, *diffuse, *passed, *scattered, alpha]).all():
         return None

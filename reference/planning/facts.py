@@ -117,7 +117,9 @@ def _mesh(mesh: mi.Mesh, is_rectangle: bool) -> Geometry:
         return Geometry(Form.OTHER, has_true_normals=not smooth)
     points = meshes.rows(mesh, meshes.POSITIONS).astype(float)
     faces = meshes.rows(mesh, meshes.FACES)
-    first, second, third = (points[faces[:, i]] for i in range(3))
+    first = points[faces[:, 0]]
+    second = points[faces[:, 1]]
+    third = points[faces[:, 2]]
     across = np.cross(second - first, third - first)
     length = np.linalg.norm(across, axis=1)
     has_area = length > 0

@@ -227,10 +227,8 @@ class Boxes:
     def __init__(self, shapes: Sequence[ShapeFacts]):
         # The box of a mesh without faces is empty, from inf to -inf.
         self.shapes = [shape for shape in shapes if np.all(shape.low <= shape.high)]
-        self.low, self.high = (
-            np.array([getattr(shape, end) for shape in self.shapes]).reshape(-1, 3)
-            for end in ("low", "high")
-        )
+        self.low = np.array([shape.low for shape in self.shapes]).reshape(-1, 3)
+        self.high = np.array([shape.high for shape in self.shapes]).reshape(-1, 3)
         facing = [shape.facing for shape in self.shapes]
         direction = np.array([d for d, _ in facing]).reshape(-1, 1, 3)
         offset = np.array([o for _, o in facing]).reshape(-1, 1)

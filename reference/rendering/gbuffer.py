@@ -132,7 +132,8 @@ def _object_ids(pointers, seen):
 
 def pixel_rays(scene: Scene, size: tuple[int, int], x: np.ndarray, y: np.ndarray) -> Any:
     """Return the camera rays through the cells in columns ``x`` and rows ``y`` of a film."""
-    places = (np.ravel(place) + 0.5 for place in (x, y))
-    across, down = (mi.Float(place / side) for place, side in zip(places, size, strict=True))
+    width, height = size
+    across = mi.Float((np.ravel(x) + 0.5) / width)
+    down = mi.Float((np.ravel(y) + 0.5) / height)
     film = mi.Point2f(across, down)
     return scene.sensors()[0].sample_ray_differential(0.0, 0.5, film, mi.Point2f(0.5))[0]

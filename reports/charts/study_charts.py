@@ -62,7 +62,7 @@ def chart(figure: StudyFigure, table: pa.Table, study: StudyFile) -> Spec:
     """
     for column in figure.values:
         dataset.require(table, column)
-    (part,) = (part for part in study.parts if part.name == figure.part)
+    part = next(part for part in study.parts if part.name == figure.part)
     data = dataset.rows(table, figure.part, figure.where)
     shown = {figure.x, figure.y, figure.series, *figure.where}
     over = [name for name in part.varying if name not in shown]
@@ -72,6 +72,10 @@ def chart(figure: StudyFigure, table: pa.Table, study: StudyFile) -> Spec:
     make = {"map": _map, "lines": _lines}[figure.kind]
     spec = specification(make(figure, table, part, data))
     return spec | {"title": title, "description": figure.title, "padding": 8}
+
+
+def _scaled(axis: Any, is_log: bool) -> Any:
+    return axis.scale(type="log" if is_log else "linear", nice=not is_log)
 
 
 def _map(
@@ -100,10 +104,8 @@ def _map(
         y = y.type("ordinal").sort("descending").axis(labelOverlap="greedy")
     else:
         logs = [part.levels[name].is_log for name in names]
-        x, y = (
-            place.scale(type="log" if is_log else "linear", nice=not is_log)
-            for place, is_log in zip((x, y), logs, strict=True)
-        )
+        x = _scaled(x, logs[0])
+        y = _scaled(y, logs[1])
     chart = alt.Chart(alt.Data(values=cells)).encode(x=x, y=y)
     marks = chart.mark_rect() if is_grid else chart.mark_circle(size=60, opacity=1)
     layers = [marks.encode(color=colour)]

@@ -77,10 +77,9 @@ def read(path: Path) -> tuple[PictureBaseline, Repeats]:
 def sentence(changes: SmallestChanges, before: Repeats) -> str:
     """Return the sentence on what could not be seen, relative to the mean of the picture."""
     whole = max(before.mean.mean(), LINEAR_ROUNDING)
-    picture, block, noisiest = (
-        f"{100 * max(change) / whole:.2g} %"
-        for change in (changes.mean, changes.block, changes.noisiest)
-    )
+    picture = f"{100 * max(changes.mean) / whole:.2g} %"
+    block = f"{100 * max(changes.block) / whole:.2g} %"
+    noisiest = f"{100 * max(changes.noisiest) / whole:.2g} %"
     equal = " The repeats are equal: if their renderer is random, give each its own seed."
     return (
         f"caught in {100 * changes.power:g} % of cases: a change of the mean by {picture}, of a"

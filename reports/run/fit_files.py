@@ -64,9 +64,9 @@ def headline(record: FitRecord) -> str:
 
 def judgement(record: FitRecord) -> str:
     """Return whether the paired and the fitted parameters pass the criterion."""
-    paired, fitted = (
-        f"{percent(share.value)} ({decide([share])})" for share in record.nearest.differ
-    )
+    before, after = record.nearest.differ
+    paired = f"{percent(before.value)} ({decide([before])})"
+    fitted = f"{percent(after.value)} ({decide([after])})"
     return (
         f"At most 5 % of the pixels may differ by more than {LEADING.label}"
         f" {TOLERANCE:g}: paired {paired}, fitted {fitted}."

@@ -229,11 +229,11 @@ def _attribution(record: Cost) -> Rows:
 
 def timed(time: Estimated) -> tuple[str, str]:
     """Return a time, which may be below 0, and its interval."""
-    value, low, high = (
-        f"{each:.3g} s" if abs(each) >= 1 else f"{each * 1e3:.3g} ms"
-        for each in (time.value, time.low, time.high)
-    )
-    return value, f"{low} to {high}"
+    return _seconds(time.value), f"{_seconds(time.low)} to {_seconds(time.high)}"
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.3g} s" if abs(time) >= 1 else f"{time * 1e3:.3g} ms"
 
 
 def _section(title: str, rows: Rows) -> Iterator[str]:
