@@ -262,7 +262,7 @@ and the correlation of the edges there."""
 
 def geometry_edges(scene: mi.Scene, width: int, height: int) -> np.ndarray:
     """Return how much the geometry changes at each pixel, (H, W)."""
-    surface = gbuffer(scene, FINER * width, FINER * height)
+    surface = gbuffer(scene, (FINER * width, FINER * height))
     layers = np.concatenate([surface.normal, surface.hit[..., None]], axis=-1)
     return _edges(layers.reshape(height, FINER, width, FINER, 4).mean(axis=(1, 3)))
 

@@ -21,7 +21,7 @@ from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.heuristic.lights import lamps
 from fotismos.heuristic.materials import COEFFICIENTS, FORMS, Material
-from fotismos.reference.rendering.gbuffer import image_size, pixel_rays
+from fotismos.reference.rendering.gbuffer import centre_rays, image_size, pixel_rays
 from fotismos.reference.rendering.renderer import Renderer, pass_seed, variant
 
 SIDE = 64
@@ -271,7 +271,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
     if not isinstance(sensor, mi.ProjectiveCamera):
         return f"The camera, {sensor.class_name()}, has no plane film."
     size = shrunk(image_size(scene), LIVE_SIDE)
-    ray = pixel_rays(scene, size, *np.meshgrid(*map(np.arange, size)))
+    ray = centre_rays(scene, size)
     ahead = sensor.world_transform() @ mi.Vector3f(0, 0, 1)
     film = (ray.o, ray.d / dr.dot(ray.d, ahead))
     corners = [0, size[0] - 1, -size[0]]
@@ -315,7 +315,8 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
     emitters = lamps(scene)
     resolution = image_size(scene)
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
-    points = _Points(scene, integrator, pixel_rays(scene, resolution, *np.meshgrid(columns, rows)))
+    x, y = np.meshgrid(columns, rows)
+    points = _Points(scene, integrator, pixel_rays(scene, resolution, x, y))
     materials, places = points.materials()
     if len(materials) > MATERIALS:
         return None

@@ -88,7 +88,7 @@ def plain_scene(source: Source, options: Options) -> PlainScene:
 
 def _layers(scene: Scene) -> dict[str, np.ndarray]:
     """Trace the rays through the pixel centres."""
-    seen = gbuffer(scene, *image_size(scene))
+    seen = gbuffer(scene, image_size(scene))
     ids = [shape.id() for shape in scene.shapes()]
     numbers = [ids.index(name) + 1 if name in ids else 0 for name in seen.shape.names]
     shape = np.array([*numbers, 0], np.float32)[seen.shape.places]

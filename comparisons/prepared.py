@@ -24,9 +24,9 @@ from fotismos.reference.planning.rules import SAMPLED_AS_HIT, loses_light
 from fotismos.reference.rendering.direct import is_behind_two_lamps
 from fotismos.reference.rendering.gbuffer import (
     GBuffer,
+    centre_rays,
     gbuffer,
     image_size,
-    pixel_rays,
     require_surface,
 )
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
@@ -84,7 +84,7 @@ class Prepared:
     @property
     def surface(self) -> GBuffer:
         """What each pixel sees. It is traced each time: cached, it would take much memory."""
-        surface = gbuffer(self.scene, *image_size(self.scene))
+        surface = gbuffer(self.scene, image_size(self.scene))
         dr.flush_malloc_cache()
         return surface
 
@@ -119,9 +119,8 @@ class Prepared:
         """Return where no integrator of Mitsuba is right, in words; empty if there is none."""
         if not (self.pair.hide_emitters and self.plan.integrator in ("volpath", "volpathmis")):
             return ""
-        size = image_size(self.scene)
-        places = np.meshgrid(*map(np.arange, size))
-        count = int(np.sum(is_behind_two_lamps(self.scene, pixel_rays(self.scene, size, *places))))
+        rays = centre_rays(self.scene, image_size(self.scene))
+        count = int(np.sum(is_behind_two_lamps(self.scene, rays)))
         if not count:
             return ""
         return (

@@ -124,7 +124,7 @@ def sum_lights(
     )
     lobe = vectors.lobe(material, normal, view) if has_specular else None
     normal = vectors.normalise(normal)
-    sums: dict[str, tuple[Array, Array]] = {}
+    sums: dict[str, numerics.Compensated] = {}
     for block in _blocks(lights, type(position), in_blocks):
         if in_blocks and sums:
             dr.eval(sums)  # the last block's sums stay open, for the caller's kernel
@@ -141,10 +141,10 @@ def sum_lights(
                 parts["specular"] = parts["specular"] + term if "specular" in parts else term
         for name, part in parts.items():
             # A sum of thousands would lose terms below its last digit (Neumaier).
-            sums[name] = numerics.add(*sums[name], part) if name in sums else (part, 0)
+            sums[name] = numerics.add(sums[name], part) if name in sums else (part, 0)
     diffuse = sums.get("diffuse", (None, 0))
     specular = sums.get("specular", (None, 0))
-    return numerics.summed(*diffuse), numerics.summed(*specular)
+    return numerics.summed(diffuse), numerics.summed(specular)
 
 
 def _blocks(

@@ -42,7 +42,8 @@ def triangle_normal(p0: Position, p1: Position, p2: Position) -> Direction:
     It points to the side from which the vertices are seen in anticlockwise order.
     """
     edges, _ = scaled_edges(p0, p1, p2)
-    return unit_cross(*shorter_edges(*edges))
+    first, second = shorter_edges(edges)
+    return unit_cross(first, second)
 
 
 def implicit_normal(gradient: Vector) -> Direction:
@@ -135,12 +136,13 @@ def scaled_edges(p0: Position, p1: Position, p2: Position) -> tuple[tuple[Vector
     return tuple(_over(edge, largest) for edge in edges), largest
 
 
-def shorter_edges(a: Vector, b: Vector, c: Vector) -> tuple[Vector, Vector]:
+def shorter_edges(edges: Sequence[Vector]) -> tuple[Vector, Vector]:
     """Return two of the three edges of a closed triangle, in order, leaving out the longest.
 
     Any two give the same cross product. In a needle the two long edges are nearly parallel, and
     their product is lost to rounding, while the short one is at a large angle to both.
     """
+    a, b, c = edges
     square_a = dr.squared_norm(a)
     square_b = dr.squared_norm(b)
     square_c = dr.squared_norm(c)
@@ -203,12 +205,12 @@ def vertex_normals(positions: Position, faces: Array, weighting: str = "angle") 
 
 def mean_normals(positions: Position, faces: Array) -> Direction:
     """Equation 6.32: ``n = sum_i n_i / |sum_i n_i|``, the mean of the faces' normals."""
-    return _weighted(positions, faces, lambda *corners: (1, 1, 1))
+    return _weighted(positions, faces, lambda p0, p1, p2: (1, 1, 1))
 
 
 def area_weighted_normals(positions: Position, faces: Array) -> Direction:
     """Equation 6.33: ``n = sum_i A_i n_i / |sum_i A_i n_i|``, with the faces' areas ``A_i``."""
-    return _weighted(positions, faces, lambda *corners: (relative_areas(*corners),) * 3)
+    return _weighted(positions, faces, lambda p0, p1, p2: (relative_areas(p0, p1, p2),) * 3)
 
 
 def angle_weighted_normals(positions: Position, faces: Array) -> Direction:
@@ -224,7 +226,8 @@ def relative_areas(p0: Position, p1: Position, p2: Position) -> Number:
     edges, size = scaled_edges(p0, p1, p2)
     largest = dr.max(size)
     relative_size = size / dr.select(largest > 0, largest, 1)
-    return dr.norm(cross(*shorter_edges(*edges))) * dr.square(relative_size)
+    first, second = shorter_edges(edges)
+    return dr.norm(cross(first, second)) * dr.square(relative_size)
 
 
 def corner_angles(p0: Position, p1: Position, p2: Position) -> tuple[Number, Number, Number]:
@@ -232,8 +235,10 @@ def corner_angles(p0: Position, p1: Position, p2: Position) -> tuple[Number, Num
 
     The arc cosine of the scalar product would lose half the digits of small angles.
     """
-    (a, b, c), _ = scaled_edges(p0, p1, p2)
-    double_area = dr.norm(cross(*shorter_edges(a, b, c)))
+    edges, _ = scaled_edges(p0, p1, p2)
+    first, second = shorter_edges(edges)
+    double_area = dr.norm(cross(first, second))
+    a, b, c = edges
     return tuple(
         dr.atan2(double_area, -dr.dot(before, after)) for before, after in ((c, a), (a, b), (b, c))
     )
@@ -246,11 +251,12 @@ def _weighted(
     if dr.width(faces) == 0:
         return dr.zeros(type(positions), dr.width(positions))
     corners = [dr.gather(type(positions), positions, faces[corner]) for corner in range(3)]
-    normals = triangle_normal(*corners)
+    p0, p1, p2 = corners
+    normals = triangle_normal(p0, p1, p2)
     has_area = dr.squared_norm(normals) > 0
     total = dr.zeros(type(positions), dr.width(positions))
     weight_sum = dr.zeros(type(positions.x), dr.width(positions))
-    for corner, weight in enumerate(weights(*corners)):
+    for corner, weight in enumerate(weights(p0, p1, p2)):
         dr.scatter_add(total, normals * weight, faces[corner], has_area)
         dr.scatter_add(weight_sum, type(positions.x)(weight), faces[corner], has_area)
     limit = CANCELLATION_STEPS * dr.epsilon(positions) * weight_sum

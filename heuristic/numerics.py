@@ -214,22 +214,28 @@ def refined_inverse(square: Number, estimate: Number) -> Number:
     return estimate * dr.fma(-0.5 * square * estimate, estimate, 1.5)
 
 
-def add(total: Array, lost: Array, term: Array) -> tuple[Array, Array]:
-    """Return ``total + term``, and ``lost`` plus what the sum's rounding took away.
+Compensated = tuple[Array, Array]
+"""A sum, and what its rounding lost."""
 
-    The pair ``total, lost`` stands for ``total + lost`` (Neumaier). Start with ``0, 0``.
+
+def add(total: Compensated, term: Array) -> Compensated:
+    """Return ``total + term``, and what the sum's rounding took away besides what was lost before.
+
+    The pair ``value, lost`` stands for ``value + lost`` (Neumaier). Start with ``0, 0``.
     """
-    result = total + term
-    back = result - total
+    value, lost = total
+    result = value + term
+    back = result - value
     # Knuth's exact form does not need to know which of the two is larger.
-    return result, lost + ((total - (result - back)) + (term - back))
+    return result, lost + ((value - (result - back)) + (term - back))
 
 
-def summed(total: Array, lost: Array) -> Array:
-    """Return ``total + lost``; for a sum beyond the type's range ``lost`` is not a number."""
+def summed(total: Compensated) -> Array:
+    """Return ``value + lost``; for a sum beyond the type's range ``lost`` is not a number."""
+    value, lost = total
     if is_number(lost, 0):
-        return total
-    return total + dr.select(dr.isfinite(lost), lost, 0)
+        return value
+    return value + dr.select(dr.isfinite(lost), lost, 0)
 
 
 def inverse_of_power(power_of_two: Number) -> Number:

@@ -52,7 +52,8 @@ def to_mesh(shape: Shape, resolution: int = RESOLUTION) -> Mesh:
             " and Gouraud shading take meshes, spheres, disks, cylinders and rectangles: give"
             " a mesh, or use phong interpolation."
         )
-    return _tessellated(shape, kind, *_cells(resolution)[kind])
+    columns, rows = _cells(resolution)[kind]
+    return _tessellated(shape, kind, columns, rows)
 
 
 def with_vertex_normals(mesh: Mesh, weighting: str = "angle") -> Mesh:
@@ -71,7 +72,8 @@ def split_faces(mesh: Mesh) -> Mesh:
     uv = texture_coordinates(mesh)
     if uv is not None:
         uv = dr.gather(mi.Point2f, uv, corners)
-    split = mi.Vector3u(*(3 * dr.arange(mi.UInt32, mesh.face_count()) + i for i in range(3)))
+    first = 3 * dr.arange(mi.UInt32, mesh.face_count())
+    split = mi.Vector3u(first, first + 1, first + 2)
     return _build(mesh, dr.gather(mi.Vector3f, positions(mesh), corners), normals, uv, split)
 
 
@@ -89,7 +91,8 @@ def normals(mesh: Mesh) -> Direction:
 
 
 def _flat_normals(points: Position, corners: Array) -> Direction:
-    return triangle_normal(*(dr.gather(mi.Vector3f, points, corners[i]) for i in range(3)))
+    p0, p1, p2 = [dr.gather(mi.Vector3f, points, corner) for corner in corners]
+    return triangle_normal(p0, p1, p2)
 
 
 def _checked_normals(mesh: Mesh, weighting: str) -> Direction:

@@ -102,13 +102,13 @@ def lobe(
     sides = _sides(material.form, unit(normal), unit(view), unit)
     if material.n_is_moderate:
         return lambda light, position, toward, cos_incidence: dr.select(
-            cos_incidence > 0, dr.dot(*sides(toward, 1)), 0
+            cos_incidence > 0, _dot(sides(toward, 1)), 0
         )
     normal = unit(normal)
 
     def sharp(light: Any, position: Position, toward: Direction, cos_incidence: Number) -> Cosines:
         vector, inverse = light.wide_toward(position)
-        cosine = _narrow_cosine(*sides(vector, inverse), type(cos_incidence))
+        cosine = _narrow_cosine(sides(vector, inverse), type(cos_incidence))
         return cosine._replace(value=dr.select(dr.dot(normal, vector) > 0, cosine.value, 0))
 
     return sharp
@@ -127,7 +127,7 @@ def local_lobe(form: str, is_moderate: bool, wi: Direction, wo: Direction) -> Co
         sides = vector(0, 0, 1), unit(view + toward)
     else:
         sides = toward, vector(-view.x, -view.y, view.z)
-    return dr.dot(*sides) if is_moderate else _narrow_cosine(*sides, type(wo.z))
+    return _dot(sides) if is_moderate else _narrow_cosine(sides, type(wo.z))
 
 
 def _sides(
@@ -143,10 +143,16 @@ def _sides(
     return lambda toward, inverse: (toward * inverse, mirrored)
 
 
-def _narrow_cosine(a: Vector, b: Vector, float_type: type) -> numerics.Cosine:
+def _dot(sides: tuple[Vector, Vector]) -> Number:
+    a, b = sides
+    return dr.dot(a, b)
+
+
+def _narrow_cosine(sides: tuple[Vector, Vector], float_type: type) -> numerics.Cosine:
     """Return the cosine of two unit vectors in double precision, as floats of a smaller type.
 
     The chord gives ``1 - a.b`` an error of 1e-13 of itself, where the scalar product would leave
     1e-13 of 1: for ``n = 1e12`` a tenth of the highlight.
     """
+    a, b = sides
     return numerics.Cosine(float_type(dr.dot(a, b)), float_type(0.5 * dr.squared_norm(a - b)))

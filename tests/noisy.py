@@ -117,7 +117,7 @@ def render(name, samples, count, size=SIZE, make=None):
     for number in range(count):
         images[number] = np.array(ready.reference.render(pass_seed(777, number)))
     heuristic = [np.array(ready.heuristic.render(pass_seed(777, n)), float) for n in range(16)]
-    return Pool(images, np.array(heuristic), gbuffer(ready.scene, size, size).hit)
+    return Pool(images, np.array(heuristic), gbuffer(ready.scene, (size, size)).hit)
 
 
 def _lights():

@@ -81,7 +81,7 @@ def test_the_geometry_is_the_scenes_own(rgb):
         positions = mi.Point3f(array_of(file, primitive["attributes"]["POSITION"]).T)
         faces = mi.Vector3u(array_of(file, primitive["indices"]).reshape(-1, 3).T)
         shapes[mesh["name"]] = meshes.new_mesh(mesh["name"], positions, faces)
-    seen = gbuffer(mi.load_dict({"type": "scene", **shapes}), *SIZE)
+    seen = gbuffer(mi.load_dict({"type": "scene", **shapes}), SIZE)
     same = found.layers["shape"] > 0
     assert (seen.hit == same).mean() > 0.99  # rays along the open edge of the box
     for layer, own in (("P", seen.position), ("N", seen.normal)):

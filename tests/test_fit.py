@@ -259,7 +259,7 @@ def test_the_errors_are_those_of_the_loss_that_was_minimised(name, rgb):
     loss = LOSSES[name]
     options = Options(resolution=(48, 48), spp=16)
     fitted = fit(builtin("fig-8-9").source(), options, name)
-    counted = gbuffer(mi.load_dict(builtin("fig-8-9").make()), 48, 48).hit
+    counted = gbuffer(mi.load_dict(builtin("fig-8-9").make()), (48, 48)).hit
     found = []
     for image in (fitted.before, fitted.after):
         pair = (loss.coordinates(part[counted], DEFAULT_VIEWING)

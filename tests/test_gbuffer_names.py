@@ -20,7 +20,7 @@ HALVES = """
 
 def seen(near, far):
     scene = mi.load_string(HALVES.format(near=near, far=far), optimize=False)
-    return {name for name in gbuffer(scene, 16, 16).bsdf.names if name}
+    return {name for name in gbuffer(scene, (16, 16)).bsdf.names if name}
 
 
 def test_a_material_is_named_by_its_id_or_else_after_its_shape(rgb):
@@ -40,7 +40,7 @@ def test_equal_names_are_told_apart(rgb):
         {"type": "scene", "sensor": {"type": "orthographic", "to_world": to_world}, **shapes},
         optimize=False,
     )
-    assert {name for name in gbuffer(scene, 16, 16).bsdf.names if name} in (
+    assert {name for name in gbuffer(scene, (16, 16)).bsdf.names if name} in (
         {"bsdf of one", "bsdf of two"},
         {"material of one", "material of two"},
     )

@@ -123,7 +123,7 @@ def test_an_instance_is_a_shape_of_its_own():
     for name, x in (("left", -1.0), ("right", 1.0)):
         group = {"type": "ref", "id": "group"}
         scene[name] = {"type": "instance", "to_world": moved((x, 0, 0)), "group": group}
-    seen = gbuffer(mi.load_dict(scene), 32, 32)
+    seen = gbuffer(mi.load_dict(scene), (32, 32))
     names = np.array(seen.shape.names)[seen.shape.places[seen.hit]]
     assert set(names) == {"left", "right", "floor"}
     at_left = seen.position[seen.hit][:, 0] < 0

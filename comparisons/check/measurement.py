@@ -85,6 +85,20 @@ class Half(Record):
         return np.array([[block.mean for block in row] for row in self.blocks])
 
 
+@dataclass(frozen=True)
+class Quantity:
+    """A number that a check tests: of a metric, of the colour of a half, or of a block of it.
+
+    ``block`` is its row and column, from 1.
+    """
+
+    name: str
+    value: float
+    error: float
+    half: str | None = None
+    block: tuple[int, int] | None = None
+
+
 class Measurement(Record):
     """All measurements of a scene, from ``passes`` independent passes of both halves."""
 
@@ -97,22 +111,25 @@ class Measurement(Record):
         """Return the measurement with only these metrics."""
         return structs.replace(self, metrics={name: self.metrics[name] for name in metrics})
 
-    def quantities(self) -> Iterator[tuple[str, str | None, tuple[int, int] | None, float, float]]:
-        """Yield all numbers: metrics, then whole images, then blocks.
-
-        Each has its name, its half and its block (row and column, from 1), its value and its error.
-        """
+    def quantities(self) -> Iterator[Quantity]:
+        """Yield all numbers: metrics, then whole images, then blocks."""
         for name, metric in self.metrics.items():
-            yield name, None, None, metric.value, metric.error
+            yield Quantity(name=name, value=metric.value, error=metric.error)
         halves = {name: getattr(self, name) for name in HALVES}
         for name, half in halves.items():
             for letter, value, error in zip("RGB", half.mean, half.error, strict=True):
-                yield f"{name} {letter}", name, None, value, error
+                yield Quantity(name=f"{name} {letter}", half=name, value=value, error=error)
         for name, half in halves.items():
             for i, row in enumerate(half.blocks, start=1):
                 for j, block in enumerate(row, start=1):
                     for letter, value, error in zip("RGB", block.mean, block.error, strict=True):
-                        yield f"{name} {letter}, block {i},{j}", name, (i, j), value, error
+                        yield Quantity(
+                            name=f"{name} {letter}, block {i},{j}",
+                            half=name,
+                            block=(i, j),
+                            value=value,
+                            error=error,
+                        )
 
 
 @dataclass(frozen=True)
@@ -313,7 +330,8 @@ def _require_sane(baseline: Baseline) -> None:
     for half in (baseline.heuristic, baseline.reference):
         if half.means().ndim != 3:  # raises ValueError for rows that differ in length
             raise ValueError("there are no blocks.")
-    numbers = [(value, error) for *_, value, error in baseline.measured().quantities()]
+    quantities = baseline.measured().quantities()
+    numbers = [(quantity.value, quantity.error) for quantity in quantities]
     floors = [metric.noise_floor or 0.0 for metric in baseline.metrics.values()]
     if not (np.abs(np.hstack([*numbers, floors])) <= LARGEST).all():
         raise ValueError(f"a number is not finite, or larger than {LARGEST:.2g}.")

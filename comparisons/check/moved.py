@@ -119,16 +119,16 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     from scipy.stats import ttest_ind_from_stats  # half a second, for those who check
 
     pairs = list(zip(before.quantities(), after.quantities(), strict=True))
-    if before.passes != after.passes or any(old[0] != new[0] for old, new in pairs):
+    if before.passes != after.passes or any(old.name != new.name for old, new in pairs):
         raise ValueError("measurements with different passes or quantities cannot be compared")
     count = before.passes
-    x = np.array([[old[3], new[3]] for old, new in pairs])
-    errors = np.array([[old[4], new[4]] for old, new in pairs])
+    x = np.array([[old.value, new.value] for old, new in pairs])
+    errors = np.array([[old.error, new.error] for old, new in pairs])
     difference = x[:, 1] - x[:, 0]
     total = (errors**2).sum(axis=1)
     known = {name: metric.rounding for name, metric in METRICS.items()}
     known[RATIO.name] = RATIO.rounding
-    rounding = np.array([known.get(old[0], LINEAR_ROUNDING) for old, _ in pairs])
+    rounding = np.array([known.get(old.name, LINEAR_ROUNDING) for old, _ in pairs])
     rounding = np.maximum(rounding, RELATIVE_ROUNDING * np.abs(x).max(axis=1))
     spread = total > (1e-6 * rounding) ** 2  # sums of equal numbers differ in their last bits
     deviations = np.where(spread[:, None], errors, 1.0) * np.sqrt(count)
@@ -139,11 +139,11 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     corrected = sidak(p, len(pairs))
     return tuple(
         Move(
-            quantity=old[0],
-            half=old[1],
-            block=old[2],
-            before=old[3],
-            after=new[3],
+            quantity=old.name,
+            half=old.half,
+            block=old.block,
+            before=old.value,
+            after=new.value,
             error=float(np.sqrt(total[i])),
             standard_errors=float(t[i]) if spread[i] else None,
             p=float(p[i]),

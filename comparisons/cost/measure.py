@@ -339,7 +339,7 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
     scene = found.ready.scene
     options = found.options
     reference = converged(found.ready, options.seed, progress, size)
-    judge = judge_by(reference, gbuffer(scene, *size).hit, options.viewing)
+    judge = judge_by(reference, gbuffer(scene, size).hit, options.viewing)
     renderers = {
         (one.name, spp): found.ladder.renderer(one, spp, size)
         for one in found.methods

@@ -136,7 +136,7 @@ def find(
         most = width  # a smaller crop would lie elsewhere, by parts of a pixel
     size = min(most, width), max(1, round(height * min(1, most / width)))
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
-    surface = gbuffer(ready.scene, *size)
+    surface = gbuffer(ready.scene, size)
     require_surface(surface.hit, source.name)
     reference = Renderer(ready.scene, ready.reference.integrator, spp, "reference image", size)
     # Seeds that no hybrid has, and as many passes as a hybrid has replicates.

@@ -82,7 +82,7 @@ def _area(light: LightNode) -> None:
         factor = INTENSITY_FACTOR * area * flatness
         form = ""
         exponent = 2 * flatness - 1
-        cone = {"direction": mi.ScalarVector3f(*normal), "cutoff": 90.0, "exponent": exponent}
+        cone = {"direction": mi.ScalarVector3f(normal), "cutoff": 90.0, "exponent": exponent}
     else:
         plugin = "heuristic_point"
         factor = CLOSED_LIGHT_FACTOR * area
@@ -97,7 +97,7 @@ def _area(light: LightNode) -> None:
             matrix = np.array(mi.traverse(body)["to_world"].matrix, float).reshape(4, 4, -1)
             cone["half_u"] = mi.ScalarVector3f(matrix[:3, 0, 0])
             cone["half_v"] = mi.ScalarVector3f(matrix[:3, 1, 0])
-    position = mi.ScalarPoint3f(*centroid)
+    position = mi.ScalarPoint3f(centroid)
     derived = heuristic(plugin, factor, **cone, position=position, intensity=radiance)
     derived.set_id(f"lamp ‘{graph.label(shape)}’")
     graph.attach(0, f"light_of_{shape}", graph.add(EMITTER, derived))
@@ -127,7 +127,7 @@ def _daylight(light: LightNode) -> Any:
     if sun is not None:
         intensity, direction = sun
         props = properties(
-            "heuristic_directional", direction=mi.ScalarVector3f(*direction), intensity=intensity
+            "heuristic_directional", direction=mi.ScalarVector3f(direction), intensity=intensity
         )
         props.set_id(f"sun of {light.label}")
         node = light.graph.add(mi.ObjectType.Emitter, props)
@@ -231,8 +231,8 @@ def _spot_to_heuristic(light: LightNode) -> None:
     props = heuristic(
         "heuristic_spot",
         factor,
-        position=mi.ScalarPoint3d(*light.position()),
-        direction=mi.ScalarVector3f(*light.column(2)),
+        position=mi.ScalarPoint3d(light.position()),
+        direction=mi.ScalarVector3f(light.column(2)),
         cutoff=cutoff,
         exponent=exponent,
         intensity=light.value("intensity", 1.0),

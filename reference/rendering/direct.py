@@ -105,8 +105,7 @@ def _define(_variant: str) -> None:
                 from fotismos.reference.rendering.indirect import indirect_light
 
                 (max_depth,) = {each.max_depth for each in deep}
-                parameters = max_depth, RR_DEPTH, hit, deep
-                indirect = indirect_light(scene, sampler, si, bsdf, *parameters)
+                indirect = indirect_light(scene, sampler, si, bsdf, max_depth, RR_DEPTH, hit, deep)
                 added = dict(zip(deep, indirect, strict=True))
                 colours = sums(colours, [added.get(each, 0) for each in self.transports])
             colours = sums(colours, _of_all(extended, False, *arguments))
@@ -215,11 +214,11 @@ def _looped(
     while number < len(targets):
         total = _added(total, one(partial(dr.switch, number, targets), sampler))
         number += 1
-    return [numerics.summed(*each) for each in total]
+    return [numerics.summed(colour) for colour in total]
 
 
 def _added(totals, terms):
-    return [numerics.add(*each, term) for each, term in zip(totals, terms, strict=True)]
+    return [numerics.add(total, term) for total, term in zip(totals, terms, strict=True)]
 
 
 def _from_bsdf(scene, si, bsdf, sampler, active, transports):

@@ -86,10 +86,10 @@ def resize(scene: Scene, size: tuple[int, int]) -> None:
         parameters.update()
 
 
-def gbuffer(scene: Scene, width: int = GRID, height: int = GRID) -> GBuffer:
-    """Trace rays through the centres of ``width`` by ``height`` cells of the film."""
-    places = np.meshgrid(np.arange(width), np.arange(height))
-    si = scene.ray_intersect(pixel_rays(scene, (width, height), *places))
+def gbuffer(scene: Scene, size: tuple[int, int] = (GRID, GRID)) -> GBuffer:
+    """Trace rays through the centres of ``size``, columns and rows, of cells of the film."""
+    width, height = size
+    si = scene.ray_intersect(centre_rays(scene, size))
     hit = si.is_valid()
     normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
     points = np.array(dr.select(hit, mi.Vector3f(si.p), 0)).T.reshape(height, width, 3)
@@ -128,6 +128,13 @@ def _object_ids(pointers, seen):
     named = zip(ids, first, strict=True)
     names = tuple((pointers[int(at)].id() or UNNAMED) if number else "" for number, at in named)
     return ObjectIds(np.where(seen, places.reshape(seen.shape), -1), names)
+
+
+def centre_rays(scene: Scene, size: tuple[int, int]) -> Any:
+    """Return the camera rays through the centres of all cells of a film, row by row."""
+    width, height = size
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    return pixel_rays(scene, size, x, y)
 
 
 def pixel_rays(scene: Scene, size: tuple[int, int], x: np.ndarray, y: np.ndarray) -> Any:
