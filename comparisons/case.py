@@ -78,14 +78,14 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
     if isinstance(scene, (str, Path)):
         entry = builtin(str(scene))
         both = entry.heuristic_variant if options.variant is None else None
-        own = {
+        settings = {
             # A requested variant is meant for both halves.
             "variant": entry.variant,
             "heuristic_variant": both,
             "interpolation": entry.interpolation,
             "tessellation": entry.tessellation,
         }
-        changes = {key: value for key, value in own.items() if getattr(options, key) is None}
+        changes = {key: value for key, value in settings.items() if getattr(options, key) is None}
         return _complete(entry.source(), options.changed(**changes), entry.name)
     if not isinstance(scene, Mapping) and not callable(scene):
         raise InputError(

@@ -282,10 +282,10 @@ def render(
     done = 0
     reached = None
     loop = passes((ready.heuristic, ready.reference), options.seed, ready.passes, progress=progress)
-    for one in loop:
-        add_difference(sums, one.images)
-        done = one.number + 1
-        del one
+    for rendered in loop:
+        add_difference(sums, rendered.images)
+        done = rendered.number + 1
+        del rendered
         if options.noise is not None and is_checked(done, ready.passes):
             reached = noise_percentile(sums, counted, options.viewing)
             if reached <= options.noise:

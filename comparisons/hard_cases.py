@@ -157,8 +157,8 @@ def _grazing() -> Setting:
 
 def _under_spot(angle: NDArray, **changes: Any) -> Setting:
     """Return points of a plane at angles from the axis of a spot above it."""
-    place = np.stack([2 * np.tan(angle), 0 * angle, 0 * angle], axis=1)
-    return replace(_SPOT, position=place, normal=(0.0, 0.0, 1.0), **changes)
+    position = np.stack([2 * np.tan(angle), 0 * angle, 0 * angle], axis=1)
+    return replace(_SPOT, position=position, normal=(0.0, 0.0, 1.0), **changes)
 
 
 _FLAT = Setting(k_d=1.0)

@@ -124,17 +124,17 @@ class Options(
             )
 
     @classmethod
-    def of(cls, words: Mapping[str, Any]) -> Options:
+    def of(cls, given: Mapping[str, Any]) -> Options:
         """Return the options in a mapping, in which None means the default.
 
         An unknown name, or a value that is not allowed, raises :class:`InputError`.
         """
-        if others := sorted(set(words) - set(cls.__struct_fields__)):
+        if others := sorted(set(given) - set(cls.__struct_fields__)):
             raise InputError(
                 f"unknown options {', '.join(others)}: choose from"
                 f" {', '.join(sorted(cls.__struct_fields__))}."
             )
-        return cls(**{name: value for name, value in words.items() if value is not None})
+        return cls(**{name: value for name, value in given.items() if value is not None})
 
     def changed(self, **changes: Any) -> Options:
         """Return the options with some of them changed."""
@@ -147,19 +147,22 @@ class Options(
 
     def command(self, verb: str, scene: str, **more: Any) -> str:
         """Return the command that does the same with a scene again."""
-        words = [verb, scene]
+        arguments = [verb, scene]
         for name, value in (msgspec.to_builtins(self) | more).items():
             option = f"--{name.replace('_', '-')}"
             if name == "define":
-                words += [word for entry in value.items() for word in ("-D", "=".join(entry))]
+                arguments += [word for entry in value.items() for word in ("-D", "=".join(entry))]
             elif name == "image":
                 images = (value,) if isinstance(value, str) else value
-                words += [word for image in images for word in (option, image)]
+                arguments += [word for image in images for word in (option, image)]
             elif value is True:
-                words.append(option)
+                arguments.append(option)
             elif value not in (None, False):
-                words += [option, "x".join(map(str, value)) if name == "resolution" else str(value)]
-        return program.command(*words)
+                arguments += [
+                    option,
+                    "x".join(map(str, value)) if name == "resolution" else str(value),
+                ]
+        return program.command(*arguments)
 
     @property
     def convention(self) -> Convention:
@@ -218,7 +221,7 @@ def _plain(name: str, value: Any) -> Any:
     if name == "image" and isinstance(value, str):
         return (value,)
     if isinstance(value, (list, tuple)):
-        return tuple(_plain("", each) for each in value)
+        return tuple(_plain("", item) for item in value)
     if isinstance(value, bool) or not isinstance(value, Real):
         return value
     return int(value) if isinstance(value, Integral) else float(value)  # NumPy's too

@@ -93,8 +93,8 @@ def require_one_size(images: Iterable[np.ndarray]) -> None:
 def at_size_of_pictures(source: Source, options: Options) -> Options:
     """Return options with the resolution of their pictures, which must be the film's in shape."""
     height, width = read_all(options)[0].shape[:2]
-    own = film_size(source.parse(), options.sensor)
-    film = options.resolution or own
+    film_sides = film_size(source.parse(), options.sensor)
+    film = options.resolution or film_sides
     if options.resolution and film != (width, height):
         raise InputError(
             f"{options.image[0]}: it has {width}x{height} pixels, and --resolution"
@@ -280,7 +280,7 @@ def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Place:
     ``expected`` are maps (H, W) of edges that it may contain; the best agreement counts.
     """
     seen = picture_edges(image)
-    return max((_shift(edges, seen) for edges in expected), key=lambda each: each[1])
+    return max((_shift(edges, seen) for edges in expected), key=lambda shift: shift[1])
 
 
 def _edges(layers: np.ndarray) -> np.ndarray:
@@ -313,11 +313,11 @@ def _correlation(seen: np.ndarray, edges: np.ndarray, down: int, right: int) -> 
     return float((a * b).sum() / size) if size > 0 else 0.0
 
 
-def _vertex(values: np.ndarray, place: int) -> float:
+def _vertex(values: np.ndarray, peak: int) -> float:
     """Return the offset of the vertex of a parabola through a maximum and its neighbours."""
-    if not 0 < place < len(values) - 1:
+    if not 0 < peak < len(values) - 1:
         return 0.0
-    before, top, after = values[place - 1 : place + 2]
+    before, top, after = values[peak - 1 : peak + 2]
     bend = before - 2 * top + after
     return 0.0 if bend >= 0 else float(0.5 * (before - after) / bend)
 
@@ -332,7 +332,7 @@ MISREADINGS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "values look sRGB-encoded": from_srgb,
     "values look decoded twice": to_srgb,
     **{
-        f"channels look like {', '.join(CHANNELS[place] for place in order)}": partial(
+        f"channels look like {', '.join(CHANNELS[channel] for channel in order)}": partial(
             np.take, indices=order, axis=-1
         )
         for order in permutations(range(3))
@@ -484,15 +484,18 @@ def _other_reading(picture: np.ndarray, reference: np.ndarray, counted: np.ndarr
     plain = _distance(picture[counted], reference[counted])
     if plain < 1e-3:
         return ""
-    readings = {f"Its {one}{CURES.get(one, '')}.": undo for one, undo in MISREADINGS.items()}
+    readings = {
+        f"Its {misreading}{CURES.get(misreading, '')}.": undo
+        for misreading, undo in MISREADINGS.items()
+    }
     readings |= {f"It looks {how}, or lit from the other side.": turn
                  for how, turn in TURNED.items()}  # fmt: skip
     distances = {
-        words: _distance(undo(picture)[counted], reference[counted])
-        for words, undo in readings.items()
+        description: _distance(undo(picture)[counted], reference[counted])
+        for description, undo in readings.items()
     }
-    words = min(distances, key=distances.__getitem__)
-    return words if distances[words] <= BETTER * plain else ""
+    description = min(distances, key=distances.__getitem__)
+    return description if distances[description] <= BETTER * plain else ""
 
 
 def _distance(image: np.ndarray, reference: np.ndarray) -> float:

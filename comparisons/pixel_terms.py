@@ -147,19 +147,19 @@ class TermGrid:
             raise InputError(
                 f"pixel {x}, {y} is outside the image: give 0, 0 to {width - 1}, {height - 1}."
             )
-        place = y * len(self.rows) // height, x * len(self.columns) // width
-        number = self.material[place]
+        cell = y * len(self.rows) // height, x * len(self.columns) // width
+        number = self.material[cell]
         if number < 0:
             return None
         material = self.materials[number]
         return PixelTerms(
-            pixel=(int(self.columns[place[1]]), int(self.rows[place[0]])),
+            pixel=(int(self.columns[cell[1]]), int(self.rows[cell[0]])),
             material=material,
-            cos_view=float(self.cos_view[place]),
+            cos_view=float(self.cos_view[cell]),
             emission=material.k_i,
             ambient=_colour(np.multiply(material.ambient, material.k_a)),
-            lights=tuple(self._light(light, material, place) for light in self.lights),
-            others=_colour((0, 0, 0) if self.others is None else self.others[place]),
+            lights=tuple(self._light(light, material, cell) for light in self.lights),
+            others=_colour((0, 0, 0) if self.others is None else self.others[cell]),
         )
 
     def light_image(self, light: GridLight) -> NDArray[np.float64]:
@@ -171,14 +171,14 @@ class TermGrid:
         reflected = light.intensity * diffuse + light.specular_intensity * specular
         return light.attenuation[..., None] * reflected
 
-    def _light(self, light: GridLight, material: TermMaterial, place: tuple) -> LightTerms:
+    def _light(self, light: GridLight, material: TermMaterial, cell: tuple) -> LightTerms:
         arrays = ("attenuation", "cos_incidence", "cos_view", "lobe")
-        here = vars(light) | {name: float(getattr(light, name)[place]) for name in arrays}
+        here = vars(light) | {name: float(getattr(light, name)[cell]) for name in arrays}
         n_l = here["cos_incidence"]
         fading = here["attenuation"]
         return LightTerms(
             **here,
-            cos_reflection=2 * n_l * float(self.cos_view[place]) - here["cos_view"],
+            cos_reflection=2 * n_l * float(self.cos_view[cell]) - here["cos_view"],
             diffuse=_colour(np.multiply(light.intensity, material.k_d) * fading * max(n_l, 0)),
             specular=_colour(
                 np.multiply(light.specular_intensity, material.k_s) * fading * here["lobe"]
@@ -298,15 +298,15 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
     def numbers(emitter: Any) -> dict[str, Any]:
         light = emitter.light(dr.zeros(mi.SurfaceInteraction3f), True)
         fields = light.given()
-        for name, place in (("diffuse_intensity", 0), ("specular_intensity", -1)):
-            fields[name] = points.colours(light.intensities[place])[0]
+        for name, end in (("diffuse_intensity", 0), ("specular_intensity", -1)):
+            fields[name] = points.colours(light.intensities[end])[0]
         return {name: np.ravel(v).tolist() for name, v in fields.items()} | {"name": emitter.id()}
 
     return LivePoints(
         planes={name: plane.reshape(size[::-1]) for name, plane in planes.items()},
         materials=materials,
         lights=tuple(map(numbers, emitters)),
-        rays=[points.colours(each)[corners].tolist() for each in film],
+        rays=[points.colours(vectors_of_rays)[corners].tolist() for vectors_of_rays in film],
         is_flat=options.polygon_shading is Interpolation.FLAT,
     )
 
@@ -424,7 +424,7 @@ class _Points:
             return self.floats(terms.specular(1, 1, cosine, material.n))[:, None]
 
         # Both intensities in a row; the largest number tells what they have in common.
-        intensity = np.hstack([self.colours(light.intensities[place])[0] for place in (0, -1)])
+        intensity = np.hstack([self.colours(light.intensities[end])[0] for end in (0, -1)])
         brightest = int(np.argmax(intensity))
         scale = np.hstack(list(map(self.colours, arriving)))[:, brightest]
         scale /= intensity[brightest] or 1.0
@@ -472,8 +472,10 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
                 # Opaque, so all terms have one kernel.
                 integrator.shares = {k: dr.opaque(mi.Float, k == kept) for k in COEFFICIENTS}
                 integrator.hide_emitters = hides = hidden or name != "emission"
-                own = renderers.setdefault(hides, Renderer(scene, integrator, half.spp, "terms"))
-                images[name] = np.array(own.render(pass_seed(options.seed, 0)))
+                renderer = renderers.setdefault(
+                    hides, Renderer(scene, integrator, half.spp, "terms")
+                )
+                images[name] = np.array(renderer.render(pass_seed(options.seed, 0)))
         finally:
             del integrator.model_at, integrator.shares
             integrator.hide_emitters = hidden

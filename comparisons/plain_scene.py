@@ -192,7 +192,7 @@ def light_of(emitter: mi.Emitter, point: mi.SurfaceInteraction3f) -> dict:
     numbered: dict[str, Any] = {"name": emitter.id(), "type": KINDS[type(light)]}
     for name, value in light.given().items():
         if isinstance(value, tuple):
-            numbered[name] = [numbers(each)[0] for each in value]
+            numbered[name] = [numbers(component)[0] for component in value]
         elif name == "clamped":
             numbered[name] = bool(value)
         else:
@@ -203,4 +203,4 @@ def light_of(emitter: mi.Emitter, point: mi.SurfaceInteraction3f) -> dict:
 
 def numbers(value: object) -> list[float]:
     """Return a Dr.Jit value of one entry as numbers, in the decimals of single precision."""
-    return [float(str(np.float32(each))) for each in np.ravel(np.array(value))]
+    return [float(str(np.float32(number))) for number in np.ravel(np.array(value))]

@@ -56,16 +56,16 @@ def schedule(
     """
     largest = max(1, WAVEFRONT // pixels)
     if noise is not None:
-        each = min(max(1, plan.spp // plan.passes), largest)
-        each = max(1, min(each, (spp or LIMIT_SPP) // 2))
-        return each, max(2, (spp or LIMIT_SPP) // each // 2 * 2)
+        per_pass = min(max(1, plan.spp // plan.passes), largest)
+        per_pass = max(1, min(per_pass, (spp or LIMIT_SPP) // 2))
+        return per_pass, max(2, (spp or LIMIT_SPP) // per_pass // 2 * 2)
     spp = spp or plan.spp
     passes = max(2, min(plan.passes, spp // 4 // 2 * 2))
-    each = max(1, spp // passes)
-    if each > largest:
-        each = largest
+    per_pass = max(1, spp // passes)
+    if per_pass > largest:
+        per_pass = largest
         passes = max(2, -(-spp // largest // 2) * 2)
-    return each, passes
+    return per_pass, passes
 
 
 @dataclass(frozen=True)

@@ -18,10 +18,12 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
     are listed or a name is not known.
     """
 
-    def __init__(self, kind: str, group: str, **own: str) -> None:
+    def __init__(self, kind: str, group: str, **built_in: str) -> None:
         self.kind = kind
         self.group = group
-        self._own: dict[str, Any] = {name.replace("_", "-"): place for name, place in own.items()}
+        self._own: dict[str, Any] = {
+            name.replace("_", "-"): location for name, location in built_in.items()
+        }
         self.added: dict[str, Declaration] = {}
         self._is_loaded = False
 

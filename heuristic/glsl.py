@@ -186,7 +186,7 @@ class Shader:
             part = slice(start, min(start + step, count))
             chunk = [np.broadcast_to(row, count)[part] for row in rows]
             colours[part] = _run(compute, chunk, part.stop - start)
-        return mi.Spectrum(*(mi.Float(np.ascontiguousarray(each)) for each in colours.T))
+        return mi.Spectrum(*(mi.Float(np.ascontiguousarray(channel)) for channel in colours.T))
 
     def fields(self, lights: int) -> dict[str, int]:
         """Return the fields of a point that the code may read, in the order of the buffer.
@@ -340,10 +340,10 @@ def uniforms(text: str) -> tuple[Parameter, ...]:
 def refusal(text: str) -> tuple[int, str] | None:
     """Return the line of a forbidden word, and what to do; None if there is none."""
     code = bare(text)
-    for number, (line, own) in enumerate(
+    for number, (line, stripped) in enumerate(
         zip(text.splitlines(), code.splitlines(), strict=False), 1
     ):
-        if _UNIFORM.match(own) and not _PARAMETER.match(line):
+        if _UNIFORM.match(stripped) and not _PARAMETER.match(line):
             return number, (
                 "a uniform is a parameter: write its default and bounds, as in"
                 " `uniform float wrap = 0.5;  // 0 to 1`"
@@ -367,11 +367,11 @@ def explained(log: str, file: str, text: str) -> str:
         match = _PLACE.search(line)
         message = re.sub(r"(?i)^error:\s*", "", line[match.end() :] if match else line.strip())
         number = int(next(filter(None, match.groups()))) if match else 0
-        place = f"{file}, line {number}" if number else file
+        position = f"{file}, line {number}" if number else file
         if number > text.count("\n") + 1:
-            place = f"{file}, at its end"
-        messages.setdefault(place, message.strip())
-    shown = [f"{place}: {message}" for place, message in messages.items()]
+            position = f"{file}, at its end"
+        messages.setdefault(position, message.strip())
+    shown = [f"{position}: {message}" for position, message in messages.items()]
     return "; ".join(shown[:3]) or f"{file}: {' '.join(log.split())}"
 
 

@@ -80,8 +80,8 @@ def _seen(scene: Any) -> tuple[Any, Any, Any]:
     columns, rows = np.meshgrid(cells, cells)
     x = mi.Float(np.repeat(columns.ravel(), STRATA**2))
     y = mi.Float(np.repeat(rows.ravel(), STRATA**2))
-    place = mi.Point2f(x, y)
-    ray, _ = scene.sensors()[0].sample_ray(0.0, 0.5, place, mi.Point2f(0.5))
+    film = mi.Point2f(x, y)
+    ray, _ = scene.sensors()[0].sample_ray(0.0, 0.5, film, mi.Point2f(0.5))
     si = scene.ray_intersect(ray)
     active = si.is_valid()
     bsdfs = SceneMaterials(scene)
@@ -110,12 +110,12 @@ def _arriving(scene: Any, si: Any, normal: Any) -> Any:
     return dr.select(active, reflected, 0) + around
 
 
-def _from_environment(scene: Any, si: Any, normal: Any, place: Any) -> Any:
+def _from_environment(scene: Any, si: Any, normal: Any, sensor: Any) -> Any:
     environment = scene.environment()
     if environment is None:
         return mi.Spectrum(0)
     active = si.is_valid()
-    sample, light = environment.sample_direction(si, place, active)
+    sample, light = environment.sample_direction(si, sensor, active)
     cosine = dr.maximum(dr.dot(normal, sample.d), 0)
     active &= (sample.pdf > 0) & (cosine > 0)
     active &= ~scene.ray_test(si.spawn_ray_to(sample.p), active)

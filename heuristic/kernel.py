@@ -65,13 +65,13 @@ def shade(
     values = {name: getattr(material, name) for name in COEFFICIENTS} | {"ambient": ambient}
     point = {"position": position, "normal": normal, "view": view, "n": material.n}
     _check_sizes(point | values, lights)
-    own = {
+    intensities = {
         f"lights[{i}].{name}": value
         for i, light in enumerate(lights)
         for name, value in light.given().items()
         if name in INTENSITIES
     }
-    materials.require_common_wavelengths(values | own)
+    materials.require_common_wavelengths(values | intensities)
     vector_type = type(position)
     arrays = [materials.as_array(value, vector_type) for value in values.values()]
     k_i, k_a, k_d, k_s, ambient = arrays

@@ -91,8 +91,8 @@ class Light:
     @property
     def intensities(self) -> list[Colour]:
         """``L_d`` and ``L_s``; one colour alone if it is the same."""
-        own = self.diffuse_intensity, self.specular_intensity
-        colours = [self.intensity if each is None else each for each in own]
+        given = self.diffuse_intensity, self.specular_intensity
+        colours = [self.intensity if intensity is None else intensity for intensity in given]
         return colours[:1] if colours[0] is colours[1] else colours
 
     def illuminate(self, position: Position, visible: Visibility | None = None) -> Arrival:
@@ -108,12 +108,14 @@ class Light:
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
         cone = self.cone(toward)
-        colours = [materials.as_array(each, vector_type) * cone for each in self.intensities]
+        colours = [
+            materials.as_array(intensity, vector_type) * cone for intensity in self.intensities
+        ]
         if not is_unattenuated(self.attenuation):
             law: Callable[..., Colour]
             law = terms.clamped_attenuation if self.clamped else terms.attenuation
             inverse = vectors.inverse_distance(vector_type(self.position), position)
-            colours = [law(distance, *self.attenuation, each, inverse) for each in colours]
+            colours = [law(distance, *self.attenuation, colour, inverse) for colour in colours]
         if not is_number(self.shell, 0):
             distance = dr.maximum(distance - self.shell, 0)
         return toward, distance, colours
@@ -152,7 +154,9 @@ class Light:
 
         float_type = dr.value_t(vector_type)
         compiled = self.compiled()
-        values = {name: moved(own) for name, own in self.given().items() if name not in compiled}
+        values = {
+            name: moved(value) for name, value in self.given().items() if name not in compiled
+        }
         for name in {"position", "direction"} & values.keys():
             values[name] = vector_type(values[name])
         for name in values.keys() & INTENSITIES:
@@ -179,7 +183,7 @@ class DirectionalLight(Light):
         """Return ``L = -direction / |direction|``, an infinite distance and the intensities."""
         vector_type = type(position)
         toward = -vectors.normalise(vector_type(self.direction))
-        colours = [materials.as_array(each, vector_type) for each in self.intensities]
+        colours = [materials.as_array(intensity, vector_type) for intensity in self.intensities]
         return toward, inf, colours
 
     def wide_toward(self, position: Position) -> tuple[Vector, Number]:

@@ -35,9 +35,9 @@ def program() -> list[str]:
     return shlex.split(os.environ.get(VARIABLE, "")) or ["fotismos"]
 
 
-def command(*words: object) -> str:
+def command(*arguments: object) -> str:
     """Return a command of the program, as a shell takes it."""
-    return shlex.join([*program(), *map(str, words)])
+    return shlex.join([*program(), *map(str, arguments)])
 
 
 def installation(*packages: str) -> str:

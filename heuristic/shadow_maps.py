@@ -126,14 +126,14 @@ def _cube_direction(size: int) -> Any:
     )
 
 
-def _cube_texel(place: Any, size: int) -> Any:
+def _cube_texel(position: Any, size: int) -> Any:
     """Return the number of the texel that a direction of any length hits."""
-    length = abs(place)
+    length = abs(position)
     is_x = (length.x >= length.y) & (length.x >= length.z)
     is_y = ~is_x & (length.y >= length.z)
-    major = dr.select(is_x, place.x, dr.select(is_y, place.y, place.z))
-    u = dr.select(is_x, place.y, place.x)
-    v = dr.select(is_x | is_y, place.z, place.y)
+    major = dr.select(is_x, position.x, dr.select(is_y, position.y, position.z))
+    u = dr.select(is_x, position.y, position.x)
+    v = dr.select(is_x | is_y, position.z, position.y)
     axis = dr.select(is_x, mi.UInt32(0), dr.select(is_y, mi.UInt32(1), 2))
     side = 2 * axis + dr.select(major >= 0, mi.UInt32(0), 1)
     inverse = dr.select(major != 0, 1 / abs(major), 0)
@@ -161,8 +161,8 @@ def shade(point: Point) -> Array:
     colour = point.textbook(lights=[])
     bare = replace(point.arguments.material, k_i=0, k_a=0)
     for light, image in zip(point.arguments.lights, point.prepared, strict=True):
-        own = point.textbook(lights=[light], material=bare, ambient=0, visible=None)
-        colour = colour + dr.select(_is_lit(point, light, image), own, 0)
+        unshadowed = point.textbook(lights=[light], material=bare, ambient=0, visible=None)
+        colour = colour + dr.select(_is_lit(point, light, image), unshadowed, 0)
     return colour
 
 

@@ -154,9 +154,9 @@ def attenuation_root(
     last = float_type(k2)
     is_far = last * distance >= numerics.at_least(first * inverse, float_type(k1))
     is_far &= is_away & (last > 0)
-    place = dr.select(is_far, inverse, distance)
+    variable = dr.select(is_far, inverse, distance)
     first, last = dr.select(is_far, last, first), dr.select(is_far, first, last)
-    root = _inverse_root(first + place * (k1 + place * last), at_zero)
+    root = _inverse_root(first + variable * (k1 + variable * last), at_zero)
     return root * dr.select(is_far, inverse, 1)
 
 

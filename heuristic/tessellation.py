@@ -86,8 +86,8 @@ def normals(mesh: Mesh) -> Direction:
     """Return a mesh's vertex normals: its own, or by 6.34 if it has none."""
     if not mesh.has_vertex_normals():
         return _checked_normals(mesh, "angle")
-    own = dr.unravel(mi.Vector3f, mesh.vertex_normals_buffer())
-    return -own if mesh.has_flipped_normals() else own
+    given = dr.unravel(mi.Vector3f, mesh.vertex_normals_buffer())
+    return -given if mesh.has_flipped_normals() else given
 
 
 def _flat_normals(points: Position, corners: Array) -> Direction:

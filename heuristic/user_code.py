@@ -58,9 +58,9 @@ def contained(path: Path) -> Iterator[set[Path]]:
         for name in set(sys.modules) - modules:
             module = sys.modules[name]
             file = getattr(module, "__file__", None)
-            own = [file] if isinstance(file, str) else list(getattr(module, "__path__", ()))
-            if own and all(is_users(Path(place)) for place in own):
-                files |= {Path(place).resolve() for place in own if Path(place).is_file()}
+            sources = [file] if isinstance(file, str) else list(getattr(module, "__path__", ()))
+            if sources and all(is_users(Path(source)) for source in sources):
+                files |= {Path(source).resolve() for source in sources if Path(source).is_file()}
                 del sys.modules[name]
 
 
@@ -84,8 +84,8 @@ def is_users(path: Path) -> bool:
 def _left_out() -> tuple[str, ...]:
     installed = sysconfig.get_paths()
     names = ("stdlib", "platstdlib", "purelib", "platlib")
-    own = [str(ROOT / folder) for folder in FOLDERS]
-    places = [installed[name] for name in names] + site.getsitepackages() + own
+    project = [str(ROOT / folder) for folder in FOLDERS]
+    places = [installed[name] for name in names] + site.getsitepackages() + project
     return (*places, *map(os.path.realpath, places), site.getusersitepackages())
 
 
@@ -94,7 +94,7 @@ def error_text(error: BaseException) -> str:
     message = error.msg if isinstance(error, SyntaxError) else str(first_error(error))
     first = first_error(error)
     if isinstance(first, AttributeError) and first.name:
-        names = [each for each in dir(first.obj) if each[0] != "_"]
+        names = [name for name in dir(first.obj) if name[0] != "_"]
         if kind := CALLED.get(type(first.obj).__name__):
             message = f"a {kind} has no {first.name!r}, but {', '.join(names)}"
         message += suggestion(first.name, names)
@@ -113,8 +113,8 @@ def _place(error: BaseException) -> str:
     """Return the innermost line of a user's code that led to an error; empty if there is none."""
     if isinstance(error, SyntaxError) and error.filename:
         return f"{_shown(error.filename)}, line {error.lineno or 1}: "
-    for each in (first_error(error), error):
-        for frame in reversed(traceback.extract_tb(each.__traceback__)):
+    for raised in (first_error(error), error):
+        for frame in reversed(traceback.extract_tb(raised.__traceback__)):
             if not frame.filename.startswith("<") and is_users(Path(frame.filename)):
                 return f"{_shown(frame.filename)}, line {frame.lineno or 1}: "
     return ""

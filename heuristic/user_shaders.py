@@ -106,14 +106,18 @@ def _read(word: str, path: Path, function: str) -> Heuristic:
 
 
 def _missing(names: dict[str, Any], function: str, path: Path) -> InputError:
-    own = [
+    functions = [
         name
         for name, value in names.items()
         if getattr(value, "__module__", None) == MODULE and callable(value)
     ]
-    has = f"It has {', '.join(own)}: give {path}:{own[0]}." if own else "It has none."
+    has = (
+        f"It has {', '.join(functions)}: give {path}:{functions[0]}."
+        if functions
+        else "It has none."
+    )
     return InputError(
-        f"{path}: there is no function `{function}`{suggestion(function, own)}. {has}"
+        f"{path}: there is no function `{function}`{suggestion(function, functions)}. {has}"
         f" A heuristic is a function `{FUNCTION}(point)` that returns a colour."
     )
 
@@ -125,8 +129,8 @@ def of_function(function: Any, name: str, label: str = "") -> Heuristic:
     :class:`Range` as annotation gives their bounds. A :class:`Heuristic` keeps its own label.
     """
     if isinstance(function, Heuristic):
-        own = replace(function, name=name)
-        return own if own.prepare else replace(own, reads=examine(own))
+        renamed = replace(function, name=name)
+        return renamed if renamed.prepare else replace(renamed, reads=examine(renamed))
     if not callable(function):
         raise InputError(
             f"{name} is of type {type(function).__name__}: give a function of a point that returns"
@@ -137,7 +141,7 @@ def of_function(function: Any, name: str, label: str = "") -> Heuristic:
 
     @wraps(function)
     def shade(point: Point) -> Any:
-        return function(point, **{each: getattr(point.parameters, each) for each in names})
+        return function(point, **{name: getattr(point.parameters, name) for name in names})
 
     everything = Heuristic(
         name=name, shade=shade, label=label, needs=frozenset(INPUTS), parameters=parameters
@@ -157,20 +161,20 @@ def _parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
     positional = inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD
     if not arguments or arguments[0].kind not in positional:
         raise _unusable(function, "it does not take a point")
-    return tuple(_parameter(function, one) for one in arguments[1:])
+    return tuple(_parameter(function, argument) for argument in arguments[1:])
 
 
-def _parameter(function: Callable[..., Any], one: inspect.Parameter) -> Parameter:
-    if one.kind in (one.VAR_POSITIONAL, one.VAR_KEYWORD, one.POSITIONAL_ONLY):
-        raise _unusable(function, f"{one} is not a number")
-    is_number = isinstance(one.default, Real) and not isinstance(one.default, bool)
-    if not (is_number and isfinite(one.default)):
-        raise _unusable(function, f"{one.name!r} has no number as its default")
-    parts = one.annotation, *get_args(one.annotation)
+def _parameter(function: Callable[..., Any], argument: inspect.Parameter) -> Parameter:
+    if argument.kind in (argument.VAR_POSITIONAL, argument.VAR_KEYWORD, argument.POSITIONAL_ONLY):
+        raise _unusable(function, f"{argument} is not a number")
+    is_number = isinstance(argument.default, Real) and not isinstance(argument.default, bool)
+    if not (is_number and isfinite(argument.default)):
+        raise _unusable(function, f"{argument.name!r} has no number as its default")
+    parts = argument.annotation, *get_args(argument.annotation)
     bounds = next((part for part in parts if isinstance(part, Range)), Range(-inf, inf))
     try:
         return Parameter(
-            name=one.name, default=float(one.default), low=bounds.low, high=bounds.high
+            name=argument.name, default=float(argument.default), low=bounds.low, high=bounds.high
         )
     except InputError as error:
         raise InputError(f"{place_of(function)}: {error}") from error
@@ -323,7 +327,7 @@ def trial_points(heuristic: Heuristic) -> Point:
         visible=lambda toward, distance: numbers(0, 1) > 0.5,
     )
     uv = mi.Point2f(numbers(0, 1), numbers(0, 1))
-    parameters = {each.name: mi.Float(each.default) for each in heuristic.parameters}
+    parameters = {parameter.name: mi.Float(parameter.default) for parameter in heuristic.parameters}
     return _TrialPoint(
         needs=heuristic.needs,
         arguments=arguments,

@@ -91,16 +91,18 @@ class Group(jobs.Helped, click.Group):
         for group, names in COMMANDS.items():
             with formatter.section(group):
                 rows = ((name, self.get_command(context, name)) for name in names)
-                formatter.write_dl([(n, one.get_short_help_str(1000)) for n, one in rows if one])
+                formatter.write_dl(
+                    [(n, command.get_short_help_str(1000)) for n, command in rows if command]
+                )
 
-    def resolve_command(self, context: click.Context, words: list[str]) -> Any:
+    def resolve_command(self, context: click.Context, arguments: list[str]) -> Any:
         """Find the command that the first word names."""
-        word = words[0]
+        word = arguments[0]
         if self.get_command(context, word) is None and not word.startswith("-"):
             names = self.list_commands(context)
             near = suggestion(word, names)
             context.fail(f"{word!r} is not a command{near}: choose one of {', '.join(names)}.")
-        return super().resolve_command(context, words)
+        return super().resolve_command(context, arguments)
 
 
 @click.group(
@@ -151,8 +153,8 @@ def main() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(128 + signal.SIGPIPE)
     except OSError as error:  # standard output on a full disk, above all
-        place = error.filename or "output"
-        echo(f"fotismos: error: {place}: {error.strerror}.", err=True)
+        where = error.filename or "output"
+        echo(f"fotismos: error: {where}: {error.strerror}.", err=True)
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         sys.exit(2)
     else:

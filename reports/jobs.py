@@ -172,7 +172,7 @@ def option(name: str, command_default: str = "") -> Decorator:
 
     ``command_default`` is what a command does without the option, if that is its own.
     """
-    field = next(each for each in FIELDS if each.name == name)
+    field = next(known for known in FIELDS if known.name == name)
     assert isinstance(field.type, inspect.Metadata), "each field has its help"
     description = (field.type.extra_json_schema or {})["description"]
     default = command_default or (field.type.extra or {}).get("default")
@@ -327,7 +327,7 @@ def results_of(
     timeout: float,
     scenes: Sequence[str],
     work: Callable[..., Any],
-    *words: Any,
+    *arguments: Any,
 ) -> dict[Path, Any]:
     """Return what ``work(scene, *words, folder, progress)`` returns for each scene, by its folder.
 
@@ -347,14 +347,14 @@ def results_of(
         ):
             tasks = [
                 Task(
-                    name=place.name,
+                    name=target.name,
                     function=work,
-                    arguments=(scene, *words, place),
-                    progress=bar.of(place.name),
+                    arguments=(scene, *arguments, target),
+                    progress=bar.of(target.name),
                 )
-                for place, scene in zip(places, scenes, strict=True)
+                for target, scene in zip(places, scenes, strict=True)
             ]
-            return {folder / each.name: done.result() for each, done in processes.each(tasks)}
+            return {folder / task.name: done.result() for task, done in processes.each(tasks)}
 
 
 @dataclass(frozen=True)
@@ -423,15 +423,17 @@ def requests(whole: Options, scenes: Sequence[str]) -> list[Options]:
     from fotismos.reference.scene.source import placeholders
 
     known = (placeholders(Path(scene)) for scene in scenes)
-    own = [{key: value for key, value in whole.define.items() if key in names} for names in known]
-    if unused := set(whole.define) - {key for each in own for key in each}:
+    by_scene = [
+        {key: value for key, value in whole.define.items() if key in names} for names in known
+    ]
+    if unused := set(whole.define) - {key for defined in by_scene for key in defined}:
         raise InputError(
             f"-D {', '.join(sorted(unused))}: no scene has such a placeholder. Write $name into a"
             " scene file, or leave the option out."
         )
-    return [whole.changed(define=define) for define in own]
+    return [whole.changed(define=define) for define in by_scene]
 
 
-def request(words: Mapping[str, Any]) -> Options:
+def request(given: Mapping[str, Any]) -> Options:
     """Return the rendering request of a command's options."""
-    return Options.of({**words, "define": dict(words.get("define") or ())})
+    return Options.of({**given, "define": dict(given.get("define") or ())})

@@ -84,7 +84,11 @@ def decision(record: ComparisonRecord, threshold: float = TOLERANCE) -> Verdict:
 def missing(record: ComparisonRecord) -> dict[str, float]:
     """Return ``{effect: its share of what all surely remove}``, the largest first."""
     effects = record.why.effects if record.why else ()
-    sure = {one.effect: one.removes.value for one in effects if one.removes.low > 0}
+    sure = {
+        contribution.effect: contribution.removes.value
+        for contribution in effects
+        if contribution.removes.low > 0
+    }
     total = sum(sure.values())
     return {effect: sure[effect] / total for effect in sorted(sure, key=lambda name: -sure[name])}
 
@@ -161,18 +165,18 @@ def _remedy(record: ComparisonRecord, cost: Cost, threshold: float) -> str:
 def _is_judged(cost: Cost, name: str) -> bool:
     """Return whether a method of a study is the kernel that is judged."""
     return any(
-        name in (one.name, *one.names)
-        and one.is_kernel
-        and not (one.shadows or one.heuristic)
-        and one.interpolation == cost.interpolation
-        for one in cost.methods
+        name in (method.name, *method.names)
+        and method.is_kernel
+        and not (method.shadows or method.heuristic)
+        and method.interpolation == cost.interpolation
+        for method in cost.methods
     )
 
 
 def search(record: ComparisonRecord, threshold: float, spp: int | None = None) -> str:
     """Return the command that finds the cheapest method for a scene at a tolerance."""
-    words = shlex.split(record.command)
-    scene, *rest = words[words.index("compare") + 1 :]
+    arguments = shlex.split(record.command)
+    scene, *rest = arguments[arguments.index("compare") + 1 :]
     known = SCENES.get(scene)
     default = ("phong", "matched", (known and known.interpolation) or "phong")
     kept = [

@@ -202,8 +202,8 @@ def lobe(subject: Subject, material: str, degrees: float) -> tuple[float, ...]:
 def white_furnace(angles: tuple[float, ...], curves: tuple[MaterialCurves, ...]) -> Checked:
     """Check that a white surface is as bright as its surroundings at every angle."""
     value, worst = max(
-        ((value, f"{each.material}, viewer at {angle:g}°")
-         for each in curves for angle, value in zip(angles, each.seen, strict=True)),
+        ((value, f"{curve.material}, viewer at {angle:g}°")
+         for curve in curves for angle, value in zip(angles, curve.seen, strict=True)),
         key=lambda pair: abs(pair[0] - 1),
     )  # fmt: skip
     return _checked("white furnace", abs(value - 1) <= TOLERANCE, value, f"1 ± {TOLERANCE}", worst)
@@ -212,8 +212,8 @@ def white_furnace(angles: tuple[float, ...], curves: tuple[MaterialCurves, ...])
 def energy(angles: tuple[float, ...], curves: tuple[MaterialCurves, ...]) -> Checked:
     """Check that no more light leaves than arrives, at the worst angle."""
     value, worst = max(
-        (value, f"{each.material}, light at {angle:g}°")
-        for each in curves for angle, value in zip(angles, each.returned, strict=True)
+        (value, f"{curve.material}, light at {angle:g}°")
+        for curve in curves for angle, value in zip(angles, curve.returned, strict=True)
     )  # fmt: skip
     return _checked("energy", value <= 1 + TOLERANCE, value, f"at most {1 + TOLERANCE}", worst)
 
@@ -293,8 +293,8 @@ def _largest(
     """Return the largest value (C, N) of any material, and describe its case."""
     material = max(values, key=lambda name: values[name].max())
     largest = values[material].max(axis=0)
-    place = int(largest.argmax())
-    return float(largest[place]), f"{material}, {furnace.describe(light, view, place)}"
+    index = int(largest.argmax())
+    return float(largest[index]), f"{material}, {furnace.describe(light, view, index)}"
 
 
 # --- Derivatives against finite differences, which share no code with them ---------------------

@@ -101,11 +101,11 @@ def _describe(heuristic: Heuristic) -> Iterator[str]:
     explanation = _explain(model, seen, counts)
     if explanation is None:
         return
-    words, fit = explanation
+    description, fit = explanation
     if is_cut:
         yield "Its values end at 1: brighter light is cut off."
-    if words:
-        yield f"A likely mistake: {words}."
+    if description:
+        yield f"A likely mistake: {description}."
     yield from _factors(fit, len(model.toward))
 
 
@@ -114,19 +114,21 @@ def _explain(model: Model, seen: Array, counts: Array) -> tuple[str, TermFit] | 
     right = model.terms()
     candidates = [("", right, seen)]
     candidates += [(f"its {symptom}", right, undo(seen)) for symptom, undo in ENCODINGS.items()]
-    candidates += [(words, model.terms(**change(model)), seen) for words, change in MISTAKES]
-    for words, terms, values in candidates:
+    candidates += [
+        (description, model.terms(**change(model)), seen) for description, change in MISTAKES
+    ]
+    for description, terms, values in candidates:
         fit = _fit(terms, values, counts)
         if fit[1] < ALIKE:
-            return words, fit
-    scaled = [_best(each, model, seen, counts) for each in SCALED]
+            return description, fit
+    scaled = [_best(mistake, model, seen, counts) for mistake in SCALED]
     alike = [pair for pair in scaled if pair[1][1] < ALIKE]
     return min(alike, key=lambda pair: len(list(_factors(pair[1], 0))), default=None)
 
 
 def _best(mistake: Mistake, model: Model, seen: Array, counts: Array) -> tuple[str, TermFit]:
     """Return a mistake by some number, described with the one that fits best."""
-    words, change = mistake
+    description, change = mistake
 
     def fit(log: float) -> TermFit:
         return _fit(model.terms(**change(model, np.exp(log))), seen, counts)
@@ -135,7 +137,7 @@ def _best(mistake: Mistake, model: Model, seen: Array, counts: Array) -> tuple[s
     start = grid[np.argmin([fit(log)[1] for log in grid])]
     bounds = start - step, start + step
     best = minimize_scalar(lambda log: fit(log)[1], bounds=bounds, options={"xatol": 1e-5}).x
-    return words.format(f"{np.exp(best):.3g}"), fit(best)
+    return description.format(f"{np.exp(best):.3g}"), fit(best)
 
 
 def _fit(terms: Array, values: Array, counts: Array) -> TermFit:
@@ -216,8 +218,8 @@ def evaluate(heuristic: Heuristic, model: Model) -> Array:
     names = {"k_i": "k_i", "k_a": "k_d", "k_d": "k_d", "k_s": "k_s", "base_color": "k_d"}
     colours = {name: getattr(model, field).T for name, field in names.items()}
     lights = [
-        PointLight(place, mi.Spectrum(intensity), INVERSE_SQUARE)
-        for place, intensity in zip(LAMPS, INTENSITIES, strict=True)
+        PointLight(position, mi.Spectrum(intensity), INVERSE_SQUARE)
+        for position, intensity in zip(LAMPS, INTENSITIES, strict=True)
     ]
     values = shaded(
         heuristic, (model.position.T, model.normal.T, model.view.T),
@@ -234,7 +236,7 @@ def _spaces() -> Iterator[Mistake]:
     for order, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
         if (order, signs) != ((0, 1, 2), (1, 1, 1)):
             pairs = zip(order, signs, strict=True)
-            axes = ", ".join(f"{'-' if sign < 0 else ''}{'xyz'[place]}" for place, sign in pairs)
+            axes = ", ".join(f"{'-' if sign < 0 else ''}{'xyz'[axis]}" for axis, sign in pairs)
             yield (
                 f"the normal is in another space: it looks like ({axes})",
                 lambda m, order=order, signs=signs: {"normal": m.normal[:, list(order)] * signs},

@@ -75,7 +75,7 @@ def sphere(azimuths: int, heights: int, edge: float = 1.0) -> tuple[NDArray, NDA
 
 def both_sides(degrees: tuple[float, ...], eta: float | None) -> tuple[float, ...]:
     """Return angles from the normal; of what transmits light, also those from behind."""
-    return degrees if eta is None else degrees + tuple(180 - each for each in reversed(degrees))
+    return degrees if eta is None else degrees + tuple(180 - degree for degree in reversed(degrees))
 
 
 def radiance(eta: float | None, directions: NDArray) -> NDArray:
@@ -126,7 +126,7 @@ def single_scattering(alpha: float, degrees: float) -> float:
     def response(light: NDArray, view: NDArray) -> NDArray:
         half = light + view
         top = half[2] ** 2 / (half**2).sum(axis=0)
-        paths = (np.sqrt(square + (1 - square) * each[2] ** 2) for each in (view, light))
+        paths = (np.sqrt(square + (1 - square) * direction[2] ** 2) for direction in (view, light))
         masked = light[2] * next(paths) + view[2] * next(paths)
         return (light[2] * square / (1 - top + square * top) ** 2 / (2 * masked))[None]
 
@@ -144,8 +144,8 @@ def random_pairs(count: int, eta: float | None = None) -> list[NDArray]:
                   rng.uniform(0, 2 * np.pi, count))
         for _ in range(2)
     ]  # fmt: skip
-    for each in pairs if eta else ():
-        each[2] *= rng.choice([-1, 1], count)
+    for directions in pairs if eta else ():
+        directions[2] *= rng.choice([-1, 1], count)
     return pairs
 
 
@@ -161,11 +161,14 @@ def asymmetries(response: Response, a: NDArray, b: NDArray, eta: float | None = 
     return np.divide(np.abs(there - back), mean, out=np.zeros_like(mean), where=counted)
 
 
-def describe(light: np.ndarray, view: np.ndarray, place: int) -> str:
+def describe(light: np.ndarray, view: np.ndarray, index: int) -> str:
     """Describe a pair of directions (3, N): angles from the normal, and the azimuth between."""
-    light = light[:, place % light.shape[1]]
-    view = view[:, place % view.shape[1]]
-    polar = [np.degrees(np.arctan2(np.hypot(each[0], each[1]), each[2])) for each in (light, view)]
+    light = light[:, index % light.shape[1]]
+    view = view[:, index % view.shape[1]]
+    polar = [
+        np.degrees(np.arctan2(np.hypot(direction[0], direction[1]), direction[2]))
+        for direction in (light, view)
+    ]
     about = np.degrees(np.arctan2(light[1], light[0]) - np.arctan2(view[1], view[0])) % 360
     return (
         f"light at {polar[0]:.4g}°, viewer at {polar[1]:.4g}°, {min(about, 360 - about):.3g}° apart"

@@ -76,14 +76,14 @@ class Subject(ABC):
         return np.where(np.isfinite(values) & (values > 0), values, 0.0)
 
     def note(
-        self, words: str, values: np.ndarray, pairs: tuple[np.ndarray, np.ndarray] | None
+        self, description: str, values: np.ndarray, pairs: tuple[np.ndarray, np.ndarray] | None
     ) -> None:
         """Note the first value (C, N) that is not finite, or negative."""
         is_wrong = ~(np.isfinite(values) & (values >= -user_shaders.ROUNDING))
         if is_wrong.any():
-            channel, place = np.argwhere(is_wrong)[0]
-            where = f"{words}, {furnace.describe(*pairs, place)}" if pairs else words
-            self.faults.append(f"{values[channel, place]:.3g} ({where})")
+            channel, index = np.argwhere(is_wrong)[0]
+            where = f"{description}, {furnace.describe(*pairs, index)}" if pairs else description
+            self.faults.append(f"{values[channel, index]:.3g} ({where})")
 
 
 # --- Heuristics --------------------------------------------------------------------------------
@@ -140,16 +140,21 @@ class ShadingSubject(Subject):
                 f"heuristic {heuristic.name} reads only positions, as a picture does, and cannot be"
                 " audited over directions. Compare it on a scene."
             )
-        known = {each.name: each for each in heuristic.parameters}
+        known = {parameter.name: parameter for parameter in heuristic.parameters}
         for name in parameters:
             if name not in known:
                 raise unknown(f"heuristic {heuristic.name}: parameter", name, known)
         self.values = {
-            name: each.checked(parameters.get(name, each.default)) for name, each in known.items()
+            name: parameter.checked(parameters.get(name, parameter.default))
+            for name, parameter in known.items()
         }
         self.white = white(heuristic.form or "phong")
-        self.materials = {name: each.get("alpha") for name, each in self.white.items()}
-        prepared = {each.name: self.values[each.name] for each in known.values() if each.prepared}
+        self.materials = {name: material.get("alpha") for name, material in self.white.items()}
+        prepared = {
+            parameter.name: self.values[parameter.name]
+            for parameter in known.values()
+            if parameter.prepared
+        }
         self.prepared = heuristic.prepared(_square(), prepared)
         if not heuristic.traced:
             self.untuned = "Dr.Jit cannot differentiate it"
@@ -159,8 +164,8 @@ class ShadingSubject(Subject):
 
     def hard_cases(self) -> Iterator[CaseValues]:
         light, view = pairs = furnace.random_and_mirrored()
-        for words, change in EXTREMES:
-            yield words, self._array(MIDDLE | change, _sun(light), view), pairs
+        for description, change in EXTREMES:
+            yield description, self._array(MIDDLE | change, _sun(light), view), pairs
         for length in LENGTHS:
             values = self._array(MIDDLE, _sun(light), view, length * UP)
             yield f"a normal of length {length:g}", values, pairs
@@ -174,8 +179,8 @@ class ShadingSubject(Subject):
         lights["a light of intensity 0"] = DirectionalLight((0.0, 0.0, -1.0), 0.0)
         if self.heuristic.prepare is None:  # it may prepare one item per light
             lights["no light at all"] = None
-        for words, lamp in lights.items():
-            yield words, self._array(MIDDLE, lamp, view), None
+        for description, lamp in lights.items():
+            yield description, self._array(MIDDLE, lamp, view), None
         nothing = np.zeros((3, 1))
         yield "a viewer at the point itself", self._array(MIDDLE, _sun(UP), nothing), None
 
@@ -193,12 +198,14 @@ class ShadingSubject(Subject):
         for name, value in MIDDLE.items():
             if value:
                 yield name, value, partial(shade, name, False)
-        for each in self.heuristic.parameters:
-            if not each.prepared and (centre := _within(each, self.values[each.name])):
-                yield each.name, centre, partial(shade, each.name, True)
+        for parameter in self.heuristic.parameters:
+            if not parameter.prepared and (
+                centre := _within(parameter, self.values[parameter.name])
+            ):
+                yield parameter.name, centre, partial(shade, parameter.name, True)
 
-    def _array(self, *words: Any) -> np.ndarray:
-        return np.array(self._colour(*words), float).reshape(3, -1)
+    def _array(self, *arguments: Any) -> np.ndarray:
+        return np.array(self._colour(*arguments), float).reshape(3, -1)
 
     def _colour(
         self,
@@ -208,15 +215,15 @@ class ShadingSubject(Subject):
         normal: np.ndarray = UP,
         values: Mapping[str, Any] | None = None,
     ) -> Any:
-        place = (0 * UP, normal, view)
+        point = (0 * UP, normal, view)
         lights = [] if light is None else [light]
         values = self.values | dict(values or {})
-        return shaded(self.heuristic, place, material, lights, 0.0, values, self.prepared)
+        return shaded(self.heuristic, point, material, lights, 0.0, values, self.prepared)
 
 
 def shaded(
     heuristic: Heuristic,
-    place: tuple[np.ndarray, np.ndarray, np.ndarray],
+    point: tuple[np.ndarray, np.ndarray, np.ndarray],
     material: Mapping[str, Any],
     lights: list[Any],
     ambient: Any = 0.0,
@@ -228,13 +235,13 @@ def shaded(
     Numbers of the ``material`` may differ from point to point, (N,), and colours (3, N). Nothing
     hides a light. ``values`` are those of its parameters, if not the defaults.
     """
-    count = max(each.shape[1] for each in place)
+    count = max(vector.shape[1] for vector in point)
     known = dict.fromkeys(COLOURS, 0.0) | {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
     # Opaque, as in a scene: Dr.Jit drops products with a literal 0, even of NaN.
     made = {name: _opaque(value) for name, value in (known | dict(material)).items()}
     made |= {name: mi.Spectrum(made[name]) for name in COLOURS}
-    values = {each.name: each.default for each in heuristic.parameters} | dict(values or {})
-    vectors = [mi.Vector3f(_single(np.broadcast_to(vector, (3, count)))) for vector in place]
+    values = {vector.name: vector.default for vector in heuristic.parameters} | dict(values or {})
+    vectors = [mi.Vector3f(_single(np.broadcast_to(vector, (3, count)))) for vector in point]
     position, normal, view = vectors
     arguments = ShadingArguments(
         position=position,
@@ -318,10 +325,10 @@ LEAST_BEND = 0.08
 
 def registered(word: str) -> str:
     """Return the name of a plugin; run the file of one that is named ``FILE.py:NAME``."""
-    if (place := heuristics.in_file(word)) is None:
+    if (file := heuristics.in_file(word)) is None:
         return word
-    path = Path(place[0])
-    name = place[1]
+    path = Path(file[0])
+    name = file[1]
     variant = mi.variant()
     content = f"that calls mitsuba.register_bsdf(NAME, class) in variant {variant}, as FILE.py:NAME"
     with contained(path):

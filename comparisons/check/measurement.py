@@ -163,7 +163,9 @@ def measure_scene(
     for half in halves:
         half.spp = max(1, spp // count)
     loop = passes(halves, options.seed, count, progress=progress)
-    images = np.array([[np.array(image) for image in one.images] for one in loop], np.float64)
+    images = np.array(
+        [[np.array(image) for image in rendered.images] for rendered in loop], np.float64
+    )
     numbers = measurement(images, ready.counted, options.viewing)
     heuristic, reference = images.mean(axis=0)
     caution = require_light(heuristic, reference, ready.counted, source.name, options)
@@ -201,7 +203,7 @@ def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metri
     count = len(images)
     total = images.sum(axis=0)
     values = departure(total / count)
-    errors = jackknife_error([departure((total - one) / (count - 1)) for one in images])
+    errors = jackknife_error([departure((total - image) / (count - 1)) for image in images])
     signs = np.where(np.arange(count) % 2, -1.0, 1.0)
     noise = np.einsum("i,ijkl->jkl", signs, images[:, 0] - images[:, 1]) / count
     reference = images[:, 1].mean(axis=0)
@@ -341,9 +343,9 @@ def _rounded(value: Any, digits: int = 8) -> Any:
     """Round all numbers inside plain data: those of errors, at these keys, to fewer digits."""
     if isinstance(value, dict):
         errors = ("error", "noise_floor")
-        return {key: _rounded(one, 3 if key in errors else digits) for key, one in value.items()}
+        return {key: _rounded(item, 3 if key in errors else digits) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_rounded(one, digits) for one in value]
+        return [_rounded(item, digits) for item in value]
     return float(f"{value:.{digits}g}") if isinstance(value, float) else value
 
 

@@ -280,7 +280,7 @@ class PictureCheck:
             size = np.maximum((weights * base).sum(axis=(0, 1)), 1e-30)
             value = (weights * (new - old)).sum(axis=(0, 1)) / size
             shifted = replace(self.before, mean=self.before.mean + value * image)
-            if not any(each.moved(self.level).any() for each in means(shifted, self.after)):
+            if not any(mean.moved(self.level).any() for mean in means(shifted, self.after)):
                 shown = map(_interval, start + value, 2.0 / np.sqrt(size))
                 found.append(f"a constant {name} of {', '.join(shown)} in R, G, B")
         if found:

@@ -126,9 +126,9 @@ def quick(
     alone: AbstractContextManager[Any],
 ) -> Study:
     """Study a compared scene with less effort, and predict for its own size; see :func:`cost`."""
-    own = options.resolution or film_size(source.parse(), options.sensor)
+    whole = options.resolution or film_size(source.parse(), options.sensor)
     small = options.changed(resolution=reduced(source, options, QUICK_WIDTH), spp=None)
-    return cost(source, small, QUICK, progress, command, own, causes=causes, alone=alone)
+    return cost(source, small, QUICK, progress, command, whole, causes=causes, alone=alone)
 
 
 def require(name: str, target: Size, size: Size, is_measured: bool) -> None:
@@ -173,7 +173,8 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
         return times.interval(values, times.UNSEEN * float(values[0]))
 
     effects = (
-        EffectCost(**structs.asdict(one), adds_s=adds(one.effect)) for one in causes.record.effects
+        EffectCost(**structs.asdict(contribution), adds_s=adds(contribution.effect))
+        for contribution in causes.record.effects
     )
     return CostAttribution(
         effects=tuple(effects),
@@ -234,7 +235,7 @@ def choose(
     progress = progress or (lambda *_: None)
     found = measure_ladder(source, small, Effort(), progress, at=options.resolution)
     points = at_size(found.points, found.methods, size)
-    full = next(one.name for one in found.methods if FULL_PLAN.name in one.names)
+    full = next(method.name for method in found.methods if FULL_PLAN.name in method.names)
     of_full = [point for point in points if point.method == full]
     chosen = sufficient(points, within)
     return Choice(

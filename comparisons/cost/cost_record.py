@@ -238,7 +238,7 @@ class Cost(Record):
 
     def method(self, name: str) -> TimedMethod:
         """Return a method by any of its names, also one that was merged with another."""
-        return next(one for one in self.methods if name in (one.name, *one.names))
+        return next(method for method in self.methods if name in (method.name, *method.names))
 
 
 LEAST_SHARE = 0.85

@@ -17,39 +17,40 @@ from fotismos.reference.records import Estimated, Record
 Interval = Estimated | MeanError
 
 
-def is_below(one: Interval, other: Interval) -> bool:
+def is_below(first: Interval, other: Interval) -> bool:
     """Return whether one interval lies below another."""
-    return one.high < other.low
+    return first.high < other.low
 
 
-def beats(one: Point, other: Point) -> bool:
+def beats(first: Point, other: Point) -> bool:
     """Return whether a point is clearly faster or more accurate, and not clearly the opposite."""
-    faster = is_below(one.seconds, other.seconds)
-    better = is_below(one.error, other.error)
-    slower = is_below(other.seconds, one.seconds)
-    worse = is_below(other.error, one.error)
+    faster = is_below(first.seconds, other.seconds)
+    better = is_below(first.error, other.error)
+    slower = is_below(other.seconds, first.seconds)
+    worse = is_below(other.error, first.error)
     return (faster and not worse) or (better and not slower)
 
 
 def fronted(points: Sequence[Point]) -> tuple[Point, ...]:
     """Return the points, of which those that none beats are on the front, with their ties."""
-    front = [one for one in points if not any(beats(other, one) for other in points)]
+    front = [point for point in points if not any(beats(other, point) for other in points)]
 
-    def ties(one: Point) -> tuple[str, ...]:
+    def ties(point: Point) -> tuple[str, ...]:
         same = (
             other.method
             for other in front
-            if other.method != one.method and not _differ(one, other)
+            if other.method != point.method and not _differ(point, other)
         )
         return tuple(dict.fromkeys(same))
 
     return tuple(
-        structs.replace(one, front=True, ties=ties(one)) if one in front else one for one in points
+        structs.replace(point, front=True, ties=ties(point)) if point in front else point
+        for point in points
     )
 
 
-def _differ(one: Point, other: Point) -> bool:
-    pairs = ((one.seconds, other.seconds), (one.error, other.error))
+def _differ(first: Point, other: Point) -> bool:
+    pairs = ((first.seconds, other.seconds), (first.error, other.error))
     return any(is_below(a, b) or is_below(b, a) for a, b in pairs)
 
 
@@ -62,9 +63,9 @@ def sufficient(points: Sequence[Point], tolerance: float) -> Point | None:
     if not enough:
         return None
     fastest = min(enough, key=lambda point: point.seconds.value)
-    alike = [one for one in enough if not is_below(fastest.seconds, one.seconds)]
+    alike = [point for point in enough if not is_below(fastest.seconds, point.seconds)]
     best = min(alike, key=lambda point: point.tolerance.mean)
-    ties = dict.fromkeys(one.method for one in alike if one.method != best.method)
+    ties = dict.fromkeys(point.method for point in alike if point.method != best.method)
     return structs.replace(best, ties=tuple(ties))
 
 
@@ -75,7 +76,8 @@ def at_size(
     known = {method.name: method for method in methods}
     samples = size[0] * size[1]
     return [
-        structs.replace(one, seconds=known[one.method].seconds(one.spp * samples)) for one in points
+        structs.replace(point, seconds=known[point.method].seconds(point.spp * samples))
+        for point in points
     ]
 
 
@@ -104,10 +106,10 @@ def reach(points: Sequence[Point], tolerance: float) -> Reach | None:
     """
     found = []
     for name in dict.fromkeys(point.method for point in points):
-        own = [one for one in points if one.method == name]
-        if len(own) < 2:
+        of_method = [point for point in points if point.method == name]
+        if len(of_method) < 2:
             continue
-        fewer, more = own[-2:]
+        fewer, more = of_method[-2:]
         step = more.spp - fewer.spp
         square = more.tolerance.mean**2
         left = max(square - (fewer.tolerance.mean**2 - square) * fewer.spp / step, 0.0)
@@ -116,4 +118,4 @@ def reach(points: Sequence[Point], tolerance: float) -> Reach | None:
         if room > 0:
             spp = max(ceil(more.spp * (square - left) / room), more.spp + 1)
         found.append(Reach(method=name, left=sqrt(left), spp=spp))
-    return min(found, key=lambda one: (one.spp is None, one.spp or one.left), default=None)
+    return min(found, key=lambda point: (point.spp is None, point.spp or point.left), default=None)

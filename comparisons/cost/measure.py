@@ -165,22 +165,24 @@ def measure_ladder(
     size = image_size(ready.scene)
     gc.collect()  # release scenes that pairing left behind
     steps = tuple(ladder.steps())
-    wanted = {one.name: one for step in steps for one in (step.before, step.after)}
-    wanted |= {one.name: one for one in ladder.methods}
-    counts = {name: effort.counts(one) for name, one in wanted.items()}
+    wanted = {method.name: method for step in steps for method in (step.before, step.after)}
+    wanted |= {method.name: method for method in ladder.methods}
+    counts = {name: effort.counts(method) for name, method in wanted.items()}
     renderers = tried(
-        {name: ladder.renderer(one, counts[name][-1]) for name, one in wanted.items()},
+        {name: ladder.renderer(method, counts[name][-1]) for name, method in wanted.items()},
         counts, size[0] * size[1], progress,
     )  # fmt: skip
-    judged = {(one.name, spp) for one in ladder.methods for spp in counts[one.name]}
+    judged = {(method.name, spp) for method in ladder.methods for spp in counts[method.name]}
     with alone or nullcontext():
         errors, images = rendered(
             renderers, judge, judged, effort.rounds, options.seed, progress, "timing"
         )
     found = timed(renderers, effort.rounds, size[0] * size[1], options.seed)
     methods = tuple(
-        timed_method(one, found, steps[0].before.name, renderers[one.name, counts[one.name][-1]])
-        for one in ladder.methods
+        timed_method(
+            method, found, steps[0].before.name, renderers[method.name, counts[method.name][-1]]
+        )
+        for method in ladder.methods
     )
     return Measurements(
         options=options,
@@ -225,8 +227,10 @@ def converged(
     total = Accumulator()
     count = max(REFERENCE_PASSES, ready.plan.passes)
     stream = Stream.OTHER_SIDE
-    for one in passes([renderer], seed, count, stream=stream, progress=progress, stage="reference"):
-        total.add(one.images[0])
+    for rendered in passes(
+        [renderer], seed, count, stream=stream, progress=progress, stage="reference"
+    ):
+        total.add(rendered.images[0])
     return total.estimate()
 
 
@@ -244,7 +248,7 @@ def tried(
     renderers: dict[Key, Renderer] = {}
     for number, (name, first) in enumerate(firsts.items()):
         progress("compiling", number, len(firsts))
-        own = {first.spp: first}
+        by_spp = {first.spp: first}
         last = first
         while True:
             warm(last)
@@ -256,11 +260,11 @@ def tried(
             while more * seconds < times.LEAST_S and 4 * more * last.spp * pixels <= MOST_SAMPLES:
                 more *= 4
             last = first.sampled(more * last.spp)
-            own[last.spp] = last
-        for spp in {*counts[name], max(1, last.spp // 4), max(1, last.spp // 16)} - own.keys():
-            own[spp] = first.sampled(spp)
-            warm(own[spp])
-        renderers |= {(name, spp): own[spp] for spp in sorted(own)}
+            by_spp[last.spp] = last
+        for spp in {*counts[name], max(1, last.spp // 4), max(1, last.spp // 16)} - by_spp.keys():
+            by_spp[spp] = first.sampled(spp)
+            warm(by_spp[spp])
+        renderers |= {(name, spp): by_spp[spp] for spp in sorted(by_spp)}
     progress("compiling", len(firsts), len(firsts))
     return renderers
 
@@ -287,18 +291,18 @@ def rendered(
     errors: dict[Key, list[tuple[float, float]]] = {key: [] for key in renderers if key in judged}
     images: dict[Key, NDArray] = {}
     loop = passes([*renderers.values()], seed, rounds, progress=progress, stage=stage)
-    for one in loop:
-        for key, image in zip(renderers, one.images, strict=True):
+    for images_of_pass in loop:
+        for key, image in zip(renderers, images_of_pass.images, strict=True):
             if key in judged:
                 images[key] = np.array(image)
                 errors[key].append(judge(images[key]))
-    return {key: _mean_errors(each) for key, each in errors.items()}, images
+    return {key: _mean_errors(values) for key, values in errors.items()}, images
 
 
 def _mean_errors(errors: ArrayLike) -> tuple[MeanError, MeanError]:
-    each = np.asarray(errors)
-    means = each.mean(axis=0)
-    halves = SURE * each.std(axis=0, ddof=1) / sqrt(len(each))
+    values = np.asarray(errors)
+    means = values.mean(axis=0)
+    halves = SURE * values.std(axis=0, ddof=1) / sqrt(len(values))
     lows = means - halves
     highs = means + halves
     error = MeanError(mean=float(means[0]), low=float(lows[0]), high=float(highs[0]))
@@ -312,8 +316,8 @@ def timed(
     """Return the time of each method from the last rounds of its renderers."""
     seconds: dict[str, dict[int, tuple[Any, Any]]] = {}
     for (name, spp), renderer in renderers.items():
-        own = renderer.times[-rounds:], renderer.processor_times[-rounds:]
-        seconds.setdefault(name, {})[spp * pixels] = own
+        both_times = renderer.times[-rounds:], renderer.processor_times[-rounds:]
+        seconds.setdefault(name, {})[spp * pixels] = both_times
     return times.lines(seconds, seed)
 
 
@@ -341,9 +345,9 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
     reference = converged(found.ready, options.seed, progress, size)
     judge = judge_by(reference, gbuffer(scene, size).hit, options.viewing)
     renderers = {
-        (one.name, spp): found.ladder.renderer(one, spp, size)
-        for one in found.methods
-        for spp in found.effort.counts(one)[:1]
+        (method.name, spp): found.ladder.renderer(method, spp, size)
+        for method in found.methods
+        for spp in found.effort.counts(method)[:1]
     }
     for renderer in renderers.values():
         warm(renderer)

@@ -93,7 +93,9 @@ def all_methods(is_short: bool = False) -> tuple[Method, ...]:
     """
     *cheaper, full = BUILT_IN
     left_out = (*STAND_INS, *PATHS[1:]) if is_short else ()
-    return tuple(one for one in (*cheaper, *_DECLARED.values(), full) if one not in left_out)
+    return tuple(
+        method for method in (*cheaper, *_DECLARED.values(), full) if method not in left_out
+    )
 
 
 def declare(method: Method) -> Method:
@@ -102,7 +104,7 @@ def declare(method: Method) -> Method:
     ``InputError`` for a name of the package itself, and for an effect that a plan cannot leave out:
     it needs the kernel, or a second image.
     """
-    if method.name in {own.name for own in BUILT_IN}:
+    if method.name in {method.name for method in BUILT_IN}:
         raise InputError(
             f"method {method.name!r} is already declared by fotismos: give another name."
         )
@@ -156,7 +158,7 @@ class Ladder:
         sampled = {effect for effect in EFFECTS if effect.sampled}
         if plan.tabulated_environment:
             sampled.remove(ENVIRONMENT)
-        self._is_random = any(plan.calls_for(one) or one in differences for one in sampled)
+        self._is_random = any(plan.calls_for(effect) or effect in differences for effect in sampled)
         refusals = self._refused_interpolations() | self._refused_heuristics()
         merged: dict[Method, list[Method]] = {}
         self.left_out: dict[str, str] = {}
@@ -234,9 +236,9 @@ class Ladder:
             found = (refusals.get(name) for name in (method.interpolation.value, method.heuristic))
             return next(filter(None, found), "")
         depth = method.max_depth
-        own = self.ready.plan.scene_depth
-        is_there = depth is None or own == UNLIMITED or depth <= own
-        return "" if is_there else f"the scene's own paths end at depth {own}"
+        scene_depth = self.ready.plan.scene_depth
+        is_there = depth is None or scene_depth == UNLIMITED or depth <= scene_depth
+        return "" if is_there else f"the scene's own paths end at depth {scene_depth}"
 
     def renderer(self, method: Method, spp: int, size: tuple[int, int] | None = None) -> Renderer:
         """Return a renderer of a method, with samples per pixel of a pass, and an image size."""
@@ -278,8 +280,8 @@ class Ladder:
         others = [effect for effect in effects if effect not in changes]
         for order in (others, others[::-1]):
             plans = [
-                self._named(self._form(structs.replace(FULL_PLAN, without=tuple(order[place:]))))
-                for place in range(len(order) + 1)
+                self._named(self._form(structs.replace(FULL_PLAN, without=tuple(order[number:]))))
+                for number in range(len(order) + 1)
             ]
             yield Step(effect="", weight=0.5, before=self._named(kernel), after=plans[0])
             for label, before, after in zip(order, plans, plans[1:], strict=False):
@@ -311,11 +313,11 @@ class Ladder:
         """Return why shapes or sensor do not allow interpolations: some cannot be meshes."""
         refused = {}
         with variant(self.pairs.heuristic_variant):
-            own = self._shapes(Interpolation.PHONG)
+            smooth = self._shapes(Interpolation.PHONG)
             for interpolation in (Interpolation.FLAT, Interpolation.GOURAUD):
                 try:
                     require_colours()
-                    if self._shapes(interpolation) != own:
+                    if self._shapes(interpolation) != smooth:
                         refused[interpolation.value] = (
                             "it needs a mesh, and the others have the scene's own shapes: give"
                             " --tessellation to measure all on one mesh"

@@ -58,17 +58,19 @@ Rounds = tuple[Sequence[float], Sequence[float]]
 
 def lines(measured: Mapping[str, Mapping[int, Rounds]], seed: int = 0) -> dict[str, Line]:
     """Return the line of each method, of ``{method: {samples over all pixels: rounds}}``."""
-    (rounds,) = {len(wall) for own in measured.values() for wall, _ in own.values()}
+    (rounds,) = {
+        len(wall) for times_by_count in measured.values() for wall, _ in times_by_count.values()
+    }
     drawn = np.random.default_rng(seed).integers(rounds, size=(DRAWS, rounds))
     drawn = np.vstack([np.arange(rounds), drawn])
     best: dict[str, tuple[NDArray, NDArray]] = {}
     slopes: list[Draws] = []
     work: list[Draws] = []
-    for name, own in measured.items():
-        counts = np.array(sorted(own), float)
+    for name, by_count in measured.items():
+        counts = np.array(sorted(by_count), float)
         # Each (counts, 1 + DRAWS).
-        wall = np.array([own[int(n)][0] for n in counts])[:, drawn].min(axis=2)
-        processor = np.array([own[int(n)][1] for n in counts])[:, drawn].min(axis=2)
+        wall = np.array([by_count[int(n)][0] for n in counts])[:, drawn].min(axis=2)
+        processor = np.array([by_count[int(n)][1] for n in counts])[:, drawn].min(axis=2)
         best[name] = counts, wall
         span = counts[-1] - counts[0]
         for found, times in ((slopes, wall), (work, processor)):
@@ -76,8 +78,8 @@ def lines(measured: Mapping[str, Mapping[int, Rounds]], seed: int = 0) -> dict[s
             found.append(np.maximum((times[-1] - times[0]) / span, least))
     processors = np.median(np.array(work) / np.array(slopes), axis=0)
     return {
-        name: _line(*best[name], own / processors, float(processors[0]))
-        for name, own in zip(measured, work, strict=True)
+        name: _line(*best[name], seconds / processors, float(processors[0]))
+        for name, seconds in zip(measured, work, strict=True)
     }
 
 

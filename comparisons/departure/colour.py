@@ -37,7 +37,7 @@ MOST_PIXELS = 1000.0
 
 BT709 = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.3127, 0.3290))
 """CIE x, y of red, green, blue and white."""
-CHROMATICITIES = tuple(value for place in BT709 for value in place)
+CHROMATICITIES = tuple(value for point in BT709 for value in point)
 """The same in a row, as files have them."""
 BT2020 = ((0.708, 0.292), (0.170, 0.797), (0.131, 0.046), (0.3127, 0.3290))
 

@@ -45,7 +45,9 @@ def cam16ucs(rgb: Array, viewing: Viewing, white: float = 1.0) -> Array:
         VIEWING_CONDITIONS_CAM16["Average"],
         compute_H=False,
     )
-    correlates = [np.asarray(each, float) for each in (appearance.J, appearance.M, appearance.h)]
+    correlates = [
+        np.asarray(correlate, float) for correlate in (appearance.J, appearance.M, appearance.h)
+    ]
     return np.asarray(JMh_CAM16_to_CAM16UCS(np.stack(correlates, axis=-1)))
 
 

@@ -92,7 +92,7 @@ def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
     """
     start, stop = exposures(_exposed(reference, viewing))
     factors = 2.0 ** np.linspace(start, stop, max(2, ceil(stop - start)))
-    curves = [partial(_toned, factor=dr.opaque(Float32, each)) for each in factors.tolist()]
+    curves = [partial(_toned, factor=dr.opaque(Float32, factor)) for factor in factors.tolist()]
     return _flip(test, reference, viewing, curves)
 
 

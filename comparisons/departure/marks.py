@@ -251,14 +251,14 @@ class _Pixels:
         """Return the pixels of some rows that are in a mask (H, W) of the whole image."""
         mask = mask[rows]
         mean = difference.mean[rows][mask]
-        own = _variance(difference, rows)[mask]
+        variance = _variance(difference, rows)[mask]
         blocks = slice(rows.start // BLOCK, -(-rows.stop // BLOCK))
         by_block = (around.pooled_freedom, around.quantile, around.pooled_variance, *around.sizes)
         by_pixel = [spread_out(values[blocks], mask.shape)[mask] for values in by_block]
         prior, quantile, pooled, *sizes = by_pixel
         freedom = prior + around.own_freedom
-        moderated = (prior * pooled + around.own_freedom * own) / freedom
-        return cls(mean, np.maximum(own, moderated), np.array(sizes), freedom, quantile)
+        moderated = (prior * pooled + around.own_freedom * variance) / freedom
+        return cls(mean, np.maximum(variance, moderated), np.array(sizes), freedom, quantile)
 
     def chances(self, most: float) -> Array:
         return _chances(self.difference, self.variance, self.sizes, self.freedom, most)
@@ -298,9 +298,9 @@ def _inflation(difference: DifferenceEstimate) -> float:
     With a wide reconstruction filter, neighbours share samples.
     """
     grouped = difference.grouped
-    own = difference.standard_error.reshape(-1, 3)[grouped.places].astype(np.float64) ** 2
-    independent = grouped.by_block(own)
-    sums = np.stack([grouped.by_block(one) for one in grouped.means])
+    variance = difference.standard_error.reshape(-1, 3)[grouped.places].astype(np.float64) ** 2
+    independent = grouped.by_block(variance)
+    sums = np.stack([grouped.by_block(mean) for mean in grouped.means])
     weights = grouped.sizes[:, None, None]
     spread = (weights * (sums - np.average(sums, axis=0, weights=grouped.sizes)) ** 2).sum(axis=0)
     spread /= max(len(weights) - 1, 1) * weights.sum()

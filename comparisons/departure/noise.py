@@ -176,7 +176,9 @@ def _shares(
     plain, *drawn = distances(np.concatenate([mean[None], _draws(mean, noise, grouped)]))
     steps = np.arange(len(thresholds))
     before = np.searchsorted(thresholds, plain)[:, None] > steps
-    chance = np.mean([np.searchsorted(thresholds, each)[:, None] > steps for each in drawn], axis=0)
+    chance = np.mean(
+        [np.searchsorted(thresholds, values)[:, None] > steps for values in drawn], axis=0
+    )
     added = before.mean(axis=0) - chance.mean(axis=0)
     undecided = (chance * (1.0 - chance)).mean(axis=0) * len(drawn) / (len(drawn) - 1)
     # The noise's part comes from the sample, the value that it is subtracted from is of all pixels.
@@ -196,24 +198,24 @@ def _draws(mean: Array, noise: Array, grouped: Grouped) -> Array:
     single pixels may depart (Efron and Morris, J. Am. Stat. Assoc. 67, 1972). The block's mean is
     moved towards 0 likewise. Noise is added by the variance that is left.
     """
-    own = grouped.blocks
+    blocks = grouped.blocks
     pixels = grouped.by_block(np.ones(len(mean)))[:, None]
 
     def split(image: Array) -> tuple[Array, Array]:
         middle = grouped.by_block(image) / pixels
-        return middle, image - middle[own]
+        return middle, image - middle[blocks]
 
     middle, off = split(mean)
     noise_middle, noise_off = map(np.array, zip(*map(split, noise), strict=True))
     spread = grouped.by_block(np.mean(noise_off**2, axis=0)) / pixels
-    true = 1.0 - ratio(spread, grouped.by_block(off**2) / pixels)[own]
-    most = ratio(np.sqrt(spread)[own], np.abs(off))
+    true = 1.0 - ratio(spread, grouped.by_block(off**2) / pixels)[blocks]
+    most = ratio(np.sqrt(spread)[blocks], np.abs(off))
     true = np.clip(np.maximum(true, 1.0 - most), 0.0, 1.0)
     sizes = np.mean(noise_middle**2, axis=0), middle**2
     level = np.clip(1.0 - ratio(*(size.sum(axis=1) for size in sizes)), 0.0, 1.0)
-    level = level[own, None]
-    kept = level * middle[own] + true * off
-    draws: Array = kept + np.sqrt(level) * noise_middle[:, own] + np.sqrt(true) * noise_off
+    level = level[blocks, None]
+    kept = level * middle[blocks] + true * off
+    draws: Array = kept + np.sqrt(level) * noise_middle[:, blocks] + np.sqrt(true) * noise_off
     return draws
 
 
@@ -254,7 +256,7 @@ class _Extrapolated:
             noise = 0.0
         else:
             pair = plain**2, np.mean(np.square(noisy), axis=0)
-            squares = np.array([grouped.by_block(each) for each in pair])
+            squares = np.array([grouped.by_block(values) for values in pair])
             lower = without_noise(before, after)
             upper = np.minimum(without_noise(*np.sqrt(squares * pixels)), before)
             added = before - (lower + upper) / 2.0

@@ -141,14 +141,14 @@ def find_objects(
     places = np.where(counted, owners.places, -1)
     present = np.unique(places[places >= 0])
     sums = np.bincount(places[places >= 0], error[places >= 0], len(owners.names))
-    ranked = sorted(present, key=lambda place: -sums[place])
+    ranked = sorted(present, key=lambda index: -sums[index])
     if len(ranked) > MOST_OBJECTS:
         ranked = ranked[: MOST_OBJECTS - 1]
     rows = np.full(len(owners.names) + 1, len(ranked))
     rows[ranked] = np.arange(len(ranked))
     rows[-1] = -1
     found = rows[places]
-    names = [owners.names[place] for place in ranked]
+    names = [owners.names[index] for index in ranked]
     if len(present) > len(names):
         names.append(f"{len(present) - len(names)} others")
     total = error[counted].sum(dtype=np.float64)
@@ -172,5 +172,5 @@ def _object_share(
 
 
 def _material(mask: NDArray[np.bool_], materials: ObjectIds) -> str:
-    own = np.unique(materials.places[mask])
-    return materials.names[own[0]] if len(own) == 1 else "several"
+    here = np.unique(materials.places[mask])
+    return materials.names[here[0]] if len(here) == 1 else "several"

@@ -100,8 +100,8 @@ def summarise(
         # Equal pixels are 0 apart: the surroundings of a figure's objects cost nothing.
         measured = mask[rows] | (not is_pixelwise or (test[rows] != reference[rows]).any(axis=-1))
         distances = metric.against(reference[rows], measured, viewing)
-        for place, image in images.items():
-            maps[place][rows][measured] = distances(image)
+        for number, image in images.items():
+            maps[number][rows][measured] = distances(image)
     values = maps[0][mask]
     exposed = maps[1][mask]
     noise_alone = maps[2][mask]
@@ -237,7 +237,7 @@ def best_exposure(
     bracketing = 2.0 ** whole_stops[:, None, None] * shown[:_BRACKET_PIXELS]
     some = np.broadcast_to(truth[:_BRACKET_PIXELS], bracketing.shape)
     at_stops = metric.against(some, ..., viewing)(bracketing)
-    start = whole_stops[np.argmin([metric.mean(each) for each in at_stops])]
+    start = whole_stops[np.argmin([metric.mean(at_stop) for at_stop in at_stops])]
     bounds = max(start - 1.0, -EXPOSURE_STOPS), min(start + 1.0, EXPOSURE_STOPS)
     finest = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
     least_squares = np.log2(least_squares_factor(shown, truth))

@@ -120,13 +120,13 @@ def fit(
         with variant(VARIANT):
             surface = model.see(rendered.ready.heuristic, rendered.seeds)
             models = [PhongModel(surface, form, rendered.counted.ravel()) for form in forms]
-            fits = [_best(rendered, each, form_starts, LOSSES[loss]) for each in models]
+            fits = [_best(rendered, form_model, form_starts, LOSSES[loss]) for form_model in models]
     else:
         half = rendered.ready.heuristic
         seeds = rendered.seeds
-        own = OwnModel(half, heuristic, seeds, rendered.counted)
-        fits = [_best(rendered, own, own_starts, LOSSES[loss])]
-    best = min(range(len(fits)), key=lambda place: fits[place][0].loss)
+        own_model = OwnModel(half, heuristic, seeds, rendered.counted)
+        fits = [_best(rendered, own_model, own_starts, LOSSES[loss])]
+    best = min(range(len(fits)), key=lambda number: fits[number][0].loss)
     ready = rendered.ready
     record = FitRecord(
         scene=source.name,
@@ -209,8 +209,8 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
         )
     sums = [Accumulator() for _ in range(3)]
     halves = (ready.heuristic, ready.reference)
-    for one in passes(halves, options.seed, ready.passes, progress=progress):
-        add_difference(sums, one.images)
+    for rendered in passes(halves, options.seed, ready.passes, progress=progress):
+        add_difference(sums, rendered.images)
     before = sums[0].estimate()
     reference = sums[1].estimate()
     difference = sums[2].estimate()
@@ -248,8 +248,8 @@ def _best(
             reference=physical.get(name),
             pixels=fitted.reached[owner],
             parameters=tuple(
-                parameter_record(fitted, place, x, certainties, covariance)
-                for place, parameter in enumerate(fitted.parameters)
+                parameter_record(fitted, number, x, certainties, covariance)
+                for number, parameter in enumerate(fitted.parameters)
                 if parameter.owner == owner
             ),
         )
@@ -296,7 +296,7 @@ def form_starts(objective: Objective) -> list[NDArray]:
 def own_starts(objective: Objective) -> list[NDArray]:
     """Return the defaults of a heuristic's parameters, and places within their bounds."""
     parameters = objective.model.parameters
-    default = np.array([each.paired for each in parameters])
+    default = np.array([parameter.paired for parameter in parameters])
     reach = REACH * np.maximum(np.abs(default), 1.0)
     low, high = model.bounds(parameters)
     low = np.maximum(low, default - reach)

@@ -135,16 +135,16 @@ def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
 
 def parameter_record(
     model: PhongModel | OwnModel,
-    place: int,
+    index: int,
     x: NDArray,
     certainties: list[Certainty],
     covariance: NDArray,
 ) -> FittedParameter:
     """Return one parameter at the best vector ``x``, ``k_s`` and ``n`` in the chapters' units."""
-    parameter = model.parameters[place]
-    certainty = certainties[place]
-    value = float(x[place])
-    spread = COVERAGE * sqrt(covariance[place, place])
+    parameter = model.parameters[index]
+    certainty = certainties[index]
+    value = float(x[index])
+    spread = COVERAGE * sqrt(covariance[index, index])
     raw: tuple[float, ...] = (parameter.paired, value, value - spread, value + spread)
     limits: tuple[float, ...] = (parameter.low, parameter.high)
     phong = model if isinstance(model, PhongModel) else None
@@ -162,7 +162,7 @@ def parameter_record(
         below = normalisation(phong.form, exp(x[at_n] + (-step)))
         above = normalisation(phong.form, exp(x[at_n] + step))
         slopes = np.zeros(len(x))
-        slopes[[place, at_n]] = per_albedo, value * (above - below) / (2 * step)
+        slopes[[index, at_n]] = per_albedo, value * (above - below) / (2 * step)
         spread = COVERAGE * sqrt(max(slopes @ covariance @ slopes, 0))
         at_pairing = normalisation(phong.form, exp(phong.parameters[at_n].paired))
         k_s = value * per_albedo
@@ -186,7 +186,7 @@ def parameter_record(
         at_bound=certainty.at_bound,
         reason=certainty.reason,
         partners=tuple(
-            f"{f'{each.name} {each.channel}'.strip()} of {model.names[each.owner]}"
-            for each in others
+            f"{f'{other.name} {other.channel}'.strip()} of {model.names[other.owner]}"
+            for other in others
         ),
     )

@@ -141,14 +141,16 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
             passes.append(arrays | {"pixel": np.arange(count) // spp})
             samples_per_pixel += spp
         eye.seen = None
-        whole = {key: np.concatenate([one[key] for one in passes], axis=-1) for key in passes[0]}
+        whole = {
+            key: np.concatenate([samples[key] for samples in passes], axis=-1) for key in passes[0]
+        }
         facing = whole.pop("facing")
         material = whole.pop("material")
         samples = []
         for owner, bsdf in enumerate(bsdfs):
             without = set(COEFFICIENTS) - set(_textured(bsdf))
-            own = facing & (material == owner)
-            samples.append({k: v[..., own] for k, v in whole.items() if k not in without})
+            shown = facing & (material == owner)
+            samples.append({k: v[..., shown] for k, v in whole.items() if k not in without})
         point = dr.zeros(mi.SurfaceInteraction3f)
         return Surface(
             names=tuple(names),
@@ -208,9 +210,9 @@ def _eye(shading):
                     return visible
 
                 before = len(seen)
-                place = mi.Vector3f(si.p)
+                position = mi.Vector3f(si.p)
                 lights = shading.lights(scene, si, active)
-                shade(place, place, place, Material(k_d=1), lights, 0, keep)
+                shade(position, position, position, Material(k_d=1), lights, 0, keep)
             dr.schedule(seen)
             self.seen = seen
             return read("k_i")
@@ -336,7 +338,9 @@ class PhongModel:
         seen = (np.unique(samples["pixel"]) for samples in surface.samples)
         self.reached = [int(self.counted[pixels].sum()) for pixels in seen]
         self.parameters = phong_parameters(surface, form)
-        self.linear = np.array([one.name in COEFFICIENTS for one in self.parameters], bool)
+        self.linear = np.array(
+            [parameter.name in COEFFICIENTS for parameter in self.parameters], bool
+        )
         self._vector = vector or mi.Vector3f
         self._basis, self._points = cache(self._rendered_basis), cache(self._point)
         self._lobe = lru_cache(maxsize=len(surface.names))(self._rendered_lobe)
@@ -370,14 +374,14 @@ class PhongModel:
     def _derivatives(self, x):
         result = np.empty((len(x), *self.surface.fixed.shape))
         albedo = self.coefficients(x, "k_s")
-        for place, parameter in enumerate(self.parameters):
+        for index, parameter in enumerate(self.parameters):
             owner = parameter.owner
             name = parameter.name
             if name in ("k_a", "k_d"):
-                result[place] = self._basis(owner, name) * parameter.tint
+                result[index] = self._basis(owner, name) * parameter.tint
                 continue
             basis, slope = self._lobe(owner, float(np.exp(x[self.place_of_exponent(owner)])))
-            result[place] = basis * parameter.tint if name == "k_s" else slope * albedo[owner]
+            result[index] = basis * parameter.tint if name == "k_s" else slope * albedo[owner]
         return result
 
     def _rendered_basis(self, owner, name):
@@ -406,19 +410,19 @@ class PhongModel:
         """Call the kernel with one coefficient of 1; None if no sample or light shows it."""
         if not len(self.surface.samples[owner]["pixel"]) or not (lights or name == "k_a"):
             return None
-        *place, textures, visible = self._points(owner)
+        *point, textures, visible = self._points(owner)
         material = Material(**{name: textures.get(name, 1.0)}, **lobe)
         masks = iter(visible)
         test = (lambda toward, distance: next(masks)) if visible else None
-        return shade(*place, material, list(lights), ambient, test)
+        return shade(*point, material, list(lights), ambient, test)
 
     def _point(self, owner):
         """Return the kernel's arrays of a material: place, textures, and masks of the lights."""
         samples = self.surface.samples[owner]
-        place = (self._vector(samples[key]) for key in ("position", "normal", "view"))
+        vectors = (self._vector(samples[key]) for key in ("position", "normal", "view"))
         textures = {key: mi.Color3f(samples[key]) for key in COEFFICIENTS if key in samples}
         lights = (f"light {number}" for number in range(len(self.surface.lights)))
-        return *place, textures, [mi.Bool(samples[key]) for key in lights if key in samples]
+        return *vectors, textures, [mi.Bool(samples[key]) for key in lights if key in samples]
 
 
 # --- A heuristic's own parameters --------------------------------------------------------------
@@ -436,8 +440,14 @@ class OwnModel:
         self, renderer: Renderer, heuristic: Heuristic, seeds: Sequence[int], counted: NDArray
     ) -> None:
         self.parameters = tuple(
-            FitParameter(name=each.name, owner=0, paired=each.default, low=each.low, high=each.high)
-            for each in heuristic.parameters
+            FitParameter(
+                name=parameter.name,
+                owner=0,
+                paired=parameter.default,
+                low=parameter.low,
+                high=parameter.high,
+            )
+            for parameter in heuristic.parameters
         )
         self.form = heuristic.name
         self.names = (heuristic.name,)
@@ -457,7 +467,7 @@ class OwnModel:
 
     def columns(self, x: NDArray) -> NDArray:
         """Return the derivatives (number of parameters, N, 3) of the image."""
-        images = (self._kept(tuple(x), place) for place in range(len(x)))
+        images = (self._kept(tuple(x), index) for index in range(len(x)))
         return np.stack([image[self._counted] for image in images])
 
     def _rendered(self, x: tuple[float, ...], by: int | None = None) -> NDArray:
@@ -466,7 +476,9 @@ class OwnModel:
         scene = self._renderer.scene
         total = np.zeros(())
         with variant(self._renderer.variant):
-            values = {one.name: mi.Float(v) for one, v in zip(self.parameters, x, strict=True)}
+            values = {
+                parameter.name: mi.Float(v) for parameter, v in zip(self.parameters, x, strict=True)
+            }
             dr.make_opaque(values)
             integrator.parameters = values
             if by is not None:

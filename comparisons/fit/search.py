@@ -174,10 +174,10 @@ def search(objective: Objective, starts: Sequence[NDArray]) -> tuple[NDArray, fl
     losses = [objective.value(x) for x in starts]
     followed = {0, *(1 + np.argsort(losses[1:], kind="stable")[:FOLLOWED])}
     minima = [
-        descend(objective, descend(objective.smoothed(), starts[place])[0])
-        for place in sorted(followed)
+        descend(objective, descend(objective.smoothed(), starts[number])[0])
+        for number in sorted(followed)
     ]
-    return min(minima, key=lambda each: each[1])
+    return min(minima, key=lambda minimum: minimum[1])
 
 
 def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, bool]:
@@ -249,9 +249,9 @@ def identify(
     shows = np.linalg.norm(flat, axis=0) / root
     free = shows >= threshold
     inverse = _inverse_normal(flat[:, free])
-    own = shows.copy()
-    own[free] = 1 / np.sqrt(np.diag(inverse)) / root[free]
-    determined = free & (own >= threshold)
+    alone = shows.copy()
+    alone[free] = 1 / np.sqrt(np.diag(inverse)) / root[free]
+    determined = free & (alone >= threshold)
     covariance = np.zeros((len(x),) * 2)
     if (inside := determined & ~at_bound).any():
         second = objective.quadratic(x)[1][np.ix_(inside, inside)]
@@ -269,8 +269,8 @@ def identify(
             reason = "does not show in the image"
         elif not determined[number]:
             reason = "others make up for it"
-            place = int(free[:number].sum())
-            shares = np.abs(inverse[place] / inverse[place, place])
+            index = int(free[:number].sum())
+            shares = np.abs(inverse[index] / inverse[index, index])
             others = zip(np.flatnonzero(free).tolist(), shares, strict=True)
             partners = tuple(i for i, share in others if i != number and share > PARTNER)
         elif lost[number]:

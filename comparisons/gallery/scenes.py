@@ -12,9 +12,9 @@ HIGHLIGHT = (0.45, -0.3, 0.0)
 """Where the light of figure 6.14 is mirrored to the viewer: inside one of the two triangles."""
 
 
-def looking_from(place: tuple[float, float, float]) -> Any:
+def looking_from(origin: tuple[float, float, float]) -> Any:
     """Return the transform of a camera or lamp at a place that faces the origin; z is up."""
-    return mi.ScalarTransform4f().look_at(place, (0, 0, 0), (0, 0, 1))
+    return mi.ScalarTransform4f().look_at(origin, (0, 0, 0), (0, 0, 1))
 
 
 def _camera(viewer, field_of_view=40.0):
@@ -149,10 +149,10 @@ def plastic_spheres() -> dict[str, Any]:
             "emitter": {"type": "area", "radiance": 250.0},
         },
     }
-    for number, (place, alpha) in enumerate(((-2.2, 0.1), (0.0, 0.2), (2.2, 0.4)), 1):
+    for number, (x, alpha) in enumerate(((-2.2, 0.1), (0.0, 0.2), (2.2, 0.4)), 1):
         scene[f"sphere-{number}"] = {
             "type": "sphere",
-            "center": (place, 0, 0),
+            "center": (x, 0, 0),
             "bsdf": {
                 "type": "roughplastic",
                 "id": f"plastic {alpha:g}",

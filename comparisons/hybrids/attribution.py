@@ -144,7 +144,7 @@ def find(
         [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
         progress=progress, stage="reference",
     )  # fmt: skip
-    groups = np.stack([np.array(one.images[0]) for one in loop])
+    groups = np.stack([np.array(rendered.images[0]) for rendered in loop])
     meter = ErrorMeter(groups, surface.hit, options.viewing)
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
@@ -211,7 +211,7 @@ class ErrorMeter:
         """Return the coordinates of the mean of images (n, N, 3), and of it with added noise."""
         mean = images.mean(axis=0)
         noise = np.tensordot(contrasts(np.ones(len(images))), images, 1)
-        shown = (mean, *(mean + sign * each for each in noise))
+        shown = (mean, *(mean + sign * deviation for deviation in noise))
         return [LEADING.coordinates(pixels, self.viewing) for pixels in shown]
 
 
@@ -231,7 +231,7 @@ def attribute(
     nothing: frozenset[Effect] = frozenset()
     # One rendering makes many images, so all that the sums will ask for are rendered at once.
     sets = [nothing, *(frozenset({effect}) for effect in effects)]
-    sets += [everything - one for one in sets]
+    sets += [everything - left_out for left_out in sets]
 
     def note(simulated: frozenset[Effect]) -> float:
         sets.append(simulated)
@@ -264,8 +264,8 @@ def attribute(
     )
     closure = jackknifed(left.mean(axis=1), bias)
     hybrids = [
-        Hybrid(effects=labels(effects, each), error=float(found[0].mean()))
-        for each, found in errors.items()
+        Hybrid(effects=labels(effects, simulated), error=float(found[0].mean()))
+        for simulated, found in errors.items()
     ]
 
     def filled(values: NDArray) -> NDArray[np.float64]:
@@ -287,14 +287,16 @@ def attribute(
             spp=images.spp,
             replicates=images.replicates,
             orders=drawn,
-            hybrids=tuple(sorted(hybrids, key=lambda each: (len(each.effects), each.effects))),
+            hybrids=tuple(
+                sorted(hybrids, key=lambda hybrid: (len(hybrid.effects), hybrid.effects))
+            ),
             objects=by_object(filled(departure[0]), removed, left[0], meter.counted, shapes),
         ),
-        maps={name: filled(each[0]) for name, each in removed.items()},
+        maps={name: filled(change[0]) for name, change in removed.items()},
         departure=filled(departure[0]),
         left=filled(left[0]),
         counted=meter.counted,
-        previews={one.effects: image for one, image in zip(hybrids, previews, strict=True)},
+        previews={hybrid.effects: image for hybrid, image in zip(hybrids, previews, strict=True)},
     )
 
 
@@ -309,24 +311,24 @@ def by_object(
     found, places = find_objects(departure, counted, shapes)
     rows = places[counted]
     count = len(found)
-    gains = [means(each, rows, count) for each in removed.values()]
+    gains = [means(change, rows, count) for change in removed.values()]
     remaining = means(left, rows, count)
     return tuple(
         ObjectContribution(
-            name=one.name,
-            pixels=one.pixels,
-            share=one.share,
-            departure=one.mean_dE2000,
-            removes=tuple(jackknifed(each[:, row], BIAS * one.mean_dE2000) for each in gains),
+            name=share.name,
+            pixels=share.pixels,
+            share=share.share,
+            departure=share.mean_dE2000,
+            removes=tuple(jackknifed(change[:, row], BIAS * share.mean_dE2000) for change in gains),
             left=float(remaining[row]),
         )
-        for row, one in enumerate(found)
+        for row, share in enumerate(found)
     )
 
 
 def means(values: NDArray, rows: NDArray, count: int) -> NDArray[np.float64]:
     """Return the means (..., count) of values (..., N) by object; ``rows`` (N,) names it."""
-    sums = [np.bincount(rows, each, count) for each in values.reshape(-1, len(rows))]
+    sums = [np.bincount(rows, weights, count) for weights in values.reshape(-1, len(rows))]
     return np.reshape(sums, (*values.shape[:-1], count)) / np.bincount(rows, minlength=count)
 
 
@@ -354,17 +356,17 @@ def shares(
     for walk in walks:
         subset: frozenset[Player] = frozenset()
         before = value(subset)
-        for place in walk:
-            subset |= {players[place]}
+        for position in walk:
+            subset |= {players[position]}
             after = value(subset)
-            gains[players[place]].append(after - before)
+            gains[players[position]].append(after - before)
             before = after
     found = tuple(sum(gain) / len(walks) for gain in gains.values())
     if is_exact:
         return found, (0.0,) * len(players), 0
     errors = []
     for gain in gains.values():
-        pairs = np.array([np.mean(each) for each in gain]).reshape(-1, 2).mean(axis=1)
+        pairs = np.array([np.mean(change) for change in gain]).reshape(-1, 2).mean(axis=1)
         errors.append(float(pairs.std(ddof=1) / np.sqrt(len(pairs))))
     return found, tuple(errors), orders
 
@@ -402,14 +404,14 @@ def named(comparison: Comparison, effects: Mapping[str, NDArray]) -> ComparisonR
             name: means(values[seen], places[seen], len(objects)) for name, values in maps.items()
         }
         return tuple(
-            structs.replace(one, effect=in_words({name: of[row] for name, of in found.items()}))
-            for row, one in enumerate(objects)
+            structs.replace(item, effect=in_words({name: of[row] for name, of in found.items()}))
+            for row, item in enumerate(objects)
         )
 
     return structs.replace(
         record,
         regions=tuple(
-            structs.replace(one, effect=in_words(in_region(one))) for one in record.regions
+            structs.replace(region, effect=in_words(in_region(region))) for region in record.regions
         ),
         objects=each(record.objects, images.objects),
         materials=each(record.materials, images.materials),

@@ -156,7 +156,7 @@ class HybridScenes:
         """
         scene = self.of(sets[0])
         alike = set(EFFECTS) - set(self.differences)
-        plans = [self.plan.directly().simulating(alike | set(each)) for each in sets]
+        plans = [self.plan.directly().simulating(alike | set(simulated)) for simulated in sets]
         integrator = physical_integrator(plans[0], scene, self.pair.hide_emitters)
         integrator.transports = tuple(
             Transport(plan.shadows, plan.bsdf_samples, plan.max_depth) for plan in plans
@@ -234,11 +234,13 @@ class HybridImages:
         A scene is released before the next: each that is alive slows all others.
         """
         groups: dict[tuple[str, frozenset[Effect]], list[frozenset[Effect]]] = {}
-        for each in dict.fromkeys(frozenset(one) - OF_KERNEL for one in sets):
-            groups.setdefault(self._group(each), []).append(each)
+        for simulated in dict.fromkeys(frozenset(simulated) - OF_KERNEL for simulated in sets):
+            groups.setdefault(self._group(simulated), []).append(simulated)
         for (name, _), group in sorted(groups.items(), key=lambda found: found[0][0]):
             # In one order of transports: scenes that differ only in data share a kernel.
-            group.sort(key=lambda each: [effect in each for effect in EFFECTS if not effect.put])
+            group.sort(
+                key=lambda simulated: [effect in simulated for effect in EFFECTS if not effect.put]
+            )
             with variant(name):
                 self._known |= zip(group, self._rendered(group), strict=True)
 
@@ -262,10 +264,10 @@ class HybridImages:
         if not effects:
             return self.kernel
         found = self.plugin(effects)
-        own = OF_KERNEL.intersection(self.effects)
-        if own <= set(effects):
+        of_kernel = OF_KERNEL.intersection(self.effects)
+        if of_kernel <= set(effects):
             return found
-        return found + (self._kernel(own.intersection(effects)) - self.plain_kernel)
+        return found + (self._kernel(of_kernel.intersection(effects)) - self.plain_kernel)
 
     @property
     def kernel(self) -> NDArray:
@@ -316,7 +318,7 @@ class HybridImages:
             renderer = scenes.emission(sets[0], self._finer_spp)
             self._emission[key] = self._passes(renderer)[0] if renderer else None
         emission = self._emission[key]
-        return found if emission is None else [each + emission for each in found]
+        return found if emission is None else [image + emission for image in found]
 
     @property
     def _finer_spp(self) -> int:
@@ -331,10 +333,12 @@ class HybridImages:
         whole = image_size(renderer.scene)
         renderer.size = self.finer * width, self.finer * height
         loop = passes([renderer], self._seed, self.replicates, stream=Stream.REPLICATES)
-        made = np.stack([np.array(one.images[0]) for one in loop])
+        made = np.stack([np.array(rendered.images[0]) for rendered in loop])
         resize(renderer.scene, whole)
         # An image in grey has one channel.
-        return [np.broadcast_to(one, (*one.shape[:3], 3)) for one in np.split(made, count, axis=3)]
+        return [
+            np.broadcast_to(image, (*image.shape[:3], 3)) for image in np.split(made, count, axis=3)
+        ]
 
     def pixels(self, fine: NDArray) -> NDArray:
         """Return the images (R, H, W, 3): means over blocks of finer pixels."""
@@ -357,17 +361,17 @@ class HybridImages:
         """
         from scipy.ndimage import uniform_filter
 
-        images = [self.simulating(each) for each in sets]
+        images = [self.simulating(simulated) for simulated in sets]
         full = self.simulating(frozenset(self.effects))
         count, height, width, _ = full.shape
         if clean is None or self.finer == 1 or len(clean[0]) < height:
-            return [each.mean(axis=0) for each in images]
+            return [simulated.mean(axis=0) for simulated in images]
         picture = averaged(clean[0], (height, width))
         error = averaged(clean[1], (height, width))
         error *= np.sqrt(height * width / clean[1][..., 0].size)
 
-        def covariance(one: NDArray, other: NDArray) -> NDArray[np.float64]:
-            return (one * other).sum(axis=0).mean(axis=-1) / (count * (count - 1))
+        def covariance(first: NDArray, other: NDArray) -> NDArray[np.float64]:
+            return (first * other).sum(axis=0).mean(axis=-1) / (count * (count - 1))
 
         def deviation(centred: NDArray) -> NDArray[np.float64]:
             return np.sqrt(np.maximum(uniform_filter(covariance(centred, centred), 3), 0))
@@ -377,10 +381,10 @@ class HybridImages:
         known = deviation(other)
         unknown = np.hypot(known, error.mean(axis=-1))
         quiet = []
-        for each in images:
-            mean = each.mean(axis=0)
-            noise = deviation(each - mean)
-            alike = ratio(covariance(each - mean, other), noise * known)
+        for simulated in images:
+            mean = simulated.mean(axis=0)
+            noise = deviation(simulated - mean)
+            alike = ratio(covariance(simulated - mean, other), noise * known)
             beta = ratio(uniform_filter(alike, NEAR).clip(-1, 1) * noise, unknown)
             quiet.append(mean - beta[..., None] * beyond)
         return quiet

@@ -38,7 +38,7 @@ def work(prepare: Callable[[], object], function: Callable[..., Any], *arguments
         return function(*arguments)
 
 
-def silent(*words: object) -> None:
+def silent(*arguments: object) -> None:
     """Discard progress."""
 
 

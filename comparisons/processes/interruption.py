@@ -49,9 +49,9 @@ def code_of(error: BaseException | None) -> int:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    for each in SIGNALS:
-        if signal.getsignal(each) is _interrupt:
-            signal.signal(each, lambda number, _: os._exit(128 + number))
+    for handled in SIGNALS:
+        if signal.getsignal(handled) is _interrupt:
+            signal.signal(handled, lambda number, _: os._exit(128 + number))
     if not _is_delicate(frame):
         raise Interrupted(number)
     signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(number, frame))

@@ -273,7 +273,7 @@ def _answer(
     with_progress: bool,
 ) -> tuple[str, Any]:
     """Do a task; return the method of its outcome to call, and the argument."""
-    progress = [lambda *words: _send(pipe, "progress", words)] if with_progress else []
+    progress = [lambda *state: _send(pipe, "progress", state)] if with_progress else []
     try:
         once(prepare)
         return "set_result", function(*arguments, *progress)

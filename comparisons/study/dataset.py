@@ -141,11 +141,11 @@ def table(study: StudyFile, rows: list[Row]) -> pa.Table:
     present |= {"part", "point", "error"}
     meanings = {True: "parameter that the heuristic declares",
                 False: "parameter of the scene, by its path"}  # fmt: skip
-    own = {
+    declared = {
         path: ("", meanings[path.startswith(OWN)], float)
         for path in sorted(present - {*IDENTITY, *PARAMETERS, *results()})
     }
-    columns = IDENTITY | PARAMETERS | own | results()
+    columns = IDENTITY | PARAMETERS | declared | results()
     columns = {name: column for name, column in columns.items() if name in present}
     kinds = {str: pa.string(), int: pa.int64(), float: pa.float64()}
     fields = [
@@ -187,8 +187,10 @@ def rows(data: pa.Table, part: str, where: dict[str, Any] | None = None) -> list
     """
     for name in where or {}:
         require(data, name)
-    own = [row for row in data.to_pylist() if row["part"] == part and row["error"] is None]
-    matching = [row for row in own if all(_matches(row[k], v) for k, v in (where or {}).items())]
+    of_part = [row for row in data.to_pylist() if row["part"] == part and row["error"] is None]
+    matching = [
+        row for row in of_part if all(_matches(row[k], v) for k, v in (where or {}).items())
+    ]
     if not matching:
         raise InputError(f"no point of part {part!r} has {where or 'a result'}.")
     return matching
@@ -207,7 +209,7 @@ def unit(data: pa.Table, column: str) -> str:
 
 def _matches(value: Any, allowed: Any) -> bool:
     if isinstance(allowed, list):
-        return any(_matches(value, one) for one in allowed)
+        return any(_matches(value, choice) for choice in allowed)
     if isinstance(value, float):
         return isclose(value, allowed, rel_tol=1e-6, abs_tol=1e-9)
     return bool(value == allowed)

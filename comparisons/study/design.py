@@ -113,19 +113,19 @@ class StudyPart:
         """Return the points in order."""
         levels = self.levels.values()
         if self.design == "grid":
-            rows: Any = product(*(each.values for each in levels))
+            rows: Any = product(*(level.values for level in levels))
         else:
             rng = np.random.default_rng(self.options.seed)
             unit = qmc.Sobol(len(levels), rng=rng).random(self.count)
             # The last digits of a power depend on where an array begins in memory.
-            drawn = np.stack([each.at(u) for each, u in zip(levels, unit.T, strict=True)], axis=1)
+            drawn = np.stack([level.at(u) for level, u in zip(levels, unit.T, strict=True)], axis=1)
             rows = [[f"{value:.12g}" for value in row] for row in drawn]
         return [dict(zip(self.levels, map(float, row), strict=True)) for row in rows]
 
     @property
     def varying(self) -> tuple[str, ...]:
         """The parameters that take more than one value."""
-        return tuple(name for name, each in self.levels.items() if len(each.values) > 1)
+        return tuple(name for name, level in self.levels.items() if len(level.values) > 1)
 
 
 class StudyFigure(Record):
@@ -249,9 +249,9 @@ def _all_levels(table: PartTable, where: str) -> dict[str, Levels]:
     """Return the values of all parameters of a part, the most structural first."""
     raw = dict(table.parameters)
     # TOML reads `heuristic.gloss` as a nested table.
-    if isinstance(own := raw.get(OWN[:-1]), dict):
+    if isinstance(tuned := raw.get(OWN[:-1]), dict):
         del raw[OWN[:-1]]
-        raw |= {f"{OWN}{name}": value for name, value in own.items()}
+        raw |= {f"{OWN}{name}": value for name, value in tuned.items()}
     if not raw:
         raise InputError(f"{where}: no parameters are given. Name some in [part.parameters].")
     known = {name: UNLIMITED for name in raw if name.startswith(OWN)}
@@ -270,8 +270,10 @@ def _all_levels(table: PartTable, where: str) -> dict[str, Levels]:
     else:
         known = dict.fromkeys(raw, UNLIMITED)
     return {
-        name: _levels(raw.get(name, one.default), one, table.design == "grid", f"{where}: {name}")
-        for name, one in known.items()
+        name: _levels(
+            raw.get(name, parameter.default), parameter, table.design == "grid", f"{where}: {name}"
+        )
+        for name, parameter in known.items()
     }
 
 
@@ -315,7 +317,7 @@ def _check_size(part: StudyPart, where: str) -> None:
     """Reject a design with no points, too many points, or no range to draw from."""
     size = part.count
     if part.design == "grid":
-        size = int(np.prod([len(each.values) for each in part.levels.values()], dtype=float))
+        size = int(np.prod([len(level.values) for level in part.levels.values()], dtype=float))
     if not 1 <= size <= LARGEST:
         raise InputError(
             f"{where}: the design {part.design!r} has {size} points: give 1 to {LARGEST}."
@@ -329,7 +331,7 @@ def _check_size(part: StudyPart, where: str) -> None:
             f"{where}: points = {size}: give a Sobol design a power of 2, such as {lower}"
             f" or {2 * lower}."
         )
-    if not any(each.is_range for each in part.levels.values()):
+    if not any(level.is_range for level in part.levels.values()):
         raise InputError(f"{where}: no parameter has a range (from, to) to draw from.")
 
 

@@ -96,9 +96,9 @@ def _points(part: StudyPart) -> Iterator[StudyPoint]:
         _check(part, points)
     except InputError as error:
         raise InputError(f"part {part.name!r}: {error}") from error
-    own = "" if part.scene in SCENES else digest(source_of(part, points[0]))
+    scene_digest = "" if part.scene in SCENES else digest(source_of(part, points[0]))
     code = named(part.options.heuristic).digest()
-    content = [own, code, versions()]
+    content = [scene_digest, code, versions()]
     identity = sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
     for number, values in enumerate(points):
         yield StudyPoint(
@@ -108,7 +108,9 @@ def _points(part: StudyPart) -> Iterator[StudyPoint]:
 
 def _check(part: StudyPart, points: list[Point]) -> None:
     """Ensure that a part's scene and heuristic exist, and that paths lead to numbers."""
-    parameters = {each.name: each for each in named(part.options.heuristic).parameters}
+    parameters = {
+        parameter.name: parameter for parameter in named(part.options.heuristic).parameters
+    }
     for point in points:
         for name, value in split(point)[0].items():
             if name not in parameters:
@@ -145,7 +147,7 @@ def run(
     report = progress or (lambda *_: None)
     begin = total - len(left)
     report("points", begin, total)
-    tasks = [Task(f"points of {each.part.name}", row, (each,)) for each in left.values()]
+    tasks = [Task(f"points of {point.part.name}", row, (point,)) for point in left.values()]
     for done, (task, outcome) in enumerate((pool or Pool(0)).each(tasks), start=begin + 1):
         (point,) = task.arguments
         error = outcome.exception()
@@ -190,7 +192,7 @@ def _rendered(point: StudyPoint) -> Row:
     its ``identity`` stays.
     """
     part = point.part
-    own, in_scene = split(point.values)
+    tuned, in_scene = split(point.values)
     source = source_of(part, point.values, point.identity)
     if part.scene not in SCENES:
         source = source.edited(partial(set_values, values=in_scene))
@@ -199,7 +201,7 @@ def _rendered(point: StudyPoint) -> Row:
     scene = ready.scene
     ready.heuristic.spp = spp
     parameters = mi.traverse(ready.heuristic.integrator)
-    for name, value in own.items():
+    for name, value in tuned.items():
         parameters[name] = value
     parameters.update()
     renderers = [ready.heuristic]
@@ -209,10 +211,10 @@ def _rendered(point: StudyPoint) -> Row:
         renderers.append(Renderer(scene, integrator, spp, "reference image"))
     sums = [Accumulator() for _ in renderers]
     difference = Accumulator()
-    for one in passes(renderers, part.options.seed, PASSES):
-        for total, image in zip(sums, one.images, strict=True):
+    for rendered in passes(renderers, part.options.seed, PASSES):
+        for total, image in zip(sums, rendered.images, strict=True):
             total.add(image)
-        difference.add(one.images[0] - one.images[-1])
+        difference.add(rendered.images[0] - rendered.images[-1])
     images = [total.estimate().mean for total in sums]
     result = measure(images[0], images[-1], ready.counted, difference.estimate().noise)
     sizes = dict.fromkeys(STEPS, 0.0)
@@ -226,8 +228,8 @@ def _rendered(point: StudyPoint) -> Row:
 
 def split(point: Point) -> tuple[Point, Point]:
     """Return a point's parameters of the heuristic, without their prefix, and of the scene."""
-    own = {k.removeprefix(OWN): value for k, value in point.items() if k.startswith(OWN)}
-    return own, {name: value for name, value in point.items() if not name.startswith(OWN)}
+    tuned = {k.removeprefix(OWN): value for k, value in point.items() if k.startswith(OWN)}
+    return tuned, {name: value for name, value in point.items() if not name.startswith(OWN)}
 
 
 def source_of(part: StudyPart, point: Point, identity: str = "") -> Source:

@@ -115,13 +115,13 @@ def bsdf(point: Point) -> Dict:
 
 def _sphere(point: Point, material: Dict) -> Dict:
     angle = radians(point["light_angle"])
-    place = (LIGHT_DISTANCE * sin(angle), 0.0, LIGHT_DISTANCE * cos(angle))
+    position = (LIGHT_DISTANCE * sin(angle), 0.0, LIGHT_DISTANCE * cos(angle))
     return {
         "type": "scene",
         "integrator": {"type": "path", "hide_emitters": True},
         "sensor": _camera((0, 0, CAMERA_DISTANCE), (0, 0, 0), (0, 1, 0), 16.0),
         "sphere": {"type": "sphere", "bsdf": material},
-        "lamp": _lamp(place, LIGHT_DISTANCE, point["light_size"]),
+        "lamp": _lamp(position, LIGHT_DISTANCE, point["light_size"]),
     }
 
 
@@ -141,14 +141,14 @@ def _enclosure(point: Point, material: Dict) -> Dict:
     }
 
 
-def _lamp(place: Vector, distance: float, size: float) -> Dict:
+def _lamp(position: Vector, distance: float, size: float) -> Dict:
     """Return a disk of a given angular size that faces the origin, with irradiance ``pi`` there.
 
     A disk of radiance ``L`` and half angle ``a`` gives ``E = pi L sin^2(a)`` on its axis.
     """
     half = radians(size) / 2
     # `up` must not be parallel to the axis; lamps are in the plane y = 0.
-    to_world = mi.ScalarTransform4f().look_at(place, (0, 0, 0), (0, 1, 0))
+    to_world = mi.ScalarTransform4f().look_at(position, (0, 0, 0), (0, 1, 0))
     return {
         "type": "disk",
         "to_world": to_world.scale(distance * tan(half)),
@@ -157,11 +157,11 @@ def _lamp(place: Vector, distance: float, size: float) -> Dict:
     }
 
 
-def _camera(place: Vector, target: Vector, up: Vector, field_of_view: float) -> Dict:
+def _camera(position: Vector, target: Vector, up: Vector, field_of_view: float) -> Dict:
     return {
         "type": "perspective",
         "fov": field_of_view,
-        "to_world": mi.ScalarTransform4f().look_at(place, target, up),
+        "to_world": mi.ScalarTransform4f().look_at(position, target, up),
         "film": {"type": "hdrfilm", "rfilter": {"type": "box"}},
     }
 
@@ -244,10 +244,10 @@ def heuristic_radiance(
     the light has the value 1.
     """
     sun = DirectionalLight(-mi.Vector3f(light), 1.0)
-    place = (0 * furnace.UP, furnace.UP, view)
+    point = (0 * furnace.UP, furnace.UP, view)
     lobe = {"k_s": phong.k_s[0], "n": phong.n}
-    total = np.array(shaded(heuristics.PHONG, place, lobe | {"k_d": phong.k_d[0]}, [sun]), float)[0]
-    specular = np.array(shaded(heuristics.PHONG, place, lobe | {"k_d": 0.0}, [sun]), float)[0]
+    total = np.array(shaded(heuristics.PHONG, point, lobe | {"k_d": phong.k_d[0]}, [sun]), float)[0]
+    specular = np.array(shaded(heuristics.PHONG, point, lobe | {"k_d": 0.0}, [sun]), float)[0]
     return total, specular
 
 

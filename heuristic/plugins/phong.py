@@ -218,9 +218,11 @@ def define() -> dict[str, Any]:
             return bs, dr.select(active, value / bs.pdf, 0)
 
         def traverse(self, callback: Any) -> None:
-            own = {name: getattr(self, name) for name in (*COEFFICIENTS, "n", "transmittance")}
+            parameters = {
+                name: getattr(self, name) for name in (*COEFFICIENTS, "n", "transmittance")
+            }
             partner = {"base_color": self.base_color} | self.partner if self.has_partner else {}
-            for name, value in (own | partner).items():
+            for name, value in (parameters | partner).items():
                 callback.put(name, value, mi.ParamFlags.Differentiable)
 
         def parameters_changed(self, keys: Sequence[str] = ()) -> None:
@@ -233,7 +235,9 @@ def define() -> dict[str, Any]:
                 require_positive(f"phong: {name}", getattr(self, name))
             self.is_clear = may_be_nonzero(self.transmittance)
             self.n_is_moderate = self.is_mirror = False
-            dr.make_opaque([each for each in self.partner.values() if isinstance(each, mi.Float)])
+            dr.make_opaque(
+                [value for value in self.partner.values() if isinstance(value, mi.Float)]
+            )
             if not isinstance(self.n, mi.Texture):
                 dr.make_opaque(self.n)
                 exponents = np.ravel(self.n).tolist()

@@ -281,11 +281,11 @@ def _rule(variant: str, size: int) -> tuple:
     points, weights = _legendre(size)
     row, i, j = np.indices((ROWS, size, size // 2)).reshape(3, -1)
     j += size // 2
-    place = np.asarray(points, np.float32) * np.float32(0.5) + np.float32(0.5)
+    node = np.asarray(points, np.float32) * np.float32(0.5) + np.float32(0.5)
     rule = (
         mi.Vector3f(mi.Float(SINES[row]), 0, mi.Float(COSINES[row])),
-        mi.Float(place[i]),
-        mi.Float(place[j]),
+        mi.Float(node[i]),
+        mi.Float(node[j]),
         mi.Float(erfinv(points)[j]),
         mi.Float(weights[i] * weights[j] / 2),
     )

@@ -85,23 +85,23 @@ class NearestPhong:
 
     def properties(self) -> mi.Properties:
         """Return the properties of the node ``phong``, without defaults."""
-        own = {name: getattr(self, name) for name in (*COEFFICIENTS, "n", "transmittance")}
-        own = {k: v for k, v in own.items() if k in ("k_d", "n") or not values.is_zero(v)}
+        numbers = {name: getattr(self, name) for name in (*COEFFICIENTS, "n", "transmittance")}
+        numbers = {k: v for k, v in numbers.items() if k in ("k_d", "n") or not values.is_zero(v)}
         for name in ("normalised", "twosided", "form"):
             if getattr(self, name) not in (False, "phong"):
-                own[name] = getattr(self, name)
+                numbers[name] = getattr(self, name)
         if self.tilt is not None:
-            own["tilt"] = self.tilt
-        return properties("phong", **own, **self.physical)
+            numbers["tilt"] = self.tilt
+        return properties("phong", **numbers, **self.physical)
 
     def parameters(self) -> dict[str, Any]:
         """Return the coefficients for records: numbers, or the word ``texture``."""
-        own = {name: getattr(self, name) for name in ("k_a", "k_d", "k_s", "n")}
+        parameters = {name: getattr(self, name) for name in ("k_a", "k_d", "k_s", "n")}
         if not values.is_zero(self.transmittance):
-            own["transmittance"] = self.transmittance
+            parameters["transmittance"] = self.transmittance
         return {
             name: "texture" if values.plain(value) is None else values.plain(value)
-            for name, value in own.items()
+            for name, value in parameters.items()
         }
 
 
@@ -251,15 +251,17 @@ def itself(context: Context, index: int) -> NearestPhong:
     props = context.graph.props(index)
     physical = {}
     if context.for_users:
-        plugin, own, _ = physical_partner(context.graph, index, context.convention)
+        plugin, partner, _ = physical_partner(context.graph, index, context.convention)
         if plugin == "diffuse":
-            physical = context.physical(own["reflectance"])
+            physical = context.physical(partner["reflectance"])
         elif plugin == "conductor":
-            physical = context.physical(own["specular_reflectance"], SMALLEST_ALPHA, metallic=1.0)
+            physical = context.physical(
+                partner["specular_reflectance"], SMALLEST_ALPHA, metallic=1.0
+            )
         else:
-            alpha = own.get("alpha", SMALLEST_ALPHA)
-            ior = own["int_ior"] / own["ext_ior"]
-            physical = context.physical(own["diffuse_reflectance"], alpha, ior)
+            alpha = partner.get("alpha", SMALLEST_ALPHA)
+            ior = partner["int_ior"] / partner["ext_ior"]
+            physical = context.physical(partner["diffuse_reflectance"], alpha, ior)
     names = ("k_i", "k_a", "k_d", "k_s", "n", "form", "normalised", "twosided", "transmittance")
     fields = {name: props[name] for name in (*names, "tilt") if name in props}
     lost = (UNSEEN,) if is_mirror(props) else ()

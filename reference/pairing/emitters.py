@@ -59,9 +59,9 @@ def to_heuristic(
             replaced=replaced,
         )
         if light.plugin == "point" and shape is None:
-            place = mi.ScalarPoint3d(light.position())
+            position = mi.ScalarPoint3d(light.position())
             intensity = light.value("intensity", 1.0)
-            light.replace(heuristic("heuristic_point", position=place, intensity=intensity))
+            light.replace(heuristic("heuristic_point", position=position, intensity=intensity))
         elif light.plugin == "directional" and shape is None:
             travel = mi.ScalarVector3f(light.travel())
             intensity = light.value("irradiance", 1.0)
@@ -85,9 +85,9 @@ def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements
             replaced.lose(light.label, light.plugin, SECOND_INTENSITY, nearest)
         if light.plugin == "heuristic_point":
             factor, note = level(light, lambda travel: 1.0, lambda travel: 1.0, 1.0)
-            place = mi.ScalarPoint3d(light.position())
+            position = mi.ScalarPoint3d(light.position())
             intensity = light.scaled_intensity(factor)
-            props = properties("point", position=place, intensity=intensity)
+            props = properties("point", position=position, intensity=intensity)
             light.replace(props, factor, not note, note)
         elif light.plugin == "heuristic_directional":
             travel = light.value("direction", mi.ScalarVector3f(0, 0, 1))

@@ -127,7 +127,7 @@ def _paired(
         half.props(index)["form"] = model.form
     radiance = emitters.to_heuristic(half, geometry, settings.hide_emitters, replaced)
     ambient = settings.ambient if settings.ambient is not None else radiance
-    own = {} if ambient is None else {"ambient": ambient}
+    extra = {} if ambient is None else {"ambient": ambient}
     props = properties(
         "heuristic",
         hide_emitters=settings.hide_emitters,
@@ -135,7 +135,7 @@ def _paired(
         interpolation=interpolation.value,
         prune=prune,
         model=model.name,
-        **own,
+        **extra,
     )
     props.set_id("integrator")  # identifies its parameters
     half.attach(0, "integrator", half.add(INTEGRATOR, props))

@@ -69,7 +69,7 @@ def _area(light: LightNode) -> None:
         props["k_i"] = radiance
         graph.attach(shape, key, graph.add(BSDF, props))
     identifier = graph.props(shape).id()
-    body = next(each for each in light.geometry().shapes() if each.id() == identifier)
+    body = next(shape for shape in light.geometry().shapes() if shape.id() == identifier)
     centroid, area, normal, radius = _extent(body)
     is_texture = isinstance(radiance, Reference)
     if is_texture and graph.instantiate(radiance.index()).is_spatially_varying():

@@ -228,8 +228,8 @@ def level(
     def physical(distance, travel):
         return derived_cone(travel) / distance**2
 
-    place = light.position()
-    here = light.surface().mean_irradiance(place, chapters)
-    there = light.surface().mean_irradiance(place, physical)
+    position = light.position()
+    here = light.surface().mean_irradiance(position, chapters)
+    there = light.surface().mean_irradiance(position, physical)
     note = "same mean irradiance over the visible surface; only the fall-off's shape differs"
     return IRRADIANCE_PER_INTENSITY * (here / there if there > 0 else 1.0), note

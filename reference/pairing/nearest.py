@@ -313,11 +313,11 @@ def alike(
 
 def _beside(material: NearestPhong, other: NearestPhong) -> NearestPhong:
     """Return a material without its mirror if another has a lobe, since both share one ``n``."""
-    own = values.plain(material.n)
+    exponent = values.plain(material.n)
     others = values.plain(other.n)
     if others == inf and values.is_zero(material.k_s):
         return replace(material, n=inf)
-    if own == inf != others and not values.is_zero(other.k_s):
+    if exponent == inf != others and not values.is_zero(other.k_s):
         return replace(material, k_s=0.0, n=other.n)
     return material
 

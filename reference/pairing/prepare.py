@@ -72,8 +72,8 @@ def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -
         values.check_colours(graph, index, bsdfs.COLOURS.get(graph.plugin(index), ()))
     for index in graph.nodes(mi.ObjectType.Emitter):
         plugin = graph.plugin(index)
-        own = INTENSITIES if lights.is_heuristic(plugin) else (lights.of(plugin).colour,)
-        values.check_colours(graph, index, own)
+        colours = INTENSITIES if lights.is_heuristic(plugin) else (lights.of(plugin).colour,)
+        values.check_colours(graph, index, colours)
     checks.check(graph)
     for shape in graph.nodes(SHAPE):
         if not graph.props(shape).id():
@@ -119,8 +119,8 @@ def keep_sensor(graph: Graph, number: int) -> int:
         raise InputError(
             f"{graph.name}: there is no sensor {number}: choose one from 0 to {len(places) - 1}."
         )
-    for place, (parent, key, _) in enumerate(places):
-        if place != number:
+    for choice, (parent, key, _) in enumerate(places):
+        if choice != number:
             graph.detach(parent, key)
     return places[number][2]
 

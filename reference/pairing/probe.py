@@ -292,9 +292,9 @@ class AlbedoTable:
     def at(self, mu: Number) -> Colour:
         """Interpolate linearly at cosines ``mu``; behind a one-sided surface, 0."""
         mu = abs(mu) if self.has_back else mu
-        place = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)
-        place = dr.clip(place, 0, NODES - 1)
-        below = dr.minimum(mi.UInt32(place), NODES - 2)
+        node = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)
+        node = dr.clip(node, 0, NODES - 1)
+        below = dr.minimum(mi.UInt32(node), NODES - 2)
         low = dr.gather(mi.Color3f, self.table, below + 0)
         high = dr.gather(mi.Color3f, self.table, below + 1)
-        return dr.select(mu > 0, dr.lerp(low, high, place - mi.Float(below)), 0)
+        return dr.select(mu > 0, dr.lerp(low, high, node - mi.Float(below)), 0)

@@ -216,9 +216,9 @@ def _inexact_lights(with_cone: bool) -> Callable[[Facts], list[str]]:
 
 
 def _put_lights(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
-    own = dict(facts.pair.heuristic.children(0, EMITTER))
+    emitters = dict(facts.pair.heuristic.children(0, EMITTER))
     for key in keys:
-        graph.attach(0, key, graft(graph, facts.pair.heuristic, own[key]))
+        graph.attach(0, key, graft(graph, facts.pair.heuristic, emitters[key]))
 
 
 def _attenuated(facts: Facts) -> tuple[bool, str]:
@@ -250,8 +250,8 @@ def _put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
             if facts.pair.hide_emitters:
                 graph.remove(shape)
     before = dict(facts.pair.physical.children(0, EMITTER))
-    own = facts.pair.heuristic.children(0, EMITTER)
-    _put_lights(graph, facts, [key for key, _ in own if key not in before])
+    emitters = facts.pair.heuristic.children(0, EMITTER)
+    _put_lights(graph, facts, [key for key, _ in emitters if key not in before])
 
 
 def _surroundings(facts: Facts) -> list[str]:

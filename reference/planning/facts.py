@@ -125,8 +125,8 @@ def _mesh(mesh: mi.Mesh, is_rectangle: bool) -> Geometry:
     has_area = length > 0
     normals = across / np.where(has_area, length, 1)[:, None]
     if smooth:
-        own = meshes.rows(mesh, meshes.NORMALS).astype(float)[faces]
-        if not _are_alike(own, normals[:, None])[has_area].all():
+        vertex_normals = meshes.rows(mesh, meshes.NORMALS).astype(float)[faces]
+        if not _are_alike(vertex_normals, normals[:, None])[has_area].all():
             return UNKNOWN
     if mesh.has_flipped_normals():  # it turns normals of faces and of vertices alike
         normals = -normals
@@ -175,7 +175,7 @@ class ShapeFacts:
     def of(cls, graph: Graph, index: int | None, shape: mi.Shape) -> "ShapeFacts":
         """Return the facts of a shape, given its node in the graph (None if it has none)."""
         box = shape.bbox()
-        own = geometry(shape)
+        shown = geometry(shape)
         nested = graph.children(index, BSDF) if index is not None else []
         bsdf = nested[0][1] if nested else None  # an instance has its group's
         opaque, front, back = _sides(graph, bsdf)
@@ -183,13 +183,13 @@ class ShapeFacts:
             name=shape.id(),
             low=np.array(box.min, float).ravel(),
             high=np.array(box.max, float).ravel(),
-            form=own.form,
-            outer=front if own.is_outward else back,
-            inner=back if own.is_outward else front,
-            shines_outwards=own.is_outward,
-            plane=own.plane,
+            form=shown.form,
+            outer=front if shown.is_outward else back,
+            inner=back if shown.is_outward else front,
+            shines_outwards=shown.is_outward,
+            plane=shown.plane,
             opaque=opaque,
-            sampled_as_hit=own.has_true_normals and _is_sampled_as_hit(graph, index, shape),
+            sampled_as_hit=shown.has_true_normals and _is_sampled_as_hit(graph, index, shape),
             is_mesh=shape.is_mesh(),
         )
 
@@ -253,7 +253,7 @@ def _sides(graph: Graph, bsdf: int | None) -> tuple[bool, bool, bool]:
     if plugin == "twosided":
         inner = [_sides(graph, child) for _, child in graph.children(bsdf, BSDF)]
         reflects = any(front or back for _, front, back in inner)
-        return bool(inner) and all(one[0] for one in inner), reflects, reflects
+        return bool(inner) and all(side[0] for side in inner), reflects, reflects
     reflectances = REFLECTANCES.get(plugin)
     transmittances = TRANSMITTANCES.get(plugin, {})
     passes = any(
@@ -443,5 +443,5 @@ def _lights(graph: Graph) -> Iterator[LightFacts]:
         if index in owners:
             yield LightFacts(name, plugin, shape=owners[index])
         else:
-            place: dict[str, Any] = lights.of(plugin).place(LightNode(graph, index))
-            yield LightFacts(name, plugin, **place)
+            location: dict[str, Any] = lights.of(plugin).place(LightNode(graph, index))
+            yield LightFacts(name, plugin, **location)

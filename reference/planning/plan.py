@@ -224,8 +224,8 @@ def physical_integrator(plan: Plan, scene: Scene, hide_emitters: bool) -> Any:
     description["max_depth"] = plan.max_depth
     if plan.integrator in PATHS:
         return mi.load_dict(description | {"rr_depth": plan.rr_depth})
-    own = {"shadows": plan.shadows, "bsdf_samples": plan.bsdf_samples}
-    integrator = mi.load_dict(description | own)
+    settings = {"shadows": plan.shadows, "bsdf_samples": plan.bsdf_samples}
+    integrator = mi.load_dict(description | settings)
     # The effect left out may be the environment itself.
     if plan.tabulated_environment and scene.environment() is not None:
         from fotismos.reference.pairing.probe import AlbedoTable  # loaded late: few plans need it

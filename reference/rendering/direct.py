@@ -99,20 +99,20 @@ def _define(_variant: str) -> None:
                     extended.append(emitter)
             colours = [colour] * len(self.transports)
             colours = sums(colours, _of_all(delta, True, *arguments))
-            deep = [each for each in self.transports if each.max_depth != 2]
+            deep = [transport for transport in self.transports if transport.max_depth != 2]
             if deep:  # first, so that paths have the same random numbers whatever lights there are
                 # Loaded late: most plans have direct light alone.
                 from fotismos.reference.rendering.indirect import indirect_light
 
-                (max_depth,) = {each.max_depth for each in deep}
+                (max_depth,) = {transport.max_depth for transport in deep}
                 indirect = indirect_light(scene, sampler, si, bsdf, max_depth, RR_DEPTH, hit, deep)
                 added = dict(zip(deep, indirect, strict=True))
-                colours = sums(colours, [added.get(each, 0) for each in self.transports])
+                colours = sums(colours, [added.get(transport, 0) for transport in self.transports])
             colours = sums(colours, _of_all(extended, False, *arguments))
-            looks = any(each.bsdf_samples for each in self.transports)
+            looks = any(transport.bsdf_samples for transport in self.transports)
             if extended and (looks or _has_delta(scene)):
                 colours = sums(colours, _from_bsdf(*arguments))
-            return colours[0], valid, [channel for each in colours[1:] for channel in each]
+            return colours[0], valid, [channel for image in colours[1:] for channel in image]
 
         def aov_names(self):
             channels = range(len(mi.Spectrum(0)))
@@ -163,7 +163,7 @@ def _has_delta(scene):
 
 def _of_all(lights, is_delta, scene, si, bsdf, sampler, active, transports):
     """Return the contribution of lights to each image; points and directions are not random."""
-    is_weighted = not is_delta and any(each.bsdf_samples for each in transports)
+    is_weighted = not is_delta and any(transport.bsdf_samples for transport in transports)
 
     def one(sample_direction, sampler):
         sample = mi.Point2f(0.5) if is_delta else sampler.next_2d(active)
@@ -172,19 +172,19 @@ def _of_all(lights, is_delta, scene, si, bsdf, sampler, active, transports):
         reached = visibility(scene, si, point, facing, transports)
         wo = si.to_local(direction)
         context = mi.BSDFContext()
-        is_mixed = len({each.shadows for each in transports}) > 1
+        is_mixed = len({transport.shadows for transport in transports}) > 1
         evaluated = facing if is_mixed else reached[0]
         if is_weighted:
             value, bsdf_density = bsdf.eval_pdf(context, si, wo, evaluated)
         else:
             value = bsdf.eval(context, si, wo, evaluated)
         colours = []
-        for each, own in zip(transports, reached, strict=True):
+        for transport, visible in zip(transports, reached, strict=True):
             term = value * weight
-            if is_weighted and each.bsdf_samples:
+            if is_weighted and transport.bsdf_samples:
                 # The balance heuristic: a sample of the BSDF can also find the light.
                 term = term * density / (density + bsdf_density)
-            colours.append(dr.select(own, term, 0))
+            colours.append(dr.select(visible, term, 0))
         return colours
 
     targets = [partial(_sampled, light) for light in lights]
@@ -201,7 +201,7 @@ def _sampled(light, si, sample, active):
 
 @dr.syntax
 def _looped(
-    targets: Sequence[Callable], one: Callable, sampler: Any, nothing: list[Colour]
+    targets: Sequence[Callable], of_light: Callable, sampler: Any, nothing: list[Colour]
 ) -> list[Colour]:
     """Sum over lights in a loop, for each image.
 
@@ -212,7 +212,7 @@ def _looped(
     # A sum of thousands would lose terms below its last digit (Neumaier).
     total = list(zip(nothing, nothing, strict=True))
     while number < len(targets):
-        total = _added(total, one(partial(dr.switch, number, targets), sampler))
+        total = _added(total, of_light(partial(dr.switch, number, targets), sampler))
         number += 1
     return [numerics.summed(colour) for colour in total]
 
@@ -235,7 +235,7 @@ def _from_bsdf(scene, si, bsdf, sampler, active, transports):
     ds.emitter = emitter
     emitter_pdf = emitter.pdf_direction(si, ds, active)
     is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-    if not any(each.bsdf_samples for each in transports):
+    if not any(transport.bsdf_samples for transport in transports):
         active &= is_delta
     share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
     value = weight * emitter.eval(hit, active) * share

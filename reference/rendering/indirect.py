@@ -86,6 +86,6 @@ def indirect_light(
 def _weighted(reached, value, share, transports):
     """Return the light of a sampled emitter, for each image; samples of the BSDF find the rest."""
     return [
-        dr.select(seen, value * (share if each.bsdf_samples else 1), 0)
-        for each, seen in zip(transports, reached, strict=True)
+        dr.select(seen, value * (share if transport.bsdf_samples else 1), 0)
+        for transport, seen in zip(transports, reached, strict=True)
     ]

@@ -126,9 +126,9 @@ class Renderer:
                 dr.sync_thread()
             except RuntimeError as error:
                 chain = list(_chain(error))
-                for own in chain:
-                    if isinstance(own, FotismosError):
-                        raise own from None
+                for integrator in chain:
+                    if isinstance(integrator, FotismosError):
+                        raise integrator from None
                 reason = str(chain[-1]).strip()
                 raise InputError(f"{self.label}: Mitsuba cannot render it: {reason}") from error
             self.times.append(perf_counter() - begin)
@@ -300,8 +300,8 @@ def passes(
         for number in range(count):
             if progress:
                 progress(stage, number, count)
-            own = pass_seed(seed, number, stream)
-            result = Pass(number, own, _images(renderers, own, backwards=number % 2 == 1))
+            of_pass = pass_seed(seed, number, stream)
+            result = Pass(number, of_pass, _images(renderers, of_pass, backwards=number % 2 == 1))
             done = number + 1
             yield result
             del result  # else its images would stay alongside the next ones
@@ -318,10 +318,10 @@ def _images(renderers: Sequence[Renderer], seed: int, backwards: bool) -> tuple:
         order.reverse()
     for name in dict.fromkeys(renderer.variant for _, renderer in order):
         with variant(name):
-            for place, renderer in order:
+            for index, renderer in order:
                 if renderer.variant == name:
-                    images[place] = renderer.render(seed)
-    return tuple(images[place] for place in range(len(renderers)))
+                    images[index] = renderer.render(seed)
+    return tuple(images[index] for index in range(len(renderers)))
 
 
 def require_finite(image: np.ndarray, layer: str) -> None:
@@ -336,10 +336,10 @@ def require_finite(image: np.ndarray, layer: str) -> None:
 def _wrong(image, right, what):
     """Return how many pixels are wrong, and the first as (x, y), in reading order from top left."""
     wrong = ~right if right.ndim == 2 else ~right.all(axis=-1)
-    place = np.unravel_index(np.argmax(wrong), wrong.shape)
+    pixel = np.unravel_index(np.argmax(wrong), wrong.shape)
     return (
         f"{np.count_nonzero(wrong)} of {wrong.size} pixels are {what}, the first at (x, y) ="
-        f" ({', '.join(str(index) for index in reversed(place))}): {np.asarray(image)[place]}"
+        f" ({', '.join(str(index) for index in reversed(pixel))}): {np.asarray(image)[pixel]}"
     )
 
 
@@ -360,7 +360,7 @@ def available_memory() -> int | None:
     with suppress(OSError, ValueError, KeyError):
         files = (Path("/proc/meminfo"), Path("/proc/self/status"))
         lines = [line.split() for file in files for line in file.read_text("utf-8").splitlines()]
-        sizes = {words[0]: 1024 * int(words[1]) for words in lines if words[-1] == "kB"}
+        sizes = {fields[0]: 1024 * int(fields[1]) for fields in lines if fields[-1] == "kB"}
         limits = {"VmData:": resource.RLIMIT_DATA, "VmSize:": resource.RLIMIT_AS}
         left = [
             resource.getrlimit(limit)[0] - sizes[name]

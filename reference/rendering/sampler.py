@@ -73,13 +73,13 @@ def _define(_variant: str) -> None:
 
         def seed(self, seed, wavefront_size=0xFFFFFFFF):
             super().seed(seed, wavefront_size)
-            place = dr.arange(mi.UInt32, self.wavefront_size())
-            pixel = place // self.sample_count()
-            self.index = place - pixel * self.sample_count()
+            index = dr.arange(mi.UInt32, self.wavefront_size())
+            pixel = index // self.sample_count()
+            self.index = index - pixel * self.sample_count()
             self.pixel, _ = mi.sample_tea_32(mi.UInt32(seed), pixel)
             # One stream per sample: the pairs of numbers differ wherever seed or place do.
-            state, stream = mi.sample_tea_32(mi.UInt32(seed), place)
-            self.jitter = mi.PCG32(len(place), mi.UInt64(state), mi.UInt64(stream))
+            state, stream = mi.sample_tea_32(mi.UInt32(seed), index)
+            self.jitter = mi.PCG32(len(index), mi.UInt64(state), mi.UInt64(stream))
             self.dimension = dr.opaque(mi.UInt32, 0)
 
         def next_1d(self, active=True):
@@ -139,5 +139,5 @@ def turned(index: Array, count: int, permutation: Array, turn: Array, active: Ma
     if count == 1:
         return mi.UInt32(0)
     # The high word of the product is uniform in 0 … count - 1, without a division.
-    place = mi.permute_kensler(index, count, permutation, active) + dr.mul_hi(turn, count)
-    return dr.select(place >= count, place - count, place)
+    cell = mi.permute_kensler(index, count, permutation, active) + dr.mul_hi(turn, count)
+    return dr.select(cell >= count, cell - count, cell)

@@ -162,8 +162,8 @@ class DifferenceSums(Accumulator):
 
     def _add(self, value: Array, sums: dict[str, Array]) -> None:
         if len(self._index):
-            own = dr.gather(mi.Float64, value, self._index)
-            self._groups[(self.count - 1) % GROUPS] += np.array(own)
+            kept = dr.gather(mi.Float64, value, self._index)
+            self._groups[(self.count - 1) % GROUPS] += np.array(kept)
         super()._add(value, sums)
 
     def estimate(self, dtype: type = float) -> DifferenceEstimate:
@@ -202,14 +202,14 @@ def sample(counted: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
 
     It returns places, blocks and total as in :class:`Grouped`.
     """
-    own = block_numbers(counted)
-    numbers = np.unique(own)
+    blocks = block_numbers(counted)
+    numbers = np.unique(blocks)
     # A random draw, not every n-th block: a stride could align with the image.
     chosen = np.random.default_rng(0).permutation(len(numbers))[:BLOCKS]
     chosen = numbers[np.sort(chosen)]
-    inside = np.isin(own, chosen)
+    inside = np.isin(blocks, chosen)
     places = np.flatnonzero(counted)[inside]
-    return places, np.searchsorted(chosen, own[inside]), len(numbers)
+    return places, np.searchsorted(chosen, blocks[inside]), len(numbers)
 
 
 def add_difference(sums: Sequence[Accumulator], images: Any) -> None:

@@ -26,9 +26,9 @@ def visibility(
 ) -> list[Mask]:
     """Return where each image sees a point of a light: with shadows only where nothing hides it."""
     visible = active
-    if any(each.shadows for each in transports):
+    if any(transport.shadows for transport in transports):
         visible = active & ~scene.ray_test(si.spawn_ray_to(point), active)
-    return [visible if each.shadows else active for each in transports]
+    return [visible if transport.shadows else active for transport in transports]
 
 
 def found_by_bsdf(
@@ -36,5 +36,6 @@ def found_by_bsdf(
 ) -> list[Colour]:
     """Return the light that samples of the BSDF find, for each image."""
     return [
-        dr.select(active & (is_delta | (each.bsdf_samples > 0)), value, 0) for each in transports
+        dr.select(active & (is_delta | (transport.bsdf_samples > 0)), value, 0)
+        for transport in transports
     ]

@@ -80,13 +80,15 @@ class Graph:
         """Return a graph of a node, which comes first, and copies of everything it refers to."""
         part = self._of(Parser.ParserState())
         part.state.files = self.state.files
-        indices = [index, *(one for one in self.nodes_in_use(index) if one != index)]
-        places = {one: place for place, one in enumerate(indices)}
+        indices = [index, *(inner for inner in self.nodes_in_use(index) if inner != index)]
+        places = {inner: number for number, inner in enumerate(indices)}
         paths = list(self.state.node_paths)  # without files and added nodes
         if paths:
-            part.state.node_paths = [paths[one] if one < len(paths) else "" for one in indices]
-        for one in indices:
-            node = Parser.SceneNode(self.state.nodes[one])
+            part.state.node_paths = [
+                paths[inner] if inner < len(paths) else "" for inner in indices
+            ]
+        for inner in indices:
+            node = Parser.SceneNode(self.state.nodes[inner])
             node.props = mi.Properties(node.props)
             part.state.nodes.append(node)
         for node in part.state.nodes:
@@ -141,8 +143,8 @@ class Graph:
 
     def nodes(self, kind: Any, plugin: str = "") -> list[int]:
         """Return the indices of the nodes in use of a kind (``mitsuba.ObjectType``) or a plugin."""
-        own = [index for index in self.nodes_in_use() if self.kind(index) == kind]
-        return [index for index in own if plugin in ("", self.plugin(index))]
+        matching = [index for index in self.nodes_in_use() if self.kind(index) == kind]
+        return [index for index in matching if plugin in ("", self.plugin(index))]
 
     def kind(self, index: int) -> Any:
         """Return the kind of a node; Mitsuba does not know it for Python plugins."""
@@ -174,8 +176,8 @@ class Graph:
         """Return a short name of a node for records and messages: its id, or else its location."""
         if identifier := self.props(index).id():
             return identifier
-        place = Parser.file_location(self.state, self.state.nodes[index])
-        return f"{self.plugin(index)} at {place}"
+        location = Parser.file_location(self.state, self.state.nodes[index])
+        return f"{self.plugin(index)} at {location}"
 
     def file(self, index: int) -> Path | None:
         """Return where Mitsuba finds the file that a node names, None if nothing is there."""
@@ -274,8 +276,8 @@ def plain_message(error: Exception) -> str:
     if isinstance(error, UnicodeDecodeError):
         text = error.object.decode("utf-8", "replace")
     if "Traceback" in text:
-        place, _, trace = text.partition(": failed to instantiate")
-        text = f"{place}: {trace.splitlines()[-1].partition(': ')[2]}"
+        location, _, trace = text.partition(": failed to instantiate")
+        text = f"{location}: {trace.splitlines()[-1].partition(': ')[2]}"
     return LONG.sub(r"\1…\2", CONTENT.sub(r"\1", INCLUDES.sub("", text)))
 
 

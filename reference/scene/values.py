@@ -94,8 +94,8 @@ def product(graph: Graph, a: Any, b: Any) -> Any:
     """Return ``a b``."""
     if is_zero(a) or is_zero(b):
         return 0.0
-    for one, other in ((a, b), (b, a)):
-        if _same(one, 1.0):
+    for factor, other in ((a, b), (b, a)):
+        if _same(factor, 1.0):
             return other
     return _combined(graph, "heuristic_product", np.multiply, a=a, b=b)
 
@@ -158,6 +158,6 @@ def _combined(graph: Graph, plugin: str, function: Callable, **operands: Any) ->
 def _same(a: Any, b: Any) -> bool:
     if isinstance(a, Reference) and isinstance(b, Reference):
         return a.index() == b.index()
-    one = plain(a)
+    first = plain(a)
     other = plain(b)
-    return one is not None and other is not None and bool(np.all(np.equal(one, other)))
+    return first is not None and other is not None and bool(np.all(np.equal(first, other)))

@@ -104,9 +104,9 @@ def _rows(record: Cost) -> list[dict[str, Any]]:
     ]
 
 
-def _by_family(channel: Callable[..., Any], place: int) -> Any:
+def _by_family(channel: Callable[..., Any], column: int) -> Any:
     """Return a channel that tells families apart, by the colours (0) or shapes (1) of MARKS."""
-    styles = [style[place] for style in MARKS.values()]
+    styles = [style[column] for style in MARKS.values()]
     return channel("family:N", legend=None, scale=alt.Scale(domain=list(MARKS), range=styles))
 
 
@@ -158,8 +158,8 @@ def _names_beside(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
     ordered = sorted(last.values(), key=lambda row: -row["error"])
     heights = [HEIGHT * log10(high / max(row["error"], low)) / log10(high / low) for row in ordered]
     named = [
-        {**row, "beside": high * (low / high) ** (place / HEIGHT)}
-        for row, place in zip(ordered, spread(heights, LABEL_GAP, HEIGHT), strict=True)
+        {**row, "beside": high * (low / high) ** (y / HEIGHT)}
+        for row, y in zip(ordered, spread(heights, LABEL_GAP, HEIGHT), strict=True)
     ]
     chart = _charted(named, times, errors)
     beside = _error("beside", errors)

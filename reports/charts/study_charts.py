@@ -91,8 +91,8 @@ def _map(
         cells = [{"x": row[names[0]], "y": row[names[1]], "value": row[column]} for row in data]
     if is_word:
         cells = [cell | {"letter": cell["value"][0].upper()} for cell in cells]
-        words = sorted({cell["value"] for cell in cells})
-        scale = alt.Scale(domain=words, range=WORDS[: len(words)])
+        categories = sorted({cell["value"] for cell in cells})
+        scale = alt.Scale(domain=categories, range=WORDS[: len(categories)])
         colour = alt.Color("value:N", title=column, scale=scale)
     else:
         scale = alt.Scale(scheme="magma" if column.startswith("dE") else "viridis")
@@ -126,8 +126,8 @@ def _lines(
         for cell in _mean(data, keys, column)
     ]
     # Of several columns, the words that their names share, such as `albedo` of both halves.
-    words = [column.split("_") for column in columns]
-    shared = [word for word in words[0] if all(word in other for other in words)]
+    parts_of_names = [column.split("_") for column in columns]
+    shared = [word for word in parts_of_names[0] if all(word in other for other in parts_of_names)]
     label = _label(columns[0]) if len(columns) == 1 else " ".join(shared) or "value"
     scales: list[Spec] = [
         {"type": "log"} if axis in figure.log else {"zero": axis == "y"} for axis in "xy"

@@ -21,7 +21,7 @@ FAINT = "#8a8a8a"
 """Colour of guide lines, visible on light and dark grounds."""
 
 
-def _theme(ink: str, **own: Any) -> Spec:
+def _theme(ink: str, **theme: Any) -> Spec:
     texts: Spec = {"labelColor": ink, "titleColor": ink, "titleFontWeight": "normal"}
     sizes = {"labelFontSize": 11, "titleFontSize": 11}
     lines = {f"{line}Color": ink for line in ("domain", "tick", "grid")}
@@ -35,7 +35,7 @@ def _theme(ink: str, **own: Any) -> Spec:
         "rule": {"color": ink},
         "point": {"color": ink},
         "view": {"stroke": None},
-        **own,
+        **theme,
     }
 
 

@@ -193,9 +193,9 @@ def read_layers(
                 )
                 for name in names
             }
-            if max(max(each.shape) for each in pictures.values()) > longest:
+            if max(max(picture.shape) for picture in pictures.values()) > longest:
                 raise ValueError("they are too large")
-            if not all(np.isfinite(each).all() for each in pictures.values()):
+            if not all(np.isfinite(picture).all() for picture in pictures.values()):
                 raise ValueError("they are not finite")
             return pictures
     except Exception as error:  # the library has many for a file that is not EXR

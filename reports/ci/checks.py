@@ -249,7 +249,7 @@ def _before(made: CheckRecord, before: baselines.Kept, after: baselines.Kept) ->
         sentences=tuple(filter(None, (*made.causes, made.versions_line))),
         moved=tuple(move.cells() for move in made.moved or ()),
         tested=made.tested or 0,
-        pictures={name: images.webp(each, lossless=True) for name, each in shown.items()},
+        pictures={name: images.webp(picture, lossless=True) for name, picture in shown.items()},
         command=made.update_command,
     )
 
@@ -319,7 +319,10 @@ def examine_all(
     """
     paths = sorted({*baselines.find(path), *patterns})
     level = level_of_each(significance, len(paths))
-    calls = [(one, level, seed, folder / one.stem, patterns.get(one)) for one in paths]
+    calls = [
+        (baseline, level, seed, folder / baseline.stem, patterns.get(baseline))
+        for baseline in paths
+    ]
     found = _each(pool, examine_one, calls)
     scenes = [view for _, view in found if isinstance(view, SceneView)]
     return [made for made, _ in found], scenes, [v for _, v in found if isinstance(v, Before)]
@@ -341,10 +344,11 @@ def update_all(
     """
     if patterns:
         transfer = options.get("transfer")
-        shots = [(place, word, transfer, significance) for place, word in patterns.items()]
+        shots = [(baseline, word, transfer, significance) for baseline, word in patterns.items()]
         return [made for made, _ in _each(pool, update_pictures, shots)]
     calls = [
-        (one, scene, with_pictures, significance, options) for one, scene in _targets(path, scenes)
+        (baseline, scene, with_pictures, significance, options)
+        for baseline, scene in _targets(path, scenes)
     ]
     return [made for made, _ in _each(pool, update_one, calls)]
 
@@ -442,4 +446,4 @@ def _targets(path: Path, scenes: Sequence[str]) -> list[tuple[Path, str | None]]
                 f"{', '.join(scenes)}: two scenes have one name. Give a file for each."
             )
         return list(named.items())
-    return [(one, None) for one in baselines.find(path)]
+    return [(baseline, None) for baseline in baselines.find(path)]

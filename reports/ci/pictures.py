@@ -33,8 +33,8 @@ def read_repeats(pattern: str, transfer: str | None) -> Repeats:
     found = [str(path)] if path.is_file() else sorted(glob(str(path), recursive=True))
     if not found:
         raise InputError(f"{pattern}: no file matches. Give repeats, such as 'render_*.exr'.")
-    words = (f"{file}:{layer}" if layer else file for file in found)
-    return Repeats.of(pictures.read(word, transfer) for word in words)
+    named = (f"{file}:{layer}" if layer else file for file in found)
+    return Repeats.of(pictures.read(word, transfer) for word in named)
 
 
 def write(path: Path, repeats: Repeats, transfer: Literal["linear", "srgb"] | None) -> None:
@@ -64,13 +64,13 @@ def record_of(path: Path) -> PictureBaseline:
 def read(path: Path) -> tuple[PictureBaseline, Repeats]:
     """Read a baseline, and the statistics of its repeats from the EXR beside it."""
     baseline = record_of(path)
-    place = path.parent / Path(baseline.images).name
+    images = path.parent / Path(baseline.images).name
     how = program.command("check", path, "--update", "--picture", f"{path.stem}=PATTERN")
-    found = baselines.read_layers(place, LAYERS, LONGEST, how)
+    found = baselines.read_layers(images, LAYERS, LONGEST, how)
     repeats = Repeats(baseline.repeats, **found, correlation=np.array(baseline.correlation))
     is_same = np.allclose(repeats.mean.mean(axis=(0, 1)), baseline.mean, rtol=1e-5, atol=1e-9)
     if not (is_same and (repeats.variance >= 0).all() and baseline.correlation < np.inf):
-        raise InputError(f"{place}: this is not of {path.name}. Write both again: `{how}`.")
+        raise InputError(f"{images}: this is not of {path.name}. Write both again: `{how}`.")
     return baseline, repeats
 
 

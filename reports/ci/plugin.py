@@ -84,8 +84,8 @@ def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
 
 def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str] | None:
     """Explain a departure for which an assertion failed."""
-    for one in (left, right):
-        explain = getattr(type(one), "fotismos_explanation", None)
+    for side in (left, right):
+        explain = getattr(type(side), "fotismos_explanation", None)
         if explain is not None:
-            return [f"{left} {op} {right}", *explain(one)]
+            return [f"{left} {op} {right}", *explain(side)]
     return None

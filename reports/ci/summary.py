@@ -90,8 +90,10 @@ def gate_lines(gates: Sequence[Gate]) -> Iterator[str]:
 def gate_outcome(gates: Sequence[Gate]) -> str:
     """Return the line that says how it went."""
     states = [gate.state for gate in gates]
-    words: dict[Verdict, str] = {"fail": "failed", "undecided": "undecided", "pass": "passed"}
-    counts = (f"{states.count(state)} {word}" for state, word in words.items() if state in states)
+    outcomes: dict[Verdict, str] = {"fail": "failed", "undecided": "undecided", "pass": "passed"}
+    counts = (
+        f"{states.count(state)} {word}" for state, word in outcomes.items() if state in states
+    )
     more = " More samples (--spp, --noise) decide." if "undecided" in states else ""
     return f"gates: {', '.join(counts)}.{more}"
 
@@ -105,13 +107,13 @@ def require_free(junit: Path | None, summary: Path | None, inputs: Iterable[str 
     JUnit replaces only an earlier JUnit file; a summary is appended to Markdown, or to
     ``$GITHUB_STEP_SUMMARY``. Devices and pipes are free.
     """
-    paths = [Path(one) for one in inputs]
+    paths = [Path(file) for file in inputs]
     if junit and summary and junit.resolve() == summary.resolve():
         raise InputError(f"--junit {junit} and --summary: they are one file. Name two.")
     for option, path in (("--junit", junit), ("--summary", summary)):
         if path is None or not path.is_file():
             continue
-        if any(one.exists() and one.samefile(path) for one in paths):
+        if any(file.exists() and file.samefile(path) for file in paths):
             raise InputError(
                 f"{option} {path}: this file is an input of the same command. Name another one."
             )
@@ -142,16 +144,16 @@ def write_junit(path: Path | None, document: Callable[[], bytes]) -> None:
 def append(path: Path | None, text: Callable[[], str]) -> None:
     """Append a summary to a file, if one was requested, and to ``$GITHUB_STEP_SUMMARY``."""
     step = os.environ.get(STEP_SUMMARY)
-    for option, place in (("--summary", path), (STEP_SUMMARY, Path(step) if step else None)):
-        if place is None or (option == STEP_SUMMARY and place == path):
+    for option, target in (("--summary", path), (STEP_SUMMARY, Path(step) if step else None)):
+        if target is None or (option == STEP_SUMMARY and target == path):
             continue
         try:
-            place.parent.mkdir(parents=True, exist_ok=True)
-            with place.open("a", encoding="utf-8") as file:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with target.open("a", encoding="utf-8") as file:
                 file.write(text())
         except OSError as error:
             raise OutputError(
-                f"{option} {place}: {error.strerror or error}. Name a file that can be written to."
+                f"{option} {target}: {error.strerror or error}. Name a file that can be written to."
             ) from error
 
 
@@ -226,8 +228,8 @@ def of_comparison(
             percent(verdict.share(record, threshold).value),
             number(record.metrics[LEADING.name].mean),
         )
-        words = f"{verdict.cause(record)} {verdict.sentence(record, cost, threshold)}"
-        rows.append((record.scene, *numbers, words.strip()))
+        sentences = f"{verdict.cause(record)} {verdict.sentence(record, cost, threshold)}"
+        rows.append((record.scene, *numbers, sentences.strip()))
     records = [record for record, _ in scenes]
     first = verdict.headline(records, threshold)
     second = verdict.most_missing(records, threshold)

@@ -146,15 +146,15 @@ class Fotismos:
         """Return a scene; a path relative to the test's folder, if there is such a file."""
         if not isinstance(scene, (str, Path)):
             return scene
-        place = self.folder.parent / scene
-        return place if place.is_file() else scene
+        beside = self.folder.parent / scene
+        return beside if beside.is_file() else scene
 
     def _path(self, scene: Scene, name: str | None) -> Path:
         if isinstance(scene, (str, Path)) and Path(scene).suffix == ".json":
             return Path(scene)
         suffix = f"-{self.variant}" if self.variant else ""
-        own = atomic.file_name(name or _name(scene), "a baseline")
-        return self.folder / f"{own}{suffix}.json"
+        stem = atomic.file_name(name or _name(scene), "a baseline")
+        return self.folder / f"{stem}{suffix}.json"
 
     def _options(self, options: dict[str, Any]) -> dict[str, Any]:
         return self._with_file(options) | ({"variant": self.variant} if self.variant else {})
@@ -170,8 +170,8 @@ class Fotismos:
 
 
 def _open(scene: Scene, options: Mapping[str, Any], name: str | None = None) -> Case:
-    own = (name or _name(scene)) if _in_python(scene) else None
-    return open_case(scene, Options.of(options), own)
+    label = (name or _name(scene)) if _in_python(scene) else None
+    return open_case(scene, Options.of(options), label)
 
 
 def _in_python(scene: Scene) -> bool:

@@ -72,8 +72,8 @@ def audit(
 
         command = jobs.command_line()
         with hold_results(output / "audit", [_folder_of(name)], command) as (folder,):
-            words = (kind, name, dict(parameters), command, folder)
-            record = pool.do(Task(name, audited, words))
+            arguments = (kind, name, dict(parameters), command, folder)
+            record = pool.do(Task(name, audited, arguments))
     if as_json:
         click.echo(to_json(record), nl=False)
     else:
@@ -87,14 +87,14 @@ def _folder_of(name: str) -> tuple[str, Path | None]:
     """Return a folder's name, one for each function, and the heuristic's file if it has one."""
     from fotismos.heuristic.heuristics import in_file
 
-    if (place := in_file(name)) is None:
+    if (located := in_file(name)) is None:
         return name, None
-    file = Path(place[0])
-    function = place[1]
+    file = Path(located[0])
+    function = located[1]
     return "-".join(filter(None, (file.stem, function))), Path(name)
 
 
-def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, place: Path) -> Audit:
+def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, target: Path) -> Audit:
     """Audit a heuristic or a BSDF, and write the audit's files."""
     from fotismos.comparisons.audit.checks import audit
     from fotismos.comparisons.case import RGB
@@ -105,5 +105,5 @@ def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, pla
     set_variant(RGB)
     plugins.register()
     record = audit(kind, name, parameters, command)
-    audit_files.write(place, record)
+    audit_files.write(target, record)
     return record

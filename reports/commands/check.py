@@ -115,7 +115,7 @@ def check(
         from fotismos.reports.files import results
         from fotismos.reports.page import page
 
-        place = ""
+        page_path = ""
         if update:
             outcomes = checks.update_all(
                 pool, baseline, scenes, images, significance, changes, patterns
@@ -131,22 +131,22 @@ def check(
                     details = page.details(records=records)
                     results.write(folder / results.DETAILS, details)
                     results.write(folder / results.PAGE, page.render(views, title, moved=moved))
-                    place = str(folder / results.PAGE)
+                    page_path = str(folder / results.PAGE)
                 else:
                     results.clear(folder, (results.PAGE, results.DETAILS))
-    for each in outcomes:
-        if each.status == "error":
-            echo(f"fotismos: error: {each.message}", err=True)
+    for outcome in outcomes:
+        if outcome.status == "error":
+            echo(f"fotismos: error: {outcome.message}", err=True)
     summaries.write_junit(junit, lambda: summaries.junit_of_checks(outcomes))
-    summaries.append(summary, lambda: summaries.of_checks(outcomes, significance, place))
-    code = max(each.exit_code for each in outcomes)
+    summaries.append(summary, lambda: summaries.of_checks(outcomes, significance, page_path))
+    code = max(outcome.exit_code for outcome in outcomes)
     if as_json:
         record = checks.Checks(passed=not code, significance=significance, checks=tuple(outcomes))
         click.echo(to_json(record), nl=False)
     elif not is_quiet():
         tell(summaries.lines(outcomes, significance))
-        if place:
-            click.echo(f"page: {place}")
+        if page_path:
+            click.echo(f"page: {page_path}")
     elif code:
         click.echo(summaries.outcome(outcomes, significance))
     context.exit(code)

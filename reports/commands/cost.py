@@ -51,8 +51,8 @@ def cost(
     """  # noqa: D301 click reads the \b as: keep these lines
     if is_measured and at is None:
         raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
-    words = (jobs.request(rendering), rounds, at, is_measured)
-    records = jobs.results_of(output, "cost", timeout, [scene], measured, *words)
+    arguments = (jobs.request(rendering), rounds, at, is_measured)
+    records = jobs.results_of(output, "cost", timeout, [scene], measured, *arguments)
     from fotismos.reference.records import to_json
     from fotismos.reports.files.results import PAGE
     from fotismos.reports.terminal import cost_tables
@@ -71,7 +71,7 @@ def measured(
     rounds: int | None,
     at: tuple[int, int] | None,
     is_measured: bool,
-    place: Path,
+    target: Path,
     progress: Any,
 ) -> Cost:
     """Study what each step of accuracy costs, and write its files."""
@@ -83,7 +83,7 @@ def measured(
     case = open_case(name, request)
     effort = Effort() if rounds is None else Effort(rounds=rounds)
     size = at and f"{at[0]}x{at[1]}"
-    words = case.command("cost", rounds=rounds, at=size, measure=is_measured or None)
-    study = cost(case.source, case.options, effort, progress, words, at, is_measured)
-    cost_files.write(place, study)
+    repeated = case.command("cost", rounds=rounds, at=size, measure=is_measured or None)
+    study = cost(case.source, case.options, effort, progress, repeated, at, is_measured)
+    cost_files.write(target, study)
     return study.record

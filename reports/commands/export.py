@@ -30,7 +30,7 @@ def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
     tell_where(folder)
 
 
-def exported(name: str, request: Options, place: Path, progress: Any) -> None:
+def exported(name: str, request: Options, target: Path, progress: Any) -> None:
     """Write the files that another program needs to render a scene."""
     from fotismos.comparisons.case import open_case
     from fotismos.comparisons.plain_scene import plain_scene
@@ -38,4 +38,4 @@ def exported(name: str, request: Options, place: Path, progress: Any) -> None:
 
     case = open_case(name, request)
     scene = plain_scene(case.source, case.options)
-    export_files.write(place, scene, case.command(image="YOURS.exr"))
+    export_files.write(target, scene, case.command(image="YOURS.exr"))

@@ -45,7 +45,7 @@ def fit(
     form: str,
     as_json: bool,
     timeout: float,
-    **words: Any,
+    **settings: Any,
 ) -> None:
     """Find the heuristic parameters nearest to the reference, and the error that remains.
 
@@ -59,7 +59,9 @@ def fit(
       fotismos fit my_scene.xml --loss linear --form phong
     """  # noqa: D301 click reads the \b as: keep these lines
     choices = {"loss": loss, "form": form}
-    records = jobs.results_of(output, "fit", timeout, scenes, fitted, jobs.request(words), choices)
+    records = jobs.results_of(
+        output, "fit", timeout, scenes, fitted, jobs.request(settings), choices
+    )
     from fotismos.reference.records import plain
     from fotismos.reports.files.results import PAGE
     from fotismos.reports.run import fit_files
@@ -74,7 +76,7 @@ def fit(
 
 
 def fitted(
-    name: str, request: Options, words: dict[str, str], place: Path, progress: Any
+    name: str, request: Options, settings: dict[str, str], target: Path, progress: Any
 ) -> FitRecord:
     """Fit the heuristic to a scene, and write the fit's files; ``words`` are the command's."""
     from fotismos.comparisons.case import open_case
@@ -83,8 +85,8 @@ def fitted(
     from fotismos.reports.run import fit_files
 
     case = open_case(name, request)
-    command = case.command("fit", **words)
-    forms = FORMS if words["form"] == "all" else (words["form"],)
-    result = fit(case.source, case.options, words["loss"], forms, progress, command)
-    fit_files.write(place, result)
+    command = case.command("fit", **settings)
+    forms = FORMS if settings["form"] == "all" else (settings["form"],)
+    result = fit(case.source, case.options, settings["loss"], forms, progress, command)
+    fit_files.write(target, result)
     return result.record

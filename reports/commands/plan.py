@@ -50,9 +50,9 @@ def plan(scene: str, as_json: bool, within: float | None, timeout: float, **rend
         code = 0
         if within is not None:
             with progress.shown() as bar:
-                words = (scene, request, within)
+                arguments = (scene, request, within)
                 result = pool.do(
-                    Task(name=scene, function=chosen, arguments=words, progress=bar.of(scene))
+                    Task(name=scene, function=chosen, arguments=arguments, progress=bar.of(scene))
                 )
             lines = cost_tables.choice_lines(result)
             code = int(result.chosen is None)

@@ -141,8 +141,8 @@ def hold_results(
     with ExitStack() as held:
         with hold(folder, command, (), ASSIGNING_S):
             places = [folder / name for name in assigned(folder, subjects)]
-            for place in places:
-                held.enter_context(hold(place, command, ()))
+            for target in places:
+                held.enter_context(hold(target, command, ()))
         yield places
     with suppress(OutputError), hold(folder, command, (), ASSIGNING_S):
         pass  # if nothing was written, it goes
@@ -338,13 +338,13 @@ def assigned(folder: Path, subjects: Iterable[tuple[str, Path | None]]) -> list[
         # Relative, so that the folder and the file may move together.
         path = file and os.path.relpath(file.resolve(), folder.resolve())
         subject = f"of: {path or f'built-in {name}'}"
-        places = [place for place, of in owners.items() if of == subject]
-        free = (place for place in _candidates(name) if not _subject_of(folder / place))
-        place = next(one for one in chain(places, free) if one not in chosen)
-        own(folder / place)
-        if owners.get(place) != subject:
-            atomic.write(folder / place / MARK, os.fsencode(subject))
-        chosen.append(place)
+        places = [candidate for candidate, of in owners.items() if of == subject]
+        free = (candidate for candidate in _candidates(name) if not _subject_of(folder / candidate))
+        candidate = next(candidate for candidate in chain(places, free) if candidate not in chosen)
+        own(folder / candidate)
+        if owners.get(candidate) != subject:
+            atomic.write(folder / candidate / MARK, os.fsencode(subject))
+        chosen.append(candidate)
     return chosen
 
 
@@ -357,7 +357,7 @@ def _candidates(name: str) -> Iterator[str]:
     yield from (f"{plain}-{number}" for number in count(2))
 
 
-def _subject_of(place: Path) -> str:
+def _subject_of(target: Path) -> str:
     """Return the subject that a mark names; empty for none, as in a mark of 0.2."""
-    text = os.fsdecode((place / MARK).read_bytes()[: 2**16]) if is_own(place) else ""
+    text = os.fsdecode((target / MARK).read_bytes()[: 2**16]) if is_own(target) else ""
     return text if text.startswith("of: ") else ""

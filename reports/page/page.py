@@ -88,11 +88,13 @@ def render(
     scenes.sort(key=lambda scene: -scene.shares[usual])
     failed = {_identifier(failure.scene, taken): failure for failure in failures}
     since = [*(view.before for view in views if view.before), *moved]
-    headline = " ".join([title, *(f"{one.name}: {one.headline}" for one in since[:FIRST_MOVED])])
+    headline = " ".join(
+        [title, *(f"{check.name}: {check.headline}" for check in since[:FIRST_MOVED])]
+    )
     data = {
         "scenes": [
             *map(_scene_data, scenes),
-            *({"id": id, "name": one.scene, "failed": True} for id, one in failed.items()),
+            *({"id": id, "name": failure.scene, "failed": True} for id, failure in failed.items()),
         ],
         "thresholds": THRESHOLDS,
         "usual": threshold,
@@ -147,7 +149,7 @@ def details(
 def _runs(text: Callable[[float], str]) -> Runs:
     """Return the texts at all thresholds, each where it begins."""
     texts = [text(threshold) for threshold in THRESHOLDS]
-    return [(i, each) for i, each in enumerate(texts) if i == 0 or each != texts[i - 1]]
+    return [(i, text) for i, text in enumerate(texts) if i == 0 or text != texts[i - 1]]
 
 
 def _scene(view: SceneView, taken: set[str]) -> PageScene:
@@ -201,10 +203,10 @@ def _board(why: WhyView | None, found: Attribution | None) -> dict[str, Any] | N
         "images": why.pictures.manifest(),
         "hybrids": [
             {
-                "on": [why.effects.names.index(effect) for effect in each.effects],
-                "mean": difference(max(each.error, 0.0)),
+                "on": [why.effects.names.index(effect) for effect in hybrid.effects],
+                "mean": difference(max(hybrid.error, 0.0)),
             }
-            for each in found.hybrids
+            for hybrid in found.hybrids
         ],
     }
 
@@ -220,7 +222,7 @@ def _drawing() -> dict[str, Any]:
         *((metric.name, metric.label, "metric", metric.map_range[1]) for metric in declared),
     )
     return {
-        "maps": [dict(zip(("name", "title", "kind", "top"), each, strict=True)) for each in maps],
+        "maps": [dict(zip(("name", "title", "kind", "top"), shown, strict=True)) for shown in maps],
         "noEffect": NO_EFFECT,
         "colours": {
             "error": images.colour_table(images.ERROR_COLOURS),

@@ -91,9 +91,9 @@ def region_view(region: Region) -> str:
     return f"zoom={zoom}&x={x}&y={y}&box={region.x},{region.y},{region.width},{region.height}"
 
 
-def text_at(runs: Sequence[tuple[int, str]], place: int) -> str:
+def text_at(runs: Sequence[tuple[int, str]], location: int) -> str:
     """Return the last text that begins at a place or before."""
-    return next(text for start, text in reversed(runs) if start <= place)
+    return next(text for start, text in reversed(runs) if start <= location)
 
 
 def ink(colour: str) -> str:

@@ -50,16 +50,16 @@ def why_view(
         height=places.shape[0],
         names=names,
         colours=tuple(EFFECT_COLOURS[name] for name in names),
-        map="".join(LETTERS[int(place)] for place in places.ravel()),
+        map="".join(LETTERS[int(index)] for index in places.ravel()),
     )
     if len(previews) < 2:
         return WhyView(effects=found)
     times = len(previews[0]) // len(counted)
     planes = {"flags": np.uint16(COUNTED) * counted.repeat(times, axis=0).repeat(times, axis=1)}
-    for place, each in enumerate(previews):
-        layers = {c: each[..., i] for i, c in enumerate("RGB")}
-        layers[LEADING.name] = LEADING(each, previews[-1], viewing)
-        planes |= {f"{place}.{c}": encode(values, ROUNDED) for c, values in layers.items()}
+    for index, preview in enumerate(previews):
+        layers = {c: preview[..., i] for i, c in enumerate("RGB")}
+        layers[LEADING.name] = LEADING(preview, previews[-1], viewing)
+        planes |= {f"{index}.{c}": encode(values, ROUNDED) for c, values in layers.items()}
     return WhyView(effects=found, pictures=packed(planes))
 
 
@@ -101,11 +101,11 @@ def terms_view(grid: TermGrid) -> TermsView:
         materials=tuple(vars(material) for material in grid.materials),
         lights=tuple(
             {
-                "name": each.name,
-                "intensity": each.intensity,
-                "specular_intensity": each.specular_intensity,
+                "name": lamp.name,
+                "intensity": lamp.intensity,
+                "specular_intensity": lamp.specular_intensity,
             }
-            for each in grid.lights
+            for lamp in grid.lights
         ),
     )
 

@@ -87,12 +87,12 @@ def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerCha
         return channel("of:N", title=of, sort=names, legend=shown, scale=scale)
 
     below = (
-        alt.Chart(alt.Data(values=[row | {"order": place} for place, row in enumerate(faint)]))
+        alt.Chart(alt.Data(values=[row | {"order": order} for order, row in enumerate(faint)]))
         .mark_line(clip=True, strokeWidth=1)
         .encode(x=x, y=y, order="order:Q", strokeDash=style(alt.StrokeDash, DASHES))
     )
     above = (
-        alt.Chart(alt.Data(values=[row | {"order": place} for place, row in enumerate(rows)]))
+        alt.Chart(alt.Data(values=[row | {"order": order} for order, row in enumerate(rows)]))
         .mark_line(clip=True, strokeWidth=2)
         .encode(x=x, y=y, order="order:Q", strokeDash=style(alt.StrokeDash, DASHES))
     )
@@ -100,12 +100,12 @@ def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerCha
     return alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH // 2)
 
 
-def write(place: Path, record: Audit) -> None:
+def write(folder: Path, record: Audit) -> None:
     """Write ``audit.svg``, ``index.html`` and ``audit.json`` to a folder; the record comes last."""
-    results.own(place)
-    results.write(place / "audit.svg", vega.paper(lobes(record)))
-    results.write(place / results.PAGE, render(record))
-    results.write(place / "audit.json", records.to_json(record))
+    results.own(folder)
+    results.write(folder / "audit.svg", vega.paper(lobes(record)))
+    results.write(folder / results.PAGE, render(record))
+    results.write(folder / "audit.json", records.to_json(record))
 
 
 def render(record: Audit) -> str:
@@ -126,9 +126,9 @@ def render(record: Audit) -> str:
 def headline(record: Audit) -> str:
     """Return the subject with its parameters, and which checks failed."""
     name = record.subject
-    if place := in_file(name):
-        file = Path(place[0]).name
-        name = f"{place[1]} ({file})" if place[1] else file
+    if located := in_file(name):
+        file = Path(located[0]).name
+        name = f"{located[1]} ({file})" if located[1] else file
     title = ", ".join([name, *(f"{key} {value}" for key, value in record.parameters.items())])
     failed = [check.name for check in record.checks if check.verdict == "does not hold"]
     if not failed:

@@ -56,7 +56,7 @@ class Batch:
     @property
     def ordered(self) -> list[SceneView]:
         """The views in the order of the scenes."""
-        return [self.views[place] for place in self.places if place in self.views]
+        return [self.views[target] for target in self.places if target in self.views]
 
     @property
     def done(self) -> int:
@@ -69,9 +69,9 @@ class Batch:
 
         errors = self.errors
         return [
-            Failure(scene=place, error=str(errors[place]))
-            for place in self.places
-            if place in errors
+            Failure(scene=target, error=str(errors[target]))
+            for target in self.places
+            if target in errors
         ]
 
     def record(self) -> RunRecord:
@@ -151,7 +151,7 @@ def run(
         command = jobs.command_line()
         with results.hold(folder, command) as folder:
             places = results.places(folder, scenes)
-            _require_inputs_apart(job.request, [folder / place for place in places])
+            _require_inputs_apart(job.request, [folder / target for target in places])
             for name in (TABLES, FIGURES) if job.figures else (TABLES,):
                 results.own(folder / name)
             batch = Batch(
@@ -159,8 +159,8 @@ def run(
             )
             batch.stages["start-up"] = perf_counter() - START
             calls = {
-                place: (scene, folder, place, replace(job, request=requests[scene]))
-                for place, scene in places.items()
+                target: (scene, folder, target, replace(job, request=requests[scene]))
+                for target, scene in places.items()
             }
             total = SCENE * len(places) + (HARD_CASES if hard_cases else 0.0)
             try:
@@ -199,12 +199,12 @@ def _compare(
 
     tasks = [
         Task(
-            name=place,
+            name=target,
             function=scene.compare,
             arguments=call,
             progress=bar.of(name_of(call[0]), stages),
         )
-        for place, call in calls.items()
+        for target, call in calls.items()
     ]
     bar.begin("scenes", len(tasks), SCENE)
     for task, outcome in pool.each([*tasks, *([hard_cases] if hard_cases else ())]):
@@ -234,7 +234,7 @@ def _require_inputs_apart(request: Options, places: Sequence[Path]) -> None:
         from fotismos.comparisons import pictures  # loaded late: few comparisons have any
 
         path, _ = pictures.parts(word)
-        if path.resolve().parent in [place.resolve() for place in places]:
+        if path.resolve().parent in [target.resolve() for target in places]:
             raise InputError(
                 f"{path}: this picture is in the folder of the results, and would be replaced by"
                 " them. Choose another output folder with -o."

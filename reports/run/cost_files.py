@@ -37,12 +37,12 @@ def documents(study: Study) -> dict[str, bytes]:
     return made
 
 
-def write(place: Path, study: Study) -> None:
+def write(folder: Path, study: Study) -> None:
     """Write the files and the page of a study to a folder, each atomically; other files stay.
 
     The record comes last, so its pictures are never those of another study.
     """
-    results.own(place)
+    results.own(folder)
     made = documents(study)
     page = rendered(
         "cost_page.html.j2",
@@ -53,9 +53,9 @@ def write(place: Path, study: Study) -> None:
         r=study.record,
         figure=figure(study.record),
     )
-    results.write(place / results.PAGE, page)
+    results.write(folder / results.PAGE, page)
     for name, content in made.items():
-        results.write(place / name, content)
+        results.write(folder / name, content)
 
 
 def figure(record: Cost) -> vega.Figure:
@@ -85,5 +85,5 @@ def view(study: Study) -> CostView:
         said=re.sub(r"(?<!\d)-(?=\d)", "−", " ".join(said)),
         busy=busy(record) if record.is_busy else "",
         unreached=unreached(record),
-        colours=tuple(theme.EFFECT_COLOURS[one.effect] for one in effects),
+        colours=tuple(theme.EFFECT_COLOURS[effect.effect] for effect in effects),
     )

@@ -112,7 +112,11 @@ def _departures(record: FitRecord) -> Iterator[Cells]:
 
 def _parameters(fit: FormFit) -> Iterator[Cells]:
     yield "material", "parameter", "paired", "fitted", "95 %, by noise", "note"
-    owned = [(each.name, parameter) for each in fit.materials for parameter in each.parameters]
+    owned = [
+        (material.name, parameter)
+        for material in fit.materials
+        for parameter in material.parameters
+    ]
     for owner, parameter in owned:
         interval = parameter.interval
         note = "at its bound" if parameter.at_bound else ""
@@ -138,5 +142,5 @@ def described(reference: Mapping[str, Any]) -> str:
         return f"{value:.3g}" if isinstance(value, float) else str(value)
 
     names = ("alpha", "int_ior", "diffuse_reflectance", "reflectance")
-    words = [f"{name} {number(reference[name])}" for name in names if name in reference]
-    return f"{reference['plugin']} {', '.join(words)}".strip()
+    changes = [f"{name} {number(reference[name])}" for name in names if name in reference]
+    return f"{reference['plugin']} {', '.join(changes)}".strip()

@@ -47,7 +47,7 @@ class Finished(Record):
 
 
 def compare(
-    name: str, folder: Path, place: str, job: Job, progress: Progress
+    name: str, folder: Path, target: str, job: Job, progress: Progress
 ) -> tuple[SceneView, Seconds]:
     """Compare a scene and write its files to ``folder/place``, unless it is finished there."""
     from fotismos.comparisons.case import open_case
@@ -56,7 +56,7 @@ def compare(
         begin = perf_counter()
         case = open_case(name, job.request)
         key = key_of(case, job)
-        view = None if job.fresh else load(folder / place, key)
+        view = None if job.fresh else load(folder / target, key)
         spent = {"finished scenes": perf_counter() - begin}
         if view is not None:
             return view, spent
@@ -87,8 +87,8 @@ def compare(
         if job.figures:  # first, since the record marks the scene as finished
             from fotismos.reports.charts import figures
 
-            figures.write_scene(folder / results.FIGURES, place, comparison)
-        view = write(folder, place, comparison, study, key)
+            figures.write_scene(folder / results.FIGURES, target, comparison)
+        view = write(folder, target, comparison, study, key)
         return view, spent | {"files": perf_counter() - begin}
 
 
@@ -141,14 +141,14 @@ def key_of(case: Case, job: Job) -> str | None:
     return _digest(json.dumps(parts, sort_keys=True).encode())
 
 
-def load(place: Path, key: str | None) -> SceneView | None:
+def load(folder: Path, key: str | None) -> SceneView | None:
     """Return the view of a finished scene; None if its key is another or a file was changed."""
     if key is None:
         return None
     try:
         # JSON has no bytes: pictures are text in it.
-        found = msgspec.convert(atomic.Entry(place / VIEW, key).load(), Finished, builtin_types=())
-        current = {name: results.digest_of(place / name) for name in found.digests}
+        found = msgspec.convert(atomic.Entry(folder / VIEW, key).load(), Finished, builtin_types=())
+        current = {name: results.digest_of(folder / name) for name in found.digests}
         if current != found.digests:
             return None
         view = found.view
@@ -183,15 +183,15 @@ def write(
     The record is removed first and written last. Files of an earlier result that this one does not
     have are deleted. With a key, :func:`load` finds the result.
     """
-    place = folder / name
+    target = folder / name
     record = comparison.record
-    results.own(place)
-    earlier = _files(place)
-    results.clear(place, (RECORD, VIEW))
+    results.own(target)
+    earlier = _files(target)
+    results.clear(target, (RECORD, VIEW))
     view = view_of(comparison)
     made = {
-        f"{each}.png": png
-        for each, png in images.pictures(comparison.images, record.viewing.exposure).items()
+        f"{picture}.png": png
+        for picture, png in images.pictures(comparison.images, record.viewing.exposure).items()
     }
     linked: tuple[str, ...] = (RECORD, PICTURE)
     if study:
@@ -203,21 +203,21 @@ def write(
         view = structs.replace(view, chart=chart, cost=cost_files.view(study))
     view = structs.replace(view, files={file: f"{name}/{file}" for file in linked})
     for file, content in made.items():
-        results.write(place / file, content)
-    images.write_exr(place / PICTURE, _layers(comparison.images), _header(record))
+        results.write(target / file, content)
+    images.write_exr(target / PICTURE, _layers(comparison.images), _header(record))
     made[RECORD] = atomic.encoded(to_json(record))
     digests = {file: _digest(content) for file, content in made.items()}
-    digests[PICTURE] = results.digest_of(place / PICTURE)
-    results.clear(place, earlier - digests.keys())
+    digests[PICTURE] = results.digest_of(target / PICTURE)
+    results.clear(target, earlier - digests.keys())
     finished = Finished(view=view, digests=digests)
-    atomic.Entry(place / VIEW, key or "none").save(plain(finished))
-    results.write(place / RECORD, made[RECORD])
+    atomic.Entry(target / VIEW, key or "none").save(plain(finished))
+    results.write(target / RECORD, made[RECORD])
     return view
 
 
-def remove(place: Path) -> None:
+def remove(folder: Path) -> None:
     """Delete the files of a result; a folder that is empty then goes with the command."""
-    results.clear(place, (RECORD, VIEW, *_files(place)))
+    results.clear(folder, (RECORD, VIEW, *_files(folder)))
 
 
 def view_of(comparison: Comparison) -> SceneView:
@@ -252,10 +252,10 @@ def _live(points: LivePoints | str) -> LiveView | None:
     return live_view(points)
 
 
-def with_fit(view: SceneView, place: Path) -> SceneView:
+def with_fit(view: SceneView, folder: Path) -> SceneView:
     """Return a view with what the record of a fit in a place says of its scene, if there is one."""
     try:
-        fit = json.loads((place / "fit.json").read_bytes())
+        fit = json.loads((folder / "fit.json").read_bytes())
         mean = fit["fits"][fit["best"]]["departure"][LEADING.name]["after"]
         found = (mean, *fit["resolution"])
         is_same = fit["scene"] == view.record.scene
@@ -273,14 +273,14 @@ def _why(comparison: Comparison) -> WhyView | None:
         return None
     from fotismos.reports.page.why_view import why_view  # loaded late: it needs what finds causes
 
-    previews = [causes.previews[each.effects] for each in causes.record.hybrids]
+    previews = [causes.previews[hybrid.effects] for hybrid in causes.record.hybrids]
     return why_view(causes.maps, causes.counted, previews, comparison.record.viewing)
 
 
-def _files(place: Path) -> set[str]:
+def _files(folder: Path) -> set[str]:
     """Return the files of the result in a place, as far as its view names them."""
     try:
-        digests = json.loads((place / VIEW).read_bytes())["content"]["digests"]
+        digests = json.loads((folder / VIEW).read_bytes())["content"]["digests"]
         return {name for name in digests if "/" not in name}
     except (OSError, ValueError, KeyError, TypeError):
         return set()

@@ -15,15 +15,15 @@ FIGURES = "figures"
 
 def write(study: StudyFile, table: pa.Table, folder: Path) -> tuple[Path, Path]:
     """Write dataset and figures, and return their places."""
-    place = folder / f"{study.name}.parquet"
+    data = folder / f"{study.name}.parquet"
     figures = folder / FIGURES
-    results.write(place, dataset.file_of(table))
+    results.write(data, dataset.file_of(table))
     with_result = {row["part"] for row in table.to_pylist() if row["error"] is None}
     for figure in study_charts.all_figures(study):
         if figure.part in with_result:
             svg = vega.paper(study_charts.chart(figure, table, study))
             results.write(figures / f"{figure.name}.svg", svg)
-    return place, figures
+    return data, figures
 
 
 def summary(study: StudyFile, table: pa.Table, done: int) -> Iterator[str]:
@@ -32,9 +32,9 @@ def summary(study: StudyFile, table: pa.Table, done: int) -> Iterator[str]:
     yield f"{'part':<{width}}  points  failed  mean ΔE2000: least  median   most"
     rows = table.to_pylist()
     for part in study.parts:
-        own = [row for row in rows if row["part"] == part.name]
-        good = sorted(row["dE2000"] for row in own if row["error"] is None)
-        line = f"{part.name:<{width}}  {len(own):>6}  {len(own) - len(good):>6}"
+        of_part = [row for row in rows if row["part"] == part.name]
+        good = sorted(row["dE2000"] for row in of_part if row["error"] is None)
+        line = f"{part.name:<{width}}  {len(of_part):>6}  {len(of_part) - len(good):>6}"
         if good:
             line += f"  {good[0]:>18.2f}  {good[len(good) // 2]:>6.2f}  {good[-1]:>5.2f}"
         yield line

@@ -80,7 +80,7 @@ def together(record: Cost) -> str:
     """Return the sum of what the effects add, in times of the kernel."""
     whole = record.attribution
     kernel = whole.kernel_s.value
-    added = sum(one.adds_s.value for one in whole.effects)
+    added = sum(effect.adds_s.value for effect in whole.effects)
     return (
         f"A sample of the full plan takes {number(whole.plan_s.value / kernel)} times as long as"
         f" the kernel's: 1, {number(added / kernel)} for the effects, and"
@@ -164,16 +164,16 @@ def _offer(point: Point, measured: str) -> str:
 
 def _times(record: Cost) -> Rows:
     yield "method", "x kernel", "interval", "per sample", "overhead", "first image (preparing)"
-    for one in record.methods:
-        others = ", ".join(other for other in one.names if other != one.name)
-        prepared = f" ({seconds(one.prepare_s)})" if one.prepare_s else ""
+    for method in record.methods:
+        others = ", ".join(other for other in method.names if other != method.name)
+        prepared = f" ({seconds(method.prepare_s)})" if method.prepare_s else ""
         yield (
-            f"{one.name} (= {others})" if others else one.name,
-            f"{one.ratio.value:.2f}",
-            f"{one.ratio.low:.2f} to {one.ratio.high:.2f}",
-            seconds(one.per_sample_s.value),
-            seconds(one.overhead_s.value),
-            f"{seconds(one.first_s)}{prepared}",
+            f"{method.name} (= {others})" if others else method.name,
+            f"{method.ratio.value:.2f}",
+            f"{method.ratio.low:.2f} to {method.ratio.high:.2f}",
+            seconds(method.per_sample_s.value),
+            seconds(method.overhead_s.value),
+            f"{seconds(method.first_s)}{prepared}",
         )
 
 
@@ -214,15 +214,15 @@ def _attribution(record: Cost) -> Rows:
     whole = record.attribution
     adds = f"adds at {sized(whole.resolution)}, {whole.spp} samples"
     yield "effect", "removed", "95 % interval", "alone", "last", adds, "95 % interval"
-    for one in whole.effects:
-        time, interval = timed(one.adds_s)
+    for effect in whole.effects:
+        time, interval = timed(effect.adds_s)
         yield (
-            one.effect,
-            f"{one.removes.value:.3f}",
-            f"{one.removes.low:.3f} to {one.removes.high:.3f}",
-            f"{one.alone:.3f}",
-            f"{one.last:.3f}",
-            "no measurable time" if one.adds_s.low <= 0 <= one.adds_s.high else time,
+            effect.effect,
+            f"{effect.removes.value:.3f}",
+            f"{effect.removes.low:.3f} to {effect.removes.high:.3f}",
+            f"{effect.alone:.3f}",
+            f"{effect.last:.3f}",
+            "no measurable time" if effect.adds_s.low <= 0 <= effect.adds_s.high else time,
             interval,
         )
 

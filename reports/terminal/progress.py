@@ -43,9 +43,9 @@ class Bar:
                 current = stage
                 self._progress.reset(task)  # the speed of the last stage says nothing on this one
             after = stages[stages.index(stage) + 1 :] if stage in stages else ()
-            words = f"{name}: {stage} {done} of {total} {self._unit}"
-            words += f", {after[0]} next" if after else ""
-            self._progress.update(task, completed=done, total=total, description=words)
+            line = f"{name}: {stage} {done} of {total} {self._unit}"
+            line += f", {after[0]} next" if after else ""
+            self._progress.update(task, completed=done, total=total, description=line)
 
         self._tasks[update] = task
         return update
@@ -70,8 +70,8 @@ class Bar:
 
     def _advance(self, weight: float) -> None:
         if self._whole is not None:
-            words = f"{self._stage}, {self._done} of {self._count}"
-            self._progress.update(self._whole, advance=weight, description=words)
+            state = f"{self._stage}, {self._done} of {self._count}"
+            self._progress.update(self._whole, advance=weight, description=state)
 
 
 @contextmanager

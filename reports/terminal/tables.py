@@ -33,8 +33,8 @@ def printed(rows: Iterable[Sequence[str]], right: int | None = None) -> Iterator
     """
     headings, *others = rows
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for place, heading in enumerate(headings):
-        is_left = right is None or place < right
+    for column, heading in enumerate(headings):
+        is_left = right is None or column < right
         justify: Literal["left", "right"] = "left" if is_left else "right"
         table.add_column(heading, overflow="fold", justify=justify)
     for row in others:
@@ -169,9 +169,9 @@ def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:
     """Yield a picture's shift, and what is odd about it: all numbers depend on that."""
     shift = picture.shift
     ratio = ", ".join(f"{value:.3g}" for value in picture.ratio)
-    place = "not known" if shift is None else f"{shift[0]:+.1f}, {shift[1]:+.1f} pixels"
+    shifted = "not known" if shift is None else f"{shift[0]:+.1f}, {shift[1]:+.1f} pixels"
     yield f"{record.scene}: {record.heuristic}"
-    yield f"shift {place}; red, green, blue {ratio} times the reference's"
+    yield f"shift {shifted}; red, green, blue {ratio} times the reference's"
     yield from picture.odd
     yield ""
 
