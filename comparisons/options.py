@@ -188,18 +188,18 @@ class Options(
 
     def pair(self, source: Source) -> Pair:
         """Derive both halves of a scene, for the current variant."""
-        from fotismos.reference.pairing.halves import pair
+        from fotismos.reference.pairing.halves import PairOptions, pair
 
-        return pair(
-            source,
-            self.convention,
-            self.resolution,
-            self.polygon_shading,
-            self.tessellation,
+        options = PairOptions(
+            convention=self.convention,
+            resolution=self.resolution,
+            interpolation=self.polygon_shading,
+            tessellation=self.tessellation,
             prune=not self.everything,
             sensor=self.sensor,
             heuristic=self.heuristic,
         )
+        return pair(source, options)
 
     def require_model(self, what: str) -> None:
         """Raise InputError if a picture replaces the heuristic half, which ``what`` renders."""

@@ -18,7 +18,7 @@ from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.lights import INTENSITIES, PLUGINS, lamps
 from fotismos.heuristic.materials import COEFFICIENTS, PHYSICAL
 from fotismos.heuristic.tessellation import RESOLUTION, to_mesh
-from fotismos.reference.pairing.halves import pair
+from fotismos.reference.pairing.halves import PairOptions, pair
 from fotismos.reference.rendering.gbuffer import gbuffer, image_size
 from fotismos.reference.scene.source import Source
 
@@ -61,14 +61,14 @@ def plain_scene(source: Source, options: Options) -> PlainScene:
     """Return a scene as plain data, in the current variant, which must be RGB."""
     if not mi.is_rgb:
         raise InputError(f"variant {mi.variant()}: scenes are exported in RGB. Give llvm_ad_rgb.")
-    halves = pair(
-        source,
-        options.convention,
-        options.resolution,
+    chosen = PairOptions(
+        convention=options.convention,
+        resolution=options.resolution,
         prune=False,
         sensor=options.sensor,
         with_partners=True,
     )
+    halves = pair(source, chosen)
     scene = halves.heuristic.instantiate()
     bsdfs = list(dict.fromkeys(shape.bsdf() for shape in scene.shapes()))
     point = dr.zeros(mi.SurfaceInteraction3f)

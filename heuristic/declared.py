@@ -13,9 +13,9 @@ Declaration = TypeVar("Declaration")
 class Declared(Mapping[str, Declaration], Generic[Declaration]):
     """All named declarations of one kind, the package's own first.
 
-    ``own`` says where these are, as ``module:object``, imported as late as they are read. Installed
-    packages declare theirs by entry points of a group, which are loaded once, when the declarations
-    are listed or a name is not known.
+    ``built_in`` says where these are, as ``module:object``, imported as late as they are read.
+    Installed packages declare theirs by entry points of a group, which are loaded once, when the
+    declarations are listed or a name is not known.
     """
 
     def __init__(self, kind: str, group: str, **built_in: str) -> None:

@@ -12,10 +12,12 @@ if mi.variant() is None:
     mi.set_variant("llvm_ad_rgb")  # Mitsuba has no names before a variant is chosen
 
 from fotismos.reference.pairing.factors import Convention
-from fotismos.reference.pairing.halves import Pair, pair
+from fotismos.reference.pairing.halves import Pair, PairOptions, pair
 from fotismos.reference.planning.plan import Plan, plan
 from fotismos.reference.rendering.renderer import Times
 from fotismos.reference.rendering.sums import Estimate
 from fotismos.reference.scene.source import Source
 
-__all__ = ["Convention", "Estimate", "Pair", "Plan", "Source", "Times", "pair", "plan"]
+__all__ = [
+    "Convention", "Estimate", "Pair", "PairOptions", "Plan", "Source", "Times", "pair", "plan",
+]  # fmt: skip

@@ -8,7 +8,7 @@ from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.heuristic import indirect_light, shadow_maps, tessellation
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import named
-from fotismos.reference.pairing.halves import pair
+from fotismos.reference.pairing.halves import PairOptions, pair
 from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.scene.source import Source
 from tests.parts import camera, moved
@@ -50,7 +50,7 @@ def test_an_integrating_sphere_has_the_light_of_its_closed_form(variant):
 
 def test_the_mean_is_the_indirect_light_of_the_cornell_box(rgb):
     """Of the physical half by ``path``, whose lamp has an extent: a few percent."""
-    found = pair(SCENES["cornell-box"].source(), resolution=(32, 32))
+    found = pair(SCENES["cornell-box"].source(), PairOptions(resolution=(32, 32)))
     physical, half = found.physical.instantiate(), found.heuristic.instantiate()
     full, direct = (
         np.mean([mi.render(physical, integrator=path, spp=128, seed=s) for s in (1, 2)], 0)
@@ -150,7 +150,9 @@ def test_errors_lie_along_edges_and_fall_with_the_resolution(rgb):
 
 def test_a_lamp_on_a_shape_is_not_hidden_by_it(rgb):
     for name in ("cornell-box", "plastic-spheres"):
-        scene = pair(SCENES[name].source(), resolution=(48, 48)).heuristic.instantiate()
+        scene = pair(
+            SCENES[name].source(), PairOptions(resolution=(48, 48))
+        ).heuristic.instantiate()
         assert wrong(scene, 512) < 0.015, name
 
 

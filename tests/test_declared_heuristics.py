@@ -212,7 +212,7 @@ def test_a_pair_says_what_its_heuristic_shades_with(rgb, declared):
     source = SCENES["fig-8-9"].source()
     props = {}
     for name in ("phong", "blinn", "shadowed"):
-        graph = halves.pair(source, heuristic=name).heuristic
+        graph = halves.pair(source, halves.PairOptions(heuristic=name)).heuristic
         (sphere,) = (index for index in graph.nodes(halves.BSDF) if graph.plugin(index) == "phong")
         integrator = graph.props(graph.nodes(halves.INTEGRATOR)[0])
         props[name] = graph.props(sphere).get("form", "phong"), integrator["occlusion"]

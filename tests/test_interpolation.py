@@ -15,7 +15,7 @@ from fotismos.heuristic.plugins.interpolated import (
     stored_shade,
 )
 from fotismos.reference import Source
-from fotismos.reference.pairing.halves import pair
+from fotismos.reference.pairing.halves import PairOptions, pair
 from fotismos.reference.scene.source import collect_messages
 from tests import oracle
 from tests.parts import camera, mesh_of, moved
@@ -289,7 +289,7 @@ def seen(**shapes):
 
 
 def half(source, interpolation=PHONG, **others):
-    return pair(source, interpolation=interpolation, **others).heuristic.instantiate()
+    return pair(source, PairOptions(interpolation=interpolation, **others)).heuristic.instantiate()
 
 
 def test_meshes_with_the_normals_of_faces_keep_them(rgb, tmp_path):

@@ -226,7 +226,9 @@ def test_a_lamp_is_seen_where_the_laws_of_reflection_say(rgb):
 def pair_of(bsdf, convention=Convention.MATCHED, **more):
     shape = {"type": "sphere", "b": bsdf}
     description = {"type": "scene", "sensor": camera((-3, 0, 1), size=8), "shape": shape}
-    return halves.pair(Source("a test", description), convention, **more)
+    return halves.pair(
+        Source("a test", description), halves.PairOptions(convention=convention, **more)
+    )
 
 
 def partner(bsdf, *arguments):

@@ -40,7 +40,9 @@ def scene(bsdf, *lights, integrator=None):
 
 
 def pair_of(*arguments, convention=MATCHED, **keywords):
-    return halves.pair(Source("a test", scene(*arguments, **keywords)), convention)
+    return halves.pair(
+        Source("a test", scene(*arguments, **keywords)), halves.PairOptions(convention)
+    )
 
 
 def only(graph, kind):
@@ -281,7 +283,7 @@ def test_a_light_of_two_intensities_is_paired_by_the_diffuse_one(rgb, tmp_path):
 
 def test_light_without_attenuation_gets_the_same_mean_irradiance_over_what_is_seen(rgb):
     """On a diffuse sphere that is the mean of the picture; only the fall-off's shape differs."""
-    pair = halves.pair(SCENES["fig-8-6b"].source(), resolution=(192, 192))
+    pair = halves.pair(SCENES["fig-8-6b"].source(), halves.PairOptions(resolution=(192, 192)))
     heuristic = np.array(mi.render(pair.heuristic.instantiate(), spp=4, seed=0), float)
     direct = mi.load_dict({"type": "direct"})
     physical = np.array(

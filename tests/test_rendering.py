@@ -52,7 +52,7 @@ def estimate(made, integrator, spp, passes, first_seed=0):
 )
 def test_camera_rays_coincide_in_both_halves(rgb, name, integrator):
     """Same sampler and seed: what the pixels see differs by exactly nothing."""
-    pair = halves.pair(SCENES[name].source(), resolution=(48, 48))
+    pair = halves.pair(SCENES[name].source(), halves.PairOptions(resolution=(48, 48)))
 
     def positions(half, nested):
         made = half.instantiate()

@@ -172,7 +172,9 @@ def test_the_partners_parameters_are_the_physical_ones(rgb, written):
         }
         for one, value in zip(names, expected, strict=True):
             if value is not None:
-                half = halves.pair(Source(name, scene), heuristic=f"mine.py:{one}").heuristic
+                half = halves.pair(
+                    Source(name, scene), halves.PairOptions(heuristic=f"mine.py:{one}")
+                ).heuristic
                 shown = np.array(mi.render(half.instantiate(), spp=1))
                 oracle.require_close(shown.reshape(-1, 3), np.broadcast_to(value, (16, 3)), 2e-3)
 
@@ -196,7 +198,7 @@ def require_sizes(name):
             "type": "scene", "floor": {"type": "rectangle"}, "lamp": lamp | shines,
             "sensor": camera((0, 0, 2), up=(0, 1, 0), size=1, fov=0.1),
         }  # fmt: skip
-        half = halves.pair(Source("lamp", scene), heuristic=name).heuristic
+        half = halves.pair(Source("lamp", scene), halves.PairOptions(heuristic=name)).heuristic
         shown = np.array(mi.render(half.instantiate(), spp=1))[0, 0]
         np.testing.assert_allclose(shown, (*size, np.sqrt(10)), atol=2e-3, err_msg=lamp["type"])
 

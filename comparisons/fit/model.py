@@ -163,7 +163,7 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
         )
 
 
-def _require_fittable(names, bsdfs):
+def _require_fittable(names: Sequence[str], bsdfs: Sequence[Any]) -> None:
     """Reject transparent materials (a sample has one surface), mirrors, and varying exponents."""
     for name, bsdf in zip(names, bsdfs, strict=True):
         if bsdf.is_clear:
@@ -180,15 +180,16 @@ def _require_fittable(names, bsdfs):
             )
 
 
-def _eye(shading):
+def _eye(shading: Any) -> Any:
     """Make an integrator that keeps the points that ``shading`` would shade, and shows emission."""
+    kind: Any = type(shading)
 
-    class Eye(type(shading)):
-        def shaded(self, scene, si, view, normal, active):
+    class Eye(kind):
+        def shaded(self, scene: Any, si: Any, view: Any, normal: Any, active: Any) -> Any:
             materials = self.known(scene).materials
             number = materials.index(si, active) if len(materials.bsdfs) > 1 else mi.UInt32(0)
 
-            def read(name):
+            def read(name: str) -> Any:
                 """Return one coefficient of the material at each sample, as the scene gives it."""
                 readers = [partial(_coefficient, bsdf, name) for bsdf in materials.bsdfs]
                 return materials.switch(readers, si, active)
@@ -205,7 +206,7 @@ def _eye(shading):
             if shading.occlusion:
                 test = shading.visibility(scene, si, active)
 
-                def keep(toward, distance):
+                def keep(toward: Any, distance: Any) -> Any:
                     seen[f"light {len(seen) - before}"] = visible = test(toward, distance)
                     return visible
 
@@ -222,34 +223,34 @@ def _eye(shading):
     return Eye(props)
 
 
-def _coefficient(bsdf, name, si, active):
+def _coefficient(bsdf: Any, name: str, si: Any, active: Any) -> Any:
     return mi.Color3f(getattr(bsdf, name).eval(si, active))
 
 
-def _textured(bsdf):
+def _textured(bsdf: Any) -> list[str]:
     return [name for name in COEFFICIENTS if getattr(bsdf, name).is_spatially_varying()]
 
 
-def _described(bsdf):
+def _described(bsdf: Any) -> Material:
     """Return a ``phong`` as a material of plain numbers; a coefficient with a texture is 1."""
 
-    def plain(values):
+    def plain(values: Any) -> Any:
         # The scene's numbers are the shortest decimals of single precision.
         return tuple(float(str(np.float32(value))) for value in np.ravel(values))
 
     point = dr.zeros(mi.SurfaceInteraction3f)
-    coefficients = dict.fromkeys(COEFFICIENTS, (1.0,) * 3)
+    coefficients: dict[str, Any] = dict.fromkeys(COEFFICIENTS, (1.0,) * 3)
     for name in set(COEFFICIENTS) - set(_textured(bsdf)):
         coefficients[name] = plain(mi.Color3f(getattr(bsdf, name).eval(point)))
     return Material(**coefficients, n=plain(bsdf.n)[0], form=bsdf.form, normalised=bsdf.normalised)
 
 
-def _names(scene, bsdfs):
+def _names(scene: Any, bsdfs: Sequence[Any]) -> list[str]:
     """Return a name for each material: its id, the id of its first shape, or a number.
 
     Shapes of an instanced group are not among the scene's.
     """
-    shapes = {}
+    shapes: dict[Any, str] = {}
     for shape in scene.shapes():
         shapes.setdefault(shape.bsdf(), shape.id())
     return [
@@ -371,7 +372,7 @@ class PhongModel:
         """Return the index of a material's ``n``."""
         return [(p.name, p.owner) for p in self.parameters].index(("n", owner))
 
-    def _derivatives(self, x):
+    def _derivatives(self, x: NDArray) -> Any:
         result = np.empty((len(x), *self.surface.fixed.shape))
         albedo = self.coefficients(x, "k_s")
         for index, parameter in enumerate(self.parameters):
@@ -384,7 +385,7 @@ class PhongModel:
             result[index] = basis * parameter.tint if name == "k_s" else slope * albedo[owner]
         return result
 
-    def _rendered_basis(self, owner, name):
+    def _rendered_basis(self, owner: int, name: str) -> Any:
         """Return the ambient or the diffuse basis of a material, (N, 3)."""
         if name == "k_a":
             value = self._shaded(owner, name, (), self.surface.ambient)
@@ -392,7 +393,7 @@ class PhongModel:
             value = self._shaded(owner, name, self.surface.lights)
         return self.surface.pixels(owner, 0.0 if value is None else value)
 
-    def _rendered_lobe(self, owner, n):
+    def _rendered_lobe(self, owner: int, n: float) -> Any:
         """Return the specular basis of a material, and its derivative by ``ln n``."""
         exponent = dr.opaque(dr.value_t(self._vector), n)
         dr.enable_grad(exponent)
@@ -406,17 +407,17 @@ class PhongModel:
         dr.eval(basis, slope)
         return self.surface.pixels(owner, basis), n * self.surface.pixels(owner, slope)
 
-    def _shaded(self, owner, name, lights, ambient=0, **lobe):
+    def _shaded(self, owner: int, name: str, lights: Any, ambient: Any = 0, **lobe: Any) -> Any:
         """Call the kernel with one coefficient of 1; None if no sample or light shows it."""
         if not len(self.surface.samples[owner]["pixel"]) or not (lights or name == "k_a"):
             return None
-        *point, textures, visible = self._points(owner)
+        position, normal, view, textures, visible = self._points(owner)
         material = Material(**{name: textures.get(name, 1.0)}, **lobe)
         masks = iter(visible)
         test = (lambda toward, distance: next(masks)) if visible else None
-        return shade(*point, material, list(lights), ambient, test)
+        return shade(position, normal, view, material, list(lights), ambient, test)
 
-    def _point(self, owner):
+    def _point(self, owner: int) -> Any:
         """Return the kernel's arrays of a material: place, textures, and masks of the lights."""
         samples = self.surface.samples[owner]
         vectors = (self._vector(samples[key]) for key in ("position", "normal", "view"))

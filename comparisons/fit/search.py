@@ -80,7 +80,7 @@ class Loss:
     rounding: float = inf
 
 
-def _perceptual_derivative(rgb, viewing):
+def _perceptual_derivative(rgb: NDArray, viewing: Viewing) -> NDArray:
     """Return central differences; all six images are converted at once."""
     step = STEP * np.abs(rgb) + SMALLEST_STEP
     shifts = np.concatenate([sign * np.eye(3) for sign in (1, -1)])

@@ -4,6 +4,7 @@ The figures of the chapters give every number but the field of view and the up v
 that frames the sphere serves those of chapter 8. The figures of chapter 6 have no numbers.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import mitsuba as mi
@@ -12,12 +13,12 @@ HIGHLIGHT = (0.45, -0.3, 0.0)
 """Where the light of figure 6.14 is mirrored to the viewer: inside one of the two triangles."""
 
 
-def looking_from(origin: tuple[float, float, float]) -> Any:
+def looking_from(origin: Sequence[float]) -> Any:
     """Return the transform of a camera or lamp at a place that faces the origin; z is up."""
     return mi.ScalarTransform4f().look_at(origin, (0, 0, 0), (0, 0, 1))
 
 
-def _camera(viewer, field_of_view=40.0):
+def _camera(viewer: Sequence[float], field_of_view: float = 40.0) -> dict[str, Any]:
     return {
         "type": "perspective",
         "fov": field_of_view,
@@ -26,11 +27,13 @@ def _camera(viewer, field_of_view=40.0):
     }
 
 
-def _sphere(**bsdf):
+def _sphere(**bsdf: Any) -> dict[str, Any]:
     return {"type": "sphere", "bsdf": {"id": "sphere material", **bsdf}}
 
 
-def _textbook(viewer, field_of_view=40.0, /, **content):
+def _textbook(
+    viewer: Sequence[float], field_of_view: float = 40.0, /, **content: Any
+) -> dict[str, Any]:
     sensor = _camera(viewer, field_of_view)
     integrator = {"type": "heuristic"}
     return {"type": "scene", "integrator": integrator, "sensor": sensor, **content}

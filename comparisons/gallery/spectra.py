@@ -48,29 +48,29 @@ def metameric_pair() -> dict[str, Any]:
     return _row(surfaces, _spectrum(_at_luminance(_incandescent(), 70.0)))
 
 
-def _colour_matching():
+def _colour_matching() -> Any:
     """CIE 1931 colour-matching functions at :data:`WAVELENGTHS`, (3, n)."""
     return np.array(mi.cie1931_xyz(mi.Float(WAVELENGTHS)))
 
 
-def _incandescent():
+def _incandescent() -> Any:
     """CIE illuminant A: Planck's law at 2856 K, relative."""
     metres = WAVELENGTHS * 1e-9
     return metres**-5 / np.expm1(1.435e-2 / (metres * 2856))
 
 
-def _at_luminance(spectrum, luminance):
+def _at_luminance(spectrum: Any, luminance: float) -> Any:
     """Scale a spectrum to a given Y, by Mitsuba's normalisation."""
     y = np.sum(spectrum * _colour_matching()[1]) * (WAVELENGTHS[1] - WAVELENGTHS[0])
     return spectrum * luminance / (y * mi.MI_CIE_Y_NORMALIZATION)
 
 
-def _spectrum(values):
+def _spectrum(values: Any) -> dict[str, Any]:
     pairs = list(zip(WAVELENGTHS.tolist(), np.asarray(values).tolist(), strict=True))
     return {"type": "spectrum", "value": pairs}
 
 
-def _row(surfaces, intensity):
+def _row(surfaces: Any, intensity: Any) -> dict[str, Any]:
     """Diffuse spheres side by side under one point light, which makes the pair exact."""
     count = len(surfaces)
     scene = {

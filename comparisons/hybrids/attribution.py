@@ -397,7 +397,7 @@ def named(comparison: Comparison, effects: Mapping[str, NDArray]) -> ComparisonR
         columns = slice(region.x, region.x + region.width)
         return {name: float(values[rows, columns].mean()) for name, values in maps.items()}
 
-    def each(objects, places):
+    def each(objects: Any, places: Any) -> Any:
         """Name the effects by the maps' cell in which each pixel of an object lies."""
         seen = places >= 0
         found = {
@@ -432,7 +432,7 @@ def in_words(found: Mapping[str, float]) -> str | None:
     return first
 
 
-def _enlarged(values, shape):
+def _enlarged(values: NDArray, shape: tuple[int, ...]) -> NDArray:
     height, width = shape
     rows = np.arange(height) * values.shape[0] // height
     columns = np.arange(width) * values.shape[1] // width

@@ -80,7 +80,7 @@ def define() -> dict[str, Any]:
     class HeuristicLight(mi.Emitter):
         """One of the kinds in :data:`fotismos.heuristic.lights.PLUGINS`, never hit by a ray."""
 
-        def __init__(self, props: Properties):
+        def __init__(self, props: Properties) -> None:
             super().__init__(props)
             self.model = PLUGINS[props.plugin_name()]
             self.intensities = {
@@ -180,7 +180,7 @@ def define() -> dict[str, Any]:
     class HeuristicGlow(mi.Emitter):
         """See the module's docstring."""
 
-        def __init__(self, props: Properties):
+        def __init__(self, props: Properties) -> None:
             super().__init__(props)
             self.k_i = emitted(props, "k_i", 0.0)
             self.k_a = coefficient(props, "k_a")

@@ -59,7 +59,7 @@ def define() -> dict[str, Any]:
     class HeuristicIntegrator(mi.SamplingIntegrator):
         """See the module's docstring."""
 
-        def __init__(self, props: Properties):
+        def __init__(self, props: Properties) -> None:
             super().__init__(props)
             self.ambient = emitted(props, "ambient", 0.0)
             self.model = heuristics.named(props.get("model", heuristics.PHONG.name))

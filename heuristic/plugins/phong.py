@@ -68,7 +68,7 @@ def define() -> dict[str, Any]:
     class PhongBSDF(mi.BSDF):
         """See the module's docstring."""
 
-        def __init__(self, props: Properties):
+        def __init__(self, props: Properties) -> None:
             super().__init__(props)
             self.k_i = emitted(props, "k_i", 0.0)
             self.k_a = coefficient(props, "k_a")

@@ -83,7 +83,7 @@ def define() -> dict[str, Any]:
     class Computed(mi.Texture):
         """See the module's docstring."""
 
-        def __init__(self, props: Properties):
+        def __init__(self, props: Properties) -> None:
             super().__init__(props)
             names, self.operation = OPERATIONS[props.plugin_name()]
             self.operands = {
@@ -129,7 +129,7 @@ def define() -> dict[str, Any]:
     class Tilt(mi.Texture):
         """See the module's docstring."""
 
-        def __init__(self, props: Properties):
+        def __init__(self, props: Properties) -> None:
             super().__init__(props)
             self.maps = {name: props.get_texture(name) for name in MAPS if name in props}
             self.scale = props.get("scale", 1.0)

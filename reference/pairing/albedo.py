@@ -163,7 +163,7 @@ def ior_of_lobe(plastic: RoughPlastic, albedo: float) -> float:
     """
     largest = LARGEST_IOR if plastic.alpha else LARGEST_SMOOTH_IOR
 
-    def distance(x):
+    def distance(x: float) -> float:
         return log(max(specular_of(replace(plastic, int_ior=1 + exp(x)))) / albedo)
 
     if albedo <= 0:
@@ -185,14 +185,14 @@ def nearest_ior(plastic: RoughPlastic, albedo: Albedo) -> float:
     A high index reflects more and transmits less to the base and back: no index gives both.
     """
 
-    def distance(log_ior):
+    def distance(log_ior: float) -> float:
         reached = of_roughplastic(replace(plastic, int_ior=exp(log_ior)))
         diffuse = np.minimum(albedo.diffuse, reached.diffuse)
         return np.sum((diffuse - albedo.diffuse) ** 2 + (reached.specular - albedo.specular) ** 2)
 
     # At the minimum the values one step to either side are equal: the minimum itself is too flat
     # to locate in single precision.
-    def slope(log_log_ior):
+    def slope(log_log_ior: float) -> float:
         return distance(exp(log_log_ior) * STEP) - distance(exp(log_log_ior) / STEP)
 
     smallest = log(log(SMALLEST_IOR) * STEP)

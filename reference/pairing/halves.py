@@ -5,6 +5,7 @@ replaces physical parts, the physical half replaces heuristic parts, and parts o
 stay. Both keep the scene's geometry, cameras and films.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 
@@ -24,7 +25,7 @@ from fotismos.reference.pairing.factors import (
     Unrepresentable,
     specular_albedo,
 )
-from fotismos.reference.pairing.prepare import Override, prepare
+from fotismos.reference.pairing.prepare import Override, Settings, prepare
 from fotismos.reference.records import Record
 from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.scene.graph import Graph, properties
@@ -70,18 +71,9 @@ class Pair:
     shading: str = PHONG.name
 
 
-def pair(
-    source: Source,
-    convention: Convention = Convention.MATCHED,
-    resolution: tuple[int, int] | None = None,
-    interpolation: Interpolation = Interpolation.PHONG,
-    tessellation: int | None = None,
-    prune: bool = True,
-    sensor: int = 0,
-    heuristic: str = PHONG.name,
-    with_partners: bool = False,
-) -> Pair:
-    """Derive both halves of a scene, for the current variant.
+@dataclass(frozen=True)
+class PairOptions:
+    """How both halves are derived from a scene.
 
     FLAT and GOURAUD make meshes of the heuristic half's shapes, by ``tessellation``
     (:mod:`fotismos.heuristic.tessellation`); if that is given, PHONG gets meshes too. ``prune``
@@ -89,12 +81,25 @@ def pair(
     that shades the heuristic half; ``with_partners`` lets its materials know their physical
     parameters (:mod:`fotismos.reference.pairing.nearest`), as they do for every user's heuristic.
     """
+
+    convention: Convention = Convention.MATCHED
+    resolution: tuple[int, int] | None = None
+    interpolation: Interpolation = Interpolation.PHONG
+    tessellation: int | None = None
+    prune: bool = True
+    sensor: int = 0
+    heuristic: str = PHONG.name
+    with_partners: bool = False
+
+
+def pair(source: Source, options: PairOptions | None = None) -> Pair:
+    """Derive both halves of a scene, for the current variant."""
+    options = options or PairOptions()
     register()
     graph = source.parse()
-    settings = prepare(graph, resolution, sensor)
-    chosen = interpolation, tessellation, prune, heuristic, with_partners
+    settings = prepare(graph, options.resolution, options.sensor)
     try:
-        return _paired(graph, settings, convention, *chosen)
+        return _paired(graph, settings, options)
     except FotismosError:
         raise
     except Exception:
@@ -102,9 +107,7 @@ def pair(
         raise
 
 
-def _paired(
-    graph, settings, convention, interpolation, tessellation, prune, heuristic, with_partners
-):
+def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
     bare = graph.copy()
     for shape in bare.nodes(SHAPE):
         for kind in (BSDF, MEDIUM):
@@ -112,10 +115,11 @@ def _paired(
                 bare.detach(shape, key)
     geometry = cache(bare.instantiate)
 
-    model = named(heuristic)
+    model = named(options.heuristic)
     half = graph.copy()
     replaced = Replacements()
-    context = bsdfs.Context(half, convention, for_users=with_partners or not model.is_own)
+    for_users = options.with_partners or not model.is_own
+    context = bsdfs.Context(half, options.convention, for_users=for_users)
     if any(half.plugin(index) not in bsdfs.RULES for index in half.nodes(BSDF)):
         from fotismos.reference.pairing import (
             nearest,  # loaded late: only for lobes and transmission
@@ -132,26 +136,27 @@ def _paired(
         "heuristic",
         hide_emitters=settings.hide_emitters,
         occlusion=settings.occlusion or "visible" in model.needs,
-        interpolation=interpolation.value,
-        prune=prune,
+        interpolation=options.interpolation.value,
+        prune=options.prune,
         model=model.name,
         **extra,
     )
     props.set_id("integrator")  # identifies its parameters
     half.attach(0, "integrator", half.add(INTEGRATOR, props))
-    if interpolation is not Interpolation.PHONG or tessellation is not None:
+    is_phong = options.interpolation is Interpolation.PHONG
+    if not is_phong or options.tessellation is not None:
         from fotismos.reference.pairing import (
             polygons,  # loaded late: few scenes are made into triangles
         )
 
-        polygons.replace_shapes(half, geometry(), tessellation, interpolation)
+        polygons.replace_shapes(half, geometry(), options.tessellation, options.interpolation)
 
     physical = graph.copy()
     emitters.add_glowing_shapes(physical, replaced)
-    bsdfs.to_physical(physical, convention, replaced)
+    bsdfs.to_physical(physical, options.convention, replaced)
     emitters.to_physical(physical, lambda: gbuffer(geometry()), replaced)
     if settings.ambient is not None:
-        emitters.add_environment(physical, graph, settings.ambient, convention, replaced)
+        emitters.add_environment(physical, graph, settings.ambient, options.convention, replaced)
 
     media = tuple((graph.label(index), graph.plugin(index)) for index in graph.nodes(MEDIUM))
     for label, plugin in media:
@@ -163,7 +168,7 @@ def _paired(
         hide_emitters=settings.hide_emitters,
         max_depth=settings.max_depth,
         pairing=Pairing(
-            convention=convention.value,
+            convention=options.convention.value,
             bsdfs=tuple(replaced.bsdfs),
             emitters=tuple(replaced.emitters),
             misses=tuple(replaced.misses),
@@ -178,7 +183,7 @@ def _paired(
     )
 
 
-def _energy_warnings(graph):
+def _energy_warnings(graph: Graph) -> Iterator[str]:
     for index in graph.nodes(BSDF, "phong"):
         try:
             material = bsdfs.phong(graph, index)

@@ -154,7 +154,7 @@ def exponent_for(cutoff: float, beam_width: float) -> float:
     target = linear_falloff(theta, cutoff, beam_width)
     flux = linear_flux(cutoff, beam_width)
 
-    def distance(log_m):
+    def distance(log_m: float) -> float:
         m = np.expm1(log_m)
         fitted = flux / power_flux(cutoff, m) * power_falloff(theta, m)
         return np.sum(weight * (fitted - target) ** 2)
@@ -173,11 +173,11 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
     target = power_falloff(theta, exponent)
     flux = power_flux(cutoff, exponent)
 
-    def distance(edge, beam_width):
+    def distance(edge: float, beam_width: float) -> float:
         fitted = flux / linear_flux(edge, beam_width) * linear_falloff(theta, edge, beam_width)
         return np.sum(weight * (fitted - target) ** 2)
 
-    def best_beam(edge):
+    def best_beam(edge: float) -> Any:
         # Mitsuba rejects a beam as wide as the cone; just below it the cone is even.
         return _least(lambda beam_width: distance(edge, beam_width), 0.0, edge * (1 - 1e-4))
 
@@ -251,7 +251,7 @@ def spot_to_physical(light: LightNode) -> None:
     exponent = light.number("exponent", 0.0)
     edge, beam_width = cone_for(cutoff, exponent)
 
-    def angle(travel):
+    def angle(travel: Any) -> Any:
         return np.degrees(np.arccos(np.clip(travel @ axis, -1, 1)))
 
     factor, rule = level(

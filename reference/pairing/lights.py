@@ -118,7 +118,7 @@ class LightNode:
         self._record("none", 0.0, False, note, "this kind of light")
         self.graph.remove(self.index)
 
-    def _record(self, derived, factor, exact, note, lost=""):
+    def _record(self, derived: str, factor: float, exact: bool, note: str, lost: str = "") -> None:
         self.replaced.emitter(self.label, self.plugin, derived, factor, exact, note)
         if lost:
             self.replaced.lose(self.label, self.plugin, lost, note)
@@ -221,11 +221,11 @@ def level(
     if (k0, k1, k2) == INVERSE_SQUARE and not clamped:
         return IRRADIANCE_PER_INTENSITY * flux_ratio, ""
 
-    def chapters(distance, travel):
+    def chapters(distance: Any, travel: Any) -> Any:
         factor = 1 / np.maximum(k0 + k1 * distance + k2 * distance**2, np.finfo(float).tiny)
         return (np.minimum(factor, 1) if clamped else factor) * cone(travel)
 
-    def physical(distance, travel):
+    def physical(distance: Any, travel: Any) -> Any:
         return derived_cone(travel) / distance**2
 
     position = light.position()

@@ -59,6 +59,6 @@ def replace_shapes(
 class _Folder:
     """A temporary folder that goes away with the last graph; ``TemporaryDirectory`` would warn."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.path = Path(mkdtemp(prefix="fotismos-"))
         weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)

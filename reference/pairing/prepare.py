@@ -98,7 +98,7 @@ def film_size(graph: Graph, sensor: int = 0) -> tuple[int, int]:
     return _size(graph.props(films[0][1]) if films else {})
 
 
-def _size(film):
+def _size(film: Any) -> tuple[int, int]:
     width, height = checks.FILM_SIZE
     return int(film.get("width", width)), int(film.get("height", height))
 
@@ -125,7 +125,9 @@ def keep_sensor(graph: Graph, number: int) -> int:
     return places[number][2]
 
 
-def _prepare_film(graph, sensor, resolution, settings):
+def _prepare_film(
+    graph: Graph, sensor: int, resolution: tuple[int, int] | None, settings: Settings
+) -> None:
     films = graph.children(sensor, FILM)
     if not films:
         films = [("film", graph.add(FILM, properties("hdrfilm")))]
@@ -155,7 +157,7 @@ def _prepare_film(graph, sensor, resolution, settings):
         _resize(props, resolution)
 
 
-def _resize(props, resolution):
+def _resize(props: Any, resolution: tuple[int, int]) -> None:
     """Set a film's size; a crop keeps its place in the picture."""
     sides = zip(("width", "height"), "xy", resolution, _size(props), strict=True)
     for side, name, new, before in sides:
@@ -168,7 +170,7 @@ def _resize(props, resolution):
         props[side] = new
 
 
-def _give_weights(graph, settings):
+def _give_weights(graph: Graph, settings: Settings) -> None:
     """Sample lights that the scene does not sample: each plan would treat them differently."""
     kind = mi.ObjectType.Emitter
     owners = {
@@ -182,7 +184,7 @@ def _give_weights(graph, settings):
             props["sampling_weight"] = 1.0
 
 
-def _take_integrator(graph, settings):
+def _take_integrator(graph: Graph, settings: Settings) -> None:
     for key, outer in graph.children(0, INTEGRATOR):
         graph.detach(0, key)
         index = outer

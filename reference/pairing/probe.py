@@ -139,7 +139,7 @@ def lattice(size: int, generator: Sequence[int] = LATTICE) -> np.ndarray:
     return (np.outer(generator, np.arange(size)) / size + 0.5 / size) % 1
 
 
-def _wavelengths():
+def _wavelengths() -> np.ndarray | tuple[None]:
     return WAVELENGTHS.reshape(-1, 4) if mi.is_spectral else (None,)
 
 
@@ -150,7 +150,7 @@ def _of_rays() -> np.ndarray:
     return np.array(wavelengths[0]).reshape(4, -1).T
 
 
-def _at(si, wavelengths):
+def _at(si: Any, wavelengths: np.ndarray | None) -> Any:
     """Return an interaction at four wavelengths; opaque ones compile the same kernel for all."""
     if wavelengths is not None:
         si.wavelengths = mi.Spectrum(*map(float, wavelengths))
@@ -193,7 +193,7 @@ def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple:
     return reflected, diffuse, passed, scattered, _width(bs, weight, up, diffuse)
 
 
-def _width(bs, weight, up, diffuse):
+def _width(bs: Any, weight: Any, up: Any, diffuse: Any) -> Any:
     weights = np.mean(np.array(weight, float), axis=0) * np.array(up)
     cosine = np.clip(np.array(bs.wo.z, float), 1e-6, 1)
     density = np.array(bs.pdf, float)
@@ -257,7 +257,7 @@ def _lattice() -> tuple[mi.Float, ...]:
     return tuple(mi.Float(row) for row in lattice(SAMPLES_OF_LIGHTS, LATTICE_OF_LIGHTS))
 
 
-def _channel_means(spectrum):
+def _channel_means(spectrum: Any) -> Any:
     """Return the mean of each channel, at least 0: sky models dip slightly below."""
     return np.array([max(np.mean(np.array(channel, float)), 0.0) for channel in spectrum])
 
@@ -271,7 +271,7 @@ class AlbedoTable:
 
     DRJIT_STRUCT: ClassVar = {"table": Any}  # what dr.freeze must know of
 
-    def __init__(self, bsdf: Any):
+    def __init__(self, bsdf: Any) -> None:
         self.has_back = mi.has_flag(bsdf.flags(), mi.BSDFFlags.BackSide)
         mu = np.linspace(1e-3, 1, NODES) ** 2
         # Spread out in the kernel: millions of numbers need not be sent.

@@ -224,7 +224,7 @@ class Boxes:
     by more than rounding; always if shape i may receive light from anywhere.
     """
 
-    def __init__(self, shapes: Sequence[ShapeFacts]):
+    def __init__(self, shapes: Sequence[ShapeFacts]) -> None:
         # The box of a mesh without faces is empty, from inf to -inf.
         self.shapes = [shape for shape in shapes if np.all(shape.low <= shape.high)]
         self.low = np.array([shape.low for shape in self.shapes]).reshape(-1, 3)

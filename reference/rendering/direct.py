@@ -57,7 +57,7 @@ def _define(_variant: str) -> None:
     class DirectAllIntegrator(mi.SamplingIntegrator):
         """See the module's docstring."""
 
-        def __init__(self, props):
+        def __init__(self, props: Any) -> None:
             super().__init__(props)
             defaults = Transport()._asdict()
             given = {name: props.get(name, value) for name, value in defaults.items()}
@@ -114,20 +114,20 @@ def _define(_variant: str) -> None:
                 colours = sums(colours, _from_bsdf(*arguments))
             return colours[0], valid, [channel for image in colours[1:] for channel in image]
 
-        def aov_names(self):
+        def aov_names(self) -> list[str]:
             channels = range(len(mi.Spectrum(0)))
             return [
                 f"{i}.{channel}" for i in range(1, len(self.transports)) for channel in channels
             ]
 
-        def to_string(self):
+        def to_string(self) -> str:
             return f"DirectAllIntegrator[hide_emitters = {self.hide_emitters}]"
 
     mi.register_integrator("direct_all", DirectAllIntegrator)
 
 
 @dr.syntax
-def _beyond_lamps(scene, ray, active):
+def _beyond_lamps(scene: Any, ray: Any, active: Any) -> Any:
     """Return the first surface that does not shine.
 
     Mitsuba's own integrators take the point of the last hit from the first ray: its origin differs,
@@ -143,7 +143,7 @@ def _beyond_lamps(scene, ray, active):
 
 
 @dr.syntax
-def is_behind_two_lamps(scene, ray):
+def is_behind_two_lamps(scene: Any, ray: Any) -> Any:
     """Return whether rays reach a shape that is not a mesh through two or more shining surfaces."""
     si = scene.ray_intersect(ray)
     count = dr.zeros(mi.UInt32, dr.width(ray.d))
@@ -156,16 +156,25 @@ def is_behind_two_lamps(scene, ray):
     return si.is_valid() & (count > 1) & ~si.shape.is_mesh()
 
 
-def _has_delta(scene):
+def _has_delta(scene: Any) -> bool:
     bsdfs = (shape.bsdf() for shape in scene.shapes())
     return any(bsdf and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) for bsdf in bsdfs)
 
 
-def _of_all(lights, is_delta, scene, si, bsdf, sampler, active, transports):
+def _of_all(
+    lights: list[Any],
+    is_delta: bool,
+    scene: Any,
+    si: Any,
+    bsdf: Any,
+    sampler: Any,
+    active: Any,
+    transports: Sequence[Transport],
+) -> list[Any]:
     """Return the contribution of lights to each image; points and directions are not random."""
     is_weighted = not is_delta and any(transport.bsdf_samples for transport in transports)
 
-    def one(sample_direction, sampler):
+    def of_light(sample_direction: Any, sampler: Any) -> Any:
         sample = mi.Point2f(0.5) if is_delta else sampler.next_2d(active)
         point, direction, density, weight = sample_direction(si, sample, active)
         facing = active & (density > 0)
@@ -190,11 +199,11 @@ def _of_all(lights, is_delta, scene, si, bsdf, sampler, active, transports):
     targets = [partial(_sampled, light) for light in lights]
     nothing = [mi.Spectrum(0)] * len(transports)
     if len(lights) > UNROLLED:
-        return _looped(targets, one, sampler, nothing)
-    return reduce(sums, (one(target, sampler) for target in targets), nothing)
+        return _looped(targets, of_light, sampler, nothing)
+    return reduce(sums, (of_light(target, sampler) for target in targets), nothing)
 
 
-def _sampled(light, si, sample, active):
+def _sampled(light: Any, si: Any, sample: Any, active: Any) -> Any:
     ds, weight = light.sample_direction(si, sample, active)
     return ds.p, ds.d, ds.pdf, weight
 
@@ -217,11 +226,13 @@ def _looped(
     return [numerics.summed(colour) for colour in total]
 
 
-def _added(totals, terms):
+def _added(totals: list[Any], terms: list[Any]) -> list[Any]:
     return [numerics.add(total, term) for total, term in zip(totals, terms, strict=True)]
 
 
-def _from_bsdf(scene, si, bsdf, sampler, active, transports):
+def _from_bsdf(
+    scene: Any, si: Any, bsdf: Any, sampler: Any, active: Any, transports: Sequence[Transport]
+) -> list[Any]:
     """One sample of the BSDF, for the emitter that it happens to hit, for each image.
 
     Without ``bsdf_samples`` only directions that emitter sampling never takes count.

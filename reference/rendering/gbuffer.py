@@ -121,7 +121,7 @@ def _named_apart(materials: ObjectIds, shapes: ObjectIds) -> ObjectIds:
     return replace(materials, names=tuple(map(named, materials.names, first)))
 
 
-def _object_ids(pointers, seen):
+def _object_ids(pointers: Any, seen: np.ndarray) -> ObjectIds:
     """Return the :class:`ObjectIds` of an array of pointers, one per pixel."""
     numbers = np.array(dr.reinterpret_array(mi.UInt32, pointers)).reshape(seen.shape)
     ids, first, places = np.unique(numbers, return_index=True, return_inverse=True)

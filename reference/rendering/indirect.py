@@ -83,7 +83,7 @@ def indirect_light(
     return light
 
 
-def _weighted(reached, value, share, transports):
+def _weighted(reached: Any, value: Any, share: Any, transports: Sequence[Transport]) -> list[Any]:
     """Return the light of a sampled emitter, for each image; samples of the BSDF find the rest."""
     return [
         dr.select(seen, value * (share if transport.bsdf_samples else 1), 0)

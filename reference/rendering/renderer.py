@@ -164,7 +164,7 @@ class Renderer:
         other.compilation = 0.0
         return other
 
-    def _image(self, seed):
+    def _image(self, seed: int) -> Any:
         """Render; later passes replay the kernels of the first if Dr.Jit knows all their arrays."""
         arguments = self.scene, self.integrator, self.spp, seed
         if self._replayed is not None:
@@ -195,7 +195,7 @@ def variant(name: str) -> Iterator[None]:
 
 
 @contextmanager
-def _no_collection():
+def _no_collection() -> Iterator[None]:
     """Postpone garbage collection: during a recording it would end the process."""
     was_enabled = gc.isenabled()
     gc.disable()
@@ -229,13 +229,13 @@ def syntax(f: FunctionType | None = None, **options: Any) -> Callable[..., Any]:
 dr.syntax = syntax  # for Mitsuba's modules, which look it up when they are loaded
 
 
-def _rendered(scene, integrator, spp, seed):
+def _rendered(scene: Any, integrator: Any, spp: int, seed: int) -> Any:
     image = mi.render(scene, integrator=integrator, spp=spp, seed=seed)
     _reset(scene)
     return image
 
 
-def _reset(scene):
+def _reset(scene: Any) -> None:
     """Release what film and sampler keep: if they begin with another state, a pass is traced."""
     sensor = scene.sensors()[0]
     sensor.film().prepare([])
@@ -243,7 +243,7 @@ def _reset(scene):
         sensor.sampler().forget()
 
 
-def _chain(error):
+def _chain(error: BaseException | None) -> Iterator[BaseException]:
     """Yield an error, and those that led to it: Dr.Jit wraps errors of Python code."""
     while error is not None:
         yield error
@@ -333,7 +333,7 @@ def require_finite(image: np.ndarray, layer: str) -> None:
         )
 
 
-def _wrong(image, right, what):
+def _wrong(image: Any, right: Any, what: str) -> str:
     """Return how many pixels are wrong, and the first as (x, y), in reading order from top left."""
     wrong = ~right if right.ndim == 2 else ~right.all(axis=-1)
     pixel = np.unravel_index(np.argmax(wrong), wrong.shape)

@@ -20,6 +20,7 @@ the rotation.
 
 from functools import cache
 from math import isqrt
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -63,15 +64,18 @@ def _define(_variant: str) -> None:
     class RotatedMultijitter(mi.Sampler):
         """See the module's docstring."""
 
-        def __init__(self, props):
+        def __init__(self, props: Any) -> None:
             super().__init__(props)
             self.forget()
 
-        def forget(self):
+        def forget(self) -> None:
             # Nothing is computed: Mitsuba may make a scene's plugins in several threads.
-            self.dimension = self.index = self.pixel = self.jitter = None
+            self.dimension: Any = None
+            self.index: Any = None
+            self.pixel: Any = None
+            self.jitter: Any = None
 
-        def seed(self, seed, wavefront_size=0xFFFFFFFF):
+        def seed(self, seed: Any, wavefront_size: int = 0xFFFFFFFF) -> None:
             super().seed(seed, wavefront_size)
             index = dr.arange(mi.UInt32, self.wavefront_size())
             pixel = index // self.sample_count()
@@ -82,12 +86,12 @@ def _define(_variant: str) -> None:
             self.jitter = mi.PCG32(len(index), mi.UInt64(state), mi.UInt64(stream))
             self.dimension = dr.opaque(mi.UInt32, 0)
 
-        def next_1d(self, active=True):
+        def next_1d(self, active: Any = True) -> Any:
             count = self.sample_count()
             stratum, _, _ = self._stratum(active)
             return _under_one((mi.Float(stratum) + self._within()) * (1 / count))
 
-        def next_2d(self, active=True):
+        def next_2d(self, active: Any = True) -> Any:
             columns, rows = cells(self.sample_count())
             stratum, permutation, turn = self._stratum(active)
             row = stratum // columns
@@ -98,38 +102,38 @@ def _define(_variant: str) -> None:
             y = mi.Float(row) + (mi.Float(across) + self._within()) * (1 / columns)
             return mi.Point2f(_under_one(x * (1 / columns)), _under_one(y * (1 / rows)))
 
-        def _stratum(self, active):
+        def _stratum(self, active: Any) -> Any:
             permutation, turn = mi.sample_tea_32(self.pixel, self.dimension)
             self.dimension += 1
             stratum = turned(self.index, self.sample_count(), permutation, turn, active)
             return stratum, permutation, turn
 
-        def _within(self):
+        def _within(self) -> Any:
             return mi.Float(self.jitter.next_float32())
 
-        def clone(self):
+        def clone(self) -> Any:
             copy = self.fork()
             if self.dimension is not None:
                 copy.dimension, copy.index = mi.UInt32(self.dimension), mi.UInt32(self.index)
                 copy.pixel, copy.jitter = mi.UInt32(self.pixel), mi.PCG32(self.jitter)
             return copy
 
-        def fork(self):
+        def fork(self) -> Any:
             props = mi.Properties()
             props["sample_count"] = self.sample_count()
             return RotatedMultijitter(props)
 
-        def schedule_state(self):
+        def schedule_state(self) -> None:
             super().schedule_state()
             dr.schedule(self.dimension, self.index, self.pixel, self.jitter)
 
-        def to_string(self):
+        def to_string(self) -> str:
             return f"RotatedMultijitter[sample_count={self.sample_count()}]"
 
     mi.register_sampler(SAMPLER, RotatedMultijitter)
 
 
-def _under_one(number):
+def _under_one(number: Any) -> Any:
     """Keep a number below 1, which it could reach by rounding."""
     return dr.minimum(number, dr.one_minus_epsilon(mi.Float))
 

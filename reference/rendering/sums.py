@@ -89,7 +89,7 @@ class Accumulator:
     They are Dr.Jit arrays of double precision: NumPy would take as long as the rendering.
     """
 
-    def __init__(self, moments: Sequence[str] = NOISE):
+    def __init__(self, moments: Sequence[str] = NOISE) -> None:
         self.count = 0
         self._moments = tuple(moments)
         self._shape = ()
@@ -153,7 +153,7 @@ class DifferenceSums(Accumulator):
     ``counted`` (H, W) are the pixels from which blocks are sampled.
     """
 
-    def __init__(self, counted: np.ndarray):
+    def __init__(self, counted: np.ndarray) -> None:
         super().__init__((*NOISE, "cubes"))
         self._sample = sample(counted)
         flat = 3 * self._sample[0][:, None] + np.arange(3)

@@ -57,7 +57,7 @@ class Graph:
     An index identifies a node. Nodes are only added or replaced, so indices stay valid.
     """
 
-    def __init__(self, name: str, config: Any, state: Any):
+    def __init__(self, name: str, config: Any, state: Any) -> None:
         self.name = name
         self.config = config
         self.state = state
@@ -130,7 +130,7 @@ class Graph:
             instance = Parser.instantiate(self.config, state)
         return instance[0] if isinstance(instance, list) else instance
 
-    def _require_extents(self, scene):
+    def _require_extents(self, scene: Any) -> None:
         for shape in scene.shapes():
             box = shape.bbox()
             ends = np.array([np.ravel(box.min), np.ravel(box.max)])

@@ -130,7 +130,7 @@ def blend(graph: Graph, a: Any, b: Any, weight: Any) -> Any:
     if _same(a, b):
         return a
 
-    def mixed(a, b, w):
+    def mixed(a: Any, b: Any, w: Any) -> Any:
         w = np.clip(w, 0, 1)
         return np.multiply(a, 1 - w) + np.multiply(b, w)
 

@@ -78,7 +78,7 @@ def fit(
 def fitted(
     name: str, request: Options, settings: dict[str, str], target: Path, progress: Any
 ) -> FitRecord:
-    """Fit the heuristic to a scene, and write the fit's files; ``words`` are the command's."""
+    """Fit the heuristic to a scene, and write the fit's files; ``settings`` are the command's."""
     from fotismos.comparisons.case import open_case
     from fotismos.comparisons.fit.fit import fit
     from fotismos.heuristic.materials import FORMS
