@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeAlias, cast
 
@@ -18,7 +19,7 @@ from click.shell_completion import CompletionItem
 from msgspec import inspect
 
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.processes.pool import Pool, Task, cores
+from fotismos.comparisons.processes.pool import Pool, cores
 from fotismos.heuristic import llvm, program
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.terminal.words import echo, level, quiet_option, verbose_option
@@ -321,40 +322,16 @@ def pool(
     return cast(Pool, cluster.connected(scheduler, ready))
 
 
-def results_of(
-    output: Path,
-    kind: str,
-    timeout: float,
-    scenes: Sequence[str],
-    work: Callable[..., Any],
-    *arguments: Any,
-) -> dict[Path, Any]:
-    """Return what ``work(scene, *words, folder, progress)`` returns for each scene, by its folder.
+def work(command_name: str, processes: Pool, /, **options: Any) -> Any:
+    """Run the worker of a command: ``run(processes, ...)`` in :mod:`fotismos.reports.work`.
 
-    The folders are below ``output/kind``.
+    It is imported here, since the help of a command needs none of it, and beside the processes,
+    which take as long to start.
     """
-    with pool(timeout) as processes:
-        processes.start()
-        from fotismos.comparisons.case import file_of, name_of
-        from fotismos.reports.files import results
-        from fotismos.reports.terminal import progress
-
-        subjects = [(name_of(scene), file_of(scene)) for scene in scenes]
-        folder = output / kind
-        with (
-            results.hold_results(folder, subjects, command_line()) as places,
-            progress.shown() as bar,
-        ):
-            tasks = [
-                Task(
-                    name=target.name,
-                    function=work,
-                    arguments=(scene, *arguments, target),
-                    progress=bar.of(target.name),
-                )
-                for target, scene in zip(places, scenes, strict=True)
-            ]
-            return {folder / task.name: done.result() for task, done in processes.each(tasks)}
+    with processes as pool:
+        pool.start()
+        worker = import_module(f"fotismos.reports.work.{command_name}")
+        return worker.run(pool, **options)
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,10 @@
 """``fotismos audit``: properties of a heuristic or a BSDF, before any scene."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
-from fotismos.comparisons.processes.pool import Task
 from fotismos.reports import jobs
-from fotismos.reports.terminal.words import tell, tell_where
-
-if TYPE_CHECKING:
-    from fotismos.comparisons.audit.checks import Audit, Kind
 
 
 def _parameter(text: str) -> tuple[str, float | bool | str]:
@@ -64,46 +56,14 @@ def audit(
     if not name or (heuristic and bsdf):
         raise click.UsageError("give one of --heuristic and --bsdf.")
     kind = "heuristic" if heuristic else "bsdf"
-    with jobs.pool(timeout) as pool:
-        pool.start()
-        from fotismos.reference.records import to_json
-        from fotismos.reports.files.results import PAGE, hold_results
-        from fotismos.reports.run import audit_files
-
-        command = jobs.command_line()
-        with hold_results(output / "audit", [_folder_of(name)], command) as (folder,):
-            arguments = (kind, name, dict(parameters), command, folder)
-            record = pool.do(Task(name, audited, arguments))
-    if as_json:
-        click.echo(to_json(record), nl=False)
-    else:
-        tell(audit_files.lines(record))
-        tell_where(folder / PAGE)
-    if record.faults:
+    has_faults = jobs.work(
+        "audit",
+        jobs.pool(timeout),
+        kind=kind,
+        name=name,
+        parameters=dict(parameters),
+        output=output,
+        as_json=as_json,
+    )
+    if has_faults:
         click.get_current_context().exit(1)
-
-
-def _folder_of(name: str) -> tuple[str, Path | None]:
-    """Return a folder's name, one for each function, and the heuristic's file if it has one."""
-    from fotismos.heuristic.heuristics import in_file
-
-    if (located := in_file(name)) is None:
-        return name, None
-    file = Path(located[0])
-    function = located[1]
-    return "-".join(filter(None, (file.stem, function))), Path(name)
-
-
-def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, target: Path) -> Audit:
-    """Audit a heuristic or a BSDF, and write the audit's files."""
-    from fotismos.comparisons.audit.checks import audit
-    from fotismos.comparisons.case import RGB
-    from fotismos.heuristic import plugins
-    from fotismos.reference.scene.graph import set_variant
-    from fotismos.reports.run import audit_files
-
-    set_variant(RGB)
-    plugins.register()
-    record = audit(kind, name, parameters, command)
-    audit_files.write(target, record)
-    return record

@@ -10,7 +10,6 @@ from click.core import ParameterSource
 from fotismos.comparisons.atomic import file_name
 from fotismos.heuristic.errors import InputError
 from fotismos.reports import jobs
-from fotismos.reports.terminal.words import echo, is_quiet, tell
 
 
 @jobs.command()
@@ -95,7 +94,10 @@ def check(
         if context.get_parameter_source(name) is not ParameterSource.DEFAULT
     }
     wanting = [f"--{name.replace('_', '-')}" for name in changes if name != "seed"]
-    wanting += ["--scene"] * bool(scenes) + ["--images"] * images
+    if scenes:
+        wanting.append("--scene")
+    if images:
+        wanting.append("--images")
     if wanting and not update:
         raise InputError(
             f"{', '.join(wanting)}: a check renders its baseline's scene and options. Add --update"
@@ -105,50 +107,22 @@ def check(
         raise InputError(f"{', '.join(others)}: pictures are not rendered. Omit it, or --picture.")
     patterns = _places(baseline, pictures)
     inputs = list(baseline.glob("*")) if baseline.is_dir() else [baseline]
-    from fotismos.reports.ci import summary as summaries  # loaded late: --help needs no metrics
-
-    summaries.require_free(junit, summary, [*scenes, *inputs])
-    with jobs.pool(timeout, max(len(scenes), len(inputs)), workers, scheduler) as pool:
-        pool.start()
-        from fotismos.reference.records import to_json
-        from fotismos.reports.ci import checks
-        from fotismos.reports.files import results
-        from fotismos.reports.page import page
-
-        page_path = ""
-        if update:
-            outcomes = checks.update_all(
-                pool, baseline, scenes, images, significance, changes, patterns
-            )
-        else:
-            with results.hold(output / "check", jobs.command_line(), ()) as folder:
-                outcomes, views, moved = checks.examine_all(
-                    pool, baseline, significance, changes.get("seed"), folder, patterns
-                )
-                title = f"fotismos check: {summaries.outcome(outcomes, significance)}"
-                if views or moved:
-                    records = [view.record for view in views]
-                    details = page.details(records=records)
-                    results.write(folder / results.DETAILS, details)
-                    results.write(folder / results.PAGE, page.render(views, title, moved=moved))
-                    page_path = str(folder / results.PAGE)
-                else:
-                    results.clear(folder, (results.PAGE, results.DETAILS))
-    for outcome in outcomes:
-        if outcome.status == "error":
-            echo(f"fotismos: error: {outcome.message}", err=True)
-    summaries.write_junit(junit, lambda: summaries.junit_of_checks(outcomes))
-    summaries.append(summary, lambda: summaries.of_checks(outcomes, significance, page_path))
-    code = max(outcome.exit_code for outcome in outcomes)
-    if as_json:
-        record = checks.Checks(passed=not code, significance=significance, checks=tuple(outcomes))
-        click.echo(to_json(record), nl=False)
-    elif not is_quiet():
-        tell(summaries.lines(outcomes, significance))
-        if page_path:
-            click.echo(f"page: {page_path}")
-    elif code:
-        click.echo(summaries.outcome(outcomes, significance))
+    code = jobs.work(
+        "check",
+        jobs.pool(timeout, max(len(scenes), len(inputs)), workers, scheduler),
+        baseline=baseline,
+        update=update,
+        scenes=scenes,
+        with_images=images,
+        significance=significance,
+        changes=changes,
+        patterns=patterns,
+        inputs=inputs,
+        output=output,
+        junit=junit,
+        summary_file=summary,
+        as_json=as_json,
+    )
     context.exit(code)
 
 

@@ -1,20 +1,11 @@
 """``fotismos compare``: how far textbook shading is from physics."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from fotismos.reports import jobs
-from fotismos.reports.run import batch
-from fotismos.reports.terminal.words import echo, is_quiet
-
-if TYPE_CHECKING:
-    from fotismos.heuristic.errors import FotismosError
-    from fotismos.reports.page.scene_view import SceneView
 
 
 @jobs.command()
@@ -85,42 +76,21 @@ def compare(
     """  # noqa: D301 click reads the \b as: keep these lines
     if rendering["image"] and len(scenes) > 1:
         raise click.UsageError("--image goes with one scene.")
-    request = jobs.request(rendering)
-    has_summary = max_visible is not None or junit is not None or summary is not None
-    if has_summary:
-        from fotismos.reports.ci.summary import (
-            require_free,  # loaded late: most comparisons need no CI
-        )
-
-        named = [rendering["heuristic"] or "", *rendering["image"]]
-        files = (word.partition(":")[0] for word in named)
-        require_free(junit, summary, [*scenes, *filter(None, files)])
-    code = 0
-
-    def finish(
-        folder: Path, views: Sequence[SceneView], errors: Mapping[str, FotismosError]
-    ) -> None:
-        """Print the gates, and write the files for CI."""
-        from fotismos.reports.ci import summary as ci  # loaded late: most comparisons need no CI
-
-        nonlocal code
-        ci.require_free(junit, summary, [])  # nor what this command wrote
-        studied = [view.studied for view in views]
-        gates = ci.gates([record for record, _ in studied], max_visible, within)
-        code = int(any(gate.state != "pass" for gate in gates))
-        for line in ci.gate_lines(gates) if gates else ():
-            if code or not is_quiet():  # the reason of a failure is never lost
-                echo(line, err=is_quiet())
-        ci.write_junit(junit, lambda: ci.junit_of_gates(gates, errors))
-        page = str(folder / "index.html") if views else ""
-        ci.append(summary, lambda: ci.of_comparison(studied, gates, errors, page, within))
-
-    batch.run(
-        scenes,
-        output,
-        jobs.Job(request, figures, with_causes=with_causes, fresh=fresh, within=within),
+    code = jobs.work(
+        "compare",
         jobs.pool(timeout, len(scenes), workers, scheduler),
-        on_page=jobs.open_page if is_opened else None,
-        finish=finish if has_summary else None,
+        scenes=scenes,
+        output=output,
+        job=jobs.Job(
+            request=jobs.request(rendering),
+            figures=figures,
+            with_causes=with_causes,
+            fresh=fresh,
+            within=within,
+        ),
+        max_visible=max_visible,
+        junit=junit,
+        summary_file=summary,
+        is_opened=is_opened,
     )
     context.exit(code)

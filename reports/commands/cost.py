@@ -1,19 +1,12 @@
 """``fotismos cost``: what each step of accuracy costs in time."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from fotismos.heuristic.errors import InputError
 from fotismos.reports import jobs
-from fotismos.reports.terminal.words import tell, tell_where
-
-if TYPE_CHECKING:
-    from fotismos.comparisons.cost.cost_record import Cost
-    from fotismos.comparisons.options import Options
 
 
 @jobs.command()
@@ -51,39 +44,14 @@ def cost(
     """  # noqa: D301 click reads the \b as: keep these lines
     if is_measured and at is None:
         raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
-    arguments = (jobs.request(rendering), rounds, at, is_measured)
-    records = jobs.results_of(output, "cost", timeout, [scene], measured, *arguments)
-    from fotismos.reference.records import to_json
-    from fotismos.reports.files.results import PAGE
-    from fotismos.reports.terminal import cost_tables
-
-    ((folder, record),) = records.items()
-    if as_json:
-        click.echo(to_json(record), nl=False)
-        return
-    tell(cost_tables.lines(record))
-    tell_where(folder / PAGE)
-
-
-def measured(
-    name: str,
-    request: Options,
-    rounds: int | None,
-    at: tuple[int, int] | None,
-    is_measured: bool,
-    target: Path,
-    progress: Any,
-) -> Cost:
-    """Study what each step of accuracy costs, and write its files."""
-    from fotismos.comparisons.case import open_case
-    from fotismos.comparisons.cost.cost import cost
-    from fotismos.comparisons.cost.measure import Effort
-    from fotismos.reports.run import cost_files
-
-    case = open_case(name, request)
-    effort = Effort() if rounds is None else Effort(rounds=rounds)
-    size = at and f"{at[0]}x{at[1]}"
-    repeated = case.command("cost", rounds=rounds, at=size, measure=is_measured or None)
-    study = cost(case.source, case.options, effort, progress, repeated, at, is_measured)
-    cost_files.write(target, study)
-    return study.record
+    jobs.work(
+        "cost",
+        jobs.pool(timeout),
+        scene=scene,
+        output=output,
+        request=jobs.request(rendering),
+        rounds=rounds,
+        at=at,
+        is_measured=is_measured,
+        as_json=as_json,
+    )

@@ -3,9 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from fotismos.comparisons.options import Options
 from fotismos.reports import jobs
-from fotismos.reports.terminal.words import tell_where
 
 
 @jobs.command()
@@ -26,16 +24,4 @@ def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
       fotismos export my_scene.xml --resolution 640x480 -o for_my_engine
     """  # noqa: D301 click reads the \b as: keep these lines
     request = jobs.request(rendering)
-    (folder,) = jobs.results_of(output, "export", timeout, [scene], exported, request)
-    tell_where(folder)
-
-
-def exported(name: str, request: Options, target: Path, progress: Any) -> None:
-    """Write the files that another program needs to render a scene."""
-    from fotismos.comparisons.case import open_case
-    from fotismos.comparisons.plain_scene import plain_scene
-    from fotismos.reports.files import export_files
-
-    case = open_case(name, request)
-    scene = plain_scene(case.source, case.options)
-    export_files.write(target, scene, case.command(image="YOURS.exr"))
+    jobs.work("export", jobs.pool(timeout), scene=scene, output=output, request=request)

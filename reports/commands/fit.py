@@ -1,19 +1,11 @@
 """``fotismos fit``: the best heuristic parameters, and the error that remains."""
 
-from __future__ import annotations
-
-import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from fotismos.reports import jobs
-from fotismos.reports.terminal.words import tell, tell_where
-
-if TYPE_CHECKING:
-    from fotismos.comparisons.fit.fit_record import FitRecord
-    from fotismos.comparisons.options import Options
 
 
 @jobs.command()
@@ -45,7 +37,7 @@ def fit(
     form: str,
     as_json: bool,
     timeout: float,
-    **settings: Any,
+    **rendering: Any,
 ) -> None:
     """Find the heuristic parameters nearest to the reference, and the error that remains.
 
@@ -58,35 +50,13 @@ def fit(
       fotismos fit fig-8-9
       fotismos fit my_scene.xml --loss linear --form phong
     """  # noqa: D301 click reads the \b as: keep these lines
-    choices = {"loss": loss, "form": form}
-    records = jobs.results_of(
-        output, "fit", timeout, scenes, fitted, jobs.request(settings), choices
+    jobs.work(
+        "fit",
+        jobs.pool(timeout),
+        scenes=scenes,
+        output=output,
+        request=jobs.request(rendering),
+        loss=loss,
+        form=form,
+        as_json=as_json,
     )
-    from fotismos.reference.records import plain
-    from fotismos.reports.files.results import PAGE
-    from fotismos.reports.run import fit_files
-
-    if as_json:
-        click.echo(json.dumps(plain([*records.values()]), indent=2, ensure_ascii=False))
-        return
-    for record in records.values():
-        tell(fit_files.lines(record))
-    folder, *others = records
-    tell_where(folder.parent if others else folder / PAGE)
-
-
-def fitted(
-    name: str, request: Options, settings: dict[str, str], target: Path, progress: Any
-) -> FitRecord:
-    """Fit the heuristic to a scene, and write the fit's files; ``settings`` are the command's."""
-    from fotismos.comparisons.case import open_case
-    from fotismos.comparisons.fit.fit import fit
-    from fotismos.heuristic.materials import FORMS
-    from fotismos.reports.run import fit_files
-
-    case = open_case(name, request)
-    command = case.command("fit", **settings)
-    forms = FORMS if settings["form"] == "all" else (settings["form"],)
-    result = fit(case.source, case.options, settings["loss"], forms, progress, command)
-    fit_files.write(target, result)
-    return result.record

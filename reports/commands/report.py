@@ -1,19 +1,12 @@
 """``fotismos report``: all built-in scenes in one report."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
-from fotismos.comparisons.processes.pool import Task, Turn
+from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.reports import jobs
-from fotismos.reports.run import batch
-
-if TYPE_CHECKING:
-    from fotismos.comparisons.hard_cases import HardCases
 
 QUICK = {"resolution": (64, 64), "spp": 16}
 """The defaults of ``--quick``."""
@@ -56,24 +49,16 @@ def report(
       fotismos report --quick --open
       fotismos report --resolution 128x128 -o small --figures
     """  # noqa: D301 click reads the \b as: keep these lines
-    from fotismos.comparisons.gallery.builtin import SCENES
-
     if quick:
         rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
     request = jobs.request(rendering)
-    ladders = frozenset() if quick else LADDERS
-    job = jobs.Job(request, figures, with_causes=True, fresh=fresh, within=within, ladders=ladders)
-    rendered = jobs.pool(timeout, len(SCENES), workers, scheduler)
-    cases = Task("hard cases", hard_cases, (output,))
-    on_page = jobs.open_page if is_opened else None
-    batch.run(tuple(SCENES), output, job, rendered, cases, on_page)
-
-
-def hard_cases(folder: Path) -> tuple[HardCases, float]:
-    """Evaluate the hard cases; return them, and the seconds that it took in its turn."""
-    from fotismos.comparisons.hard_cases import collect
-    from fotismos.reports.files import results
-
-    with Turn(folder, folder / results.TABLES):
-        begin = perf_counter()
-        return collect(), perf_counter() - begin
+    job = jobs.Job(
+        request=request,
+        figures=figures,
+        with_causes=True,
+        fresh=fresh,
+        within=within,
+        ladders=frozenset() if quick else LADDERS,
+    )
+    processes = jobs.pool(timeout, len(SCENES), workers, scheduler)
+    jobs.work("report", processes, output=output, job=job, is_opened=is_opened)

@@ -5,8 +5,6 @@ command ends with that error's exit code. Scenes are compared in separate proces
 them may kill. The page is written again after each scene.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,18 +12,26 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
+from fotismos.comparisons.case import name_of
+from fotismos.comparisons.comparison import machine, versions
+from fotismos.comparisons.departure.criterion import checked_threshold
+from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import FotismosError, InputError, InstallationError, OutputError
-from fotismos.reports import jobs
+from fotismos.reference.records import to_json
+from fotismos.reports import jobs, verdict
+from fotismos.reports.files import results
+from fotismos.reports.files.results import FIGURES, START, TABLES, Failure, RunRecord
 from fotismos.reports.jobs import Job
+from fotismos.reports.page import page
+from fotismos.reports.page.scene_view import SceneView
+from fotismos.reports.run import scene
+from fotismos.reports.terminal import progress, tables
+from fotismos.reports.terminal.progress import Bar
 from fotismos.reports.terminal.words import remark, tell, tell_where
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # a comparison has no hard cases
     from fotismos.comparisons.hard_cases import HardCases
-    from fotismos.comparisons.options import Options
-    from fotismos.reports.files.results import Failure, RunRecord
-    from fotismos.reports.page.scene_view import SceneView
-    from fotismos.reports.terminal.progress import Bar
 
 SCENE = 8.0
 HARD_CASES = 1.0
@@ -50,7 +56,7 @@ class Batch:
     stages: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     views: dict[str, SceneView] = field(default_factory=dict)
     errors: dict[str, FotismosError] = field(default_factory=dict)
-    hard_cases: HardCases | None = None
+    hard_cases: "HardCases | None" = None
     next_page: float = 0.0
 
     @property
@@ -65,8 +71,6 @@ class Batch:
 
     def failures(self) -> list[Failure]:
         """The scenes that could not be compared, in order."""
-        from fotismos.reports.files.results import Failure
-
         errors = self.errors
         return [
             Failure(scene=target, error=str(errors[target]))
@@ -76,9 +80,6 @@ class Batch:
 
     def record(self) -> RunRecord:
         """The record of the run, with its stages until now."""
-        from fotismos.comparisons.comparison import machine, versions
-        from fotismos.reports.files.results import START, RunRecord
-
         other = perf_counter() - START - sum(self.stages.values())
         return RunRecord(
             command=self.command,
@@ -90,9 +91,6 @@ class Batch:
 
     def write_page(self, is_interrupted: bool = False, run: RunRecord | None = None) -> None:
         """Write the page and its details, at the end with the record of the run."""
-        from fotismos.reports.files import results
-        from fotismos.reports.page import page
-
         begin = perf_counter()
         path = self.folder / results.PAGE
         state = ""
@@ -125,10 +123,10 @@ class Batch:
 
 
 def run(
+    pool: Pool,
     scenes: Sequence[str],
     folder: Path,
     job: Job,
-    pool: Pool,
     hard_cases: Task | None = None,
     on_page: Callable[[Path], object] | None = None,
     finish: Callable[[Path, Sequence[SceneView], Mapping[str, FotismosError]], None] | None = None,
@@ -139,43 +137,36 @@ def run(
     is called with the page's path once it exists; ``finish`` at the end with the output folder, the
     views of the compared scenes and the errors of the others. The gravest error is raised at last.
     """
-    with pool as pool:
-        pool.start()
-        from fotismos.comparisons.departure.criterion import checked_threshold
-        from fotismos.reports.files import results
-        from fotismos.reports.files.results import FIGURES, START, TABLES
-        from fotismos.reports.terminal import progress
-
-        checked_threshold(job.within)
-        requests = dict(zip(scenes, jobs.requests(job.request, scenes), strict=True))
-        command = jobs.command_line()
-        with results.hold(folder, command) as folder:
-            places = results.places(folder, scenes)
-            _require_inputs_apart(job.request, [folder / target for target in places])
-            for name in (TABLES, FIGURES) if job.figures else (TABLES,):
-                results.own(folder / name)
-            batch = Batch(
-                folder=folder, places=places, on_page=on_page, command=command, within=job.within
-            )
-            batch.stages["start-up"] = perf_counter() - START
-            calls = {
-                target: (scene, folder, target, replace(job, request=requests[scene]))
-                for target, scene in places.items()
-            }
-            total = SCENE * len(places) + (HARD_CASES if hard_cases else 0.0)
-            try:
-                with progress.shown(total=total) as bar:
-                    stages = ("rendering", *(["causes"] if job.with_causes else ()))
-                    _compare(pool, batch, calls, bar, hard_cases, stages)
-            except KeyboardInterrupt:
-                pool.end()
-                if batch.done:
-                    _write(batch, is_interrupted=True)
-                raise
-            if batch.views or len(places) > 1:
-                _write(batch)
-            if finish is not None:
-                finish(folder, batch.ordered, batch.errors)
+    checked_threshold(job.within)
+    requests = dict(zip(scenes, jobs.requests(job.request, scenes), strict=True))
+    command = jobs.command_line()
+    with results.hold(folder, command) as folder:
+        places = results.places(folder, scenes)
+        _require_inputs_apart(job.request, [folder / target for target in places])
+        for name in (TABLES, FIGURES) if job.figures else (TABLES,):
+            results.own(folder / name)
+        batch = Batch(
+            folder=folder, places=places, on_page=on_page, command=command, within=job.within
+        )
+        batch.stages["start-up"] = perf_counter() - START
+        calls = {
+            target: (word, folder, target, replace(job, request=requests[word]))
+            for target, word in places.items()
+        }
+        total = SCENE * len(places) + (HARD_CASES if hard_cases else 0.0)
+        try:
+            with progress.shown(total=total) as bar:
+                stages = ("rendering", "causes") if job.with_causes else ("rendering",)
+                _compare(pool, batch, calls, bar, hard_cases, stages)
+        except KeyboardInterrupt:
+            pool.end()
+            if batch.done:
+                _write(batch, is_interrupted=True)
+            raise
+        if batch.views or len(places) > 1:
+            _write(batch)
+        if finish is not None:
+            finish(folder, batch.ordered, batch.errors)
     if batch.errors and len(places) == 1:
         raise batch.errors.popitem()[1]
     if batch.errors:
@@ -193,10 +184,6 @@ def _compare(
     stages: tuple[str, ...],
 ) -> None:
     """Collect the views and errors of scenes, and the hard cases."""
-    from fotismos.comparisons.case import name_of
-    from fotismos.reports.run import scene
-    from fotismos.reports.terminal import tables
-
     tasks = [
         Task(
             name=target,
@@ -243,11 +230,6 @@ def _require_inputs_apart(request: Options, places: Sequence[Path]) -> None:
 
 def _write(batch: Batch, is_interrupted: bool = False) -> None:
     """Write the page, record and tables of all scenes as far as possible, and print the results."""
-    from fotismos.reference.records import to_json
-    from fotismos.reports import verdict
-    from fotismos.reports.files import results
-    from fotismos.reports.terminal import tables
-
     views = batch.ordered
     folder = batch.folder
     records = [view.record for view in views]

@@ -1,7 +1,5 @@
 """One scene of a command: compared and written, or found finished."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from pathlib import Path
@@ -12,24 +10,28 @@ import msgspec
 from msgspec import structs
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.comparison import CAUSES, ComparisonRecord
+from fotismos.comparisons.case import Case, open_case
+from fotismos.comparisons.comparison import (
+    CAUSES,
+    Comparison,
+    ComparisonRecord,
+    Images,
+    versions,
+)
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, drawn
 from fotismos.comparisons.processes.pool import Turn
 from fotismos.heuristic import program
 from fotismos.heuristic.heuristics import named
 from fotismos.reference.records import VERSION, Record, plain, to_json
+from fotismos.reference.scene.source import digest
 from fotismos.reports.files import images, results
+from fotismos.reports.jobs import Job
 from fotismos.reports.page import embedding
-from fotismos.reports.page.scene_view import LiveView, SceneView, TermsView
+from fotismos.reports.page.scene_view import LiveView, SceneView, TermsView, WhyView
 
-if TYPE_CHECKING:
-    from fotismos.comparisons.case import Case
-    from fotismos.comparisons.comparison import Comparison, Images
+if TYPE_CHECKING:  # few scenes have these
     from fotismos.comparisons.cost.cost import Study
     from fotismos.comparisons.pixel_terms import LivePoints
-    from fotismos.reference.rendering.renderer import Progress
-    from fotismos.reports.jobs import Job
-    from fotismos.reports.page.scene_view import WhyView
 
 RECORD = "comparison.json"
 PICTURE = "comparison.exr"
@@ -47,11 +49,9 @@ class Finished(Record):
 
 
 def compare(
-    name: str, folder: Path, target: str, job: Job, progress: Progress
+    name: str, folder: Path, target: str, job: Job, progress: Any
 ) -> tuple[SceneView, Seconds]:
     """Compare a scene and write its files to ``folder/place``, unless it is finished there."""
-    from fotismos.comparisons.case import open_case
-
     with Turn(folder, folder / results.TABLES) as turn:
         begin = perf_counter()
         case = open_case(name, job.request)
@@ -115,9 +115,6 @@ def key_of(case: Case, job: Job) -> str | None:
     place, options, versions, and the sources of fotismos where it runs from a checkout. What a
     script reads is not known.
     """
-    from fotismos.comparisons.comparison import versions
-    from fotismos.reference.scene.source import digest
-
     code = named(case.options.heuristic).digest()
     if Path(case.word).suffix == ".py" or code is None:
         return None
@@ -175,7 +172,7 @@ def write(
     folder: Path,
     name: str,
     comparison: Comparison,
-    study: Study | None = None,
+    study: "Study | None" = None,
     key: str | None = None,
 ) -> SceneView:
     """Write the files of one comparison to ``folder/name``, and return its part of the page.
@@ -243,7 +240,7 @@ def _terms(comparison: Comparison) -> TermsView | None:
     return terms_view(comparison.terms)
 
 
-def _live(points: LivePoints | str) -> LiveView | None:
+def _live(points: "LivePoints | str") -> LiveView | None:
     """Return the points that the page shades again, or why it does not."""
     if isinstance(points, str):
         return LiveView(missing=points) if points else None

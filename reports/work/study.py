@@ -1,16 +1,43 @@
-"""The output of a study: dataset, figures, and lines for the terminal."""
+"""The work of ``fotismos study``."""
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import click
 import pyarrow as pa
 
-from fotismos.comparisons.study import dataset
+from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.comparisons.study import dataset, design, running
 from fotismos.comparisons.study.design import StudyFile
 from fotismos.reports.charts import study_charts, vega
 from fotismos.reports.files import results
+from fotismos.reports.files.results import hold_results, own
+from fotismos.reports.jobs import command_line
+from fotismos.reports.terminal import progress
+from fotismos.reports.terminal.words import tell
 
 FIGURES = "figures"
+
+
+def run(pool: Pool, file: Path, output: Path, many: Callable[[int], Pool]) -> None:
+    """Render the points of a study, and write its dataset and figures.
+
+    ``pool`` lists the points, since scenes are read for that; ``many(tasks)`` renders them.
+    """
+    chosen = design.read(file)
+    with hold_results(output / "study", [(chosen.name, file)], command_line()) as (folder,):
+        points = pool.do(Task(chosen.name, running.all_points, (chosen,)))
+        pool.end()
+        tasks = len(points) // running.WORTH_A_PROCESS + 1
+        for part in (folder / FIGURES, folder / running.POINTS):
+            own(part)  # a study replaces only its own results
+        with many(tasks) as renderers, progress.shown("points") as bar:
+            table, done = running.run(chosen, folder, renderers, bar.of(chosen.name), points)
+        places = write(chosen, table, folder)
+    tell([*summary(chosen, table, done), ""])
+    for path in places:
+        click.echo(os.fsencode(path))
 
 
 def write(study: StudyFile, table: pa.Table, folder: Path) -> tuple[Path, Path]:

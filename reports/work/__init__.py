@@ -1,0 +1,1 @@
+"""The work of the commands: each is imported when its options are known."""

@@ -1,0 +1,81 @@
+"""The work of ``fotismos check``."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fotismos.comparisons.processes.pool import Pool
+from fotismos.reference.records import to_json
+from fotismos.reports.ci import checks, summary
+from fotismos.reports.ci.checks import CheckRecord
+from fotismos.reports.files import results
+from fotismos.reports.jobs import command_line
+from fotismos.reports.page import page
+from fotismos.reports.terminal.words import echo, is_quiet, tell
+
+
+def run(
+    pool: Pool,
+    baseline: Path,
+    update: bool,
+    scenes: Sequence[str],
+    with_images: bool,
+    significance: float,
+    changes: Mapping[str, Any],
+    patterns: Mapping[Path, str],
+    inputs: Sequence[Path],
+    output: Path,
+    junit: Path | None,
+    summary_file: Path | None,
+    as_json: bool,
+) -> int:
+    """Check or update baselines, print what moved, and return the exit code."""
+    summary.require_free(junit, summary_file, [*scenes, *inputs])
+    shown = ""
+    if update:
+        outcomes = checks.update_all(
+            pool, baseline, scenes, with_images, significance, changes, patterns
+        )
+    else:
+        outcomes, shown = _examined(pool, baseline, significance, changes, patterns, output)
+    for outcome in outcomes:
+        if outcome.status == "error":
+            echo(f"fotismos: error: {outcome.message}", err=True)
+    summary.write_junit(junit, lambda: summary.junit_of_checks(outcomes))
+    summary.append(summary_file, lambda: summary.of_checks(outcomes, significance, shown))
+    code = max(outcome.exit_code for outcome in outcomes)
+    if as_json:
+        record = checks.Checks(passed=not code, significance=significance, checks=tuple(outcomes))
+        click.echo(to_json(record), nl=False)
+    elif not is_quiet():
+        tell(summary.lines(outcomes, significance))
+        if shown:
+            click.echo(f"page: {shown}")
+    elif code:
+        click.echo(summary.outcome(outcomes, significance))
+    return code
+
+
+def _examined(
+    pool: Pool,
+    baseline: Path,
+    significance: float,
+    changes: Mapping[str, Any],
+    patterns: Mapping[Path, str],
+    output: Path,
+) -> tuple[list[CheckRecord], str]:
+    """Check the baselines; return the outcomes, and the page if there is anything to see."""
+    with results.hold(output / "check", command_line(), ()) as folder:
+        outcomes, views, moved = checks.examine_all(
+            pool, baseline, significance, changes.get("seed"), folder, patterns
+        )
+        if not (views or moved):
+            results.clear(folder, (results.PAGE, results.DETAILS))
+            return outcomes, ""
+        title = f"fotismos check: {summary.outcome(outcomes, significance)}"
+        details = page.details(records=[view.record for view in views])
+        results.write(folder / results.DETAILS, details)
+        results.write(folder / results.PAGE, page.render(views, title, moved=moved))
+        return outcomes, str(folder / results.PAGE)

@@ -1,0 +1,54 @@
+"""The work of ``fotismos compare``."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from fotismos.comparisons.processes.pool import Pool
+from fotismos.heuristic.errors import FotismosError
+from fotismos.reports.jobs import Job, open_page
+from fotismos.reports.page.scene_view import SceneView
+from fotismos.reports.run import batch
+from fotismos.reports.terminal.words import echo, is_quiet
+
+
+def run(
+    pool: Pool,
+    scenes: Sequence[str],
+    output: Path,
+    job: Job,
+    max_visible: float | None,
+    junit: Path | None,
+    summary_file: Path | None,
+    is_opened: bool,
+) -> int:
+    """Compare scenes, print the gates, write the files for CI, and return the exit code."""
+    on_page = open_page if is_opened else None
+    if max_visible is None and junit is None and summary_file is None:
+        batch.run(pool, scenes, output, job, on_page=on_page)
+        return 0
+    from fotismos.reports.ci import summary  # loaded late: most comparisons need no CI
+
+    named = [job.request.heuristic, *job.request.image]
+    files = [word.partition(":")[0] for word in named]
+    summary.require_free(junit, summary_file, [*scenes, *files])
+    code = 0
+
+    def finish(
+        folder: Path, views: Sequence[SceneView], errors: Mapping[str, FotismosError]
+    ) -> None:
+        nonlocal code
+        summary.require_free(junit, summary_file, [])  # nor what this command wrote
+        studied = [view.studied for view in views]
+        gates = summary.gates([record for record, _ in studied], max_visible, job.within)
+        code = int(any(gate.state != "pass" for gate in gates))
+        for line in summary.gate_lines(gates) if gates else ():
+            if code or not is_quiet():  # the reason of a failure is never lost
+                echo(line, err=is_quiet())
+        summary.write_junit(junit, lambda: summary.junit_of_gates(gates, errors))
+        page = str(folder / "index.html") if views else ""
+        summary.append(
+            summary_file, lambda: summary.of_comparison(studied, gates, errors, page, job.within)
+        )
+
+    batch.run(pool, scenes, output, job, on_page=on_page, finish=finish)
+    return code

@@ -1,0 +1,61 @@
+"""The work of ``fotismos cost``."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.cost.cost import cost
+from fotismos.comparisons.cost.cost_record import Cost
+from fotismos.comparisons.cost.measure import Effort
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.processes.pool import Pool
+from fotismos.reference.records import to_json
+from fotismos.reports.files.results import PAGE
+from fotismos.reports.run import cost_files
+from fotismos.reports.terminal import cost_tables
+from fotismos.reports.terminal.words import tell, tell_where
+from fotismos.reports.work.folders import results_of
+
+Size = tuple[int, int]
+
+
+def run(
+    pool: Pool,
+    scene: str,
+    output: Path,
+    request: Options,
+    rounds: int | None,
+    at: Size | None,
+    is_measured: bool,
+    as_json: bool,
+) -> None:
+    """Study one scene, and print the table or the record."""
+    arguments = (request, rounds, at, is_measured)
+    records = results_of(pool, output / "cost", [scene], measured, arguments)
+    ((folder, record),) = records.items()
+    if as_json:
+        click.echo(to_json(record), nl=False)
+        return
+    tell(cost_tables.lines(record))
+    tell_where(folder / PAGE)
+
+
+def measured(
+    name: str,
+    request: Options,
+    rounds: int | None,
+    at: Size | None,
+    is_measured: bool,
+    target: Path,
+    progress: Any,
+) -> Cost:
+    """Study what each step of accuracy costs, and write its files."""
+    case = open_case(name, request)
+    effort = Effort() if rounds is None else Effort(rounds=rounds)
+    size = at and f"{at[0]}x{at[1]}"
+    repeated = case.command("cost", rounds=rounds, at=size, measure=is_measured or None)
+    study = cost(case.source, case.options, effort, progress, repeated, at, is_measured)
+    cost_files.write(target, study)
+    return study.record

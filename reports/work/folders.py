@@ -1,0 +1,39 @@
+"""Work on scenes whose results go to a folder each, such as ``OUTPUT/cost/SCENE``."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from fotismos.comparisons.case import file_of, name_of
+from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.reports.files import results
+from fotismos.reports.jobs import command_line
+from fotismos.reports.terminal import progress
+
+
+def results_of(
+    pool: Pool,
+    folder: Path,
+    scenes: Sequence[str],
+    work: Callable[..., Any],
+    arguments: Sequence[Any] = (),
+) -> dict[Path, Any]:
+    """Return what ``work(scene, *arguments, folder, progress)`` returns for each scene, by folder.
+
+    The scenes' folders are below ``folder``.
+    """
+    subjects = [(name_of(scene), file_of(scene)) for scene in scenes]
+    with (
+        results.hold_results(folder, subjects, command_line()) as places,
+        progress.shown() as bar,
+    ):
+        tasks = [
+            Task(
+                name=target.name,
+                function=work,
+                arguments=(scene, *arguments, target),
+                progress=bar.of(target.name),
+            )
+            for target, scene in zip(places, scenes, strict=True)
+        ]
+        return {folder / task.name: done.result() for task, done in pool.each(tasks)}
