@@ -19,6 +19,7 @@ RGB = "llvm_ad_rgb"
 SPECTRAL = "llvm_ad_spectral"
 
 SUFFIXES = (".xml", ".py")
+PICTURES = (".exr", ".png")
 """Suffixes of scene files: Mitsuba's, and Python's."""
 
 Scene = str | Path | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
@@ -132,3 +133,13 @@ def _complete(source: Source, options: Options, word: str) -> Case:
     set_variant(variant)
     interpolation = options.interpolation or "phong"
     return Case(source, options.changed(variant=variant, interpolation=interpolation), word)
+
+
+def picture_parts(word: str) -> tuple[Path, str]:
+    """Return the file and the layer that a word names."""
+    file, _, layer = word.rpartition(":")
+    if file.lower().endswith(PICTURES):
+        return Path(file), layer
+    if not word.lower().endswith(PICTURES):
+        raise InputError(f"{word}: pictures are {' or '.join(PICTURES)} files. Convert it to EXR.")
+    return Path(word), ""

@@ -22,6 +22,7 @@ import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
+from fotismos.comparisons.case import PICTURES, picture_parts
 from fotismos.comparisons.comparison import Images, PictureRecord
 from fotismos.comparisons.departure.colour import CHROMATICITIES, from_srgb, luminance, to_srgb
 from fotismos.comparisons.options import Options
@@ -30,8 +31,6 @@ from fotismos.reference.pairing.prepare import film_size
 from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.rendering.renderer import LARGEST_VALUE, Renderer, Times
 from fotismos.reference.scene.source import Source
-
-SUFFIXES = (".exr", ".png")
 
 SAME_PRIMARIES = 2e-3
 """Largest difference of chromaticities that are the same: some files round them."""
@@ -116,10 +115,10 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
     ``word`` is the path of a file, or ``FILE.exr:LAYER``. Without a ``transfer`` function,
     an EXR is linear.
     """
-    path, layer = parts(word)
+    path, layer = picture_parts(word)
     if not path.is_file():
         fault = "it is not a regular file" if path.exists() else "there is no such file"
-        raise InputError(f"{path}: {fault}. Give a {' or '.join(SUFFIXES)} picture.")
+        raise InputError(f"{path}: {fault}. Give a {' or '.join(PICTURES)} picture.")
     image = _exr(path, layer) if path.suffix.lower() == ".exr" else _png(path, transfer)
     wrong = ~np.isfinite(image).all(axis=-1)
     if wrong.any():
@@ -139,16 +138,6 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
             " overshoots of a sharpening filter: write linear BT.709 without either."
         )
     return np.ascontiguousarray(image, np.float32)
-
-
-def parts(word: str) -> tuple[Path, str]:
-    """Return the file and the layer that a word names."""
-    file, _, layer = word.rpartition(":")
-    if file.lower().endswith(SUFFIXES):
-        return Path(file), layer
-    if not word.lower().endswith(SUFFIXES):
-        raise InputError(f"{word}: pictures are {' or '.join(SUFFIXES)} files. Convert it to EXR.")
-    return Path(word), ""
 
 
 def _exr(path: Path, layer: str) -> np.ndarray:

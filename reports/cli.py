@@ -15,6 +15,7 @@ from typing import Any, cast
 import click
 from click.shell_completion import get_completion_class
 
+from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.processes import interruption
 from fotismos.heuristic import llvm
 from fotismos.heuristic.errors import FotismosError, InstallationError, suggestion
@@ -43,8 +44,6 @@ def scenes() -> None:
       fotismos scenes
       fotismos scenes | grep sphere
     """  # noqa: D301 click reads the \b as: keep these lines
-    from fotismos.comparisons.gallery.builtin import SCENES
-
     width = max(map(len, SCENES))
     for scene in SCENES.values():
         click.echo(f"{scene.name:<{width}}  {scene.title}")

@@ -18,6 +18,7 @@ import click
 from click.shell_completion import CompletionItem
 from msgspec import inspect
 
+from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, cores
 from fotismos.heuristic import llvm, program
@@ -49,8 +50,6 @@ def complete_scene(
     context: click.Context, parameter: click.Parameter, beginning: str
 ) -> list[CompletionItem]:
     """Complete a SCENE: built-in ones with this beginning, or else files."""
-    from fotismos.comparisons.gallery.builtin import SCENES
-
     named = [name for name in SCENES if name.startswith(beginning)]
     items = [CompletionItem(name, help=SCENES[name].title) for name in named]
     return items or [CompletionItem(beginning, type="file")]
@@ -391,24 +390,6 @@ class Job:
 def command_line() -> str:
     """Return the command that the user gave, as a shell takes it."""
     return program.command(*sys.argv[1:])
-
-
-def requests(whole: Options, scenes: Sequence[str]) -> list[Options]:
-    """Return the request for each scene: with values only for the placeholders that it has."""
-    if len(scenes) == 1 or not whole.define:
-        return [whole] * len(scenes)
-    from fotismos.reference.scene.source import placeholders
-
-    known = (placeholders(Path(scene)) for scene in scenes)
-    by_scene = [
-        {key: value for key, value in whole.define.items() if key in names} for names in known
-    ]
-    if unused := set(whole.define) - {key for defined in by_scene for key in defined}:
-        raise InputError(
-            f"-D {', '.join(sorted(unused))}: no scene has such a placeholder. Write $name into a"
-            " scene file, or leave the option out."
-        )
-    return [whole.changed(define=define) for define in by_scene]
 
 
 def request(given: Mapping[str, Any]) -> Options:

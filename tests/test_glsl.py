@@ -16,7 +16,7 @@ from fotismos.comparisons.prepared import prepare
 from fotismos.heuristic import glsl, program, user_shaders
 from fotismos.heuristic.errors import InputError, InstallationError
 from fotismos.heuristic.heuristics import INPUTS, Heuristic, named
-from fotismos.reports.commands import doctor
+from fotismos.reports.work import doctor
 from tests.parts import camera
 from tests.test_user_heuristics import SHADERS, SMALL, image, require_sizes
 

@@ -18,6 +18,7 @@ which determines the irradiance; its ``L_s`` is recorded as lost.
 """
 
 from collections.abc import Callable, Iterator
+from types import ModuleType
 from typing import Any
 
 import mitsuba as mi
@@ -67,11 +68,7 @@ def to_heuristic(
             intensity = light.value("irradiance", 1.0)
             light.replace(heuristic("heuristic_directional", direction=travel, intensity=intensity))
         else:
-            from fotismos.reference.pairing import (
-                lamps,  # loaded late: most scenes have points alone
-            )
-
-            glow = lamps.to_heuristic(light)
+            glow = _lamps().to_heuristic(light)
             ambient = ambient if glow is None else glow
     return ambient
 
@@ -95,9 +92,13 @@ def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements
             props = properties("directional", direction=travel, irradiance=irradiance)
             light.replace(props, IRRADIANCE_PER_INTENSITY)
         else:
-            from fotismos.reference.pairing import lamps  # loaded late: see to_heuristic
+            _lamps().spot_to_physical(light)
 
-            lamps.spot_to_physical(light)
+
+def _lamps() -> ModuleType:
+    from fotismos.reference.pairing import lamps  # loaded late: most scenes have points alone
+
+    return lamps
 
 
 def _physical(graph: Graph) -> Iterator[tuple[int | None, str, int]]:

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from fotismos.comparisons import pictures
+from fotismos.comparisons.case import picture_parts
 from fotismos.comparisons.check.measurement import LINEAR_ROUNDING, laid_out
 from fotismos.comparisons.check.pictures import (
     SIDE,
@@ -29,7 +30,7 @@ LONGEST = 2**15
 
 def read_repeats(pattern: str, transfer: str | None) -> Repeats:
     """Read the repeats that match a pattern, ``render_*.exr`` or ``render_*.exr:LAYER``."""
-    path, layer = pictures.parts(pattern)
+    path, layer = picture_parts(pattern)
     found = [str(path)] if path.is_file() else sorted(glob(str(path), recursive=True))
     if not found:
         raise InputError(f"{pattern}: no file matches. Give repeats, such as 'render_*.exr'.")

@@ -12,17 +12,18 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from fotismos.comparisons.case import name_of
+from fotismos.comparisons.case import name_of, picture_parts
 from fotismos.comparisons.comparison import machine, versions
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import FotismosError, InputError, InstallationError, OutputError
 from fotismos.reference.records import to_json
-from fotismos.reports import jobs, verdict
+from fotismos.reference.scene.source import placeholders
+from fotismos.reports import verdict
 from fotismos.reports.files import results
 from fotismos.reports.files.results import FIGURES, START, TABLES, Failure, RunRecord
-from fotismos.reports.jobs import Job
+from fotismos.reports.jobs import Job, command_line
 from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene
@@ -138,8 +139,8 @@ def run(
     views of the compared scenes and the errors of the others. The gravest error is raised at last.
     """
     checked_threshold(job.within)
-    requests = dict(zip(scenes, jobs.requests(job.request, scenes), strict=True))
-    command = jobs.command_line()
+    requests = dict(zip(scenes, _requests(job.request, scenes), strict=True))
+    command = command_line()
     with results.hold(folder, command) as folder:
         places = results.places(folder, scenes)
         _require_inputs_apart(job.request, [folder / target for target in places])
@@ -173,6 +174,22 @@ def run(
         error = max(batch.errors.values(), key=lambda error: error.exit_code)
         count = f"{len(batch.errors)} of {len(places)} scenes failed, "
         raise type(error)(f"{count}among them: {error}") from error
+
+
+def _requests(whole: Options, scenes: Sequence[str]) -> list[Options]:
+    """Return the request for each scene: with values only for the placeholders that it has."""
+    if len(scenes) == 1 or not whole.define:
+        return [whole] * len(scenes)
+    known = (placeholders(Path(scene)) for scene in scenes)
+    by_scene = [
+        {key: value for key, value in whole.define.items() if key in names} for names in known
+    ]
+    if unused := set(whole.define) - {key for defined in by_scene for key in defined}:
+        raise InputError(
+            f"-D {', '.join(sorted(unused))}: no scene has such a placeholder. Write $name into a"
+            " scene file, or leave the option out."
+        )
+    return [whole.changed(define=define) for define in by_scene]
 
 
 def _compare(
@@ -218,9 +235,7 @@ def _compare(
 def _require_inputs_apart(request: Options, places: Sequence[Path]) -> None:
     """Refuse pictures in a folder whose files are about to be replaced."""
     for word in request.image:
-        from fotismos.comparisons import pictures  # loaded late: few comparisons have any
-
-        path, _ = pictures.parts(word)
+        path, _ = picture_parts(word)
         if path.resolve().parent in [target.resolve() for target in places]:
             raise InputError(
                 f"{path}: this picture is in the folder of the results, and would be replaced by"

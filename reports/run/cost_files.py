@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fotismos.reference import records
 from fotismos.reports import glossary
-from fotismos.reports.charts import theme, vega
+from fotismos.reports.charts import cost_charts, theme, vega
 from fotismos.reports.files import images, results
 from fotismos.reports.page.scene_view import CostView
 from fotismos.reports.page.templating import HELP, rendered
@@ -23,8 +23,6 @@ FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BS
 
 def documents(study: Study) -> dict[str, bytes]:
     """Return the named files of a study: charts, and pictures of methods with its exposure."""
-    from fotismos.reports.charts import cost_charts  # Altair takes half a second to import
-
     record = study.record
     pictures = {f"cost-method-{_plain(name)}": image for name, image in study.methods.items()}
     pictures["cost-reference"] = study.reference
@@ -60,8 +58,6 @@ def write(folder: Path, study: Study) -> None:
 
 def figure(record: Cost) -> vega.Figure:
     """Return the chart of a study: error against time."""
-    from fotismos.reports.charts import cost_charts  # Altair takes half a second to import
-
     note = "; ".join([FAMILIES, *cost_charts.reading(record)]) + "."
     return vega.figure("Error against time", cost_charts.error_over_time(record), note)
 

@@ -10,7 +10,8 @@ import msgspec
 from msgspec import structs
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.case import Case, open_case
+from fotismos.comparisons.case import Case, open_case, picture_parts
+from fotismos.comparisons.compare import compare as compare_scene
 from fotismos.comparisons.comparison import (
     CAUSES,
     Comparison,
@@ -28,6 +29,7 @@ from fotismos.reports.files import images, results
 from fotismos.reports.jobs import Job
 from fotismos.reports.page import embedding
 from fotismos.reports.page.scene_view import LiveView, SceneView, TermsView, WhyView
+from fotismos.reports.page.why_view import live_view, terms_view, why_view
 
 if TYPE_CHECKING:  # few scenes have these
     from fotismos.comparisons.cost.cost import Study
@@ -60,7 +62,6 @@ def compare(
         spent = {"finished scenes": perf_counter() - begin}
         if view is not None:
             return view, spent
-        import fotismos.comparisons.compare  # loaded late: a finished scene needs none
 
         def in_turn(*state: Any) -> None:
             """Show progress, after other processes have measured."""
@@ -70,7 +71,7 @@ def compare(
         begin = perf_counter()
         source = case.source
         options = case.options
-        comparison = fotismos.comparisons.compare.compare(
+        comparison = compare_scene(
             source, options, in_turn, case.command(), job.with_causes, turn.alone()
         )
         spent = _stages(comparison.record, perf_counter() - begin)
@@ -120,9 +121,7 @@ def key_of(case: Case, job: Job) -> str | None:
         return None
     files = []
     if case.options.image:
-        from fotismos.comparisons import pictures  # loaded late: few have any
-
-        files = [pictures.parts(word)[0] for word in case.options.image]
+        files = [picture_parts(word)[0] for word in case.options.image]
     parts: dict[str, Any] = {
         "record": VERSION,
         "metrics": list(METRICS),
@@ -235,8 +234,6 @@ def _terms(comparison: Comparison) -> TermsView | None:
     """Return the terms at pixels for the page, or why there are none."""
     if comparison.terms is None:
         return TermsView(missing=comparison.no_terms) if comparison.no_terms else None
-    from fotismos.reports.page.why_view import terms_view  # loaded late: --no-why traces none
-
     return terms_view(comparison.terms)
 
 
@@ -244,8 +241,6 @@ def _live(points: "LivePoints | str") -> LiveView | None:
     """Return the points that the page shades again, or why it does not."""
     if isinstance(points, str):
         return LiveView(missing=points) if points else None
-    from fotismos.reports.page.why_view import live_view  # loaded late: --no-why traces none
-
     return live_view(points)
 
 
@@ -268,8 +263,6 @@ def _why(comparison: Comparison) -> WhyView | None:
     causes = comparison.causes
     if causes is None:
         return None
-    from fotismos.reports.page.why_view import why_view  # loaded late: it needs what finds causes
-
     previews = [causes.previews[hybrid.effects] for hybrid in causes.record.hybrids]
     return why_view(causes.maps, causes.counted, previews, comparison.record.viewing)
 
