@@ -13,7 +13,9 @@ const VALUES = Float64Array.from({ length: 65536 }, (_, code) => {
 });
 
 /** Bits of the plane "flags". */
-const SIGNIFICANT = 1, COUNTED = 2, UNDETERMINED = 4;
+const SIGNIFICANT = 1;
+const COUNTED = 2;
+const UNDETERMINED = 4;
 
 /** The greatest grey of a difference that is not visible. */
 const DARK = 70;
@@ -21,7 +23,11 @@ const DARK = 70;
 /** Decoded planes by the ids of their elements. @type {Map<string, Promise<Images>>} */
 const decoded = new Map();
 
-/** The planes in an element, decoded when first requested. @param {string} id @param {Manifest} manifest */
+/**
+ * The planes in an element, decoded when first requested.
+ * @param {string} id
+ * @param {Manifest} manifest
+ */
 function imagesIn(id, manifest) {
   if (!decoded.has(id)) decoded.set(id, decode(manifest, byId(id).textContent ?? ""));
   return /** @type {Promise<Images>} */ (decoded.get(id));
@@ -29,7 +35,7 @@ function imagesIn(id, manifest) {
 
 /** @param {Manifest} manifest @param {string} text @returns {Promise<Images>} */
 async function decode(manifest, text) {
-  const bytes = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
+  const bytes = Uint8Array.from(atob(text.trim()), letter => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   const halves = new Uint8Array(await new Response(stream).arrayBuffer());
   const codes = new Uint16Array(halves.length / 2);
@@ -42,14 +48,25 @@ async function decode(manifest, text) {
     if (!/[.][GB]$/.test(name)) return;
     for (let place = i * size; place < (i + 1) * size; place++) codes[place] += codes[place - size];
   });
-  return { ...manifest, codes: Object.fromEntries(manifest.names.map((name, i) => [name, codes.subarray(i * size, (i + 1) * size)])) };
+  return {
+    ...manifest,
+    codes: Object.fromEntries(
+      manifest.names.map((name, i) => [name, codes.subarray(i * size, (i + 1) * size)]),
+    ),
+  };
 }
 
-/** An opaque pixel as stored in the canvas, on little-endian machines (all that browsers run on). @param {number[]} colour */
+/**
+ * An opaque pixel as stored in the canvas, on little-endian machines (all that browsers run on).
+ * @param {number[]} colour
+ */
 const rgba = ([r, g, b]) => (0xff000000 | (b << 16) | (g << 8) | r) >>> 0;
 
 /** "rrggbb", once or repeated, as pixels. @param {string} digits */
-const pixelsOf = (digits) => Uint32Array.from(digits.match(/.{6}/g) ?? [], (css) => rgba([0, 2, 4].map((at) => parseInt(css.slice(at, at + 2), 16))));
+const pixelsOf = digits =>
+  Uint32Array.from(digits.match(/.{6}/g) ?? [], css =>
+    rgba([0, 2, 4].map(at => parseInt(css.slice(at, at + 2), 16))),
+  );
 
 /** The 8-bit sRGB level of linear light, 1 being white (IEC 61966-2-1). @param {number} linear */
 function srgb(linear) {
@@ -57,7 +74,12 @@ function srgb(linear) {
   return Math.round(255 * (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055));
 }
 
-/** A canvas that a function has painted. @param {number} width @param {number} height @param {(pixels: Uint32Array) => void} paint */
+/**
+ * A canvas that a function has painted.
+ * @param {number} width
+ * @param {number} height
+ * @param {(pixels: Uint32Array) => void} paint
+ */
 function painted(width, height, paint) {
   const canvas = Object.assign(document.createElement("canvas"), { width, height });
   const data = new ImageData(width, height);
@@ -66,7 +88,11 @@ function painted(width, height, paint) {
   return canvas;
 }
 
-/** The colours of differences: grey up to the threshold, then from dark to bright up to the top. @param {number} t @param {number} top */
+/**
+ * The colours of differences: grey up to the threshold, then from dark to bright up to the top.
+ * @param {number} t
+ * @param {number} top
+ */
 function differenceColours(t, top) {
   const table = pixelsOf(page.colours.error);
   return (/** @type {number} */ value) => {
@@ -77,16 +103,25 @@ function differenceColours(t, top) {
 
 /** Pictures of one scene, kept until they change. */
 class Painter {
-  /** @param {Scene} scene @param {Images} images @param {Painter | null} whole of the scene, if these images are smaller */
+  /**
+   * @param {Scene} scene
+   * @param {Images} images
+   * @param {Painter | null} whole of the scene, if these images are smaller
+   */
   constructor(scene, images, whole = null) {
     this.scene = scene;
     this.images = images;
-    this.differences = Float64Array.from(images.codes.dE2000, (code) => VALUES[code]);
+    this.differences = Float64Array.from(images.codes.dE2000, code => VALUES[code]);
     const sizes = this.differences.filter((_, place) => this.counts(place)).sort();
     /** The end of the map's colours, by what most pixels have. */
-    this.top = whole?.top ?? [5, 10, 20, 40].find((end) => end >= (sizes[Math.floor(0.95 * sizes.length)] ?? 0)) ?? 100;
+    this.top =
+      whole?.top ??
+      [5, 10, 20, 40].find(end => end >= (sizes[Math.floor(0.95 * sizes.length)] ?? 0)) ??
+      100;
     /** Pixels of the scene in a place, to the right and down. */
-    this.step = whole ? [scene.width / images.width, scene.height / images.height] : [images.block, images.block];
+    this.step = whole
+      ? [scene.width / images.width, scene.height / images.height]
+      : [images.block, images.block];
     /** @type {Map<string, {key: string, canvas: HTMLCanvasElement}>} */
     this.kept = new Map();
   }
@@ -103,27 +138,44 @@ class Painter {
 
   /** Linear red, green and blue. @param {string} half @param {number} place */
   colour(half, place) {
-    return ["R", "G", "B"].map((channel) => VALUES[this.images.codes[`${half}.${channel}`][place]]);
+    return ["R", "G", "B"].map(channel => VALUES[this.images.codes[`${half}.${channel}`][place]]);
   }
 
   /** Luminance of the first half over that of the reference, in stops. @param {number} place */
   ratio(place) {
-    const [test, reference] = ["heuristic", "reference"].map((half) =>
-      Math.max(this.colour(half, place).reduce((sum, value, channel) => sum + page.xyz[1][channel] * value, 0), 0) + page.epsilon);
+    const [test, reference] = ["heuristic", "reference"].map(
+      half =>
+        Math.max(
+          this.colour(half, place).reduce(
+            (sum, value, channel) => sum + page.xyz[1][channel] * value,
+            0,
+          ),
+          0,
+        ) + page.epsilon,
+    );
     return Math.log2(test / reference);
   }
 
   /** The letter of the effect that dominates at a place. @param {number} place */
   letter(place) {
     const { width, height } = this.images;
-    return letterAt(this.scene.effects, ((place % width) + 0.5) / width, (Math.floor(place / width) + 0.5) / height);
+    return letterAt(
+      this.scene.effects,
+      ((place % width) + 0.5) / width,
+      (Math.floor(place / width) + 0.5) / height,
+    );
   }
 
-  /** The canvas in a slot, painted place by place if its key has changed. @param {string} slot @param {string} key @param {(place: number) => number} pixelAt */
+  /**
+   * The canvas in a slot, painted place by place if its key has changed.
+   * @param {string} slot
+   * @param {string} key
+   * @param {(place: number) => number} pixelAt
+   */
   picture(slot, key, pixelAt) {
     const kept = this.kept.get(slot);
     if (kept?.key === key) return kept.canvas;
-    const canvas = painted(this.images.width, this.images.height, (pixels) => {
+    const canvas = painted(this.images.width, this.images.height, pixels => {
       for (let place = 0; place < pixels.length; place++) pixels[place] = pixelAt(place);
     });
     this.kept.set(slot, { key, canvas });
@@ -132,49 +184,75 @@ class Painter {
 
   /** "heuristic" or "reference". @param {string} half @param {number} ev */
   rendering(half, ev) {
-    const levels = Uint8Array.from(VALUES, (value) => srgb(value * this.scene.exposure * 2 ** ev));
-    const [r, g, b] = ["R", "G", "B"].map((channel) => this.images.codes[`${half}.${channel}`]);
-    return this.picture(half, String(ev), (place) => rgba([levels[r[place]], levels[g[place]], levels[b[place]]]));
+    const levels = Uint8Array.from(VALUES, value => srgb(value * this.scene.exposure * 2 ** ev));
+    const [r, g, b] = ["R", "G", "B"].map(channel => this.images.codes[`${half}.${channel}`]);
+    return this.picture(half, String(ev), place =>
+      rgba([levels[r[place]], levels[g[place]], levels[b[place]]]),
+    );
   }
 
-  /** The pixel at each place of a map. @param {MapOf} map @param {number} t @returns {(place: number) => number} */
+  /**
+   * The pixel at each place of a map.
+   * @param {MapOf} map
+   * @param {number} t
+   * @returns {(place: number) => number}
+   */
   colours({ name, kind, top }, t) {
     const flags = this.images.codes.flags;
     const [marked, unmarked, uncounted, undetermined] = page.mask.map(rgba);
     if (kind === "ratio") {
       const table = pixelsOf(page.colours.signed);
-      return (place) => table[clamp(Math.floor(128 + (128 * this.ratio(place)) / top), 0, 255)];
+      return place => table[clamp(Math.floor(128 + (128 * this.ratio(place)) / top), 0, 255)];
     }
     if (kind === "metric") {
-      const table = pixelsOf(page.colours.error), codes = this.images.codes[name];
-      return (place) => table[clamp(Math.floor((256 * VALUES[codes[place]]) / top), 0, 255)];
+      const table = pixelsOf(page.colours.error);
+      const codes = this.images.codes[name];
+      return place => table[clamp(Math.floor((256 * VALUES[codes[place]]) / top), 0, 255)];
     }
     if (kind === "mask") {
-      const unshown = (/** @type {number} */ place) => (flags[place] & UNDETERMINED ? undetermined : unmarked);
-      return (place) => (!this.counts(place) ? uncounted : flags[place] & SIGNIFICANT ? marked : unshown(place));
+      const unshown = (/** @type {number} */ place) =>
+        flags[place] & UNDETERMINED ? undetermined : unmarked;
+      return place =>
+        !this.counts(place) ? uncounted : flags[place] & SIGNIFICANT ? marked : unshown(place);
     }
     if (kind === "effects") {
-      const own = pixelsOf([...(this.scene.effects?.colours ?? []), page.noEffect].join("").replaceAll("#", ""));
-      return (place) => {
+      const own = pixelsOf(
+        [...(this.scene.effects?.colours ?? []), page.noEffect].join("").replaceAll("#", ""),
+      );
+      return place => {
         const letter = this.letter(place);
-        return letter === NOT_COUNTED ? uncounted : own[letter === NO_EFFECT ? own.length - 1 : parseInt(letter, 36)];
+        return letter === NOT_COUNTED
+          ? uncounted
+          : own[letter === NO_EFFECT ? own.length - 1 : parseInt(letter, 36)];
       };
     }
     const colour = differenceColours(t, this.top);
-    return (place) => colour(this.differences[place]);
+    return place => colour(this.differences[place]);
   }
 }
 
 /** Letters of pixels without an effect: none dominates, and not counted. */
-const NO_EFFECT = ".", NOT_COUNTED = "-";
+const NO_EFFECT = ".";
+const NOT_COUNTED = "-";
 
-/** The letter at a place of the image, from 0 to 1. @param {Effects | null} effects @param {number} x @param {number} y */
+/**
+ * The letter at a place of the image, from 0 to 1.
+ * @param {Effects | null} effects
+ * @param {number} x
+ * @param {number} y
+ */
 function letterAt(effects, x, y) {
   if (!effects) return NOT_COUNTED;
-  return effects.map[Math.floor(y * effects.height) * effects.width + Math.floor(x * effects.width)];
+  return effects.map[
+    Math.floor(y * effects.height) * effects.width + Math.floor(x * effects.width)
+  ];
 }
 
-/** What is missing where a letter stands; empty if unknown or nothing. @param {Effects | null} effects @param {string} letter */
+/**
+ * What is missing where a letter stands; empty if unknown or nothing.
+ * @param {Effects | null} effects
+ * @param {string} letter
+ */
 function effectName(effects, letter) {
   return effects?.names[parseInt(letter, 36)] ?? "";
 }

@@ -8,7 +8,11 @@ let view = DEFAULT_VIEW;
 /** How far the overview was scrolled when it was left. */
 let left = 0;
 
-/** Change the view, and the address unless the change is passing: browsers allow few changes per second. @param {Partial<View>} changes */
+/**
+ * Change the view, and the address unless the change is passing: browsers allow few changes per
+ * second.
+ * @param {Partial<View>} changes
+ */
 function change(changes, passing = false) {
   view = { ...view, ...changes };
   if (!passing) address.replace(fragmentOf(view));
@@ -19,7 +23,7 @@ function change(changes, passing = false) {
 function follow() {
   const before = view;
   view = parseFragment(address.read());
-  if (!page.scenes.some((scene) => scene.id === view.scene && !scene.failed)) view.scene = "";
+  if (!page.scenes.some(scene => scene.id === view.scene && !scene.failed)) view.scene = "";
   if (!before.scene && view.scene) left = window.scrollY;
   if (!/[#&]t=/.test(address.read()) && before.t !== view.t) {
     view.t = before.t;
@@ -28,19 +32,25 @@ function follow() {
   show();
   if (view.scene === before.scene) return;
   window.scrollTo(0, view.scene ? 0 : left);
-  if (view.scene) /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h1"))?.focus({ preventScroll: true });
+  if (view.scene)
+    /** @type {HTMLElement | null} */ (document.querySelector(".scene.open h1"))?.focus({
+      preventScroll: true,
+    });
 }
 
 function show() {
   const place = placeOf(view.t);
-  const scene = page.scenes.find((one) => one.id === view.scene);
+  const scene = page.scenes.find(one => one.id === view.scene);
   document.documentElement.dataset.view = scene ? "scene" : "overview";
-  for (const slider of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("[data-threshold]"))) {
+  for (const slider of /** @type {NodeListOf<HTMLInputElement>} */ (
+    document.querySelectorAll("[data-threshold]")
+  )) {
     slider.value = String(view.t);
     if (slider.nextElementSibling) slider.nextElementSibling.textContent = String(view.t);
   }
   const open = scene ? sectionOf(scene.id) : null;
-  for (const section of document.querySelectorAll(".scene")) section.classList.toggle("open", section === open);
+  for (const section of document.querySelectorAll(".scene"))
+    section.classList.toggle("open", section === open);
   if (!scene) showOverview(view.t);
   if (!scene || scene.failed || !open) return;
   showScene(open, scene, place);
@@ -72,19 +82,27 @@ function showTerms() {
 
 /** @param {number} step */
 function turn(step) {
-  const seen = page.scenes.filter((scene) => scene.images);
-  const next = seen[(seen.findIndex((scene) => scene.id === view.scene) + step + seen.length) % seen.length];
-  address.go(fragmentOf({ ...DEFAULT_VIEW, t: view.t, mode: view.mode, map: view.map, scene: next.id }));
+  const seen = page.scenes.filter(scene => scene.images);
+  const next =
+    seen[(seen.findIndex(scene => scene.id === view.scene) + step + seen.length) % seen.length];
+  address.go(
+    fragmentOf({ ...DEFAULT_VIEW, t: view.t, mode: view.mode, map: view.map, scene: next.id }),
+  );
 }
 
-for (const slider of /** @type {NodeListOf<HTMLInputElement>} */ (document.querySelectorAll("[data-threshold]"))) {
+for (const slider of /** @type {NodeListOf<HTMLInputElement>} */ (
+  document.querySelectorAll("[data-threshold]")
+)) {
   slider.addEventListener("input", () => change({ t: Number(slider.value) }));
 }
-for (const link of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll("[data-jump]"))) {
-  link.addEventListener("click", (event) => {
+for (const link of /** @type {NodeListOf<HTMLElement>} */ (
+  document.querySelectorAll("[data-jump]")
+)) {
+  link.addEventListener("click", event => {
     event.preventDefault(); // the fragment is the view's
     event.stopPropagation();
-    if (view.scene && link.dataset.jump !== "main") address.go(fragmentOf({ ...DEFAULT_VIEW, t: view.t }));
+    if (view.scene && link.dataset.jump !== "main")
+      address.go(fragmentOf({ ...DEFAULT_VIEW, t: view.t }));
     setTimeout(() => {
       const target = byId(link.dataset.jump ?? "");
       target.scrollIntoView();
@@ -93,10 +111,12 @@ for (const link of /** @type {NodeListOf<HTMLElement>} */ (document.querySelecto
   });
 }
 window.addEventListener("beforeprint", () => {
-  for (const part of document.querySelectorAll(".scene.open details")) part.setAttribute("open", "");
+  for (const part of document.querySelectorAll(".scene.open details"))
+    part.setAttribute("open", "");
 });
 listenToKeys(viewer, turn, () => address.go(fragmentOf({ ...DEFAULT_VIEW, t: view.t })));
 address.listen(follow);
 const [only, ...others] = page.scenes;
-if (!address.read() && only?.images && !others.length) address.replace(fragmentOf({ ...DEFAULT_VIEW, scene: only.id }));
+if (!address.read() && only?.images && !others.length)
+  address.replace(fragmentOf({ ...DEFAULT_VIEW, scene: only.id }));
 follow();

@@ -4,12 +4,15 @@
  * @typedef {[number, string][]} Runs   texts by the place of the threshold from which each holds
  * @typedef {{name: string, title: string, kind: string, top: number}} MapOf
  * @typedef {{x: number, y: number, width: number, height: number, effect: string | null}} Region
- * @typedef {{width: number, height: number, names: string[], colours: string[], map: string}} Effects
+ * @typedef {{width: number, height: number, names: string[], colours: string[], map: string}}
+ * Effects
  * @typedef {{on: number[], mean: string}} Hybrid
  * @typedef {{images: Manifest, hybrids: Hybrid[]}} Board
- * @typedef {{name: string, k_i: number[], k_a: number[], k_d: number[], k_s: number[], n: number, form: string, ambient: number[]}} Material
+ * @typedef {{name: string, k_i: number[], k_a: number[], k_d: number[], k_s: number[], n: number,
+ * form: string, ambient: number[]}} Material
  * @typedef {{name: string, intensity: number[], specular_intensity: number[]}} Lamp
- * @typedef {{grid: Manifest | null, tops: Record<string, number>, materials: Material[], lights: Lamp[], missing: string}} Terms
+ * @typedef {{grid: Manifest | null, tops: Record<string, number>, materials: Material[], lights:
+ * Lamp[], missing: string}} Terms
  */
 
 /**
@@ -33,7 +36,10 @@
  * @property {undefined} [failed]
  */
 
-/** @typedef {Scene & {images: Manifest}} Pictured @typedef {{id: string, name: string, failed: true, images?: undefined}} Failed */
+/**
+ * @typedef {Scene & {images: Manifest}} Pictured
+ * @typedef {{id: string, name: string, failed: true, images?: undefined}} Failed
+ */
 
 /**
  * @typedef {object} Page
@@ -42,11 +48,11 @@
  * @property {number} usual              the threshold shown first
  * @property {Runs} headlines
  * @property {Runs} missing
- * @property {string} find              the sentence on commands, which rows of the overview leave out
+ * @property {string} find  the sentence on commands, which rows of the overview leave out
  * @property {MapOf[]} maps
  * @property {string} noEffect
  * @property {Record<string, string>} colours   256 of each map, as "rrggbb"
- * @property {number[][]} mask           colours of pixels: marked, unmarked, not counted, undetermined
+ * @property {number[][]} mask  colours of pixels: marked, unmarked, not counted, undetermined
  * @property {number[][]} xyz            the matrix from linear RGB; white has Y = 1
  * @property {Record<string, string>} terms   meanings, from the glossary
  * @property {number} epsilon
@@ -56,7 +62,7 @@
 const page = JSON.parse(document.getElementById("page-data")?.textContent ?? "{}");
 
 /** @param {string} id @returns {HTMLElement} */
-const byId = (id) => /** @type {HTMLElement} */ (document.getElementById(id));
+const byId = id => /** @type {HTMLElement} */ (document.getElementById(id));
 
 /** @param {number} value @param {number} low @param {number} high */
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
@@ -65,7 +71,7 @@ const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 const textAt = (runs, place) => runs.filter(([from]) => from <= place).at(-1)?.[1] ?? "";
 
 /** The place of a threshold in the lists. @param {number} t */
-const placeOf = (t) => page.thresholds.indexOf(t);
+const placeOf = t => page.thresholds.indexOf(t);
 
 /** A value with significant digits, in human form. @param {number} value */
 function significant(value, digits = 3) {
@@ -73,15 +79,21 @@ function significant(value, digits = 3) {
   const [mantissa, power] = value.toExponential(digits - 1).split("e");
   const exponent = Number(power);
   const isPlain = exponent >= -3 && exponent < Math.max(digits, 3);
-  const raised = [...String(exponent)].map((sign) => (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(sign)])).join("");
-  return (isPlain ? value.toFixed(Math.max(0, digits - 1 - exponent)) : `${mantissa} × 10${raised}`).replace("-", "−");
+  const raised = [...String(exponent)]
+    .map(sign => (sign === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(sign)]))
+    .join("");
+  return (
+    isPlain ? value.toFixed(Math.max(0, digits - 1 - exponent)) : `${mantissa} × 10${raised}`
+  ).replace("-", "−");
 }
 
 /** A colour difference; a hundredth is invisible. @param {number} value */
-const differenceText = (value) => (value > 0 && value < 0.01 ? "< 0.01" : significant(value));
+const differenceText = value => (value > 0 && value < 0.01 ? "< 0.01" : significant(value));
 
 /** @param {number} part of 1 */
 function percentText(part) {
   const value = 100 * part;
-  return value > 0 && value < 0.1 ? "< 0.1 %" : `${value >= 99.95 ? "100" : value.toPrecision(value < 1 ? 1 : value < 10 ? 2 : 3)} %`;
+  return value > 0 && value < 0.1
+    ? "< 0.1 %"
+    : `${value >= 99.95 ? "100" : value.toPrecision(value < 1 ? 1 : value < 10 ? 2 : 3)} %`;
 }

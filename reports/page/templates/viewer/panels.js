@@ -1,4 +1,5 @@
-// Beside the picture: the numbers of a pixel, and how the error is distributed over the image or a selection.
+// Beside the picture: the numbers of a pixel, and how the error is distributed over the image or a
+// selection.
 
 /** Bars of the histogram, from 0 to the end of the map's colours. */
 const BARS = 40;
@@ -14,7 +15,10 @@ class Panels {
     this.distribution = byId("distribution");
     this.elements = [this.inspector, this.distribution];
     this.key = "";
-    /** The worst pixel, found once for each scene. @type {{painter: Painter | null, pixel: number[]}} */
+    /**
+     * The worst pixel, found once for each scene.
+     * @type {{painter: Painter | null, pixel: number[]}}
+     */
     this.found = { painter: null, pixel: [0, 0] };
     this.part("clear").addEventListener("click", () => viewer.change({ box: null }));
     this.listenToDrags(/** @type {SVGElement} */ (this.distribution.querySelector("svg")));
@@ -32,7 +36,7 @@ class Panels {
     const { block, width } = painter.images;
     let [best, most] = [0, -1];
     const [region] = scene.regions;
-    eachPlace(painter, region ? [region.x, region.y, region.width, region.height] : null, (place) => {
+    eachPlace(painter, region ? [region.x, region.y, region.width, region.height] : null, place => {
       if (painter.differences[place] > most) [best, most] = [place, painter.differences[place]];
     });
     this.found = { painter, pixel: [(best % width) * block, Math.floor(best / width) * block] };
@@ -41,21 +45,29 @@ class Panels {
 
   show() {
     this.inspect();
-    const { shown: painter, added, view, scene } = this.viewer, box = this.viewer.box();
+    const { shown: painter, added, view, scene } = this.viewer;
+    const box = this.viewer.box();
     const key = JSON.stringify([scene.id, view.t, box, view.on]);
     if (!painter || this.key === key) return;
     this.key = key;
-    const all = summarise(painter, null, view.t), some = box ? summarise(painter, box, view.t) : all;
-    this.part("title").textContent = `ΔE2000 ${added ? "left " : ""}in ${box ? "the selection" : "the whole image"}`;
+    const all = summarise(painter, null, view.t);
+    const some = box ? summarise(painter, box, view.t) : all;
+    this.part("title").textContent =
+      `ΔE2000 ${added ? "left " : ""}in ${box ? "the selection" : "the whole image"}`;
     const tallest = Math.max(...all.bars, ...some.bars, 1e-9);
     this.part("some").setAttribute("d", outlineOf(some.bars, tallest));
     this.part("all").setAttribute("d", outlineOf(all.bars, tallest));
     this.part("line").setAttribute("x", String((100 * view.t) / painter.top));
     this.part("end").textContent = `≥ ${painter.top}`;
     const texts = {
-      mean: added && !box ? added.mean : differenceText(some.mean), visible: percentText(box || added ? some.visible : scene.shares[placeOf(view.t)]),
-      shown: added ? UNKNOWN : `${percentText(some.marked)}, ${percentText(some.both)} above ${view.t}`,
-      pixels: box ? percentText(some.count / all.count) : "all", error: percentText(all.sum ? some.sum / all.sum : 0), cause: added ? UNKNOWN : causesIn(painter, box),
+      mean: added && !box ? added.mean : differenceText(some.mean),
+      visible: percentText(box || added ? some.visible : scene.shares[placeOf(view.t)]),
+      shown: added
+        ? UNKNOWN
+        : `${percentText(some.marked)}, ${percentText(some.both)} above ${view.t}`,
+      pixels: box ? percentText(some.count / all.count) : "all",
+      error: percentText(all.sum ? some.sum / all.sum : 0),
+      cause: added ? UNKNOWN : causesIn(painter, box),
     };
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text;
     this.part("clear").hidden = !box;
@@ -66,40 +78,63 @@ class Panels {
     const drag = (/** @type {PointerEvent} */ event, passing = true) => {
       const { left, width } = chart.getBoundingClientRect();
       const value = ((event.clientX - left) / width) * (this.viewer.painter?.top ?? 1);
-      const t = page.thresholds.reduce((best, one) => (Math.abs(one - value) < Math.abs(best - value) ? one : best));
+      const t = page.thresholds.reduce((best, one) =>
+        Math.abs(one - value) < Math.abs(best - value) ? one : best,
+      );
       this.viewer.change({ t }, passing);
     };
-    chart.addEventListener("pointerdown", (event) => {
+    chart.addEventListener("pointerdown", event => {
       chart.setPointerCapture(event.pointerId);
       drag(event);
     });
-    chart.addEventListener("pointermove", (event) => event.buttons && drag(event));
-    chart.addEventListener("pointerup", (event) => drag(event, false));
+    chart.addEventListener("pointermove", event => event.buttons && drag(event));
+    chart.addEventListener("pointerup", event => drag(event, false));
   }
 
   /** Write the numbers of the pixel into the page. */
   inspect() {
     const { shown: painter, added, scene, view } = this.viewer;
     if (!painter) return;
-    const pixel = this.viewer.pixel(), place = painter.placeOf(pixel);
-    const { codes, block, width, height } = painter.images, flags = codes.flags[place];
-    const [textbook, physical] = ["heuristic", "reference"].map((half) => painter.colour(half, place));
-    const seen = (/** @type {number[]} */ rgb) => `#${rgb.map((value) => srgb(value * scene.exposure * 2 ** view.ev).toString(16).padStart(2, "0")).join("")}`;
+    const pixel = this.viewer.pixel();
+    const place = painter.placeOf(pixel);
+    const { codes, block, width, height } = painter.images;
+    const flags = codes.flags[place];
+    const [textbook, physical] = ["heuristic", "reference"].map(half =>
+      painter.colour(half, place),
+    );
+    const seen = (/** @type {number[]} */ rgb) =>
+      `#${rgb
+        .map(value =>
+          srgb(value * scene.exposure * 2 ** view.ev)
+            .toString(16)
+            .padStart(2, "0"),
+        )
+        .join("")}`;
     const marked = flags & SIGNIFICANT ? "yes" : flags & UNDETERMINED ? "undetermined" : "no";
-    const short = (/** @type {number} */ value) => significant(value, Math.abs(value) < 1e-3 ? 2 : 3);
+    const short = (/** @type {number} */ value) =>
+      significant(value, Math.abs(value) < 1e-3 ? 2 : 3);
     const isWorst = !this.viewer.hovered && !view.pixel && !added;
-    const size = added ? ` + ${added.name}, at ${width} × ${height}` : block > 1 ? `: mean of ${block} × ${block}` : "";
+    const size = added
+      ? ` + ${added.name}, at ${width} × ${height}`
+      : block > 1
+        ? `: mean of ${block} × ${block}`
+        : "";
     /** @type {Record<string, string | string[]>} */
     const texts = {
       position: `${isWorst ? "Worst pixel outlined" : "Pixel"} ${pixel.join(", ")}${size}`,
       cause: added ? UNKNOWN : causeAt(painter, pixel) || "unknown",
-      heuristic: textbook.map(short), reference: physical.map(short),
-      heuristic_hex: seen(textbook), reference_hex: seen(physical), dE2000: differenceText(painter.differences[place]),
+      heuristic: textbook.map(short),
+      reference: physical.map(short),
+      heuristic_hex: seen(textbook),
+      reference_hex: seen(physical),
+      dE2000: differenceText(painter.differences[place]),
       log2_luminance: `${significant(painter.ratio(place), 2)} stops`,
       standard_error: added ? UNKNOWN : significant(VALUES[codes.standard_error[place]], 2),
       significant: !(flags & COUNTED) ? "not counted" : added ? UNKNOWN : marked,
     };
-    for (const cell of /** @type {NodeListOf<HTMLElement>} */ (this.inspector.querySelectorAll("[data-value]"))) {
+    for (const cell of /** @type {NodeListOf<HTMLElement>} */ (
+      this.inspector.querySelectorAll("[data-value]")
+    )) {
       const [name, index] = cell.dataset.value?.split(".") ?? [];
       cell.textContent = index ? texts[name][Number(index)] : String(texts[name]);
       if (name.endsWith("_hex")) cell.style.borderColor = String(texts[name]);
@@ -107,21 +142,40 @@ class Panels {
   }
 }
 
-/** What is missing at a pixel: the effect that dominates there, or in its region; "none" if nothing is, empty if unknown. @param {Painter} painter @param {number[]} pixel */
+/**
+ * What is missing at a pixel: the effect that dominates there, or in its region; "none" if nothing
+ * is, empty if unknown.
+ * @param {Painter} painter
+ * @param {number[]} pixel
+ */
 function causeAt({ scene }, [x, y]) {
   if (scene.effects) {
     const letter = letterAt(scene.effects, (x + 0.5) / scene.width, (y + 0.5) / scene.height);
     return letter === NO_EFFECT ? "none" : effectName(scene.effects, letter);
   }
-  return scene.regions.find((one) => x >= one.x && y >= one.y && x < one.x + one.width && y < one.y + one.height)?.effect ?? "";
+  return (
+    scene.regions.find(
+      one => x >= one.x && y >= one.y && x < one.x + one.width && y < one.y + one.height,
+    )?.effect ?? ""
+  );
 }
 
-/** Statistics of a rectangle, or of the whole image. @param {Painter} painter @param {number[] | null} box @param {number} t */
+/**
+ * Statistics of a rectangle, or of the whole image.
+ * @param {Painter} painter
+ * @param {number[] | null} box
+ * @param {number} t
+ */
 function summarise(painter, box, t) {
   const bars = new Array(BARS).fill(0);
-  let count = 0, sum = 0, visible = 0, marked = 0, both = 0;
-  eachPlace(painter, box, (place) => {
-    const value = painter.differences[place], isMarked = painter.images.codes.flags[place] & SIGNIFICANT;
+  let count = 0;
+  let sum = 0;
+  let visible = 0;
+  let marked = 0;
+  let both = 0;
+  eachPlace(painter, box, place => {
+    const value = painter.differences[place];
+    const isMarked = painter.images.codes.flags[place] & SIGNIFICANT;
     count += 1;
     sum += value;
     visible += Number(value > t);
@@ -130,43 +184,86 @@ function summarise(painter, box, t) {
     bars[clamp(Math.floor((BARS * value) / painter.top), 0, BARS - 1)] += 1;
   });
   const share = (/** @type {number} */ part) => (count ? part / count : 0);
-  return { count, sum, mean: share(sum), visible: share(visible), marked: share(marked), both: share(both), bars: bars.map(share) };
+  return {
+    count,
+    sum,
+    mean: share(sum),
+    visible: share(visible),
+    marked: share(marked),
+    both: share(both),
+    bars: bars.map(share),
+  };
 }
 
-/** Call with each counted place of a rectangle of the image. @param {Painter} painter @param {number[] | null} box @param {(place: number) => void} visit */
+/**
+ * Call with each counted place of a rectangle of the image.
+ * @param {Painter} painter
+ * @param {number[] | null} box
+ * @param {(place: number) => void} visit
+ */
 function eachPlace(painter, box, visit) {
-  const { scene, step: [right, down], images: { width, height } } = painter;
+  const {
+    scene,
+    step: [right, down],
+    images: { width, height },
+  } = painter;
   const [x, y, w, h] = box ?? [0, 0, scene.width, scene.height];
   for (let row = Math.floor(y / down); row < Math.min(Math.ceil((y + h) / down), height); row++) {
-    for (let column = Math.floor(x / right); column < Math.min(Math.ceil((x + w) / right), width); column++) {
+    for (
+      let column = Math.floor(x / right);
+      column < Math.min(Math.ceil((x + w) / right), width);
+      column++
+    ) {
       if (painter.counts(row * width + column)) visit(row * width + column);
     }
   }
 }
 
-/** What is missing in a rectangle: the parts of its error where each effect dominates. @param {Painter} painter @param {number[] | null} box */
+/**
+ * What is missing in a rectangle: the parts of its error where each effect dominates.
+ * @param {Painter} painter
+ * @param {number[] | null} box
+ */
 function causesIn(painter, box) {
   const { scene } = painter;
   if (!scene.effects) {
     const [x, y, w, h] = box ?? [0, 0, Infinity, Infinity];
-    const near = scene.regions.filter((one) => one.x < x + w && x < one.x + one.width && one.y < y + h && y < one.y + one.height);
-    return [...new Set(near.flatMap((one) => one.effect ?? []))].join(", ") || "unknown";
+    const near = scene.regions.filter(
+      one => one.x < x + w && x < one.x + one.width && one.y < y + h && y < one.y + one.height,
+    );
+    return [...new Set(near.flatMap(one => one.effect ?? []))].join(", ") || "unknown";
   }
   /** @type {Map<string, number>} */
   const sums = new Map();
   let whole = 0;
-  eachPlace(painter, box, (place) => {
-    const letter = painter.letter(place), size = painter.differences[place];
+  eachPlace(painter, box, place => {
+    const letter = painter.letter(place);
+    const size = painter.differences[place];
     whole += size;
     sums.set(letter, (sums.get(letter) ?? 0) + size);
   });
-  const parts = [...sums].map(([letter, sum]) => ({ name: effectName(scene.effects, letter), part: whole ? sum / whole : 0 }));
-  const seen = parts.filter(({ name, part }) => name && part >= 0.005).sort((a, b) => b.part - a.part);
-  return seen.slice(0, 3).map(({ name, part }) => `${name} ${percentText(part)}`).join(", ") || "unknown";
+  const parts = [...sums].map(([letter, sum]) => ({
+    name: effectName(scene.effects, letter),
+    part: whole ? sum / whole : 0,
+  }));
+  const seen = parts
+    .filter(({ name, part }) => name && part >= 0.005)
+    .sort((a, b) => b.part - a.part);
+  return (
+    seen
+      .slice(0, 3)
+      .map(({ name, part }) => `${name} ${percentText(part)}`)
+      .join(", ") || "unknown"
+  );
 }
 
-/** A bar chart as one outline, 100 by 100, from the bottom left. @param {number[]} bars @param {number} tallest */
+/**
+ * A bar chart as one outline, 100 by 100, from the bottom left.
+ * @param {number[]} bars
+ * @param {number} tallest
+ */
 function outlineOf(bars, tallest) {
   const step = 100 / bars.length;
-  return `M0 100${bars.map((bar) => `V${(100 - (100 * bar) / tallest).toFixed(2)}h${step}`).join("")}V100Z`;
+  const steps = bars.map(bar => `V${(100 - (100 * bar) / tallest).toFixed(2)}h${step}`);
+  return `M0 100${steps.join("")}V100Z`;
 }

@@ -1,4 +1,5 @@
-// The switches of effects: the textbook with some of them, and the error that is left, at a small size.
+// The switches of effects: the textbook with some of them, and the error that is left, at a small
+// size.
 
 /** @typedef {{name: string, mean: string, painter: Painter}} Added */
 
@@ -21,10 +22,16 @@ class Switches {
     });
   }
 
-  /** The effects that are on after switching one of them; unchanged if that was not rendered. @param {number[] | null} on @param {number} effect */
+  /**
+   * The effects that are on after switching one of them; unchanged if that was not rendered.
+   * @param {number[] | null} on
+   * @param {number} effect
+   */
   after(on, effect) {
     const before = on ?? [];
-    const next = before.includes(effect) ? before.filter((one) => one !== effect) : [...before, effect].sort((a, b) => a - b);
+    const next = before.includes(effect)
+      ? before.filter(one => one !== effect)
+      : [...before, effect].sort((a, b) => a - b);
     return !this.places.has(next.join()) ? on : next.length ? next : null;
   }
 
@@ -34,24 +41,42 @@ class Switches {
       const cannot = this.after(on, effect) === on;
       button.setAttribute("aria-pressed", String(Boolean(on?.includes(effect))));
       button.setAttribute("aria-disabled", String(cannot));
-      button.title = cannot ? "This combination was not rendered; switch another effect first." : "";
+      button.title = cannot
+        ? "This combination was not rendered; switch another effect first."
+        : "";
     });
   }
 
-  /** The textbook with some effects, if it was rendered. @param {number[]} on @returns {Added | null} */
+  /**
+   * The textbook with some effects, if it was rendered.
+   * @param {number[]} on
+   * @returns {Added | null}
+   */
   find(on) {
     const place = this.places.get(on.join());
     if (place === undefined) return null;
     const painter = this.painters.get(place) ?? this.painterOf(place);
     this.painters.set(place, painter);
-    return { name: on.map((effect) => this.names[effect]).join(" + "), mean: this.board.hybrids[place].mean, painter };
+    return {
+      name: on.map(effect => this.names[effect]).join(" + "),
+      mean: this.board.hybrids[place].mean,
+      painter,
+    };
   }
 
   /** A hybrid beside the last one, which has all effects. @param {number} place */
   painterOf(place) {
-    const { codes } = this.images, last = this.board.hybrids.length - 1;
-    const halves = ["R", "G", "B"].flatMap((channel) => [[`heuristic.${channel}`, codes[`${place}.${channel}`]], [`reference.${channel}`, codes[`${last}.${channel}`]]]);
-    const own = { ...Object.fromEntries(halves), dE2000: codes[`${place}.dE2000`], flags: codes.flags };
+    const { codes } = this.images;
+    const last = this.board.hybrids.length - 1;
+    const halves = ["R", "G", "B"].flatMap(channel => [
+      [`heuristic.${channel}`, codes[`${place}.${channel}`]],
+      [`reference.${channel}`, codes[`${last}.${channel}`]],
+    ]);
+    const own = {
+      ...Object.fromEntries(halves),
+      dE2000: codes[`${place}.dE2000`],
+      flags: codes.flags,
+    };
     return new Painter(this.painter.scene, { ...this.images, codes: own }, this.painter);
   }
 }

@@ -22,14 +22,21 @@ class Viewer {
     /** @type {number[] | null} */
     this.hovered = null;
     this.selecting = this.pending = false;
-    element.addEventListener("click", (event) => {
-      const { mode, action, effect } = /** @type {HTMLElement} */ (event.target).closest("button")?.dataset ?? {};
+    element.addEventListener("click", event => {
+      const { mode, action, effect } =
+        /** @type {HTMLElement} */ (event.target).closest("button")?.dataset ?? {};
       if (mode) change({ mode });
       if (action) this.act(action);
-      if (effect && this.switches) change({ on: this.switches.after(this.view.on, Number(effect)) });
+      if (effect && this.switches)
+        change({ on: this.switches.after(this.view.on, Number(effect)) });
     });
     for (const control of this.fields()) {
-      control.addEventListener("input", () => change({ [control.dataset.control ?? ""]: control.type === "range" ? Number(control.value) : control.value }));
+      control.addEventListener("input", () =>
+        change({
+          [control.dataset.control ?? ""]:
+            control.type === "range" ? Number(control.value) : control.value,
+        }),
+      );
     }
     listenToPointers(this);
     new ResizeObserver(() => this.redraw()).observe(element);
@@ -45,7 +52,11 @@ class Viewer {
     return /** @type {HTMLElement} */ (this.element.querySelector(selector));
   }
 
-  /** Open a scene in its section of the page. @param {Pictured} scene @param {HTMLElement} section */
+  /**
+   * Open a scene in its section of the page.
+   * @param {Pictured} scene
+   * @param {HTMLElement} section
+   */
   async open(scene, section) {
     Object.assign(this, { scene, painter: null, switches: null, hovered: null, selecting: false });
     this.viewport = new Viewport(scene.width, scene.height);
@@ -55,7 +66,10 @@ class Viewer {
     this.element.dataset.ready = "";
     this.part("[data-part=switches]").hidden = !scene.board;
     const waiting = scene.board && imagesIn(`data-board-${scene.id}`, scene.board.images);
-    const [images, small] = await Promise.all([imagesIn(`data-${scene.id}`, scene.images), waiting]);
+    const [images, small] = await Promise.all([
+      imagesIn(`data-${scene.id}`, scene.images),
+      waiting,
+    ]);
     if (this.scene !== scene) return; // another one was opened meanwhile
     this.painter = new Painter(scene, images);
     this.switches = scene.board && small && new Switches(this.painter, scene.board, small);
@@ -68,20 +82,24 @@ class Viewer {
   show(view) {
     const without = !this.scene.effects && view.map === "effects";
     this.view = without ? { ...view, map: DEFAULT_VIEW.map } : view;
-    for (const button of /** @type {NodeListOf<HTMLElement>} */ (this.element.querySelectorAll("button[data-mode]"))) {
+    for (const button of /** @type {NodeListOf<HTMLElement>} */ (
+      this.element.querySelectorAll("button[data-mode]")
+    )) {
       button.setAttribute("aria-pressed", String(button.dataset.mode === view.mode));
     }
     this.part("[data-action=select]").setAttribute("aria-pressed", String(this.selecting));
     const option = /** @type {HTMLOptionElement} */ (this.part("option[value=effects]"));
     option.hidden = option.disabled = !this.scene.effects;
-    for (const field of this.fields()) field.value = String(this.view[/** @type {"map" | "ev"} */ (field.dataset.control)]);
-    this.part("[data-control=ev] + output").textContent = `${view.ev > 0 ? "+" : ""}${view.ev}`.replace("-", "−");
+    for (const field of this.fields())
+      field.value = String(this.view[/** @type {"map" | "ev"} */ (field.dataset.control)]);
+    this.part("[data-control=ev] + output").textContent =
+      `${view.ev > 0 ? "+" : ""}${view.ev}`.replace("-", "−");
     this.redraw();
   }
 
   /** @returns {MapOf} */
   map() {
-    return /** @type {MapOf} */ (page.maps.find((map) => map.name === this.view.map));
+    return /** @type {MapOf} */ (page.maps.find(map => map.name === this.view.map));
   }
 
   /** The part of the selection in the image, or null. @returns {number[] | null} */
@@ -111,22 +129,43 @@ class Viewer {
   paint() {
     const { painter, shown, added, scene, view } = this;
     if (!painter || !shown || !this.canvas.clientWidth) return;
-    const map = added ? page.maps[0] : this.map(), box = this.box();
+    const map = added ? page.maps[0] : this.map();
+    const box = this.box();
     const textbook = { picture: painter.rendering("heuristic", view.ev), title: scene.judged.name };
-    const more = added ? [{ picture: added.painter.rendering("heuristic", view.ev), title: `+ ${added.name}`, smooth: true }] : [];
+    const more = added
+      ? [
+          {
+            picture: added.painter.rendering("heuristic", view.ev),
+            title: `+ ${added.name}`,
+            smooth: true,
+          },
+        ]
+      : [];
     const physical = { picture: painter.rendering("reference", view.ev), title: "physical" };
     const kind = map.kind === "difference" ? "error" : map.title;
-    const error = { picture: shown.picture("map", `${map.name} ${view.t}`, shown.colours(map, view.t)), title: added ? "error left" : kind };
-    const contents = { side: [textbook, ...more, physical, error], split: [more[0] ?? textbook, physical] }[view.mode] ?? [error];
+    const error = {
+      picture: shown.picture("map", `${map.name} ${view.t}`, shown.colours(map, view.t)),
+      title: added ? "error left" : kind,
+    };
+    const contents = {
+      side: [textbook, ...more, physical, error],
+      split: [more[0] ?? textbook, physical],
+    }[view.mode] ?? [error];
     /** @type {[number[], string][]} */
-    const outlines = scene.regions.slice(0, 1).map(({ x, y, width, height }) => [[x, y, width, height], OVERLAY.worst]);
+    const outlines = scene.regions
+      .slice(0, 1)
+      .map(({ x, y, width, height }) => [[x, y, width, height], OVERLAY.worst]);
     if (box) outlines.push([box, OVERLAY.selection]);
     outlines.push([[...(view.pixel ?? this.panels.worst()), 1, 1], OVERLAY.line]);
     this.drawing.draw(view, this.viewport, contents, outlines);
     this.canvas.style.touchAction = view.zoom === null && !this.selecting ? "pan-y" : "none";
-    this.canvas.setAttribute("aria-label", `${scene.name}: ${contents.map((one) => one.title).join(", ")}. Press ? for the keys.`);
+    this.canvas.setAttribute(
+      "aria-label",
+      `${scene.name}: ${contents.map(one => one.title).join(", ")}. Press ? for the keys.`,
+    );
     this.part("[data-part=numbers]").textContent = this.numbers(added);
-    for (const one of document.querySelectorAll("[data-judged]")) one.textContent = `${scene.judged.title}${added ? " +" : ""}`;
+    for (const one of document.querySelectorAll("[data-judged]"))
+      one.textContent = `${scene.judged.title}${added ? " +" : ""}`;
     this.switches?.show(view.on);
     this.panels.show();
     showLegend(this.part(".legend"), this);
@@ -146,12 +185,17 @@ class Viewer {
   numbers(added) {
     const { scene, view } = this;
     const visibly = `of the pixels differ visibly (ΔE2000 above ${view.t}), mean`;
-    const share = percentText(scene.shares[placeOf(view.t)]), size = `at ${scene.width} × ${scene.height}`;
+    const share = percentText(scene.shares[placeOf(view.t)]);
+    const size = `at ${scene.width} × ${scene.height}`;
     const none = added && this.switches?.find([]);
     if (!none) return `${share} ${visibly} ${scene.mean}; ${size}`;
-    const [before, after] = [none, added].map(({ painter }) => percentText(summarise(painter, null, view.t).visible));
+    const [before, after] = [none, added].map(({ painter }) =>
+      percentText(summarise(painter, null, view.t).visible),
+    );
     const { width, height } = none.painter.images;
-    return `${before} → ${after} ${visibly} ${none.mean} → ${added.mean}; at ${width} × ${height} (whole comparison, ${size}: ${share}, mean ${scene.mean})`;
+    const changes = `${before} → ${after} ${visibly} ${none.mean} → ${added.mean}`;
+    const whole = `whole comparison, ${size}: ${share}, mean ${scene.mean}`;
+    return `${changes}; at ${width} × ${height} (${whole})`;
   }
 
   /** @param {number[] | null} place */
@@ -160,31 +204,51 @@ class Viewer {
     if (this.painter) this.panels.inspect();
   }
 
-  /** Select the rectangle between two places of the canvas. @param {number[]} from @param {number[]} to */
+  /**
+   * Select the rectangle between two places of the canvas.
+   * @param {number[]} from
+   * @param {number[]} to
+   */
   select(from, to) {
-    const [a, b] = [from, to].map((place) => this.viewport.pixelAt(this.view, place));
+    const [a, b] = [from, to].map(place => this.viewport.pixelAt(this.view, place));
     const size = a.map((value, axis) => Math.abs(value - b[axis]) + 1);
     this.change({ box: [...a.map((value, axis) => Math.min(value, b[axis])), ...size] }, true);
   }
 
   /** Mark a pixel; clear the selection when selecting. @param {number[]} place */
   tap(place) {
-    this.change(this.selecting ? { box: null } : { pixel: this.viewport.pixelAt(this.view, place) });
+    this.change(
+      this.selecting ? { box: null } : { pixel: this.viewport.pixelAt(this.view, place) },
+    );
   }
 
-  /** Move the marked pixel, or the far corner of the selection. @param {number} right @param {number} down */
+  /**
+   * Move the marked pixel, or the far corner of the selection.
+   * @param {number} right
+   * @param {number} down
+   */
   step(right, down) {
     const { width, height } = this.scene;
     const [x, y] = this.view.pixel ?? this.panels.worst();
-    if (!this.selecting) return this.change({ pixel: [clamp(x + right, 0, width - 1), clamp(y + down, 0, height - 1)] });
+    if (!this.selecting)
+      return this.change({
+        pixel: [clamp(x + right, 0, width - 1), clamp(y + down, 0, height - 1)],
+      });
     const [left, top, w, h] = this.box() ?? [x, y, 1, 1];
-    this.change({ box: [left, top, clamp(w + right, 1, width - left), clamp(h + down, 1, height - top)] });
+    this.change({
+      box: [left, top, clamp(w + right, 1, width - left), clamp(h + down, 1, height - top)],
+    });
   }
 
   /** Zoom about the marked pixel. @param {number} factor */
   zoomBy(factor) {
     const [x, y] = this.pixel();
-    const [left, top] = this.viewport.frame(this.view, this.viewport.panes[0], [x + 0.5, y + 0.5, 0, 0]);
+    const [left, top] = this.viewport.frame(this.view, this.viewport.panes[0], [
+      x + 0.5,
+      y + 0.5,
+      0,
+      0,
+    ]);
     this.change(this.viewport.zoomed(this.view, factor, [left, top]));
   }
 
@@ -204,7 +268,7 @@ class Viewer {
 /** The meaning of the map's colours. @param {HTMLElement} legend @param {Viewer} viewer */
 function showLegend(legend, { painter, view, scene }) {
   if (!painter) return;
-  const { kind, title, top } = /** @type {MapOf} */ (page.maps.find((map) => map.name === view.map));
+  const { kind, title, top } = /** @type {MapOf} */ (page.maps.find(map => map.name === view.map));
   const is = view.on ? "difference" : kind;
   const hasBar = ["difference", "ratio", "metric"].includes(is);
   const key = JSON.stringify([scene.id, is, title, view.t]);
@@ -213,16 +277,34 @@ function showLegend(legend, { painter, view, scene }) {
   const [bar, labels, words] = /** @type {HTMLElement[]} */ ([...legend.children]);
   bar.hidden = labels.hidden = !hasBar;
   if (hasBar) {
-    const table = pixelsOf(is === "ratio" ? page.colours.signed : page.colours.error), differences = differenceColours(view.t, painter.top);
-    const strip = painted(256, 1, (pixels) => pixels.forEach((_, place) => { pixels[place] = is === "difference" ? differences((place / 256) * painter.top) : table[place]; }));
+    const table = pixelsOf(is === "ratio" ? page.colours.signed : page.colours.error);
+    const differences = differenceColours(view.t, painter.top);
+    const strip = painted(256, 1, pixels =>
+      pixels.forEach((_, place) => {
+        pixels[place] =
+          is === "difference" ? differences((place / 256) * painter.top) : table[place];
+      }),
+    );
     /** @type {HTMLCanvasElement} */ (bar).getContext("2d")?.drawImage(strip, 0, 0);
-    const texts = is === "ratio" ? [`≤ −${top}`, "0", `≥ +${top} stops`] : ["0", "", `≥ ${is === "metric" ? top : painter.top}`];
-    texts.forEach((text, place) => { labels.children[place].textContent = text; });
-    words.textContent = is === "difference" ? `ΔE2000; grey up to ${view.t}, where nothing is visible` : title;
+    const texts =
+      is === "ratio"
+        ? [`≤ −${top}`, "0", `≥ +${top} stops`]
+        : ["0", "", `≥ ${is === "metric" ? top : painter.top}`];
+    texts.forEach((text, place) => {
+      labels.children[place].textContent = text;
+    });
+    words.textContent =
+      is === "difference" ? `ΔE2000; grey up to ${view.t}, where nothing is visible` : title;
     return;
   }
-  const names = is === "mask" ? ["shown to differ, however little", "not shown", "not counted", "undetermined"] : [...(scene.effects?.names ?? []), "none visible"];
-  const colours = is === "mask" ? page.mask.map((rgb) => `rgb(${rgb})`) : [...(scene.effects?.colours ?? []), page.noEffect];
+  const names =
+    is === "mask"
+      ? ["shown to differ, however little", "not shown", "not counted", "undetermined"]
+      : [...(scene.effects?.names ?? []), "none visible"];
+  const colours =
+    is === "mask"
+      ? page.mask.map(rgb => `rgb(${rgb})`)
+      : [...(scene.effects?.colours ?? []), page.noEffect];
   words.replaceChildren(...names.map((name, place) => keyOf(name, colours[place])));
 }
 

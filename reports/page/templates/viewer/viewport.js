@@ -1,10 +1,14 @@
 // The places of the image's pixels on the canvas: zoom, pan, and the panes of side by side.
 
-/** Narrower canvases stack the panes of side by side (CSS pixels); four stand in two rows below twice this. */
+/**
+ * Narrower canvases stack the panes of side by side (CSS pixels); four stand in two rows below
+ * twice this.
+ */
 const STACKED_BELOW = 340;
 
 /** Most screen pixels per image pixel, and the greatest height relative to the window's. */
-const GREATEST_ZOOM = 64, GREATEST_PART = 0.74;
+const GREATEST_ZOOM = 64;
+const GREATEST_PART = 0.74;
 
 /** @typedef {{left: number, top: number, width: number, height: number}} Box */
 
@@ -20,13 +24,24 @@ class Viewport {
     this.fit = 1;
   }
 
-  /** Lay out panes over a canvas of a width, and return their height. @param {number} count @param {number} available */
+  /**
+   * Lay out panes over a canvas of a width, and return their height.
+   * @param {number} count
+   * @param {number} available
+   */
   arrange(count, available) {
-    const gap = 4, columns = available < STACKED_BELOW ? 1 : count > 3 && available < 2 * STACKED_BELOW ? 2 : count;
+    const gap = 4;
+    const columns =
+      available < STACKED_BELOW ? 1 : count > 3 && available < 2 * STACKED_BELOW ? 2 : count;
     const width = (available - gap * (columns - 1)) / columns;
-    const height = Math.round(Math.min((width * this.height) / this.width, GREATEST_PART * window.innerHeight));
+    const height = Math.round(
+      Math.min((width * this.height) / this.width, GREATEST_PART * window.innerHeight),
+    );
     this.panes = Array.from({ length: count }, (_, place) => ({
-      left: (place % columns) * (width + gap), top: Math.floor(place / columns) * (height + gap), width, height,
+      left: (place % columns) * (width + gap),
+      top: Math.floor(place / columns) * (height + gap),
+      width,
+      height,
     }));
     this.fit = Math.min(width / this.width, height / this.height);
     return Math.ceil(count / columns) * (height + gap) - gap;
@@ -43,28 +58,55 @@ class Viewport {
     return view.zoom === null ? middle : [view.x ?? middle[0], view.y ?? middle[1]];
   }
 
-  /** A rectangle of the image in a pane. @param {View} view @param {Box} pane @param {number[]} box */
+  /**
+   * A rectangle of the image in a pane.
+   * @param {View} view
+   * @param {Box} pane
+   * @param {number[]} box
+   */
   frame(view, pane, [x, y, width, height]) {
     const [zoom, [cx, cy]] = [this.zoom(view), this.centre(view)];
-    return [pane.left + pane.width / 2 + (x - cx) * zoom, pane.top + pane.height / 2 + (y - cy) * zoom, width * zoom, height * zoom];
+    return [
+      pane.left + pane.width / 2 + (x - cx) * zoom,
+      pane.top + pane.height / 2 + (y - cy) * zoom,
+      width * zoom,
+      height * zoom,
+    ];
   }
 
   /** From the canvas to the image. @param {View} view @param {number[]} place */
   toImage(view, [left, top]) {
-    const pane = this.panes.filter((one) => one.left <= left && one.top <= top).at(-1) ?? this.panes[0];
+    const pane =
+      this.panes.filter(one => one.left <= left && one.top <= top).at(-1) ?? this.panes[0];
     const [zoom, [cx, cy]] = [this.zoom(view), this.centre(view)];
-    return [cx + (left - pane.left - pane.width / 2) / zoom, cy + (top - pane.top - pane.height / 2) / zoom];
+    return [
+      cx + (left - pane.left - pane.width / 2) / zoom,
+      cy + (top - pane.top - pane.height / 2) / zoom,
+    ];
   }
 
-  /** The pixel under a place of the canvas, or the nearest of the image. @param {View} view @param {number[]} place */
+  /**
+   * The pixel under a place of the canvas, or the nearest of the image.
+   * @param {View} view
+   * @param {number[]} place
+   */
   pixelAt(view, place) {
     const [x, y] = this.toImage(view, place).map(Math.floor);
     return [clamp(x, 0, this.width - 1), clamp(y, 0, this.height - 1)];
   }
 
-  /** Zoom by a factor, keeping the image's point under a place of the canvas. @param {View} view @param {number} factor @param {number[]} place */
+  /**
+   * Zoom by a factor, keeping the image's point under a place of the canvas.
+   * @param {View} view
+   * @param {number} factor
+   * @param {number[]} place
+   */
   zoomed(view, factor, place) {
-    const [[x, y], [cx, cy], before] = [this.toImage(view, place), this.centre(view), this.zoom(view)];
+    const [[x, y], [cx, cy], before] = [
+      this.toImage(view, place),
+      this.centre(view),
+      this.zoom(view),
+    ];
     const zoom = Math.min(before * factor, GREATEST_ZOOM);
     if (zoom <= this.fit) return { zoom: null, x: null, y: null };
     return { zoom, ...this.within(x + ((cx - x) * before) / zoom, y + ((cy - y) * before) / zoom) };
@@ -73,7 +115,9 @@ class Viewport {
   /** Move by screen pixels. @param {View} view @param {number} right @param {number} down */
   panned(view, right, down) {
     const [cx, cy] = this.centre(view);
-    return view.zoom === null ? {} : this.within(cx - right / this.zoom(view), cy - down / this.zoom(view));
+    return view.zoom === null
+      ? {}
+      : this.within(cx - right / this.zoom(view), cy - down / this.zoom(view));
   }
 
   /** The nearest centre in the image. @param {number} x @param {number} y */
