@@ -283,7 +283,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
     if len(materials) > MATERIALS:
         vectors["k_d"] = points.select(lambda material: points.colours(material.k_d))
         has_ambient = points.colours(points.ambient).any()  # else k_a, too, does not matter
-        materials, places = points.materials(range(7 if has_ambient else 4, 10))
+        materials, places = points.materials(("k_d",) if has_ambient else ("k_a", "k_d"))
         if len(materials) > MATERIALS:
             return f"Its textures make more than {MATERIALS} different materials."
     si = points.si
@@ -352,6 +352,13 @@ def _pixels(resolution: tuple[int, int], lights: int) -> tuple[NDArray, NDArray]
     return columns, rows
 
 
+ROW = {
+    "number": slice(0, 1), "k_i": slice(1, 4), "k_a": slice(4, 7), "k_d": slice(7, 10),
+    "k_s": slice(10, 13), "n": slice(13, 14), "form": slice(14, 15), "ambient": slice(15, 18),
+}  # fmt: skip
+"""The columns of a point's numbers: its material, of which ``number`` is the index, and light."""
+
+
 class _Points:
     """The kernel's arguments at the points that rays see."""
 
@@ -384,11 +391,12 @@ class _Points:
             total = total + np.where(here, read(material), 0.0)
         return total
 
-    def materials(self, ones: Sequence[int] = ()) -> tuple[tuple[TermMaterial, ...], NDArray]:
-        """Return the different materials, with 1 in some columns, and the index of each point's."""
+    def materials(self, ones: Sequence[str] = ()) -> tuple[tuple[TermMaterial, ...], NDArray]:
+        """Return the different materials, with 1 for some of `ROW`, and each point's index."""
         number = self.floats(self.known.index(self.si, self.si.is_valid()))
         rows = np.column_stack((number, self.select(self._row), self.colours(self.ambient)))
-        rows[:, list(ones)] = 1
+        for name in ones:
+            rows[:, ROW[name]] = 1
         different, places = np.unique(rows[self.hit], axis=0, return_inverse=True)
         numbers = np.full(len(self.hit), -1)
         numbers[self.hit] = places.ravel()
@@ -400,16 +408,19 @@ class _Points:
         return np.column_stack((*colours, self.floats(material.n), form))
 
     def _material(self, row: list[float]) -> TermMaterial:
-        number, *values = row
-        k_i = _colour(values[0 : 0 + 3])
-        k_a = _colour(values[3 : 3 + 3])
-        k_d = _colour(values[6 : 6 + 3])
-        k_s = _colour(values[9 : 9 + 3])
-        ambient = _colour(values[14 : 14 + 3])
-        name = self.known.bsdfs[int(number)].id()
-        form = FORMS[int(values[13])]
+        parts = {name: row[columns] for name, columns in ROW.items()}
+        (number,) = parts["number"]
+        (n,) = parts["n"]
+        (form,) = parts["form"]
         return TermMaterial(
-            name=name, k_i=k_i, k_a=k_a, k_d=k_d, k_s=k_s, n=values[12], form=form, ambient=ambient
+            name=self.known.bsdfs[int(number)].id(),
+            k_i=_colour(parts["k_i"]),
+            k_a=_colour(parts["k_a"]),
+            k_d=_colour(parts["k_d"]),
+            k_s=_colour(parts["k_s"]),
+            n=n,
+            form=FORMS[int(form)],
+            ambient=_colour(parts["ambient"]),
         )
 
     def light(self, emitter: Any, shape: tuple[int, int]) -> GridLight:
@@ -462,7 +473,9 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
     images = dict.fromkeys(TERMS, 0 * whole)
     with variant(half.variant):
         bsdfs = integrator.known(scene).materials.bsdfs
-        there = {*(k for bsdf in bsdfs for k in bsdf.present), *["k_i"] * bool(scene.environment())}
+        there = {k for bsdf in bsdfs for k in bsdf.present}
+        if scene.environment():
+            there.add("k_i")
         names = [name for name, k in TERMS.items() if k in there]
         renderers: dict[bool, Renderer] = {}
         integrator.model_at = lambda *_: partial(_shade, integrator.shares)

@@ -27,6 +27,8 @@ VERSION = 430
 SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 """Parts of the names of OpenGL renderers that do not use a graphics card."""
 
+ON_SOFTWARE = "{} ran on {}, a software GPU: its times are not those of a graphics card."
+
 SIGNATURE = "vec3 shade(Point point)"
 
 LARGEST = 1 << 20
@@ -132,10 +134,7 @@ def of_text(word: str, text: str) -> Heuristic:
         needs=frozenset(name for name in INPUTS if name in shader.words),
         parameters=uniforms(text),
         traced=False,
-        remarks=(
-            f"{word} ran on {renderer}, a software GPU: its times are not those of a graphics"
-            " card.",
-        )[: int(is_software)],
+        remarks=(ON_SOFTWARE.format(word, renderer),) if is_software else (),
     )
     with mi.scoped_set_variant(user_shaders.DEFAULT_VARIANT):
         return replace(heuristic, reads=user_shaders.examine(heuristic))
@@ -332,8 +331,8 @@ def uniforms(text: str) -> tuple[Parameter, ...]:
     """Return the parameters: ``uniform float NAME = DEFAULT;  // LOW to HIGH``."""
     matches = [match for line in text.splitlines() if (match := _PARAMETER.match(line))]
     return tuple(
-        Parameter(name=match[1], default=float(match[2]), low=float(match[3]), high=float(match[4]))
-        for match in matches
+        Parameter(name=name, default=float(default), low=float(low), high=float(high))
+        for name, default, low, high in (match.groups() for match in matches)
     )
 
 

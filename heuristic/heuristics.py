@@ -393,7 +393,10 @@ def in_file(name: str) -> tuple[str, str] | None:
     The function is empty if the name has none, such as ``FILE.glsl``.
     """
     match = _FILE.fullmatch(name)
-    return match and (match[1] or match[3], match[2] or "")
+    if match is None:
+        return None
+    python, function, shader = match.groups()
+    return python or shader, function or ""
 
 
 def content_digest(files: Iterable[Path]) -> str:

@@ -95,7 +95,7 @@ def missing(record: ComparisonRecord) -> dict[str, float]:
 
 def cause(record: ComparisonRecord) -> str:
     """Return why a scene differs, as a sentence; empty if that is unknown."""
-    largest = [*missing(record)][:1]
+    largest = list(missing(record))[:1]
     if MICROFACETS.label in largest and (albedo := _impossible_albedo(record)):
         amount = f"{number(albedo)} times the light that it receives"
         return f"A material reflects {amount}; no physical material does."

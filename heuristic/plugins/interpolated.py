@@ -98,7 +98,7 @@ def shade_mesh(
     # Terms that do not depend on the position are a single number until spread out.
     everywhere = dr.zeros(mi.Float, dr.width(position))
     attributes = {}
-    for back in (False, True)[: 1 + twosided]:
+    for back in (False, True) if twosided else (False,):
         facing = -normal if back else normal
         colour = model(position, facing, view, material, lights, ambient, visible)
         if dr.depth_v(colour) > 1 and len(colour) == 1:  # of llvm_ad_mono

@@ -68,11 +68,12 @@ def probe(bsdf: mi.BSDF) -> Albedos | None:
         parts = [_parts(bsdf, four) for four in ((None,) if drawn is None else drawn)]
     except RuntimeError:
         return None
-    columns = [np.stack(column, 1) for column in zip(*(part[:4] for part in parts), strict=True)]
+    by_part = zip(*(colours for colours, _ in parts), strict=True)
+    columns = [np.stack(column, 1) for column in by_part]
     if drawn is not None:
         columns = [np.interp(WAVELENGTHS, drawn.T.ravel(), column.ravel()) for column in columns]
     reflected, diffuse, passed, scattered = map(np.ravel, columns)
-    alpha = float(np.mean([part[4] for part in parts]))
+    alpha = float(np.mean([width for _, width in parts]))
     if not np.isfinite([*reflected, *diffuse, *passed, *scattered, alpha]).all():
         return None
     return Albedos(
@@ -158,17 +159,18 @@ def _at(si: Any, wavelengths: np.ndarray | None) -> Any:
     return si
 
 
-def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple:
+def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple[tuple, float]:
     points = [mi.Float(row) for row in lattice(SAMPLES)]
+    lobe, x, y, u, v = points
     si = _at(dr.zeros(mi.SurfaceInteraction3f, SAMPLES), wavelengths)
     si.t = 1.0
     si.n = mi.Normal3f(0, 0, 1)
     si.sh_frame = mi.Frame3f(mi.Vector3f(0, 0, 1))
     si.dp_du, si.dp_dv = mi.Vector3f(1, 0, 0), mi.Vector3f(0, 1, 0)
-    si.uv = mi.Point2f(points[3], points[4])
+    si.uv = mi.Point2f(u, v)
     si.wi = mi.Vector3f(0, 0, 1)
     context = mi.BSDFContext(mi.TransportMode.Importance)
-    bs, weight = bsdf.sample(context, si, points[0], mi.Point2f(points[1], points[2]), True)
+    bs, weight = bsdf.sample(context, si, lobe, mi.Point2f(x, y), True)
     weight = dr.select(dr.isfinite(weight) & (bs.pdf > 0), weight, 0)
     up = bs.wo.z > 0
     straight = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null) | ~mi.has_flag(
@@ -190,7 +192,7 @@ def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple:
     )
     diffuse = np.array([np.mean(np.array(channel, float)) for channel in level])
     diffuse = np.clip(diffuse, 0, reflected)
-    return reflected, diffuse, passed, scattered, _width(bs, weight, up, diffuse)
+    return (reflected, diffuse, passed, scattered), _width(bs, weight, up, diffuse)
 
 
 def _width(bs: Any, weight: Any, up: Any, diffuse: Any) -> Any:

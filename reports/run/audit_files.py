@@ -45,7 +45,8 @@ def furnace(record: Audit) -> Spec:
         ):
             at, of = (curve.alpha, f"{angle:g}°") if varied else (angle, "")
             for rows, value in zip(lines, values, strict=True):
-                rows += [{"x": at, "y": value, "of": of}] * (not varied or angle in SHOWN)
+                if not varied or angle in SHOWN:
+                    rows.append({"x": at, "y": value, "of": of})
     x = alt.X("x:Q").title("alpha" if varied else "viewer’s angle").scale(nice=False)
     y = alt.Y("y:Q").title("seen")
     return _charts({kind: _chart(*lines, "viewer at", x, y) for kind, lines in kinds.items()})

@@ -150,7 +150,8 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
         if record.noise_target:
             yield _noise(record, record.noise_target)
         if count := len(record.warnings):
-            yield f"{record.scene}: {count} warning{'s' * (count > 1)}, which -v and the page show"
+            noun = "warning" if count == 1 else "warnings"
+            yield f"{record.scene}: {count} {noun}, which -v and the page show"
         guard = record.plan.guard
         if guard and guard.state == "disagreed":
             yield (
