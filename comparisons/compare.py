@@ -136,7 +136,7 @@ def _load() -> None:
 
 def _computed_twice(comparison: Comparison) -> Comparison:
     """Note how far colour differences are from those of colour-science, and warn if it is far."""
-    from fotismos.comparisons.departure import definitions
+    from fotismos.comparisons.departure import definitions  # loaded late: see `_load`
 
     shown = comparison.images
     record = comparison.record
@@ -144,7 +144,7 @@ def _computed_twice(comparison: Comparison) -> Comparison:
     first = shown.heuristic.reshape(-1, 3)[some]
     second = shown.reference.reshape(-1, 3)[some]
     distances = {name: values.ravel()[some] for name, values in shown.maps.items()}
-    largest = definitions.deviations(first, second, distances, record.viewing)
+    largest = definitions.deviations(first, second, values=distances, viewing=record.viewing)
     warnings = [
         f"{METRICS[name].label} deviates from colour-science's by up to {most:.2g}, and"
         f" {DEVIATION_ALLOWED:g} is allowed: a formula is wrong here. Give --colour-science to do"
@@ -192,14 +192,14 @@ def _compare(
     done("timing")
     _load()  # not beside the passes, whose times are compared
     exact = ready.plan.exact and not options.image
-    numbers, images = _measure(estimates, ready.surface, options, exact)
+    numbers, images = _measure(estimates, ready.surface, options=options, exact=exact)
     shown = images.heuristic, images.reference, images.counted
     caution = ready.caution() or require_light(*shown, source.name, options)
     picture = None
     if options.image:
         from fotismos.comparisons import pictures  # loaded late: few comparisons have any
 
-        picture = pictures.picture_record(heuristic, ready.scene, options, images)
+        picture = pictures.picture_record(heuristic, ready.scene, options=options, images=images)
     done("metrics")
     terms: TermGrid | None = None
     no_terms = "Terms are traced with --why, in Python with why=True."
@@ -357,7 +357,13 @@ def _measure(
     maps = {}
     for name, metric in METRICS.items():
         metrics[name], distances = statistics.summarise(
-            metric, test, reference, counted, options.viewing, noise, estimates.difference.grouped
+            metric,
+            test,
+            reference=reference,
+            mask=counted,
+            viewing=options.viewing,
+            noise=noise,
+            grouped=estimates.difference.grouped,
         )
         if metric.drawn:
             maps[name] = distances
@@ -366,7 +372,9 @@ def _measure(
         estimates.difference, test, counted, leading_distance(options.viewing), exact=exact
     )
     error = maps[LEADING.name]
-    shapes, seen = regions.find_objects(error, counted, surface.shape, surface.bsdf)
+    shapes, seen = regions.find_objects(
+        error, counted, owners=surface.shape, materials=surface.bsdf
+    )
     materials, made_of = regions.find_objects(error, counted, surface.bsdf)
     images = Images(
         heuristic=test,

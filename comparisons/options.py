@@ -17,8 +17,8 @@ from fotismos.heuristic.errors import InputError, unknown
 
 if TYPE_CHECKING:  # the command line reads options without loading Dr.Jit
     from fotismos.comparisons.departure.colour import Viewing
-    from fotismos.heuristic.heuristics import Interpolation
-    from fotismos.reference.pairing.factors import Convention
+    from fotismos.heuristic.heuristics import Interpolation  # loaded late: help needs no Mitsuba
+    from fotismos.reference.pairing.factors import Convention  # loaded late: help needs no Mitsuba
     from fotismos.reference.pairing.halves import Pair
     from fotismos.reference.scene.source import Source
 
@@ -167,6 +167,7 @@ class Options(
     @property
     def convention(self) -> Convention:
         """How roughplastic and phong are paired."""
+        # Loaded late: help needs no Mitsuba.
         from fotismos.reference.pairing.factors import Convention
 
         return Convention(self.pairing)
@@ -174,6 +175,7 @@ class Options(
     @property
     def polygon_shading(self) -> Interpolation:
         """How the heuristic half shades polygons."""
+        # Loaded late: help needs no Mitsuba.
         from fotismos.heuristic.heuristics import Interpolation
 
         return Interpolation(self.interpolation or "phong")
@@ -181,6 +183,7 @@ class Options(
     @property
     def viewing(self) -> Viewing:
         """The viewing conditions."""
+        # Loaded late: help needs no Mitsuba.
         from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Viewing
 
         density = self.pixels_per_degree
@@ -188,6 +191,7 @@ class Options(
 
     def pair(self, source: Source) -> Pair:
         """Derive both halves of a scene, for the current variant."""
+        # Loaded late: help needs no Mitsuba.
         from fotismos.reference.pairing.halves import PairOptions, pair
 
         options = PairOptions(
@@ -213,7 +217,7 @@ class Options(
 def _plain(name: str, value: Any) -> Any:
     """Return a value of an option as a file would have it."""
     if name == "heuristic" and value is not None and not isinstance(value, str):
-        from fotismos.heuristic.heuristics import known_as
+        from fotismos.heuristic.heuristics import known_as  # loaded late: help needs no Mitsuba
 
         return known_as(value)
     if name == "define":

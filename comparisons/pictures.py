@@ -281,7 +281,7 @@ def _edges(layers: np.ndarray) -> np.ndarray:
 def _shift(edges: np.ndarray, seen: np.ndarray) -> Place:
     reach = max(1, min(REACH, min(edges.shape) // 4))
     shifts = range(-reach, reach + 1)
-    table = np.array([[_correlation(seen, edges, y, x) for x in shifts] for y in shifts])
+    table = np.array([[_correlation(seen, edges, down=y, right=x) for x in shifts] for y in shifts])
     y, x = map(int, np.unravel_index(np.argmax(table), table.shape))
     highest = float(table[y, x])
     if highest < LEAST:

@@ -316,7 +316,7 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
     resolution = image_size(scene)
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
     x, y = np.meshgrid(columns, rows)
-    points = _Points(scene, integrator, pixel_rays(scene, resolution, x, y))
+    points = _Points(scene, integrator, pixel_rays(scene, resolution, x=x, y=y))
     materials, places = points.materials()
     if len(materials) > MATERIALS:
         return None
@@ -486,7 +486,7 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
                 integrator.shares = {k: dr.opaque(mi.Float, k == kept) for k in COEFFICIENTS}
                 integrator.hide_emitters = hides = hidden or name != "emission"
                 renderer = renderers.setdefault(
-                    hides, Renderer(scene, integrator, half.spp, "terms")
+                    hides, Renderer(scene, integrator, spp=half.spp, label="terms")
                 )
                 images[name] = np.array(renderer.render(pass_seed(options.seed, 0)))
         finally:

@@ -181,7 +181,7 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
     planning = perf_counter() - begin
     # Dr.Jit traces every live BSDF: those of finished scenes would slow this one.
     gc.collect()
-    spp, passes = schedule(chosen, width * height, options.spp, options.noise)
+    spp, passes = schedule(chosen, width * height, spp=options.spp, noise=options.noise)
     if len(options.image) > 1:  # a pass for each repeat
         spp = max(1, spp * passes // len(options.image))
         passes = len(options.image)
@@ -189,8 +189,8 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
         pair=pair,
         plan=chosen,
         scene=physical,
-        heuristic=_heuristic_renderer(source, pair, chosen, spp, options),
-        reference=Renderer(physical, integrator, spp, "reference image"),
+        heuristic=_heuristic_renderer(source, pair, chosen=chosen, spp=spp, options=options),
+        reference=Renderer(physical, integrator, spp=spp, label="reference image"),
         passes=passes,
         planning_seconds=planning,
     )
@@ -207,7 +207,9 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
     width, height = image_size(ready.scene)
     samples = ready.reference.spp * ready.passes * width * height
     hidden = ready.pair.hide_emitters
-    found = examine_plan(ready.plan, ready.scene, hidden, samples, options.seed)
+    found = examine_plan(
+        ready.plan, ready.scene, hide_emitters=hidden, samples=samples, seed=options.seed
+    )
     if found.state == "disagreed":
         ready = prepare(source, options.changed(everything=True))
         ready = replace(ready, plan=ready.plan.unpruned("guard", found.words))
@@ -252,9 +254,9 @@ def _heuristic_renderer(
         if options.heuristic_variant:
             pair = options.pair(source)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        renderer = Renderer(scene, None, spp, "heuristic image")
+        renderer = Renderer(scene, None, spp=spp, label="heuristic image")
         if not options.image:
             return renderer
-        from fotismos.comparisons import pictures
+        from fotismos.comparisons import pictures  # loaded late: few comparisons have any
 
         return pictures.PictureHalf(pictures.read_all(options), renderer)

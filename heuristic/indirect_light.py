@@ -106,7 +106,9 @@ def _arriving(scene: Any, si: Any, normal: Any) -> Any:
     # The visible environment is added below: rays would hit a sun too seldom.
     paths = mi.load_dict({"type": "path", "max_depth": REFLECTIONS + 1, "hide_emitters": True})
     reflected, _, _ = paths.sample(scene, sampler, ray, active=active)
-    around = _from_environment(scene, si, normal, (corner + sampler.next_2d()) / STRATA)
+    around = _from_environment(
+        scene, si, normal=normal, sensor=(corner + sampler.next_2d()) / STRATA
+    )
     return dr.select(active, reflected, 0) + around
 
 

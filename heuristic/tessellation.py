@@ -53,13 +53,15 @@ def to_mesh(shape: Shape, resolution: int = RESOLUTION) -> Mesh:
             " a mesh, or use phong interpolation."
         )
     columns, rows = _cells(resolution)[kind]
-    return _tessellated(shape, kind, columns, rows)
+    return _tessellated(shape, kind, columns=columns, rows=rows)
 
 
 def with_vertex_normals(mesh: Mesh, weighting: str = "angle") -> Mesh:
     """Return a mesh with vertex normals by 6.32, 6.33 or 6.34, replacing any that it has."""
     computed = _checked_normals(mesh, weighting)
-    return _build(mesh, positions(mesh), computed, texture_coordinates(mesh), faces(mesh))
+    return _build(
+        mesh, positions(mesh), normals=computed, uv=texture_coordinates(mesh), corners=faces(mesh)
+    )
 
 
 def split_faces(mesh: Mesh) -> Mesh:
@@ -74,7 +76,13 @@ def split_faces(mesh: Mesh) -> Mesh:
         uv = dr.gather(mi.Point2f, uv, corners)
     first = 3 * dr.arange(mi.UInt32, mesh.face_count())
     split = mi.Vector3u(first, first + 1, first + 2)
-    return _build(mesh, dr.gather(mi.Vector3f, positions(mesh), corners), normals, uv, split)
+    return _build(
+        mesh,
+        dr.gather(mi.Vector3f, positions(mesh), corners),
+        normals=normals,
+        uv=uv,
+        corners=split,
+    )
 
 
 def face_normals(mesh: Mesh) -> Direction:
@@ -143,7 +151,7 @@ def _tessellated(shape: Shape, kind: Any, columns: int, rows: int) -> Mesh:
     if dr.sum(alignment)[0] < 0:
         corners = corners.xzy
     corners = dr.gather(mi.Vector3u, corners, dr.compress(has_area))
-    return _build(shape, points, surface_normals, uv, corners)
+    return _build(shape, points, normals=surface_normals, uv=uv, corners=corners)
 
 
 def _surface(shape: Shape, kind: Any, uv: Array) -> tuple[Position, Direction]:
@@ -193,7 +201,7 @@ def _build(
     original: Shape, points: Position, normals: Direction, uv: Array, corners: Array
 ) -> Mesh:
     """Make a mesh from its arrays, with the name and BSDF of an original."""
-    mesh = new_mesh(original.id(), points, corners, normals, uv)
+    mesh = new_mesh(original.id(), points, corners=corners, normals=normals, uv=uv)
     mesh.set_id(original.id())
     mesh.set_bsdf(original.bsdf())
     return mesh

@@ -312,7 +312,7 @@ def pool(
         return Pool(workers if IN_PROCESSES else 0, Ready(level(), threads), timeout)
     if workers and workers > 1:
         raise click.UsageError("--workers and --scheduler exclude each other.")
-    from fotismos.comparisons.processes import cluster
+    from fotismos.comparisons.processes import cluster  # loaded late: Dask is an extra
 
     # As a context it gives a Cluster, which does what a Pool does.
     ready = Ready(

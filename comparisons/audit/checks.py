@@ -121,7 +121,7 @@ def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "
     In the current variant. ``command`` is the one that was run, for the record.
     """
     try:
-        return _audited(kind, name, parameters, command)
+        return _audited(kind, name, parameters=parameters, command=command)
     except FotismosError:
         raise
     except Exception as error:
@@ -222,7 +222,7 @@ def reciprocity(subject: Subject) -> Checked:
     """Check that ``f(i, o) = f(o, i)``, over the squares of indices, for random directions."""
     a, b = furnace.random_pairs(PAIRS, subject.eta)
     differences = {
-        material: furnace.asymmetries(partial(subject.response, material), a, b, subject.eta)
+        material: furnace.asymmetries(partial(subject.response, material), a, b=b, eta=subject.eta)
         for material in subject.materials
     }
     value, worst = _largest(differences, a, b)

@@ -168,7 +168,9 @@ def measure_scene(
     )
     numbers = measurement(images, ready.counted, options.viewing)
     heuristic, reference = images.mean(axis=0)
-    caution = require_light(heuristic, reference, ready.counted, source.name, options)
+    caution = require_light(
+        heuristic, reference, counted=ready.counted, name=source.name, options=options
+    )
     pictures = {"heuristic": heuristic, "reference": reference}
     return MeasuredScene(measurement=numbers, pictures=pictures, spp=spp, caution=caution)
 
@@ -208,7 +210,7 @@ def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metri
     noise = np.einsum("i,ijkl->jkl", signs, images[:, 0] - images[:, 1]) / count
     reference = images[:, 1].mean(axis=0)
     floors = {
-        name: noise_floor(metric, reference, noise, counted, viewing)
+        name: noise_floor(metric, reference, noise=noise, mask=counted, viewing=viewing)
         for name, metric in METRICS.items()
     }
     return {

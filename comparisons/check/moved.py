@@ -245,7 +245,7 @@ def check(
     same machine; the test also holds for other seeds. Metrics that the baseline lacks are not
     tested. ``level`` is the chance of a false alarm, over all quantities of this scene.
     """
-    now = measure_scene(source, options, before.passes, progress)
+    now = measure_scene(source, options, count=before.passes, progress=progress)
     after = now.measurement.of(before.metrics)
     old = before.reference.means().shape
     new = after.reference.means().shape

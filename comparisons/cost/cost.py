@@ -78,7 +78,7 @@ def cost(
     if at:
         size = options.resolution or reduced(source, options.changed(resolution=at), WIDTH)
         require(source.name, at, size, is_measured)
-    found = measure_ladder(source, options, effort, progress, at=at, alone=alone)
+    found = measure_ladder(source, options, effort=effort, progress=progress, at=at, alone=alone)
     options = found.options
     ready = found.ready
     ladder = found.ladder
@@ -233,7 +233,7 @@ def choose(
     size = options.resolution or film_size(source.parse(), options.sensor)
     small = options.changed(resolution=None)
     progress = progress or (lambda *_: None)
-    found = measure_ladder(source, small, Effort(), progress, at=options.resolution)
+    found = measure_ladder(source, small, effort=Effort(), progress=progress, at=options.resolution)
     points = at_size(found.points, found.methods, size)
     full = next(method.name for method in found.methods if FULL_PLAN.name in method.names)
     of_full = [point for point in points if point.method == full]

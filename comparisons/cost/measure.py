@@ -161,7 +161,7 @@ def measure_ladder(
     ready = guarded(source, options.changed(spp=None, allow_empty=False))
     reference = converged(ready, options.seed, progress)
     judge = judge_by(reference, ready.counted, options.viewing)
-    ladder = Ladder(source, options, ready, effort.is_short)
+    ladder = Ladder(source, options, ready=ready, is_short=effort.is_short)
     size = image_size(ready.scene)
     gc.collect()  # release scenes that pairing left behind
     steps = tuple(ladder.steps())
@@ -170,7 +170,7 @@ def measure_ladder(
     counts = {name: effort.counts(method) for name, method in wanted.items()}
     renderers = tried(
         {name: ladder.renderer(method, counts[name][-1]) for name, method in wanted.items()},
-        counts, size[0] * size[1], progress,
+        counts, pixels=size[0] * size[1], progress=progress,
     )  # fmt: skip
     judged = {(method.name, spp) for method in ladder.methods for spp in counts[method.name]}
     with alone or nullcontext():
@@ -180,7 +180,10 @@ def measure_ladder(
     found = timed(renderers, effort.rounds, size[0] * size[1], options.seed)
     methods = tuple(
         timed_method(
-            method, found, steps[0].before.name, renderers[method.name, counts[method.name][-1]]
+            method,
+            found,
+            textbook=steps[0].before.name,
+            first=renderers[method.name, counts[method.name][-1]],
         )
         for method in ladder.methods
     )
@@ -223,7 +226,7 @@ def converged(
     integrator = ready.reference.integrator
     width, height = size or image_size(ready.scene)
     spp = min(REFERENCE_SPP, LARGEST_PASS // (width * height))
-    renderer = Renderer(ready.scene, integrator, spp, "reference image", size)
+    renderer = Renderer(ready.scene, integrator, spp=spp, label="reference image", size=size)
     total = Accumulator()
     count = max(REFERENCE_PASSES, ready.plan.passes)
     stream = Stream.OTHER_SIDE
@@ -342,7 +345,7 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
     """Render each method with its fewest samples at another size."""
     scene = found.ready.scene
     options = found.options
-    reference = converged(found.ready, options.seed, progress, size)
+    reference = converged(found.ready, options.seed, progress=progress, size=size)
     judge = judge_by(reference, gbuffer(scene, size).hit, options.viewing)
     renderers = {
         (method.name, spp): found.ladder.renderer(method, spp, size)

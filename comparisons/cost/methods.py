@@ -245,12 +245,14 @@ class Ladder:
         if method.is_kernel:
             with variant(method.variant or self.pairs.heuristic_variant):
                 scene = self._kernel_scene(method.interpolation, mi.variant())
-                return Renderer(scene, self._kernel(method), spp, "image of the kernel", size)
+                return Renderer(
+                    scene, self._kernel(method), spp=spp, label="image of the kernel", size=size
+                )
         simulated = {effect for effect in EFFECTS if effect.label not in method.without}
         plan = self.ready.plan.simulating(simulated, method.max_depth)
         scene = self._plan_scene(self.scenes.key(simulated))
         integrator = physical_integrator(plan, scene, self.ready.pair.hide_emitters)
-        return Renderer(scene, integrator, spp, f"image of {method.name}", size)
+        return Renderer(scene, integrator, spp=spp, label=f"image of {method.name}", size=size)
 
     def forget(self) -> None:
         """Release the scenes of methods."""

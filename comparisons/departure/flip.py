@@ -81,7 +81,7 @@ def ldr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
     Images are exposed, then clipped to [0, 1]. Equal images are 0 apart, black and white 0.967,
     green and blue 1. It is symmetric.
     """
-    return _flip(test, reference, viewing, [lambda light: dr.minimum(light, 1.0)])
+    return _flip(test, reference, viewing=viewing, curves=[lambda light: dr.minimum(light, 1.0)])
 
 
 def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
@@ -93,7 +93,7 @@ def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
     start, stop = exposures(_exposed(reference, viewing))
     factors = 2.0 ** np.linspace(start, stop, max(2, ceil(stop - start)))
     curves = [partial(_toned, factor=dr.opaque(Float32, factor)) for factor in factors.tolist()]
-    return _flip(test, reference, viewing, curves)
+    return _flip(test, reference, viewing=viewing, curves=curves)
 
 
 def exposures(reference: Array) -> tuple[float, float]:

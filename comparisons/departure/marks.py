@@ -206,7 +206,7 @@ class _Around:
         sizes = ratio(self.largest_sizes, self.pixels) * inflation
         # A quarter, since neighbours and their squares are not quite independent.
         freedom = np.maximum(neighbourhood(self.pixels) * self.own_freedom / 4.0, 1.0)
-        chances = _chances(self.difference, self.variance * inflation, sizes, freedom)
+        chances = _chances(self.difference, self.variance * inflation, sizes=sizes, freedom=freedom)
         tested = self.pixels[..., 0] > 0
         return tested & (chances <= level / max(int(np.count_nonzero(tested)), 1))
 
@@ -261,7 +261,9 @@ class _Pixels:
         return cls(mean, np.maximum(variance, moderated), np.array(sizes), freedom, quantile)
 
     def chances(self, most: float) -> Array:
-        return _chances(self.difference, self.variance, self.sizes, self.freedom, most)
+        return _chances(
+            self.difference, self.variance, sizes=self.sizes, freedom=self.freedom, most=most
+        )
 
     def are_open(self, shown: Array, distance: Distance) -> NDArray[np.bool_]:
         """Return whether the 95 % interval of each pixel reaches a visible difference.

@@ -84,7 +84,7 @@ def exactly(metric: Metric, values: Floats) -> dict[str, Any]:
     """Return the fields of a summary of distances (N,) without noise."""
     mean = metric.mean(values)
     shares = shares_above(values, metric.visible)
-    return _fields(metric, mean, mean, mean, np.array([shares] * 3))
+    return _fields(metric, mean, low=mean, high=mean, shares=np.array([shares] * 3))
 
 
 def roughly(metric: Metric, values: Floats, noise: Floats) -> dict[str, Any]:
@@ -101,7 +101,9 @@ def roughly(metric: Metric, values: Floats, noise: Floats) -> dict[str, Any]:
     ]
     clean = max(float(without_noise(mean, np.hypot(mean, floor))), 0.0)
     half = MARGIN * floor
-    return _fields(metric, clean, max(mean - half, 0.0), mean + half, np.array(shares))
+    return _fields(
+        metric, clean, low=max(mean - half, 0.0), high=mean + half, shares=np.array(shares)
+    )
 
 
 def _fields(metric: Metric, value: float, low: float, high: float, shares: Array) -> dict[str, Any]:
@@ -162,7 +164,7 @@ def debiased(
     if metric.linear:
         value, low, high = np.sqrt([value, low, high])
     shares = _shares(metric.visible, distances, grouped, raw)
-    return _fields(metric, float(value), float(low), float(high), shares)
+    return _fields(metric, float(value), low=float(low), high=float(high), shares=shares)
 
 
 def _shares(

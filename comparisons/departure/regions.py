@@ -153,7 +153,8 @@ def find_objects(
         names.append(f"{len(present) - len(names)} others")
     total = error[counted].sum(dtype=np.float64)
     return tuple(
-        _object_share(name, error, found == row, total, materials) for row, name in enumerate(names)
+        _object_share(name, error, mask=found == row, total=total, materials=materials)
+        for row, name in enumerate(names)
     ), found
 
 

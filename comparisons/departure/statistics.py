@@ -84,7 +84,7 @@ def summarise(
     """
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
-    factor = best_exposure(metric, test, reference, mask, viewing)
+    factor = best_exposure(metric, test, reference=reference, mask=mask, viewing=viewing)
     grain = np.asarray(noise) if noise is not None and np.any(noise) else None
     # Of the test image, after exposure, and of noise alone, the last two of the mask only. Single
     # precision keeps seven digits of a distance, in half the memory.
@@ -116,7 +116,7 @@ def summarise(
     if not noise_alone.any():
         clean = exactly(metric, values)
     elif isinstance(metric, Pixelwise) and grouped is not None:
-        clean = debiased(metric, test, grouped, viewing, values)
+        clean = debiased(metric, test, grouped=grouped, viewing=viewing, raw=values)
     clean = clean or roughly(metric, values, noise_alone)
     summary = Summary(
         **numbers,

@@ -124,7 +124,7 @@ def fit(
     else:
         half = rendered.ready.heuristic
         seeds = rendered.seeds
-        own_model = OwnModel(half, heuristic, seeds, rendered.counted)
+        own_model = OwnModel(half, heuristic, seeds=seeds, counted=rendered.counted)
         fits = [_best(rendered, own_model, own_starts, LOSSES[loss])]
     best = min(range(len(fits)), key=lambda number: fits[number][0].loss)
     ready = rendered.ready
@@ -236,11 +236,13 @@ def _best(
 ) -> tuple[FormFit, NDArray, dict[str, NDArray]]:
     """Return the record of a fit, its image, and the maps of what it leaves."""
     counted = rendered.counted
-    objective = Objective(fitted, rendered.reference.mean[counted], loss, rendered.viewing)
+    objective = Objective(
+        fitted, rendered.reference.mean[counted], loss=loss, viewing=rendered.viewing
+    )
     x, least, converged = search(objective, starts(objective))
     pixels = np.array([fitted.reached[parameter.owner] for parameter in fitted.parameters])
     error = rendered.difference.standard_error[counted]
-    certainties, covariance = identify(objective, x, pixels, error)
+    certainties, covariance = identify(objective, x, pixels=pixels, standard_error=error)
     physical = physical_materials(rendered.ready.pair.physical)
     materials = tuple(
         FittedMaterial(
@@ -248,7 +250,9 @@ def _best(
             reference=physical.get(name),
             pixels=fitted.reached[owner],
             parameters=tuple(
-                parameter_record(fitted, number, x, certainties, covariance)
+                parameter_record(
+                    fitted, number, x=x, certainties=certainties, covariance=covariance
+                )
                 for number, parameter in enumerate(fitted.parameters)
                 if parameter.owner == owner
             ),
@@ -287,7 +291,7 @@ def form_starts(objective: Objective) -> list[NDArray]:
         columns = phong.columns(x)[linear].reshape(linear.sum(), -1)
         target = (objective.reference - phong.surface.fixed[phong.counted]).ravel()
         x[linear] = bounded_minimum(
-            columns @ columns.T, -columns @ target, low[linear], high[linear]
+            columns @ columns.T, -columns @ target, low=low[linear], high=high[linear]
         )
         starts.append(x)
     return starts
@@ -318,6 +322,8 @@ def departures(
         maps[name] = metric(after, reference, viewing)
         before = metric.mean(first[counted])
         after_fit = metric.mean(maps[name][counted])
-        floor = noise_floor(metric, reference, rendered.difference.noise, counted, viewing)
+        floor = noise_floor(
+            metric, reference, noise=rendered.difference.noise, mask=counted, viewing=viewing
+        )
         by_metric[name] = FitDeparture(before=before, after=after_fit, noise_floor=floor)
     return by_metric, maps

@@ -126,7 +126,7 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
         names = _names(scene, bsdfs)
         _require_fittable(names, bsdfs)
         eye = _eye(shading)
-        eyes = Renderer(scene, eye, renderer.spp, "heuristic samples")
+        eyes = Renderer(scene, eye, spp=renderer.spp, label="heuristic samples")
         fixed: Any = 0.0
         passes = []
         samples_per_pixel = 0
@@ -388,7 +388,7 @@ class PhongModel:
     def _rendered_basis(self, owner: int, name: str) -> Any:
         """Return the ambient or the diffuse basis of a material, (N, 3)."""
         if name == "k_a":
-            value = self._shaded(owner, name, (), self.surface.ambient)
+            value = self._shaded(owner, name, lights=(), ambient=self.surface.ambient)
         else:
             value = self._shaded(owner, name, self.surface.lights)
         return self.surface.pixels(owner, 0.0 if value is None else value)

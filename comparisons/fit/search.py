@@ -123,7 +123,7 @@ class Objective:
     def smoothed(self) -> "Objective":
         """Return the same with a loss that is rounded by :data:`SMOOTH` or more."""
         loss = replace(self.loss, rounding=max(self.loss.rounding, SMOOTH))
-        return Objective(self.model, self.reference, loss, self.viewing)
+        return Objective(self.model, self.reference, loss=loss, viewing=self.viewing)
 
     def value(self, x: NDArray) -> float:
         """Return the loss of a vector of parameters."""
@@ -188,7 +188,7 @@ def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, bool]:
     gradient, second = objective.quadratic(x)
     for _ in range(1, LARGEST_COUNT):
         damped = second + damping * np.diag(np.diag(second))
-        step = bounded_minimum(damped, gradient, low - x, high - x)
+        step = bounded_minimum(damped, gradient, low=low - x, high=high - x)
         expected = -(gradient @ step + step @ damped @ step / 2)
         if expected <= max(TOLERANCE * loss, SMALLEST_GAIN) or damping > LARGEST_DAMPING:
             return x, loss, True

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from fotismos.heuristic.errors import InputError, suggestion
 
 if TYPE_CHECKING:  # names are listed without importing Mitsuba
-    from fotismos.reference.scene.source import Source
+    from fotismos.reference.scene.source import Source  # loaded late: names need no Mitsuba
 
 VIEWER_A = (-3, -3, 0)
 VIEWER_C = (-3, 0, 1)
@@ -41,7 +41,7 @@ class BuiltIn:
 
     def source(self) -> Source:
         """Return the scene for :func:`fotismos.reference.pair`."""
-        from fotismos.reference.scene.source import Source
+        from fotismos.reference.scene.source import Source  # loaded late: names need no Mitsuba
 
         return Source(self.name, self.make)
 
@@ -58,14 +58,14 @@ def builtin(name: str) -> BuiltIn:
 
 def _scene(function: str, *arguments: Any, **more: Any) -> dict[str, Any]:
     """Make a scene by a function of ``gallery.scenes``, which imports Mitsuba."""
-    from fotismos.comparisons.gallery import scenes
+    from fotismos.comparisons.gallery import scenes  # loaded late: names need no Mitsuba
 
     return getattr(scenes, function)(*arguments, **more)
 
 
 def _spectral(function: str) -> dict[str, Any]:
     """Make a scene by a function of ``gallery.spectra``, which few scenes load."""
-    from fotismos.comparisons.gallery import spectra
+    from fotismos.comparisons.gallery import spectra  # loaded late: few scenes have any
 
     return getattr(spectra, function)()
 
@@ -78,24 +78,24 @@ def _figures() -> Iterator[BuiltIn]:
     levels = {"a": 0.5, "b": 0.7, "c": 0.9}
     for letter, k in levels.items():
         title = f"Figure 8.5{letter}: ambient light alone, k_a = {k}"
-        yield _figure(f"fig-8-5{letter}", title, (), VIEWER_A, k_a=k)
+        yield _figure(f"fig-8-5{letter}", title, lights=(), viewer=VIEWER_A, k_a=k)
     for letter, k in levels.items():
         title = f"Figure 8.6{letter}: diffuse reflection, k_d = {k}"
-        yield _figure(f"fig-8-6{letter}", title, WHITE_LIGHT, VIEWER_A, k_d=k)
+        yield _figure(f"fig-8-6{letter}", title, lights=WHITE_LIGHT, viewer=VIEWER_A, k_d=k)
     for letter, k in levels.items():
         title = f"Figure 8.7{letter}: specular reflection, k_s = {k}, n = 3"
-        yield _figure(f"fig-8-7{letter}", title, WHITE_LIGHT, VIEWER_A, k_s=k, n=3)
+        yield _figure(f"fig-8-7{letter}", title, lights=WHITE_LIGHT, viewer=VIEWER_A, k_s=k, n=3)
     whole = {"k_a": 0.3, "k_d": 0.5, "k_s": 0.7}
     for letter, viewer in {"a": VIEWER_A, "b": VIEWER_C, "c": VIEWER_C}.items():
         title = f"Figure 8.8{letter}: ambient, diffuse and specular, n = 3, viewer {viewer}"
         if viewer == VIEWER_C:
             title += "; the chapter gives 8.8b and 8.8c the same viewer"
-        yield _figure(f"fig-8-8{letter}", title, WHITE_LIGHT, viewer, **whole, n=3)
+        yield _figure(f"fig-8-8{letter}", title, lights=WHITE_LIGHT, viewer=viewer, **whole, n=3)
     title = "Figure 8.9: as 8.8c with a sharper highlight, n = 9"
-    yield _figure("fig-8-9", title, WHITE_LIGHT, VIEWER_C, **whole, n=9)
+    yield _figure("fig-8-9", title, lights=WHITE_LIGHT, viewer=VIEWER_C, **whole, n=9)
     for n, reading in {9: "text", 3: "caption"}.items():
         title = f"Figure 8.11: red, green and blue light, n = {n} (from the {reading})"
-        yield _figure(f"fig-8-11-n{n}", title, THREE_LIGHTS, VIEWER_C, **whole, n=n)
+        yield _figure(f"fig-8-11-n{n}", title, lights=THREE_LIGHTS, viewer=VIEWER_C, **whole, n=n)
 
 
 def _chapter_six() -> Iterator[BuiltIn]:

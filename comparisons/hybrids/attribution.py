@@ -138,7 +138,9 @@ def find(
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
     surface = gbuffer(ready.scene, size)
     require_surface(surface.hit, source.name)
-    reference = Renderer(ready.scene, ready.reference.integrator, spp, "reference image", size)
+    reference = Renderer(
+        ready.scene, ready.reference.integrator, spp=spp, label="reference image", size=size
+    )
     # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
     loop = passes(
         [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
@@ -148,10 +150,12 @@ def find(
     meter = ErrorMeter(groups, surface.hit, options.viewing)
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
-    images = HybridImages(pairs, scenes, REPLICATES, spp, options.seed, size)
+    images = HybridImages(
+        pairs, scenes, replicates=REPLICATES, spp=spp, seed=options.seed, size=size
+    )
     if progress:
         progress(CAUSES, 0, 1)
-    found = attribute(images, meter, surface.shape, options.seed, clean)
+    found = attribute(images, meter, shapes=surface.shape, seed=options.seed, clean=clean)
     resize(ready.scene, (width, height))
     if progress:
         progress(CAUSES, 1, 1)
@@ -237,7 +241,7 @@ def attribute(
         sets.append(simulated)
         return 0.0
 
-    shares(effects, note, seed, EXACT_EFFECTS, ORDERS)
+    shares(effects, note, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS)
     images.render(sets)
     errors: dict[frozenset[Effect], NDArray] = {}
 
@@ -247,7 +251,9 @@ def attribute(
             errors[simulated] = meter.without_noise(images.pixels(images.simulating(simulated)))
         return errors[simulated]
 
-    gains, sampling_errors, drawn = shares(effects, error, seed, EXACT_EFFECTS, ORDERS)
+    gains, sampling_errors, drawn = shares(
+        effects, error, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS
+    )
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
     departure = error(nothing)
     left = error(everything)
@@ -290,7 +296,9 @@ def attribute(
             hybrids=tuple(
                 sorted(hybrids, key=lambda hybrid: (len(hybrid.effects), hybrid.effects))
             ),
-            objects=by_object(filled(departure[0]), removed, left[0], meter.counted, shapes),
+            objects=by_object(
+                filled(departure[0]), removed, left=left[0], counted=meter.counted, shapes=shapes
+            ),
         ),
         maps={name: filled(change[0]) for name, change in removed.items()},
         departure=filled(departure[0]),

@@ -161,7 +161,7 @@ class HybridScenes:
         integrator.transports = tuple(
             Transport(plan.shadows, plan.bsdf_samples, plan.max_depth) for plan in plans
         )
-        return Renderer(scene, integrator, spp, "image of some effects")
+        return Renderer(scene, integrator, spp=spp, label="image of some effects")
 
     def emission(self, simulated: Set[Effect], spp: int) -> Renderer | None:
         """Return the renderer of the emission pass: emission, ambient light and background.
@@ -193,7 +193,7 @@ class HybridScenes:
         # Hiding emitters would hide the emission; a hidden environment was detached above.
         direct.register()
         integrator = mi.load_dict({"type": "direct_all", "max_depth": 1, "hide_emitters": False})
-        return Renderer(scene, integrator, spp, "image of emission and ambient light")
+        return Renderer(scene, integrator, spp=spp, label="image of emission and ambient light")
 
 
 class HybridImages:
@@ -292,7 +292,7 @@ class HybridImages:
                     if ONE_INTENSITY in effects:
                         lights.give_one_intensity(graph)
                     scene = graph.instantiate()
-                renderer = Renderer(scene, None, self._finer_spp, "image of the kernel")
+                renderer = Renderer(scene, None, spp=self._finer_spp, label="image of the kernel")
                 (self._kernels[effects],) = self._passes(renderer)
         return self._kernels[effects]
 

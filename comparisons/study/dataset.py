@@ -105,7 +105,9 @@ def measure(
 
     The images (H, W, 3) are linear; ``noise`` is that of their difference, ``counted`` (H, W).
     """
-    summary, _ = statistics.summarise(LEADING, heuristic, reference, counted, noise=noise)
+    summary, _ = statistics.summarise(
+        LEADING, heuristic, reference=reference, mask=counted, noise=noise
+    )
     ratio, _ = statistics.summarise_log2_luminance(heuristic, reference, counted)
     test = heuristic[counted]
     truth = reference[counted]

@@ -271,7 +271,10 @@ def _all_levels(table: PartTable, where: str) -> dict[str, Levels]:
         known = dict.fromkeys(raw, UNLIMITED)
     return {
         name: _levels(
-            raw.get(name, parameter.default), parameter, table.design == "grid", f"{where}: {name}"
+            raw.get(name, parameter.default),
+            parameter,
+            is_grid=table.design == "grid",
+            where=f"{where}: {name}",
         )
         for name, parameter in known.items()
     }

@@ -208,7 +208,7 @@ def _rendered(point: StudyPoint) -> Row:
     plans = _plans(ready.plan)
     for stage in plans.values():
         integrator = physical_integrator(stage, scene, ready.pair.hide_emitters)
-        renderers.append(Renderer(scene, integrator, spp, "reference image"))
+        renderers.append(Renderer(scene, integrator, spp=spp, label="reference image"))
     sums = [Accumulator() for _ in renderers]
     difference = Accumulator()
     for rendered in passes(renderers, part.options.seed, PASSES):

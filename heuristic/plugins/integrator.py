@@ -85,7 +85,9 @@ def define() -> dict[str, Any]:
             if any(bsdf.is_clear for bsdf in materials.bsdfs):
                 recorded = self.model.traced and dr.flag(dr.JitFlag.SymbolicLoops)
                 with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, recorded):
-                    colour, hit = _through_layers(self, scene, mi.Ray3f(ray), mi.Bool(active))
+                    colour, hit = _through_layers(
+                        self, scene, ray=mi.Ray3f(ray), active=mi.Bool(active)
+                    )
             else:
                 colour, hit, _ = self.layer(scene, ray, active)
             sees_all = scene.environment() is not None and not self.hide_emitters
@@ -154,7 +156,7 @@ def define() -> dict[str, Any]:
             is_same = self.parts is not None and len(parts) == len(self.parts)
             if not (is_same and all(map(is_, parts, self.parts)) and self.values == self.numbers):
                 self.materials = SceneMaterials(
-                    scene, self.prune, self.model.form, not self.model.is_own
+                    scene, self.prune, form=self.model.form, physical=not self.model.is_own
                 )
                 begin = perf_counter()
                 self.prepared = self.model.prepared(scene, self.numbers)

@@ -157,18 +157,20 @@ def derived(base: type) -> type:
                 shade_mesh(
                     mesh,
                     self.interpolation,
-                    viewer,
-                    material,
-                    self.lights(scene, at, True),
-                    self.ambient_at(at, True),
-                    self.visibility(scene, at, True),
-                    twosided,
+                    viewer=viewer,
+                    material=material,
+                    lights=self.lights(scene, at, True),
+                    ambient=self.ambient_at(at, True),
+                    visible=self.visibility(scene, at, True),
+                    twosided=twosided,
                     model=self.model_at(scene, at),
                 )
             return super().render(scene, sensor, *others, **named)
 
         def surface_colour(self, scene: Scene, si: Interaction, view: Any, active: Mask) -> Colour:
-            value = stored_shade(si, self.interpolation, _is_twosided(scene), active)
+            value = stored_shade(
+                si, self.interpolation, twosided=_is_twosided(scene), active=active
+            )
             return value if mi.is_rgb else mi.Spectrum(value.x)
 
     return InterpolatingIntegrator

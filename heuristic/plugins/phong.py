@@ -177,7 +177,7 @@ def define() -> dict[str, Any]:
         def eval_pdf(
             self, ctx: Any, si: Interaction, wo: Direction, active: Mask = True
         ) -> tuple[Colour, Number]:
-            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo, active)
+            return self.eval(ctx, si, wo, active), self.pdf(ctx, si, wo=wo, active=active)
 
         def eval_diffuse_reflectance(self, si: Interaction, active: Mask = True) -> Colour:
             return self.k_d.eval(si, active)
@@ -208,7 +208,7 @@ def define() -> dict[str, Any]:
                 mi.UInt32(+self.specular),
                 mi.UInt32(+mi.BSDFFlags.DiffuseReflection),
             )
-            value, bs.pdf = self.eval_pdf(ctx, si, wo, active)
+            value, bs.pdf = self.eval_pdf(ctx, si, wo=wo, active=active)
             if self.is_mirror:
                 mirrored = terms.mirror(1, self.k_s.eval(si, active))
                 value = dr.select(is_specular, mirrored, value)

@@ -149,14 +149,22 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
             polygons,  # loaded late: few scenes are made into triangles
         )
 
-        polygons.replace_shapes(half, geometry(), options.tessellation, options.interpolation)
+        polygons.replace_shapes(
+            half, geometry(), resolution=options.tessellation, interpolation=options.interpolation
+        )
 
     physical = graph.copy()
     emitters.add_glowing_shapes(physical, replaced)
     bsdfs.to_physical(physical, options.convention, replaced)
     emitters.to_physical(physical, lambda: gbuffer(geometry()), replaced)
     if settings.ambient is not None:
-        emitters.add_environment(physical, graph, settings.ambient, options.convention, replaced)
+        emitters.add_environment(
+            physical,
+            graph,
+            ambient=settings.ambient,
+            convention=options.convention,
+            replaced=replaced,
+        )
 
     media = tuple((graph.label(index), graph.plugin(index)) for index in graph.nodes(MEDIUM))
     for label, plugin in media:

@@ -131,14 +131,14 @@ def roughplastic(context: Context, index: int) -> NearestPhong:
     if values.plain(base) is not None and values.plain(coat) is not None:
         material = albedo.to_phong(_roughplastic(graph, index), context.convention)
         return NearestPhong(k_a=material.k_d, **asdict(material), physical=physical)
-    white = _roughplastic(graph, index, (1.0,) * 3, (1.0,) * 3)
+    white = _roughplastic(graph, index, base=(1.0,) * 3, coat=(1.0,) * 3)
     unit = albedo.to_phong(white, context.convention)
     k_s = values.product(graph, coat, unit.k_s[0])
     if context.convention is Convention.LITERAL:
         return NearestPhong(k_a=base, k_d=base, k_s=k_s, n=unit.n, physical=physical)
-    half = _roughplastic(graph, index, (0.5,) * 3, (1.0,) * 3)
+    half = _roughplastic(graph, index, base=(0.5,) * 3, coat=(1.0,) * 3)
     level = albedo.to_phong(half, context.convention).k_d[0]
-    k_d = _of_base(graph, base, unit.k_d[0], level)
+    k_d = _of_base(graph, base, whole=unit.k_d[0], half=level)
     return NearestPhong(k_a=k_d, k_d=k_d, k_s=k_s, n=unit.n, physical=physical)
 
 
@@ -158,10 +158,10 @@ def plastic(context: Context, index: int) -> NearestPhong:
     inside = values.index_of_refraction(graph, index, "int_ior", "polypropylene")
     outside = values.index_of_refraction(graph, index, "ext_ior", "air")
     nonlinear = context.value(index, "nonlinear", False)
-    whole, mirror = albedo.of_smooth_plastic(1.0, inside, outside, nonlinear)
-    half, _ = albedo.of_smooth_plastic(0.5, inside, outside, nonlinear)
-    k_d = _of_base(graph, base, whole, half)
-    reflected = _tinted(context, index, mirror, "specular_reflectance")
+    whole, mirror = albedo.of_smooth_plastic(1.0, inside, ext_ior=outside, nonlinear=nonlinear)
+    half, _ = albedo.of_smooth_plastic(0.5, inside, ext_ior=outside, nonlinear=nonlinear)
+    k_d = _of_base(graph, base, whole=whole, half=half)
+    reflected = _tinted(context, index, reflected=mirror, key="specular_reflectance")
     return NearestPhong(
         k_a=k_d,
         k_d=k_d,
@@ -179,7 +179,7 @@ def conductor(context: Context, index: int) -> NearestPhong:
     lobe reflects a constant environment: ``k_a`` is that albedo.
     """
     white = probe.measured(context.graph, index, specular_reflectance=1.0)
-    reflected = _tinted(context, index, white.reflected, "specular_reflectance")
+    reflected = _tinted(context, index, reflected=white.reflected, key="specular_reflectance")
     if context.plugin(index) == "conductor":
         alpha = 0.0
         lost = [MIRROR]
@@ -280,11 +280,11 @@ def _clear(context: Context, index: int, lost: str, twosided: bool) -> NearestPh
     white = probe.measured(
         context.graph, index, specular_reflectance=1.0, specular_transmittance=1.0
     )
-    reflected = _tinted(context, index, white.reflected, "specular_reflectance")
+    reflected = _tinted(context, index, reflected=white.reflected, key="specular_reflectance")
     return NearestPhong(
         k_a=reflected,
         **lobe(context, reflected, context.value(index, "alpha", white.alpha)),
-        transmittance=_tinted(context, index, white.passed, "specular_transmittance"),
+        transmittance=_tinted(context, index, reflected=white.passed, key="specular_transmittance"),
         twosided=twosided,
         lost=((lost, NEAREST),),
         physical=context.physical(0.0, _alpha(context, index), _ior(context.graph, index, "bk7")),

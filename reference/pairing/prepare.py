@@ -80,7 +80,7 @@ def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -
             graph.props(shape).set_id(f"shape-{shape}")
     settings = Settings()
     camera = keep_sensor(graph, sensor)
-    _prepare_film(graph, camera, resolution, settings)
+    _prepare_film(graph, camera, resolution=resolution, settings=settings)
     for _, index in graph.children(camera, SAMPLER):
         count = graph.props(index).get("sample_count", 4)
         before = f"{graph.plugin(index)}, {count} samples per pixel"

@@ -192,7 +192,7 @@ def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple[tuple, float]
     )
     diffuse = np.array([np.mean(np.array(channel, float)) for channel in level])
     diffuse = np.clip(diffuse, 0, reflected)
-    return (reflected, diffuse, passed, scattered), _width(bs, weight, up, diffuse)
+    return (reflected, diffuse, passed, scattered), _width(bs, weight, up=up, diffuse=diffuse)
 
 
 def _width(bs: Any, weight: Any, up: Any, diffuse: Any) -> Any:

@@ -113,13 +113,16 @@ def examine_plan(
     pieces = []
     rays = 0
     for size in sizes:
-        pieces.append(radiances(scene, integrators, size - rays, seeds))
+        pieces.append(radiances(scene, integrators, count=size - rays, seeds=seeds))
         tally = Tally.of(pieces)
         rays = size
         if tally.agrees(LOOKING):
             break
         if tally.departs(LOOKING / len(sizes)):
-            fresh = [radiances(scene, integrators, PIECE, seeds) for _ in range(MOST // PIECE)]
+            fresh = [
+                radiances(scene, integrators, count=PIECE, seeds=seeds)
+                for _ in range(MOST // PIECE)
+            ]
             decided = Tally.of(fresh)
             confirmed = decided.departs(DECIDING) and decided.mean * tally.mean > 0
             return decided.guard(confirmed, rays + decided.rays, begin)

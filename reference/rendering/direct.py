@@ -105,7 +105,16 @@ def _define(_variant: str) -> None:
                 from fotismos.reference.rendering.indirect import indirect_light
 
                 (max_depth,) = {transport.max_depth for transport in deep}
-                indirect = indirect_light(scene, sampler, si, bsdf, max_depth, RR_DEPTH, hit, deep)
+                indirect = indirect_light(
+                    scene,
+                    sampler,
+                    si=si,
+                    bsdf=bsdf,
+                    max_depth=max_depth,
+                    rr_depth=RR_DEPTH,
+                    active=hit,
+                    transports=deep,
+                )
                 added = dict(zip(deep, indirect, strict=True))
                 colours = sums(colours, [added.get(transport, 0) for transport in self.transports])
             colours = sums(colours, _of_all(extended, False, *arguments))
@@ -184,7 +193,7 @@ def _of_all(
         is_mixed = len({transport.shadows for transport in transports}) > 1
         evaluated = facing if is_mixed else reached[0]
         if is_weighted:
-            value, bsdf_density = bsdf.eval_pdf(context, si, wo, evaluated)
+            value, bsdf_density = bsdf.eval_pdf(context, si, wo=wo, active=evaluated)
         else:
             value = bsdf.eval(context, si, wo, evaluated)
         colours = []
@@ -199,7 +208,7 @@ def _of_all(
     targets = [partial(_sampled, light) for light in lights]
     nothing = [mi.Spectrum(0)] * len(transports)
     if len(lights) > UNROLLED:
-        return _looped(targets, of_light, sampler, nothing)
+        return _looped(targets, of_light, sampler=sampler, nothing=nothing)
     return reduce(sums, (of_light(target, sampler) for target in targets), nothing)
 
 
@@ -250,4 +259,4 @@ def _from_bsdf(
         active &= is_delta
     share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
     value = weight * emitter.eval(hit, active) * share
-    return found_by_bsdf(active, is_delta, value, transports)
+    return found_by_bsdf(active, is_delta, value=value, transports=transports)

@@ -134,7 +134,7 @@ def centre_rays(scene: Scene, size: tuple[int, int]) -> Any:
     """Return the camera rays through the centres of all cells of a film, row by row."""
     width, height = size
     x, y = np.meshgrid(np.arange(width), np.arange(height))
-    return pixel_rays(scene, size, x, y)
+    return pixel_rays(scene, size, x=x, y=y)
 
 
 def pixel_rays(scene: Scene, size: tuple[int, int], x: np.ndarray, y: np.ndarray) -> Any:

@@ -54,14 +54,16 @@ def indirect_light(
         emitter_pdf = scene.pdf_emitter_direction(previous, ds, is_indirect & ~previous_delta)
         share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
         value = throughput * emitter.eval(si, is_indirect) * share
-        light = sums(light, found_by_bsdf(is_indirect, previous_delta, value, transports))
+        light = sums(
+            light, found_by_bsdf(is_indirect, previous_delta, value=value, transports=transports)
+        )
 
         active &= si.is_valid() & (depth < limit)
         vertex = si.bsdf(ray)
         direct = active & mi.has_flag(vertex.flags(), mi.BSDFFlags.Smooth)
         ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), False, direct)
         direct &= ds.pdf > 0
-        value, bsdf_pdf = vertex.eval_pdf(context, si, si.to_local(ds.d), direct)
+        value, bsdf_pdf = vertex.eval_pdf(context, si, wo=si.to_local(ds.d), active=direct)
         reached = visibility(scene, si, ds.p, direct, transports)
         share = dr.select(ds.delta, 1, ds.pdf / (ds.pdf + bsdf_pdf))
         value = throughput * value * weight

@@ -255,4 +255,4 @@ def jackknifed(values: ArrayLike, bias: float = 0.0) -> Estimated:
     The first is of all repeats, each other one leaves out one of them. ``bias`` is what all share.
     """
     value, *others = np.asarray(values, float)
-    return student(float(value), float(jackknife_error(others)), len(others), bias)
+    return student(float(value), float(jackknife_error(others)), count=len(others), bias=bias)

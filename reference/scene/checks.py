@@ -182,7 +182,7 @@ def damage(graph: Graph, index: int) -> str:
     state = path.stat()
     number = graph.props(index).get("shape_index", 0)
     stamp = state.st_mtime_ns, state.st_size, mi.variant()
-    fault = _wrong_mesh(plugin, str(path), number, stamp)
+    fault = _wrong_mesh(plugin, str(path), number=number, stamp=stamp)
     return f"{path}: {fault} Write the file again." if fault else ""
 
 

@@ -138,7 +138,7 @@ class Source:
                 path = Path(content)
                 resolver = mi.FileResolver(mi.file_resolver())
                 resolver.prepend(str(path.resolve().parent))  # first, as for Mitsuba's command
-                _require_regular(path, resolver, self.parameters, set())
+                _require_regular(path, resolver, parameters=self.parameters, seen=set())
                 with resolving(resolver):
                     state = Parser.parse_file(config, str(path), **self.parameters)
                 _require_text(self.name, state)
@@ -170,7 +170,7 @@ def _require_regular(
             continue
         require_regular_file(str(path), name, file)
         if file.suffix == ".xml":
-            _require_regular(file, resolver, parameters, seen)
+            _require_regular(file, resolver, parameters=parameters, seen=seen)
 
 
 def _require_text(name: str, state: Any) -> None:

@@ -63,7 +63,7 @@ def error_over_time(record: Cost, ground: str = "transparent") -> Spec:
     chart = _charted(rows, times, errors).encode(color=colour)
     layers = [
         *_slope(rows, times, errors),
-        *([_guide([floor, floor], times, errors, [1, 3])] if floor > errors[0] else []),
+        *([_guide([floor, floor], times, errors=errors, dash=[1, 3])] if floor > errors[0] else []),
         chart.mark_line(strokeWidth=1.2, opacity=0.75).encode(detail="method:N"),
         chart.mark_rule(strokeWidth=1.2, opacity=0.8).encode(x="fastest:Q", x2="slowest:Q"),
         chart.mark_point(size=55, strokeWidth=1.6, opacity=1).encode(
@@ -141,7 +141,7 @@ def _slope(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
         return []
     best = min(sampled, key=lambda row: row["error"])
     ends = [max(best["error"], errors[0]) * (time / best["time"]) ** -0.5 for time in times]
-    return [_guide(ends, times, errors, [6, 4])]
+    return [_guide(ends, times, errors=errors, dash=[6, 4])]
 
 
 def _guide(ends: Sequence[float], times: Ends, errors: Ends, dash: list[int]) -> alt.Chart:

@@ -43,7 +43,9 @@ class BaselineFile:
         if not (name := self.baseline.images):
             return None
         how = program.command("check", "BASELINE", "--update", "--images")
-        return read_layers(self.path.parent / Path(name).name, HALVES, LONGEST_KEPT, how)
+        return read_layers(
+            self.path.parent / Path(name).name, HALVES, longest=LONGEST_KEPT, how=how
+        )
 
 
 def find(path: Path) -> list[Path]:

@@ -263,8 +263,8 @@ def examine_pictures(path: Path, pattern: str, level: float) -> tuple[CheckRecor
     baseline, before = pictures.read(path)
     found = check_pictures(before, pictures.read_repeats(pattern, baseline.transfer), level)
     if not found.moved:
-        return _of_pictures(path, pattern, "passed", found, begin), None
-    made = _of_pictures(path, pattern, "failed", found, begin)
+        return _of_pictures(path, pattern, status="passed", found=found, begin=begin), None
+    made = _of_pictures(path, pattern, status="failed", found=found, begin=begin)
     made = structs.replace(made, passed=False, causes=(found.cause(),))
     old = {"picture": baselines.small(before.mean), "blocks": found.blocks.before}
     return made, _before(made, old, {"picture": found.after.mean, "blocks": found.blocks.after})
@@ -281,7 +281,7 @@ def update_pictures(
     repeats = pictures.read_repeats(pattern, transfer)
     pictures.write(path, repeats, transfer)
     found = check_pictures(repeats, repeats, level)
-    return _of_pictures(path, pattern, status, found, begin), None
+    return _of_pictures(path, pattern, status=status, found=found, begin=begin), None
 
 
 def _of_pictures(
@@ -428,7 +428,13 @@ def update_one(
         with_pictures = with_pictures or bool(old.images)
     assert scene is not None, "a missing baseline comes with its scene"
     case = open_case(scene, Options.of(baselines.options_from(options, path)))
-    return create(path, baselines.scene_for(scene, path), case, with_pictures, progress), None
+    return create(
+        path,
+        baselines.scene_for(scene, path),
+        case=case,
+        with_pictures=with_pictures,
+        progress=progress,
+    ), None
 
 
 def _targets(path: Path, scenes: Sequence[str]) -> list[tuple[Path, str | None]]:

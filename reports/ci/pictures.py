@@ -67,7 +67,7 @@ def read(path: Path) -> tuple[PictureBaseline, Repeats]:
     baseline = record_of(path)
     images = path.parent / Path(baseline.images).name
     how = program.command("check", path, "--update", "--picture", f"{path.stem}=PATTERN")
-    found = baselines.read_layers(images, LAYERS, LONGEST, how)
+    found = baselines.read_layers(images, LAYERS, longest=LONGEST, how=how)
     repeats = Repeats(baseline.repeats, **found, correlation=np.array(baseline.correlation))
     is_same = np.allclose(repeats.mean.mean(axis=(0, 1)), baseline.mean, rtol=1e-5, atol=1e-9)
     if not (is_same and (repeats.variance >= 0).all() and baseline.correlation < np.inf):

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from fotismos.reports.ci.testing import Fotismos
+    from fotismos.reports.ci.testing import Fotismos  # likewise
 
 MARK = "fotismos_variant"
 
@@ -56,8 +56,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 @pytest.fixture
 def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
     """Departures and baselines of scenes: see :class:`fotismos.reports.ci.testing.Fotismos`."""
-    from fotismos.heuristic import llvm
-    from fotismos.heuristic.errors import InstallationError
+    from fotismos.heuristic import llvm  # loaded late: most suites use nothing of it
+    from fotismos.heuristic.errors import InstallationError  # likewise
 
     try:
         llvm.check()
@@ -65,8 +65,8 @@ def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
         pytest.skip(f"fotismos cannot render here. {error}")
     import mitsuba as mi
 
-    from fotismos.reference.scene.graph import set_variant
-    from fotismos.reports.ci.testing import Fotismos
+    from fotismos.reference.scene.graph import set_variant  # likewise
+    from fotismos.reports.ci.testing import Fotismos  # likewise
 
     before = mi.variant()
     variant = getattr(request, "param", None)

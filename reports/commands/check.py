@@ -109,7 +109,7 @@ def check(
     inputs = list(baseline.glob("*")) if baseline.is_dir() else [baseline]
     code = jobs.work(
         "check",
-        jobs.pool(timeout, max(len(scenes), len(inputs)), workers, scheduler),
+        jobs.pool(timeout, max(len(scenes), len(inputs)), workers=workers, scheduler=scheduler),
         baseline=baseline,
         update=update,
         scenes=scenes,

@@ -78,7 +78,7 @@ def compare(
         raise click.UsageError("--image goes with one scene.")
     code = jobs.work(
         "compare",
-        jobs.pool(timeout, len(scenes), workers, scheduler),
+        jobs.pool(timeout, len(scenes), workers=workers, scheduler=scheduler),
         scenes=scenes,
         output=output,
         job=jobs.Job(

@@ -60,5 +60,5 @@ def report(
         within=within,
         ladders=frozenset() if quick else LADDERS,
     )
-    processes = jobs.pool(timeout, len(SCENES), workers, scheduler)
+    processes = jobs.pool(timeout, len(SCENES), workers=workers, scheduler=scheduler)
     jobs.work("report", processes, output=output, job=job, is_opened=is_opened)

@@ -31,5 +31,5 @@ def study(
         jobs.pool(timeout),
         file=file,
         output=output,
-        many=lambda tasks: jobs.pool(timeout, tasks, workers, scheduler),
+        many=lambda tasks: jobs.pool(timeout, tasks, workers=workers, scheduler=scheduler),
     )

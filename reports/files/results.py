@@ -139,12 +139,12 @@ def hold_results(
     Other commands may write to other folders below it at the same time.
     """
     with ExitStack() as held:
-        with hold(folder, command, (), ASSIGNING_S):
+        with hold(folder, command, names=(), patience=ASSIGNING_S):
             places = [folder / name for name in assigned(folder, subjects)]
             for target in places:
                 held.enter_context(hold(target, command, ()))
         yield places
-    with suppress(OutputError), hold(folder, command, (), ASSIGNING_S):
+    with suppress(OutputError), hold(folder, command, names=(), patience=ASSIGNING_S):
         pass  # if nothing was written, it goes
 
 

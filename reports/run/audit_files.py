@@ -68,7 +68,7 @@ def lobes(record: Audit) -> Spec:
             shown = {"tickCount": 4}
             x = alt.X("x:Q", axis=shown).title(None).scale(domain=[-reach, reach], nice=False)
             y = alt.Y("y:Q", axis=shown).title(None).scale(domain=[low, reach], nice=False)
-            chart = _chart(rows, circle, "light at", x, y)
+            chart = _chart(rows, circle, of="light at", x=x, y=y)
             charts[curve.material] = chart.properties(height=WIDTH if low else WIDTH // 2)
     return _charts(charts)
 

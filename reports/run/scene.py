@@ -82,7 +82,14 @@ def compare(
 
             begin = perf_counter()
             command = case.command("cost")
-            study = quick(source, options, causes, progress, command, turn.alone())
+            study = quick(
+                source,
+                options,
+                causes=causes,
+                progress=progress,
+                command=command,
+                alone=turn.alone(),
+            )
             spent["methods"] = perf_counter() - begin
         begin = perf_counter()
         if job.figures:  # first, since the record marks the scene as finished
@@ -191,7 +198,7 @@ def write(
     }
     linked: tuple[str, ...] = (RECORD, PICTURE)
     if study:
-        from fotismos.reports.run import cost_files
+        from fotismos.reports.run import cost_files  # loaded late: for a handful of scenes
 
         made |= cost_files.documents(study)
         linked = (*linked, "cost.json")
@@ -264,7 +271,9 @@ def _why(comparison: Comparison) -> WhyView | None:
     if causes is None:
         return None
     previews = [causes.previews[hybrid.effects] for hybrid in causes.record.hybrids]
-    return why_view(causes.maps, causes.counted, previews, comparison.record.viewing)
+    return why_view(
+        causes.maps, causes.counted, previews=previews, viewing=comparison.record.viewing
+    )
 
 
 def _files(folder: Path) -> set[str]:

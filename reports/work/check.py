@@ -36,10 +36,23 @@ def run(
     shown = ""
     if update:
         outcomes = checks.update_all(
-            pool, baseline, scenes, with_images, significance, changes, patterns
+            pool,
+            baseline,
+            scenes=scenes,
+            with_pictures=with_images,
+            significance=significance,
+            options=changes,
+            patterns=patterns,
         )
     else:
-        outcomes, shown = _examined(pool, baseline, significance, changes, patterns, output)
+        outcomes, shown = _examined(
+            pool,
+            baseline,
+            significance=significance,
+            changes=changes,
+            patterns=patterns,
+            output=output,
+        )
     for outcome in outcomes:
         if outcome.status == "error":
             echo(f"fotismos: error: {outcome.message}", err=True)
@@ -69,7 +82,12 @@ def _examined(
     """Check the baselines; return the outcomes, and the page if there is anything to see."""
     with results.hold(output / "check", command_line(), ()) as folder:
         outcomes, views, moved = checks.examine_all(
-            pool, baseline, significance, changes.get("seed"), folder, patterns
+            pool,
+            baseline,
+            significance=significance,
+            seed=changes.get("seed"),
+            folder=folder,
+            patterns=patterns,
         )
         if not (views or moved):
             results.clear(folder, (results.PAGE, results.DETAILS))

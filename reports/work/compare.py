@@ -47,7 +47,10 @@ def run(
         summary.write_junit(junit, lambda: summary.junit_of_gates(gates, errors))
         page = str(folder / "index.html") if views else ""
         summary.append(
-            summary_file, lambda: summary.of_comparison(studied, gates, errors, page, job.within)
+            summary_file,
+            lambda: summary.of_comparison(
+                studied, gates, errors=errors, page=page, threshold=job.within
+            ),
         )
 
     batch.run(pool, scenes, output, job, on_page=on_page, finish=finish)

@@ -33,7 +33,7 @@ def run(
 ) -> None:
     """Study one scene, and print the table or the record."""
     arguments = (request, rounds, at, is_measured)
-    records = results_of(pool, output / "cost", [scene], measured, arguments)
+    records = results_of(pool, output / "cost", scenes=[scene], work=measured, arguments=arguments)
     ((folder, record),) = records.items()
     if as_json:
         click.echo(to_json(record), nl=False)

@@ -14,7 +14,9 @@ from fotismos.reports.work.folders import results_of
 
 def run(pool: Pool, scene: str, output: Path, request: Options) -> None:
     """Export one scene."""
-    (folder,) = results_of(pool, output / "export", [scene], exported, [request])
+    (folder,) = results_of(
+        pool, output / "export", scenes=[scene], work=exported, arguments=[request]
+    )
     tell_where(folder)
 
 

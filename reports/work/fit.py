@@ -30,7 +30,9 @@ def run(
     as_json: bool,
 ) -> None:
     """Fit each scene, and print the tables or the records."""
-    records = results_of(pool, output / "fit", scenes, fitted, (request, loss, form))
+    records = results_of(
+        pool, output / "fit", scenes=scenes, work=fitted, arguments=(request, loss, form)
+    )
     if as_json:
         click.echo(json.dumps(plain([*records.values()]), indent=2, ensure_ascii=False))
         return

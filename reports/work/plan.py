@@ -53,4 +53,4 @@ def planned(name: str, request: Options) -> PlanReport:
 def chosen(name: str, request: Options, within: float, progress: Any) -> Choice:
     """Measure the methods of a scene, and name the fastest that passes at a tolerance."""
     case = open_case(name, request)
-    return choose(case.source, within, case.options, progress)
+    return choose(case.source, within, options=case.options, progress=progress)
