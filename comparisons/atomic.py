@@ -51,7 +51,7 @@ def refusal(path: Path, error: OSError) -> OutputError:
     reason = os.strerror(error.errno) if error.errno else str(error)
     advice = ADVICE.get(error.errno or 0, "Move away whatever is in the way")
     return OutputError(
-        f"{printable(path)}: {reason}. {advice}, or choose another place (-o). Finished results"
+        f"{printable(path)}: {reason}. {advice}, or choose another `output`. Finished results"
         " are kept."
     )
 
@@ -164,7 +164,7 @@ class Entry:
         except OSError as error:
             raise InputError(
                 f"{self.path}: {error.strerror or error}. Results are kept there: make room,"
-                " or choose another output folder with -o."
+                " or choose another `output` folder."
             ) from error
 
     def _head(self, body: bytes) -> bytes:

@@ -6,13 +6,14 @@ The seed of pass ``i`` is hashed from the run's seed and ``i``.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
 from threading import Thread
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from msgspec import structs
@@ -33,11 +34,9 @@ from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, leading_distance
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import Prepared, guarded, require_light
-from fotismos.heuristic import heuristics
+from fotismos.comparisons.prepared import Prepared, guarded
 from fotismos.heuristic.errors import InstallationError
-from fotismos.reference.records import Pixels
-from fotismos.reference.rendering.gbuffer import GBuffer
+from fotismos.reference.records import Interval, Missing, Pixels
 from fotismos.reference.rendering.renderer import Progress, Renderer, passes
 from fotismos.reference.rendering.sums import (
     DEVIATION,
@@ -49,8 +48,8 @@ from fotismos.reference.rendering.sums import (
 )
 from fotismos.reference.scene.source import Source, collect_messages, count_messages
 
-if TYPE_CHECKING:
-    from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
+Step = Callable[[Comparison, Prepared, Progress | None], Comparison]
+"""What adds to a comparison once it is measured, with what it was rendered with."""
 
 PERCENTILE = 95
 """A noise target is for this percentile of the noise over the counted pixels."""
@@ -83,16 +82,17 @@ def compare(
     options: Options | None = None,
     progress: Progress | None = None,
     command: str = "",
-    why: bool = False,
     alone: AbstractContextManager[Any] | None = None,
+    then: Sequence[Step] = (),
 ) -> Comparison:
     """Compare the heuristic half of a scene with the physical one, in the current variant.
 
     ``command`` repeats the comparison, for the record. ``progress(stage, done, total)`` is called
-    after each pass; with a noise target, ``total`` is the limit. ``why`` finds causes, and traces
-    equation 8.10 at pixels. Raises `InputError` if the scene cannot be read or paired, no
-    pixel sees a surface, or both halves are black; `NonFiniteError` for a NaN or an infinity in a
-    rendering. Times are taken within the context ``alone``.
+    after each pass; with a noise target, ``total`` is the limit. The steps ``then`` add to the
+    comparison, one after the other (:mod:`fotismos.comparisons.steps`). Raises `InputError` if the
+    scene cannot be read or paired, no pixel sees a surface, or both halves are black;
+    `NonFiniteError` for a NaN or an infinity in a rendering. Times are taken within the context
+    ``alone``.
     """
     options = options or Options()
     _require_colour_science()
@@ -103,17 +103,11 @@ def compare(
 
             formulas.enter_context(definitions.in_use())
         with collect_messages(printed):
-            comparison, ready = _compare(source, options, progress, command, why, alone)
+            comparison, ready = _measured(source, options, progress, command, alone)
         lines = count_messages([*source.messages, *printed])
-        record = comparison.record
-        record = structs.replace(record, warnings=(*record.warnings, *lines))
-        comparison = replace(comparison, record=record)
-        if why and not options.image:  # no effect can be added to a picture
-            from fotismos.comparisons.hybrids import (
-                attribution,  # loaded late: --no-why needs none of it
-            )
-
-            comparison = attribution.explained(comparison, ready, source, options, progress)
+        comparison = comparison.warned(*lines)
+        for step in then:
+            comparison = step(comparison, ready, progress)
         return _computed_twice(comparison)
 
 
@@ -145,29 +139,25 @@ def _computed_twice(comparison: Comparison) -> Comparison:
     second = shown.reference.reshape(-1, 3)[some]
     distances = {name: values.ravel()[some] for name, values in shown.maps.items()}
     largest = definitions.deviations(first, second, values=distances, viewing=record.viewing)
-    warnings = [
+    record = structs.replace(record, colour_science=Deviations(pixels=len(some), largest=largest))
+    warnings = (
         f"{METRICS[name].label} deviates from colour-science's by up to {most:.2g}, and"
-        f" {DEVIATION_ALLOWED:g} is allowed: a formula is wrong here. Give --colour-science to do"
+        f" {DEVIATION_ALLOWED:g} is allowed: a formula is wrong here. Give `colour_science` to do"
         " without it, and report this scene."
         for name, most in largest.items()
         if most > DEVIATION_ALLOWED
-    ]
-    record = structs.replace(
-        record,
-        colour_science=Deviations(pixels=len(some), largest=largest),
-        warnings=(*record.warnings, *warnings),
     )
-    return replace(comparison, record=record)
+    return replace(comparison, record=record).warned(*warnings)
 
 
-def _compare(
+def _measured(
     source: Source,
     options: Options,
     progress: Progress | None,
     command: str,
-    why: bool,
     alone: AbstractContextManager[Any] | None,
 ) -> tuple[Comparison, Prepared]:
+    """Return the record and the images of a scene, and what they were rendered with."""
     stages: dict[str, float] = {}
     begin = perf_counter()
 
@@ -178,6 +168,7 @@ def _compare(
         stages[stage] = now - begin - elsewhere
         begin = now
 
+    # The scene, both halves and the plan.
     ready = guarded(source, options)
     heuristic: Any = ready.heuristic  # a renderer, or pictures in its place
     reference = ready.reference
@@ -185,40 +176,19 @@ def _compare(
     assert guard is not None
     done("scene and pairing", ready.planning_seconds + guard.seconds)
     stages |= {"planning": ready.planning_seconds, "guard": guard.seconds}
-    estimates = render(ready, options, ready.counted, progress)
+
+    # The passes, and their times.
+    estimates = render(ready, ready.counted, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
     with alone or nullcontext():
         spent = _times(heuristic, reference, options)
     done("timing")
+
+    # The departure.
     _load()  # not beside the passes, whose times are compared
-    exact = ready.plan.exact and not options.image
-    numbers, images = _measure(estimates, ready.surface, options=options, exact=exact)
-    shown = images.heuristic, images.reference, images.counted
-    caution = ready.caution() or require_light(*shown, source.name, options)
-    picture = None
-    if options.image:
-        from fotismos.comparisons import pictures  # loaded late: few comparisons have any
-
-        picture = pictures.picture_record(heuristic, ready.scene, options=options, images=images)
+    numbers, images = _measure(estimates, ready)
+    caution = ready.caution() or ready.require_light(images.heuristic, images.reference)
     done("metrics")
-    terms: TermGrid | None = None
-    no_terms = "Terms are traced with --why, in Python with why=True."
-    live: LivePoints | str = "It needs --why."
-    if why:
-        from fotismos.comparisons import pixel_terms  # loaded late: --no-why traces none
-
-        terms, no_terms = pixel_terms.trace(ready.heuristic, options)
-        live = pixel_terms.live(ready.heuristic, options)
-        layers = pixel_terms.layers(ready.heuristic, options, images.heuristic)
-        images = replace(images, terms=layers)
-        done("terms")
-    mistakes: tuple[str, ...] = ()
-    if not options.image and not heuristics.named(options.heuristic).is_own:
-        from fotismos.comparisons.audit import (
-            diagnosis,  # loaded late: only users' shaders have any
-        )
-
-        mistakes = diagnosis.describe(options.heuristic)
     record = ComparisonRecord(
         scene=source.name,
         variant=reference.variant,
@@ -236,33 +206,29 @@ def _compare(
         unrepresentable=ready.pair.unrepresentable,
         integrator_given=ready.pair.integrator,
         overridden=ready.overridden,
-        warnings=(*(picture.odd if picture else ()), *ready.warnings()),
+        warnings=tuple(ready.warnings()),
         versions=versions(),
         command=command,
         caution=caution,
         noise_target=estimates.stop,
-        picture=picture,
-        mistakes=mistakes,
         **numbers,
     )
-    comparison = Comparison(record=record, images=images, terms=terms, no_terms=no_terms, live=live)
-    return comparison, ready
+    return Comparison(record=record, images=images), ready
 
 
 def _times(heuristic: Any, reference: Renderer, options: Options) -> TimeSpent:
     """Return the times of both halves, without stages; the time of a picture is not known."""
-    ratio = None
-    reason = "a picture's time is not known"
+    ratio: Interval | Missing = timing.NOT_TIMED
     if not options.image:
-        ratio, reason = timing.measure(heuristic, reference, options.seed)
-    return TimeSpent(
-        heuristic=heuristic.pass_times(),
-        reference=reference.pass_times(),
-        stages={},
-        ratio=two_digits(ratio.value) if ratio else None,
-        ratio_low=two_digits(ratio.low) if ratio else None,
-        ratio_high=two_digits(ratio.high) if ratio else None,
-        no_ratio=reason,
+        ratio = timing.measure(heuristic, reference, options.seed)
+    spent = TimeSpent(heuristic=heuristic.pass_times(), reference=reference.pass_times(), stages={})
+    if isinstance(ratio, Missing):
+        return structs.replace(spent, no_ratio=ratio.reason)
+    return structs.replace(
+        spent,
+        ratio=two_digits(ratio.value),
+        ratio_low=two_digits(ratio.low),
+        ratio_high=two_digits(ratio.high),
     )
 
 
@@ -271,13 +237,12 @@ def two_digits(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-def render(
-    ready: Prepared, options: Options, counted: np.ndarray, progress: Progress | None
-) -> Estimates:
+def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> Estimates:
     """Render the passes of both halves in turn: a drift of the machine then affects both.
 
     ``counted`` (H, W) are the pixels whose noise counts.
     """
+    options = ready.options
     sums = Accumulator(MEAN), Accumulator(DEVIATION), DifferenceSums(counted)
     done = 0
     reached = None
@@ -298,7 +263,7 @@ def render(
             target=options.noise,
             reached=reached,
             stopped_by="target" if reached <= options.noise else "samples",
-            limit_spp=ready.passes * ready.reference.spp,
+            limit_spp=ready.passes * ready.reference.pass_spp,
         )
     # From here on images have single precision, like the files.
     difference = sums[2].estimate(np.float32)
@@ -342,13 +307,14 @@ def noise_percentile(
     return float(np.percentile(np.concatenate(distances), PERCENTILE))
 
 
-def _measure(
-    estimates: Estimates, surface: GBuffer, options: Options, exact: bool
-) -> tuple[dict[str, Any], Images]:
+def _measure(estimates: Estimates, ready: Prepared) -> tuple[dict[str, Any], Images]:
     """Compute fields of the record, and maps over the pixels that see a surface.
 
     The relevant uncertainty is that of the difference, in which shared noise cancels.
     """
+    surface = ready.traced()
+    options = ready.options
+    exact = ready.plan.exact and not options.image
     test = estimates.heuristic
     reference = estimates.reference
     noise = estimates.difference.noise

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import platform
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import drjit as dr
+import msgspec
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.colour import Viewing
@@ -26,8 +27,9 @@ from fotismos.reference.records import (
     VERSION,
     Amount,
     Count,
-    Estimated,
+    Interval,
     Machine,
+    Missing,
     Pixels,
     Positive,
     Record,
@@ -84,6 +86,9 @@ class Significant(Record):
     ]
 
 
+NO_TERMS = Missing("Terms are traced with the causes, which were not asked for.")
+NOT_LIVE = Missing("It needs the causes, which were not asked for.")
+
 CAUSES = "causes"
 """The stage that finds causes."""
 
@@ -123,12 +128,10 @@ class NoiseTarget(Record):
     limit_spp: Annotated[int, Meta(ge=2, description="Samples per pixel that end a run.")]
 
 
-class MeanError(Record):
+class MeanError(Interval):
     """A mean ΔE2000 with its 95 % interval; without noise it may come out below 0."""
 
-    mean: float
-    low: float
-    high: float
+    value: float = msgspec.field(name="mean")
 
 
 class Contribution(Record):
@@ -145,7 +148,7 @@ class Contribution(Record):
     """
 
     effect: str
-    removes: Estimated
+    removes: Interval
     alone: float
     last: float
     sampling_error: Amount
@@ -174,7 +177,7 @@ class ObjectContribution(Record):
     pixels: Size
     share: float
     departure: float
-    removes: tuple[Estimated, ...]
+    removes: tuple[Interval, ...]
     left: float
 
 
@@ -323,7 +326,9 @@ class ComparisonRecord(Record):
     picture: PictureRecord | None = None
     why: Annotated[
         Attribution | None,
-        Meta(description="What the effects remove; null with --no-why, and of pictures."),
+        Meta(
+            description="What the effects remove; null if they were not asked for, and of pictures."
+        ),
     ] = None
     mistakes: Annotated[
         tuple[str, ...], Meta(description="Mistakes that the heuristic seems to make, in words.")
@@ -356,15 +361,25 @@ class Images:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a comparison returns: the content of ``comparison.json``, the images, and the terms.
+    """What a comparison returns: the content of ``comparison.json``, and the images.
 
-    ``no_terms`` is the reason if there are no terms. ``live`` are the points that a page shades
-    again, or why it cannot. ``causes`` are those of ``record.why``, by pixel.
+    Steps add the others: ``terms`` of 8.10 at pixels, ``live``, the points that a page shades
+    again, and ``causes``, those of ``record.why``, by pixel.
     """
 
     record: ComparisonRecord
     images: Images
-    terms: TermGrid | None = None
-    no_terms: str = ""
-    live: LivePoints | str = ""
+    terms: TermGrid | Missing = NO_TERMS
+    live: LivePoints | Missing = NOT_LIVE
     causes: Causes | None = None
+
+    def warned(self, *warnings: str) -> Comparison:
+        """Return the comparison with more warnings."""
+        record = structs.replace(self.record, warnings=(*self.record.warnings, *warnings))
+        return replace(self, record=record)
+
+    def timed(self, stage: str, seconds: float) -> Comparison:
+        """Return the comparison with the time of one more stage."""
+        time = self.record.time
+        time = structs.replace(time, stages=time.stages | {stage: seconds})
+        return replace(self, record=structs.replace(self.record, time=time))

@@ -58,7 +58,7 @@ class Options(
     heuristic_variant: Annotated[
         Variant | None,
         _help("Variant of the heuristic half, such as RGB shading against a spectral reference.",
-              "the scene's own, else --variant"),
+              "the scene's own, else `variant`"),
     ] = None  # fmt: skip
     seed: Annotated[Seed, _help("Seed of the run, from which each pass derives its own.")] = 0
     spp: Annotated[
@@ -67,7 +67,7 @@ class Options(
     ] = None
     noise: Annotated[
         Error | None,
-        _help("Continue until 95 % of pixels have noise under this ΔE2000, up to --spp samples per"
+        _help("Continue until 95 % of pixels have noise under this ΔE2000, up to `spp` samples per"
               " pixel, or 4096."),
     ] = None  # fmt: skip
     resolution: Annotated[tuple[Side, Side] | None, _help("Width and height.", "the film's")] = None

@@ -11,6 +11,7 @@ values gives the fraction of a pixel.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import permutations
 from math import pi
@@ -23,13 +24,14 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons.case import PICTURES, picture_parts
-from fotismos.comparisons.comparison import Images, PictureRecord
+from fotismos.comparisons.comparison import Comparison, Images, PictureRecord
 from fotismos.comparisons.departure.colour import CHROMATICITIES, from_srgb, luminance, to_srgb
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import Prepared
 from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
 from fotismos.reference.pairing.prepare import film_size
 from fotismos.reference.rendering.gbuffer import gbuffer
-from fotismos.reference.rendering.renderer import LARGEST_VALUE, Renderer, Times
+from fotismos.reference.rendering.renderer import LARGEST_VALUE, Progress, Renderer, Times
 from fotismos.reference.scene.source import Source
 
 SAME_PRIMARIES = 2e-3
@@ -72,7 +74,7 @@ def read_all(options: Options) -> list[np.ndarray]:
     if len(images) > 1 and options.noise is not None:
         raise InputError(
             f"noise = {options.noise:g} and {len(images)} repeats: a noise target may need more"
-            " passes than there are pictures. Give --spp instead of --noise."
+            " passes than there are pictures. Give `spp` instead of `noise`."
         )
     if len(images) > 1 and len(images) % 2:
         raise InputError(
@@ -96,15 +98,15 @@ def at_size_of_pictures(source: Source, options: Options) -> Options:
     film = options.resolution or film_sides
     if options.resolution and film != (width, height):
         raise InputError(
-            f"{options.image[0]}: it has {width}x{height} pixels, and --resolution"
-            f" {film[0]}x{film[1]} is requested. Omit the option."
+            f"{options.image[0]}: it has {width}x{height} pixels, and"
+            f" `resolution={film[0]}x{film[1]}` is requested. Omit the option."
         )
     if abs(width * film[1] - height * film[0]) > max(film):  # more than a pixel
         raise InputError(
             f"{options.image[0]}: it has {width}x{height} pixels, an aspect ratio of"
             f" {width / height:.4g}, and the scene's film {film[0]}x{film[1]},"
             f" {film[0] / film[1]:.4g}. Render the picture with the scene's camera, or ignore the"
-            f" film's size with --resolution {width}x{height}."
+            f" film's size with `resolution={width}x{height}`."
         )
     return options.changed(resolution=(width, height))
 
@@ -201,8 +203,8 @@ def _require_plain(path: Path, header: Mapping[str, Any]) -> None:
 def _png(path: Path, transfer: str | None) -> np.ndarray:
     if transfer is None:
         raise InputError(
-            f"{path}: a PNG does not state its transfer function. Add --transfer srgb for values"
-            " encoded for displays, or --transfer linear."
+            f"{path}: a PNG does not state its transfer function. Give `transfer=srgb` for"
+            " values encoded for displays, or `transfer=linear`."
         )
     try:
         pixels = np.array(mi.Bitmap(str(path)))
@@ -337,8 +339,8 @@ TURNED = {
 }
 
 CURES = {
-    "values look sRGB-encoded": ": give --transfer srgb, or write linear values",
-    "values look decoded twice": ": give --transfer linear",
+    "values look sRGB-encoded": ": give `transfer=srgb`, or write linear values",
+    "values look decoded twice": ": give `transfer=linear`",
 }
 
 NEAR_PI = 0.05
@@ -368,14 +370,24 @@ BETTER = 0.5
 """Largest share of the difference that a credible other reading of the values leaves."""
 
 
+def with_picture(
+    comparison: Comparison, ready: Prepared, progress: Progress | None = None
+) -> Comparison:
+    """Return a comparison with the record of its pictures, which it warns of first."""
+    record = comparison.record
+    half: Any = ready.heuristic
+    picture = picture_record(half, ready.scene, options=ready.options, images=comparison.images)
+    warnings = (*picture.odd, *record.warnings)
+    return replace(comparison, record=structs.replace(record, picture=picture, warnings=warnings))
+
+
 def picture_record(
     half: PictureHalf, scene: mi.Scene, options: Options, images: Images
 ) -> PictureRecord:
     """Return the record of the pictures that replace a heuristic half, with its warnings."""
     shown = images.heuristic[images.counted]
     reference = images.reference[images.counted]
-    half.half.spp = TEMPLATE_SPP
-    template = np.array(half.half.render(0), float)
+    template = np.array(half.half.sampled(TEMPLATE_SPP).render(0), float)
     height, width = images.counted.shape
     expected = [geometry_edges(scene, width, height)]
     expected += [picture_edges(image) for image in (template, images.reference)]

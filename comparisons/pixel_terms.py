@@ -5,7 +5,7 @@ Those of the grid are at the centres of pixels, one in the middle of each cell.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from time import perf_counter
 from typing import Any
 
 import drjit as dr
@@ -13,16 +13,20 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import Prepared
 from fotismos.heuristic import kernel, materials, terms, vectors
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Interpolation
+from fotismos.heuristic.kernel import LightContribution
 from fotismos.heuristic.lights import lamps
 from fotismos.heuristic.materials import COEFFICIENTS, FORMS, Material
+from fotismos.reference.records import Missing
 from fotismos.reference.rendering.gbuffer import centre_rays, image_size, pixel_rays
-from fotismos.reference.rendering.renderer import Renderer, pass_seed, variant
+from fotismos.reference.rendering.renderer import Progress, Renderer, pass_seed, variant
 
 SIDE = 64
 """Points along the longer side of the grid, at most."""
@@ -38,6 +42,8 @@ MOST_LIGHTS = 64
 
 MATERIALS = 256
 """Different sets of coefficients, at most: textures have more."""
+
+TOO_MANY_MATERIALS = Missing(f"Its textures make more than {MATERIALS} different materials.")
 
 LIVE_SIDE = 128
 """Points along the longer side of the film on which a page shades again, at most."""
@@ -214,25 +220,40 @@ def _colour(values: object) -> Colour:
 # --- Reading the kernel ------------------------------------------------------------------------
 
 
-def trace(half: Renderer, options: Options) -> tuple[TermGrid | None, str]:
+def with_terms(
+    comparison: Comparison, ready: Prepared, progress: Progress | None = None
+) -> Comparison:
+    """Return a comparison with its terms at pixels and as images, and the points to shade again."""
+    begin = perf_counter()
+    half = ready.heuristic
+    options = ready.options
+    images = comparison.images
+    made = replace(
+        comparison,
+        terms=trace(half, options),
+        live=live(half, options),
+        images=replace(images, terms=layers(half, options, images.heuristic)),
+    )
+    return made.timed("terms", perf_counter() - begin)
+
+
+def trace(half: Renderer, options: Options) -> TermGrid | Missing:
     """Return the terms of a heuristic half, or why there are none."""
     with variant(half.variant):
         if reason := _without(half, options, Interpolation.PHONG):
-            return None, reason
-        grid = _traced(half.scene, half.integrator)
-    if grid is None:
-        return None, f"Its textures make more than {MATERIALS} different materials."
-    return grid, ""
+            return Missing(reason)
+        return _traced(half.scene, half.integrator)
 
 
-def live(half: Renderer, options: Options) -> LivePoints | str:
+def live(half: Renderer, options: Options) -> LivePoints | Missing:
     """Return what a page needs to shade a heuristic half again, or why it cannot.
 
     Flat shading has the face's normal, at each point in place of the face's centre.
     """
     with variant(half.variant):
-        reason = _without(half, options, Interpolation.PHONG, Interpolation.FLAT)
-        return reason or _live(half, options)
+        if reason := _without(half, options, Interpolation.PHONG, Interpolation.FLAT):
+            return Missing(reason)
+        return _live(half, options)
 
 
 def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
@@ -262,14 +283,14 @@ def _without_sum(half: Renderer, options: Options) -> str:
     return ""
 
 
-def _live(half: Renderer, options: Options) -> LivePoints | str:
+def _live(half: Renderer, options: Options) -> LivePoints | Missing:
     scene = half.scene
     emitters = lamps(scene)
     sensor = scene.sensors()[0]
     if len(emitters) > LIVE_LIGHTS:
-        return f"There are more than {LIVE_LIGHTS} lights."
+        return Missing(f"There are more than {LIVE_LIGHTS} lights.")
     if not isinstance(sensor, mi.ProjectiveCamera):
-        return f"The camera, {sensor.class_name()}, has no plane film."
+        return Missing(f"The camera, {sensor.class_name()}, has no plane film.")
     size = shrunk(image_size(scene), LIVE_SIDE)
     ray = centre_rays(scene, size)
     ahead = sensor.world_transform() @ mi.Vector3f(0, 0, 1)
@@ -277,7 +298,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
     corners = [0, size[0] - 1, -size[0]]
     points = _Points(scene, half.integrator, ray)
     if not points.hit.any():
-        return "No pixel’s centre sees a shaded surface."
+        return Missing("No pixel’s centre sees a shaded surface.")
     materials, places = points.materials()
     vectors = dict[str, NDArray]()
     if len(materials) > MATERIALS:
@@ -285,7 +306,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
         has_ambient = points.colours(points.ambient).any()  # else k_a, too, does not matter
         materials, places = points.materials(("k_d",) if has_ambient else ("k_a", "k_d"))
         if len(materials) > MATERIALS:
-            return f"Its textures make more than {MATERIALS} different materials."
+            return TOO_MANY_MATERIALS
     si = points.si
     vectors["normal"] = points.colours(points.normal)
     face = points.colours(dr.mulsign(si.n, dr.dot(si.n, points.view)))
@@ -311,7 +332,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | str:
     )
 
 
-def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
+def _traced(scene: Scene, integrator: Any) -> TermGrid | Missing:
     emitters = lamps(scene)
     resolution = image_size(scene)
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
@@ -319,7 +340,7 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | None:
     points = _Points(scene, integrator, pixel_rays(scene, resolution, x=x, y=y))
     materials, places = points.materials()
     if len(materials) > MATERIALS:
-        return None
+        return TOO_MANY_MATERIALS
     shape = len(rows), len(columns)
     lights = [points.light(emitter, shape) for emitter in emitters]
     cos_view = points.floats(dr.dot(points.normal, points.view)).reshape(shape)
@@ -426,26 +447,34 @@ class _Points:
     def light(self, emitter: Any, shape: tuple[int, int]) -> GridLight:
         """Return a light at all points."""
         light = emitter.light(self.si, self.si.is_valid())
-        toward, *arriving, _ = light.illuminate(self.position)
-        cos_incidence = dr.dot(self.normal, toward)
+
+        def contribution(material: Material) -> LightContribution:
+            material = replace(material, k_d=1, k_s=1)
+            at = (self.position, self.normal, self.view)
+            return next(kernel.contributions(*at, material, [light]))
 
         def lobe(material: Material) -> NDArray:
-            cosine = vectors.lobe(material, self.normal, self.view)
-            cosine = cosine(light, self.position, toward, cos_incidence)
+            cosine = contribution(material).cos_lobe
+            if cosine is None:  # a mirror shows no light
+                return np.zeros((len(self.hit), 1))
             return self.floats(terms.specular(1, 1, cosine, material.n))[:, None]
 
+        # Where and how light arrives is one for all materials.
+        shared = contribution(Material())
+        arrival = shared.arrival
         # Both intensities in a row; the largest number tells what they have in common.
         intensity = np.hstack([self.colours(light.intensities[end])[0] for end in (0, -1)])
         brightest = int(np.argmax(intensity))
-        scale = np.hstack(list(map(self.colours, arriving)))[:, brightest]
+        arriving = np.hstack([self.colours(arrival.diffuse), self.colours(arrival.specular)])
+        scale = arriving[:, brightest]
         scale /= intensity[brightest] or 1.0
-        cos_view = self.floats(dr.dot(toward, self.view))
+        cos_view = self.floats(dr.dot(arrival.toward, self.view))
         return GridLight(
             name=emitter.id(),
             intensity=_colour(intensity[:3]),
             specular_intensity=_colour(intensity[3:]),
             attenuation=scale.reshape(shape),
-            cos_incidence=self.floats(cos_incidence).reshape(shape),
+            cos_incidence=self.floats(shared.cos_incidence).reshape(shape),
             cos_view=cos_view.reshape(shape),
             lobe=self.select(lobe).reshape(shape),
         )
@@ -478,7 +507,6 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
             there.add("k_i")
         names = [name for name, k in TERMS.items() if k in there]
         renderers: dict[bool, Renderer] = {}
-        integrator.model_at = lambda *_: partial(_shade, integrator.shares)
         try:
             for name in names:
                 kept = TERMS[name]
@@ -486,11 +514,11 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
                 integrator.shares = {k: dr.opaque(mi.Float, k == kept) for k in COEFFICIENTS}
                 integrator.hide_emitters = hides = hidden or name != "emission"
                 renderer = renderers.setdefault(
-                    hides, Renderer(scene, integrator, spp=half.spp, label="terms")
+                    hides, Renderer(scene, integrator, pass_spp=half.pass_spp, label="terms")
                 )
                 images[name] = np.array(renderer.render(pass_seed(options.seed, 0)))
         finally:
-            del integrator.model_at, integrator.shares
+            integrator.shares = None
             integrator.hide_emitters = hidden
     together = sum(images.values())
     rest = whole
@@ -500,10 +528,3 @@ def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArra
         rest = rest - images[name]
     images[names[-1] if names else "emission"] = rest
     return {f"term.{name}": image for name, image in images.items()}
-
-
-def _shade(shares: dict[str, Any], *given: Any) -> Any:
-    """Return the kernel's value of a material with shares of its coefficients."""
-    position, normal, view, material, *lit = given
-    changed = {k: getattr(material, k) * share for k, share in shares.items()}
-    return kernel.shade(position, normal, view, replace(material, **changed), *lit)

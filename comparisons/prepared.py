@@ -72,6 +72,8 @@ def schedule(
 class Prepared:
     """A scene that is ready to be rendered: its halves, its plan, and a renderer for each half."""
 
+    source: Source
+    options: Options
     pair: Pair
     plan: Plan
     scene: Scene
@@ -81,9 +83,8 @@ class Prepared:
     planning_seconds: float
     guard: Guard | None = None
 
-    @property
-    def surface(self) -> GBuffer:
-        """What each pixel sees. It is traced each time: cached, it would take much memory."""
+    def traced(self) -> GBuffer:
+        """Return what each pixel sees; traced at each call, since it takes much memory."""
         surface = gbuffer(self.scene, image_size(self.scene))
         dr.flush_malloc_cache()
         return surface
@@ -91,14 +92,14 @@ class Prepared:
     @cached_property
     def counted(self) -> np.ndarray:
         """The pixels (H, W) that count: those that see a surface."""
-        return self.surface.hit
+        return self.traced().hit
 
     @property
     def overridden(self) -> tuple[Override, ...]:
         """The settings of the scene that are not used, and what is used instead."""
         pair = self.pair
         plan = self.plan
-        used = f"{plan.sampler}, {self.reference.spp * self.passes} samples per pixel"
+        used = f"{plan.sampler}, {self.reference.pass_spp * self.passes} samples per pixel"
         overrides = [
             structs.replace(entry, used=used) if entry.what == "sampler" else entry
             for entry in pair.overridden
@@ -128,9 +129,34 @@ class Prepared:
             " hidden lamp: no integrator of Mitsuba is right there. Show the lamp, or make it flat."
         )
 
+    def require_light(self, test: np.ndarray, reference: np.ndarray) -> str:
+        """Return what makes linear images (H, W, 3) of both halves meaningless; often "".
+
+        If both are black, it raises `InputError`, unless the options allow it: they would agree,
+        whatever is wrong.
+        """
+        if not self.counted.any():
+            return ""
+        sides = [np.abs(image[self.counted]) for image in (test, reference)]
+        is_black = [float(values.max()) < BLACK for values in sides]
+        if all(is_black) and not self.options.allow_empty:
+            raise InputError(
+                f"{self.source.name}: both halves are black: no pixel that sees a surface is"
+                f" brighter than {BLACK} of display white. Check the lights, their intensity, and"
+                " whether the camera is inside a shape. To allow a black picture, give"
+                " `allow_empty`."
+            )
+        if all(is_black):
+            return "Both halves are black, so their difference means nothing."
+        if is_black[1]:
+            return "The reference is black: check whether its lights reach what the camera sees."
+        if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in sides):
+            return "Each half is one colour: the view shows nothing but a uniform surface."
+        return ""
+
     def plan_record(self, passes: int) -> Plan:
         """Return the plan with the samples and passes that were rendered."""
-        spp = self.reference.spp * passes
+        spp = self.reference.pass_spp * passes
         reads = named(self.pair.shading).inputs
         return structs.replace(
             self.plan, spp=spp, passes=passes, heuristic_reads=reads, guard=self.guard
@@ -172,7 +198,7 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
     if width * height > LARGEST_PASS:
         raise InputError(
             f"{source.name}: an image of {width}x{height} pixels is too large: at most"
-            f" {LARGEST_PASS} pixels are allowed. Give a smaller --resolution."
+            f" {LARGEST_PASS} pixels are allowed. Give a smaller `resolution`."
         )
     require_memory(source.name, width, height)
     begin = perf_counter()
@@ -186,11 +212,13 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
         spp = max(1, spp * passes // len(options.image))
         passes = len(options.image)
     return Prepared(
+        source=source,
+        options=options,
         pair=pair,
         plan=chosen,
         scene=physical,
         heuristic=_heuristic_renderer(source, pair, chosen=chosen, spp=spp, options=options),
-        reference=Renderer(physical, integrator, spp=spp, label="reference image"),
+        reference=Renderer(physical, integrator, pass_spp=spp, label="reference image"),
         passes=passes,
         planning_seconds=planning,
     )
@@ -205,7 +233,7 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
     options = options or Options()
     ready = prepare(source, options)
     width, height = image_size(ready.scene)
-    samples = ready.reference.spp * ready.passes * width * height
+    samples = ready.reference.pass_spp * ready.passes * width * height
     hidden = ready.pair.hide_emitters
     found = examine_plan(
         ready.plan, ready.scene, hide_emitters=hidden, samples=samples, seed=options.seed
@@ -213,37 +241,10 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
     if found.state == "disagreed":
         ready = prepare(source, options.changed(everything=True))
         ready = replace(ready, plan=ready.plan.unpruned("guard", found.words))
-    ready = replace(ready, guard=found)
+    ready = replace(ready, options=options, guard=found)
     if not options.allow_empty:
         require_surface(ready.counted, source.name)
     return ready
-
-
-def require_light(
-    test: np.ndarray, reference: np.ndarray, counted: np.ndarray, name: str, options: Options
-) -> str:
-    """Return what makes linear images (H, W, 3) of both halves meaningless, in words; often "".
-
-    If both are black, it raises `InputError`, unless the options allow it: they would agree,
-    whatever is wrong.
-    """
-    if not counted.any():
-        return ""
-    sides = [np.abs(image[counted]) for image in (test, reference)]
-    is_black = [float(values.max()) < BLACK for values in sides]
-    if all(is_black) and not options.allow_empty:
-        raise InputError(
-            f"{name}: both halves are black: no pixel that sees a surface is brighter than {BLACK}"
-            " of display white. Check the lights, their intensity, and whether the camera is inside"
-            " a shape. To allow a black picture, give --allow-empty."
-        )
-    if all(is_black):
-        return "Both halves are black, so their difference means nothing."
-    if is_black[1]:
-        return "The reference is black: check whether its lights reach what the camera sees."
-    if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in sides):
-        return "Each half is one colour: the view shows nothing but a uniform surface."
-    return ""
 
 
 def _heuristic_renderer(
@@ -254,7 +255,7 @@ def _heuristic_renderer(
         if options.heuristic_variant:
             pair = options.pair(source)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        renderer = Renderer(scene, None, spp=spp, label="heuristic image")
+        renderer = Renderer(scene, None, pass_spp=spp, label="heuristic image")
         if not options.image:
             return renderer
         from fotismos.comparisons import pictures  # loaded late: few comparisons have any

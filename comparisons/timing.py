@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fotismos.reference.records import Estimated
+from fotismos.reference.records import Interval, Missing
 from fotismos.reference.rendering.renderer import Renderer, passes
 from fotismos.reference.rendering.sums import student
 
@@ -28,12 +28,13 @@ BUDGET_S = 1.0
 WIDEST = 0.3
 """The widest interval that a ratio may have, over the ratio."""
 
-TOO_FEW = "too few passes to time"
-TOO_WIDE = "passes too short, or the machine too busy, to time within 30 %"
+TOO_FEW = Missing("too few passes to time")
+TOO_WIDE = Missing("passes too short, or the machine too busy, to time within 30 %")
+NOT_TIMED = Missing("a picture's time is not known")
 
 
-def measure(heuristic: Renderer, reference: Renderer, seed: int) -> tuple[Estimated | None, str]:
-    """Return the ratio of the times of both halves, physical over textbook, or why there is none.
+def measure(heuristic: Renderer, reference: Renderer, seed: int) -> Interval | Missing:
+    """Return the ratio of the times of both halves, physical over textbook.
 
     Both have rendered the same passes in turns
     (:func:`fotismos.reference.rendering.renderer.passes`).
@@ -41,16 +42,16 @@ def measure(heuristic: Renderer, reference: Renderer, seed: int) -> tuple[Estima
     halves = (heuristic, reference)
     count = min(MOST, int(BUDGET_S / np.add(heuristic.times, reference.times).min()))
     if count >= FEWEST:
-        halves = (heuristic.sampled(heuristic.spp), reference.sampled(reference.spp))
+        halves = (heuristic.sampled(heuristic.pass_spp), reference.sampled(reference.pass_spp))
         for _ in passes(halves, seed, WARM + count):
             pass
     return ratio(halves[0].times[WARM:], halves[1].times[WARM:])
 
 
-def ratio(heuristic: Sequence[float], reference: Sequence[float]) -> tuple[Estimated | None, str]:
-    """Return the geometric mean of the batches' ratios with its interval, or why there is none."""
+def ratio(heuristic: Sequence[float], reference: Sequence[float]) -> Interval | Missing:
+    """Return the geometric mean of the batches' ratios with its interval."""
     if len(heuristic) < FEWEST:
-        return None, TOO_FEW
+        return TOO_FEW
     count = min(BATCHES, len(heuristic))
     shortest_h = [batch.min() for batch in np.array_split(np.array(heuristic), count)]
     shortest_r = [batch.min() for batch in np.array_split(np.array(reference), count)]
@@ -59,5 +60,5 @@ def ratio(heuristic: Sequence[float], reference: Sequence[float]) -> tuple[Estim
     interval = student(float(logarithms.mean()), error, len(logarithms))
     value, low, high = np.exp([interval.value, interval.low, interval.high]).tolist()
     if high - low > WIDEST * value:
-        return None, TOO_WIDE
-    return Estimated(value=value, low=low, high=high), ""
+        return TOO_WIDE
+    return Interval(value=value, low=low, high=high)

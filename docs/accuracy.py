@@ -65,8 +65,8 @@ def fronts(records: Sequence[Cost]) -> Iterator[str]:
     for record in (each for each in records if each.scene in AT_FULL_SIZE):
         error = float("inf")
         for point in sorted(at_full_size(record), key=lambda point: point.seconds.value):
-            if point.front and point.error.mean <= 0.9 * error:
-                error = point.error.mean
+            if point.front and point.error.value <= 0.9 * error:
+                error = point.error.value
                 where = record.scene, f"{point.method}, {point.spp}"
                 rows.append((*where, seconds(point.seconds.value), number(error)))
     yield from markdown([("Scene", "Method, samples", "Time", "ΔE2000"), *rows], right=2)

@@ -20,7 +20,7 @@ from fotismos.comparisons.gallery import scenes
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.heuristic.heuristics import Interpolation
-from fotismos.reference.records import Estimated
+from fotismos.reference.records import Interval
 from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.scene.source import Source
 from fotismos.reports.terminal.words import number
@@ -46,7 +46,7 @@ class Density:
     shading: Interpolation
     faces: int
     error: float
-    ratio: Estimated
+    ratio: Interval
 
 
 def near_sphere() -> dict:
@@ -77,7 +77,7 @@ def measured(fineness: Sequence[int] = FINENESS, rounds: int = ROUNDS) -> list[D
     errors, _ = measure.rendered(renderers, judge, judged, rounds, options.seed, None, "")
     lines = measure.timed(renderers, rounds, SIDE**2)
     return [
-        Density(*mesh, errors[name, SPP][0].mean, ratio(lines[name], lines[EXACT]))
+        Density(*mesh, errors[name, SPP][0].value, ratio(lines[name], lines[EXACT]))
         for name, mesh in meshes.items()
     ]
 

@@ -90,10 +90,10 @@ def attribution() -> Iterator[str]:
     yield (
         f"A sample of the full plan takes {ratio['full plan']} times as long as the textbook"
         f" kernel's, one of direct light alone {ratio['direct']} times. The kernel is"
-        f" {kernel.error.mean:.1f} away from the reference (mean ΔE2000), and more samples do not"
-        f" bring it nearer; the full plan is {few.error.mean:.1f} away with {few.spp} samples per"
-        f" pixel and {many.error.mean:.1f} with {many.spp}. Adding shadows alone gives"
-        f" {shadows.error.mean:.1f}, because the interreflection that would fill them is missing."
+        f" {kernel.error.value:.1f} away from the reference (mean ΔE2000), and more samples do not"
+        f" bring it nearer; the full plan is {few.error.value:.1f} away with {few.spp} samples per"
+        f" pixel and {many.error.value:.1f} with {many.spp}. Adding shadows alone gives"
+        f" {shadows.error.value:.1f}, because the interreflection that would fill them is missing."
     )
 
 

@@ -167,7 +167,7 @@ class Shader:
         if not mi.is_rgb:
             raise InputError(
                 f"{self.file}: a shader in GLSL needs RGB colours, which {mi.variant()} does not"
-                " have. Give --variant llvm_ad_rgb, or --heuristic-variant llvm_ad_rgb."
+                " have. Give `variant=llvm_ad_rgb`, or `heuristic_variant=llvm_ad_rgb`."
             )
         lights = point.lights if "lights" in self.words else ()
         fields = self.fields(max(len(lights), 1))

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import inf
 from numbers import Real
 from typing import Any
@@ -10,9 +11,17 @@ import drjit as dr
 import numpy as np
 
 from fotismos.heuristic import materials, numerics, terms, vectors
-from fotismos.heuristic.convention import Array, Colour, Position, Vector, Visibility
+from fotismos.heuristic.convention import (
+    Array,
+    Colour,
+    Cosines,
+    Number,
+    Position,
+    Vector,
+    Visibility,
+)
 from fotismos.heuristic.errors import InputError, type_of
-from fotismos.heuristic.lights import INTENSITIES, Light
+from fotismos.heuristic.lights import INTENSITIES, Arrival, Light
 from fotismos.heuristic.materials import COEFFICIENTS, Material
 
 HOW = "give a Dr.Jit array of three components, such as drjit.auto.Array3f(x, y, z)"
@@ -115,36 +124,73 @@ def sum_lights(
     if there is nothing to evaluate (scalar arrays) or it is impossible (in a symbolic loop or
     call).
     """
-    has_diffuse = not materials.is_zero(material.k_d)
-    has_specular = not (materials.is_zero(material.k_s) or numerics.is_number(material.n, inf))
-    if not (has_diffuse or has_specular):
-        return None, None
     in_blocks = (
         len(lights) > BLOCK and dr.is_jit_v(position) and not dr.flag(dr.JitFlag.SymbolicScope)
     )
-    lobe = vectors.lobe(material, normal, view) if has_specular else None
-    normal = vectors.normalise(normal)
     sums: dict[str, numerics.Compensated] = {}
     for block in _blocks(lights, type(position), in_blocks):
         if in_blocks and sums:
             dr.eval(sums)  # the last block's sums stay open, for the caller's kernel
         parts: dict[str, Array] = {}
-        for light in block:
-            toward, diffuse, specular, _ = light.illuminate(position, visible)
-            cos_incidence = dr.dot(normal, toward)
-            if has_diffuse:
-                term = terms.diffuse(diffuse, 1, cos_incidence)
-                parts["diffuse"] = parts["diffuse"] + term if "diffuse" in parts else term
-            if lobe:
-                cosine = lobe(light, position, toward, cos_incidence)
-                term = terms.specular(specular, 1, cosine, material.n)
-                parts["specular"] = parts["specular"] + term if "specular" in parts else term
+        for light in contributions(position, normal, view, material, block, visible):
+            for name, term in (("diffuse", light.diffuse), ("specular", light.specular)):
+                if term is not None:
+                    parts[name] = parts[name] + term if name in parts else term
         for name, part in parts.items():
             # A sum of thousands would lose terms below its last digit (Neumaier).
             sums[name] = numerics.add(sums[name], part) if name in sums else (part, 0)
     diffuse = sums.get("diffuse", (None, 0))
     specular = sums.get("specular", (None, 0))
     return numerics.summed(diffuse), numerics.summed(specular)
+
+
+@dataclass(frozen=True)
+class LightContribution:
+    """What one light contributes to 8.10 at points, with ``k_d`` and ``k_s`` taken out.
+
+    ``arrival`` is how its light arrives, ``cos_incidence`` is ``N.L``, and ``cos_lobe`` the lobe's
+    cosine. ``diffuse`` is ``I_p0 f_att (N.L)``, ``specular`` is ``I_p0 f_att (R.V)^n``, both 0
+    below the horizon. What the material has no coefficient for is None.
+    """
+
+    arrival: Arrival
+    cos_incidence: Number
+    cos_lobe: Cosines | None
+    diffuse: Colour | None
+    specular: Colour | None
+
+
+def contributions(
+    position: Position,
+    normal: Vector,
+    view: Vector,
+    material: Material,
+    lights: Iterable[Light],
+    visible: Visibility | None = None,
+) -> Iterator[LightContribution]:
+    """Yield what each light contributes at each point to the sums over lights of 8.10."""
+    has_diffuse = not materials.is_zero(material.k_d)
+    has_specular = not (materials.is_zero(material.k_s) or numerics.is_number(material.n, inf))
+    if not (has_diffuse or has_specular):
+        return
+    lobe = vectors.lobe(material, normal, view) if has_specular else None
+    normal = vectors.normalise(normal)
+    for light in lights:
+        arrival = light.illuminate(position, visible)
+        cos_incidence = dr.dot(normal, arrival.toward)
+        diffuse = specular = cosine = None
+        if has_diffuse:
+            diffuse = terms.diffuse(arrival.diffuse, 1, cos_incidence)
+        if lobe:
+            cosine = lobe(light, position, arrival.toward, cos_incidence)
+            specular = terms.specular(arrival.specular, 1, cosine, material.n)
+        yield LightContribution(
+            arrival=arrival,
+            cos_incidence=cos_incidence,
+            cos_lobe=cosine,
+            diffuse=diffuse,
+            specular=specular,
+        )
 
 
 def _blocks(

@@ -6,6 +6,7 @@ in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, 
 """
 
 import json
+from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar, dataclass_transform
 
 import msgspec
@@ -69,8 +70,15 @@ class Machine(Record):
     system: str
 
 
-class Estimated(Record):
-    """A number with a 95 % interval of Student's t over the replicates."""
+@dataclass(frozen=True)
+class Missing:
+    """In place of a value that does not exist; ``reason`` is a sentence."""
+
+    reason: str
+
+
+class Interval(Record):
+    """A number with its 95 % interval: of Student's t over replicates, unless another is stated."""
 
     value: float
     low: float

@@ -23,7 +23,7 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, cores
 from fotismos.heuristic import llvm, program
 from fotismos.heuristic.errors import InputError
-from fotismos.reports.terminal.words import echo, level, quiet_option, verbose_option
+from fotismos.reports.terminal.words import as_typed, echo, level, quiet_option, verbose_option
 
 Decorator: TypeAlias = Callable[[Any], Any]
 
@@ -183,7 +183,7 @@ def option(name: str, command_default: str = "") -> Decorator:
         default=field.default if is_stated else None,
         show_default=is_stated and not isinstance(field.default, bool),
         metavar=METAVARS.get(name),
-        help=description + (f" [default: {default}]" if default else ""),
+        help=as_typed(description + (f" [default: {default}]" if default else "")),
     )
 
 

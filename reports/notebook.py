@@ -34,12 +34,14 @@ from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.pixel_terms import PixelTerms
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.steps import steps
 from fotismos.heuristic import user_shaders
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Heuristic
 from fotismos.heuristic.heuristics import declare as declare_heuristic
 from fotismos.heuristic.plugins import register
 from fotismos.heuristic.user_code import same_variant
+from fotismos.reference.records import Missing
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports import verdict
 from fotismos.reports.charts import figures
@@ -102,8 +104,8 @@ class Shown:
     def at(self, x: int, y: int) -> PixelTerms:
         """Return the terms of 8.10 at a column and row, or at the nearest that has them."""
         grid = self.comparison.terms
-        if grid is None:
-            raise InputError(f"there are no terms. {self.comparison.no_terms}")
+        if isinstance(grid, Missing):
+            raise InputError(f"there are no terms. {grid.reason}")
         if (terms := grid.at(x, y)) is None:
             raise InputError(f"pixel {x}, {y} sees no surface. Give one that does.")
         return terms
@@ -119,7 +121,7 @@ def compare(scene: Scene, name: str | None = None, why: bool = True, **options: 
     """
     case = open_case(scene, Options.of(options), name)
     comparison = fotismos.comparisons.compare.compare(
-        case.source, case.options, command=case.command(), why=why
+        case.source, case.options, command=case.command(), then=steps(case.options, why)
     )
     return Shown(comparison, page.render([view_of(comparison)]))
 

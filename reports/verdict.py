@@ -151,7 +151,7 @@ def _remedy(record: ComparisonRecord, cost: Cost, threshold: float) -> str:
         if kernels:
             time += f", kernel {seconds(min(point.seconds.value for point in kernels))}"
         return f"{best.method[:1].upper()}{best.method[1:]} passes: {time} at {size}."
-    nearest = min(points, key=lambda point: point.tolerance.mean)
+    nearest = min(points, key=lambda point: point.tolerance.value)
     more = f"To try more samples: `{search(record, threshold, 4 * nearest.spp)}`."
     if nearest in kernels:
         return f"None of the {len(cost.methods)} methods measured is closer. {more}"

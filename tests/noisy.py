@@ -112,7 +112,7 @@ def render(name, samples, count, size=SIZE, make=None):
     """Render a pool of passes of so many samples per pixel."""
     options = Options(resolution=(size, size), spp=16 * samples, everything=name == "lights")
     ready = prepare(Source(name, make or CASES[name]), options)
-    ready.reference.spp = ready.heuristic.spp = samples
+    ready.reference.pass_spp = ready.heuristic.pass_spp = samples
     images = np.empty((count, size, size, 3), np.float32)
     for number in range(count):
         images[number] = np.array(ready.reference.render(pass_seed(777, number)))

@@ -341,7 +341,7 @@ SMOOTH = ("conductor", "plastic", "dielectric")
 
 
 def _judged(seed, word, ready, stock, spp):
-    ready.reference.spp = spp
+    ready.reference.pass_spp = spp
     try:
         planned = [np.array(ready.reference.render(pass_seed(seed, i))) for i in range(PASSES)]
         seeds = [pass_seed(seed, PASSES + i) for i in range(PASSES)]

@@ -5,6 +5,7 @@ import re
 import struct
 import tomllib
 from pathlib import Path
+from types import SimpleNamespace
 
 import mitsuba as mi
 import numpy as np
@@ -16,7 +17,7 @@ from fotismos.comparisons.compare import compare
 from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.fit.fit import fit
 from fotismos.comparisons.options import LARGEST_SPP, Options
-from fotismos.comparisons.prepared import require_light
+from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.study import design
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.rendering.renderer import LARGEST_PASS
@@ -83,7 +84,7 @@ AWAY = SCENE.replace('target="0, 0, 0"', 'target="0, -9, 3"')
 def test_every_command_refuses_an_empty_picture_unless_it_is_allowed(rgb, tmp_path):
     case = case_of(tmp_path, AWAY)
     for work in (compare, measure_scene, cost, fit):
-        with pytest.raises(InputError, match=r"no pixel sees a surface.*--allow-empty"):
+        with pytest.raises(InputError, match=r"no pixel sees a surface.*`allow_empty`"):
             work(case.source, case.options)
     case = case_of(tmp_path, AWAY, allow_empty=True)
     assert compare(case.source, case.options).record.pixels.counted == 0
@@ -100,7 +101,7 @@ DARK = SCENE.replace('value="60"', 'value="1e-38"').replace(
 def test_black_pictures_never_pass_in_silence(rgb, tmp_path):
     case = case_of(tmp_path, DARK)
     for work in (compare, measure_scene):
-        with pytest.raises(InputError, match=r"both halves are black.*--allow-empty"):
+        with pytest.raises(InputError, match=r"both halves are black.*`allow_empty`"):
             work(case.source, case.options)
     case = case.changed(allow_empty=True)
     said = "Both halves are black, so their difference means nothing."
@@ -116,13 +117,16 @@ def test_doubts_about_pictures_are_told_from_their_values():
     seen[0] = False  # where all is black
     black, grey = np.zeros((4, 5, 3)), np.where(seen[..., None], (0.2, 0.3, 0.4), 0.0)
 
+    def view(counted):
+        return SimpleNamespace(counted=counted, options=Options(), source=Source("a", None))
+
     def doubt(test, reference):
-        return require_light(test, reference, seen, "a", Options())
+        return Prepared.require_light(view(seen), test, reference)
 
     assert doubt(noise, noise) == doubt(grey, noise) == doubt(black, noise) == ""
     assert doubt(noise, black).startswith("The reference is black")
     assert doubt(grey, 2 * grey).startswith("Each half is one colour")
-    assert not require_light(black, black, np.zeros((4, 5), bool), "a", Options())
+    assert not Prepared.require_light(view(np.zeros((4, 5), bool)), black, black)
     with pytest.raises(InputError, match="a: both halves are black"):
         doubt(black, 1e-6 * noise)
 

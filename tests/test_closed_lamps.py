@@ -6,6 +6,7 @@ import pytest
 
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.steps import steps
 from fotismos.reference.scene.source import Source
 from tests.parts import camera, moved
 
@@ -54,7 +55,7 @@ def test_a_lamp_casts_no_shadow_on_what_it_lights(rgb, kind):
 @pytest.mark.parametrize("kind", ["ball", "box"])
 def test_shadows_are_not_blamed_for_the_lamp(rgb, kind):
     small = Options(resolution=(48, 36), spp=16)
-    found = compare(Source("lamp", room(kind)), small, why=True).record.why
+    found = compare(Source("lamp", room(kind)), small, then=steps(small, True)).record.why
     errors = {each.effects: each.error for each in found.hybrids}
     assert errors["occlusion",] < 1.5 * errors[()]
     removed = {one.effect: one.removes.value for one in found.effects}

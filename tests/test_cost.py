@@ -239,7 +239,7 @@ def test_the_command_predicts_and_measures_at_another_shape_than_the_films(rgb, 
     kernel = measured["Phong kernel"]
     (predicted,) = (p for p in record.predicted if (p.method, p.spp) == (kernel.method, kernel.spp))
     assert predicted.seconds.low <= predicted.seconds.value <= predicted.seconds.high
-    assert predicted.error.mean == pytest.approx(kernel.error.mean, abs=0.05)
+    assert predicted.error.value == pytest.approx(kernel.error.value, abs=0.05)
 
 
 def test_sizes_that_cannot_be_predicted_or_measured_are_refused(run):
@@ -273,7 +273,7 @@ def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does
     assert 0 < best <= full < 10 > chosen
     assert made["chosen"]["seconds"]["low"] <= made["full"]["seconds"]["high"]
     assert {"shadow map", "hemisphere ambient"} <= made["left_out"].keys()
-    none = MeanError(mean=20.0, low=19.0, high=21.0)
+    none = MeanError(value=20.0, low=19.0, high=21.0)
     points = tuple(structs.replace(point, tolerance=none) for point in found.points)
     monkeypatch.setattr(studies, "measure_ladder", lambda *_, **__: replace(found, points=points))
     code, said, _ = run(*words, "--within", 10)

@@ -48,7 +48,7 @@ def test_the_figures_on_the_page_are_those_of_the_json(study):
         wanted += [method.overhead_s.value, method.first_s]
     for point in data.points:
         wanted += [*structs.astuple(point.seconds), *structs.astuple(point.error)]
-        wanted += [point.spp, point.tolerance.mean]
+        wanted += [point.spp, point.tolerance.value]
     for one in data.attribution.effects:
         wanted += [*structs.astuple(one.removes), one.adds_s.low, one.adds_s.high]
         wanted += [one.alone, one.last]
@@ -72,14 +72,14 @@ def test_page_and_terminal_name_what_cannot_be_measured_a_busy_machine_and_ties(
 def test_page_and_terminal_say_which_sample_count_would_pass(study):
     """By the two counts of the full plan: the noise's square falls with the samples."""
     record = study.record
-    few, many = (point.tolerance.mean**2 for point in record.points[1:])
+    few, many = (point.tolerance.value**2 for point in record.points[1:])
     left = (4 * many - few) / 3
     spp = 16 * (many - left) / (4 - left)
     expected = (
         f"No measured method passes at ΔE2000 2. About {ceil(spp)} samples per pixel of full plan"
         " would;"
     )
-    enough = structs.replace(record.points[2], tolerance=MeanError(mean=1.0, low=0.9, high=1.1))
+    enough = structs.replace(record.points[2], tolerance=MeanError(value=1.0, low=0.9, high=1.1))
     for points, is_said in ((record.points, True), ((*record.points, enough), False)):
         changed = structs.replace(record, points=points)
         text = "\n".join(cost_tables.lines(changed))

@@ -40,7 +40,7 @@ def planned(description, spp=256, everything=False):
     """The plan of a scene, and the mean of its reference."""
     options = Options(spp=spp * PASSES, everything=everything)
     made = prepare(Source("a test", description), options)
-    made.reference.spp = spp
+    made.reference.pass_spp = spp
     return made, estimate(made.reference.render)
 
 

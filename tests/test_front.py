@@ -13,7 +13,7 @@ from fotismos.comparisons.cost.cost_record import Method, Point
 from fotismos.comparisons.cost.front import at_size, beats, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import QUICK, Effort, timed, tried
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.records import Estimated
+from fotismos.reference.records import Interval
 from fotismos.reference.rendering.renderer import passes
 from tests import cost_records
 
@@ -30,14 +30,14 @@ class Clock:
     per_sample: float
     rng: np.random.Generator
     taken: float = 0.0
-    spp: int = 64
+    pass_spp: int = 64
     bend: float = 0.0
     variant: str = "llvm_ad_rgb"
     times: list = field(default_factory=list)
     processor_times: list = field(default_factory=list)
 
     def render(self, seed):
-        samples = self.spp * PIXELS
+        samples = self.pass_spp * PIXELS
         work = self.overhead + samples * self.per_sample * (1 + self.bend * samples)
         # Others only ever add time; now and then a burst adds much.
         slower = 1 + self.taken + self.rng.gamma(1.0, 0.02) + (self.rng.random() < 0.1)
@@ -46,8 +46,8 @@ class Clock:
         self.processor_times.append(self.overhead + busy)
         return np.zeros((1, 1, 3))
 
-    def sampled(self, spp):
-        return replace(self, spp=spp, times=[], processor_times=[])
+    def sampled(self, pass_spp):
+        return replace(self, pass_spp=pass_spp, times=[], processor_times=[])
 
 
 def lines_of(per_sample, rng, rounds=7, taken=0.0, overhead=6e-3, **more):
@@ -133,9 +133,8 @@ def test_intervals_hold_the_time_and_what_steps_add_is_the_whole(rgb):
 # -- Fronts and choices ----------------------------------------------------------------------------
 
 
-def about(value, share=0.0, kind=Estimated):
-    name = "value" if kind is Estimated else "mean"
-    return kind(**{name: value, "low": value * (1 - share), "high": value * (1 + share)})
+def about(value, share=0.0, kind=Interval):
+    return kind(value=value, low=value * (1 - share), high=value * (1 + share))
 
 
 def made(method, spp, seconds, error, spread=0.0):
@@ -191,7 +190,7 @@ def by_law(name, left, noise, per_sample, counts=(4, 16, 64)):
     for spp in counts:
         tolerance = np.hypot(left, noise / np.sqrt(spp))
         point = made(name, spp, per_sample * spp, 1.0, 0.01)
-        near = MeanError(mean=tolerance, low=0.99 * tolerance, high=1.01 * tolerance)
+        near = MeanError(value=tolerance, low=0.99 * tolerance, high=1.01 * tolerance)
         found.append(structs.replace(point, tolerance=near))
     return found
 

@@ -17,6 +17,7 @@ from fotismos.comparisons.hybrids import attribution
 from fotismos.comparisons.hybrids.hybrids import HybridImages, HybridScenes
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded, prepare
+from fotismos.comparisons.steps import steps
 from fotismos.reference.planning.effects import EXTENDED, INTERREFLECTION, OCCLUSION, labelled
 from fotismos.reference.rendering.renderer import Stream, passes
 from fotismos.reference.scene.graph import set_variant
@@ -75,7 +76,7 @@ def test_a_clamped_fall_off_is_a_cause(rgb):
     record = attribution.find(ready, source, Options()).record
     assert record.departure > 0.5
     assert [entry.effect for entry in record.effects] == ["distance attenuation"]
-    assert abs(record.closure.mean) < 0.01 * record.departure
+    assert abs(record.closure.value) < 0.01 * record.departure
 
 
 @pytest.mark.thorough
@@ -97,7 +98,7 @@ def test_attributions_add_up_to_the_departure_in_the_mean_and_in_every_pixel(fou
     record = causes.record
     assert set(causes.maps) == MADE_OF[found.name]
     removed = [one.removes.value for one in record.effects]
-    assert sum(removed) + record.closure.mean == pytest.approx(record.departure, abs=1e-9)
+    assert sum(removed) + record.closure.value == pytest.approx(record.departure, abs=1e-9)
     total = sum(causes.maps.values()) + causes.left
     np.testing.assert_allclose(total, causes.departure, atol=1e-9)
     assert causes.departure.max() > 1
@@ -129,7 +130,7 @@ def test_with_all_effects_nothing_is_left(rgb, monkeypatch):
     monkeypatch.setattr(attribution, "REPLICATES", 8)
     record = removes(Options(resolution=(32, 32)))
     closure = record.closure
-    assert closure.low <= 0 <= closure.high or abs(closure.mean) < 0.02
+    assert closure.low <= 0 <= closure.high or abs(closure.value) < 0.02
     assert closure.high - closure.low < 0.1 * record.departure
 
 
@@ -137,7 +138,7 @@ def test_with_all_effects_nothing_is_left(rgb, monkeypatch):
 @pytest.mark.guarantee("attribution", "A quick closure is unbiased to 1 % of the departure.")
 def test_a_quick_closure_is_not_biased(rgb):
     records = [removes(Options(resolution=(48, 48), seed=seed)) for seed in range(5)]
-    mean = np.mean([record.closure.mean for record in records])
+    mean = np.mean([record.closure.value for record in records])
     assert abs(mean) < 0.01 * records[0].departure
 
 
@@ -183,7 +184,7 @@ def hybrid_scenes(source, size=24):
 def test_without_effects_the_plugins_give_the_kernels_image(rgb):
     for name in ("fig-8-9", "plastic-spheres", "fig-6-5-m40"):
         ready, scenes = hybrid_scenes(SCENES[name].source())
-        found = np.array(Shown(scenes, (), ready.heuristic.spp).render(3))
+        found = np.array(Shown(scenes, (), ready.heuristic.pass_spp).render(3))
         expected = np.array(ready.heuristic.render(3))
         assert expected.max() > 0.1
         np.testing.assert_allclose(found, expected, atol=2e-5)
@@ -209,7 +210,7 @@ def test_with_all_effects_they_give_the_reference(rgb):
     for name in ("fig-8-9", "cornell-box"):
         ready, scenes = hybrid_scenes(SCENES[name].source())
         found = whole(Shown(scenes, scenes.differences, 64))
-        ready.reference.spp = 64
+        ready.reference.pass_spp = 64
         require_equal(found, whole(ready.reference, seed=90), name)
 
 
@@ -267,7 +268,7 @@ def test_a_clean_reference_takes_noise_out_of_previews(rgb):
     """By two runs that share nothing but the scene; the means stay."""
     case = open_case("cornell-box", Options(resolution=(48, 48)))
     ladder = Ladder(case.source, case.options, guarded(case.source, case.options))
-    ladder.ready.reference.spp = 256
+    ladder.ready.reference.pass_spp = 256
     total = whole(ladder.ready.reference)
     clean = total.mean, total.standard_error
     runs = [HybridImages(ladder.pairs, ladder.scenes, 4, 16, seed, (24, 24)) for seed in (1, 2)]
@@ -286,6 +287,6 @@ def test_a_crop_keeps_its_place_in_finer_pixels(rgb):
     crop = {"crop_width": 24, "crop_height": 32, "crop_offset_x": 21, "crop_offset_y": 17}
     parts["sensor"]["film"] |= crop
     case = open_case(parts, Options(), "cropped")
-    record = compare(case.source, case.options, why=True).record
-    assert abs(record.why.closure.mean) < 0.05 < record.why.departure
+    record = compare(case.source, case.options, then=steps(case.options, True)).record
+    assert abs(record.why.closure.value) < 0.05 < record.why.departure
     assert record.why.departure == pytest.approx(record.metrics["dE2000"].mean, rel=0.1)

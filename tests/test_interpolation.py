@@ -316,5 +316,5 @@ def test_instances_are_refused_by_name(rgb):
     group = {"type": "shapegroup", "ball": {"type": "sphere"}}
     copy = {"type": "instance", "group": {"type": "ref", "id": "group"}}
     source = seen(group=group, left=copy)
-    with pytest.raises(InputError, match=r"instances and their groups .* --interpolation phong"):
+    with pytest.raises(InputError, match=r"instances and their groups .* `interpolation=phong`"):
         half(source, FLAT)

@@ -18,7 +18,9 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.steps import steps
 from fotismos.heuristic.errors import InputError
+from fotismos.reference.records import Missing
 from fotismos.reports.notebook import Shown
 from tests.programs import ROOT
 
@@ -66,7 +68,7 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
 def shown():
     """A sphere in front of nothing, wider than high so that no column passes for a row."""
     case = open_case("fig-8-9", Options(spp=4, resolution=(24, 16)))
-    return Shown(compare(case.source, case.options, why=True), page="")
+    return Shown(compare(case.source, case.options, then=steps(case.options, True)), page="")
 
 
 @pytest.mark.parametrize("place", [(12, 8), (9, 5)])
@@ -83,7 +85,7 @@ def test_pixels_without_terms_say_why(shown):
         shown.at(0, 0)
     with pytest.raises(InputError, match="outside the image"):
         shown.at(24, 0)
-    flat = replace(shown.comparison, terms=None, no_terms="Flat shading has none.")
+    flat = replace(shown.comparison, terms=Missing("Flat shading has none."))
     with pytest.raises(InputError, match=r"there are no terms. Flat shading has none"):
         Shown(flat, shown.page).at(12, 8)
 

@@ -11,6 +11,7 @@ from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure import regions
 from fotismos.comparisons.hybrids.attribution import BIAS, by_object, named
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.steps import steps
 from fotismos.reference.rendering import sums
 from fotismos.reference.rendering.gbuffer import ObjectIds, gbuffer
 from tests import records
@@ -38,7 +39,7 @@ def shadowed(size=24):
 @pytest.fixture(scope="module")
 def compared():
     case = open_case(shadowed(), Options.of({"resolution": (48, 48)}), "shadowed")
-    found = compare(case.source, case.options, why=True)
+    found = compare(case.source, case.options, then=steps(case.options, True))
     return SimpleNamespace(found=found, record=found.record)
 
 
@@ -87,7 +88,7 @@ def test_intervals_on_shapes_tell_the_spread_of_replicates():
     found = {row.name: row for row in rows}
     still, noisy = found["still"], found["noisy"]
     assert (still.pixels, noisy.pixels) == (3, 2)
-    assert still.removes[0] == sums.Estimated(value=2.0, low=2.0 - 3 * BIAS, high=2.0 + 3 * BIAS)
+    assert still.removes[0] == sums.Interval(value=2.0, low=2.0 - 3 * BIAS, high=2.0 + 3 * BIAS)
     error = spread.std(ddof=1) / np.sqrt(len(spread))
     expected = sums.student(spread.mean(), error, len(spread), 3 * BIAS)
     assert noisy.removes[0].value == pytest.approx(expected.value)

@@ -12,6 +12,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
+from fotismos.reference.records import Missing
 from fotismos.reference.rendering.gbuffer import pixel_rays
 from fotismos.reference.rendering.renderer import passes, variant
 from fotismos.reports.files import results
@@ -38,8 +39,8 @@ def prepared(scene, **options):
 
 def traced(scene, **options):
     ready, given = prepared(scene, **options)
-    grid, missing = pixel_terms.trace(ready.heuristic, given)
-    assert grid is not None, missing
+    grid = pixel_terms.trace(ready.heuristic, given)
+    assert not isinstance(grid, Missing), grid.reason
     return grid, ready
 
 
@@ -186,9 +187,7 @@ def test_other_shading_has_no_terms_and_says_why():
         ("fig-8-9", {"variant": "llvm_ad_spectral"}, "by wavelength"),
     ):
         ready, given = prepared(scene, resolution=(8, 8), **options)
-        grid, missing = pixel_terms.trace(ready.heuristic, given)
-        assert grid is None
-        assert reason in missing
+        assert reason in pixel_terms.trace(ready.heuristic, given).reason
 
 
 # --- As images ------------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ def methods(name, is_short=False):
 def traced(renderer, seed):
     """Render a pass by tracing everything again."""
     with variant(renderer.variant):
-        given = {"integrator": renderer.integrator, "spp": renderer.spp, "seed": seed}
+        given = {"integrator": renderer.integrator, "spp": renderer.pass_spp, "seed": seed}
         image = np.array(mi.render(renderer.scene, **given))
     return image if image.shape[2] == 3 else np.repeat(image, 3, axis=2)
 

@@ -12,8 +12,9 @@ from fotismos.comparisons.cost import cost_record
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.steps import steps
 from fotismos.heuristic.heuristics import HEURISTICS, Interpolation, Point
-from fotismos.reference.records import Estimated
+from fotismos.reference.records import Interval
 from fotismos.reports import verdict
 from tests import records
 from tests.small_scene import PLAIN
@@ -54,9 +55,9 @@ def study(*points):
         cost_record.Point(
             method=name,
             spp=spp,
-            seconds=Estimated(value=ms / 1e3, low=0.95 * ms / 1e3, high=1.05 * ms / 1e3),
-            error=MeanError(mean=1.0, low=1.0, high=1.0),
-            tolerance=MeanError(mean=tolerance, low=tolerance, high=1.01 * tolerance),
+            seconds=Interval(value=ms / 1e3, low=0.95 * ms / 1e3, high=1.05 * ms / 1e3),
+            error=MeanError(value=1.0, low=1.0, high=1.0),
+            tolerance=MeanError(value=tolerance, low=tolerance, high=1.01 * tolerance),
         )
         for name, spp, ms, tolerance in (kernel, *points)
     ]
@@ -195,7 +196,8 @@ def test_a_material_that_reflects_more_than_it_receives_is_the_cause(rgb, tmp_pa
     path = tmp_path / "bright.xml"
     path.write_text(text)
     case = open_case(path, Options(resolution=(12, 8), spp=16))
-    record = compare(case.source, case.options, command=case.command(), why=True).record
+    then = steps(case.options, True)
+    record = compare(case.source, case.options, command=case.command(), then=then).record
     assert verdict.missing(record)
     said = f"{verdict.about(record)} {verdict.most_missing([record])}"
     assert "A material reflects 2.50 times the light that it receives" in said

@@ -8,7 +8,7 @@ from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare, debiased
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.records import Estimated
+from fotismos.reference.records import Interval
 from fotismos.reference.rendering import sums
 from tests import noisy
 
@@ -147,4 +147,4 @@ def test_the_interval_of_a_mean_is_that_of_students_table():
     found, half = sums.student(2.5, error, 4), 3.182446 * error  # t(0.975, 3) = 3.182446
     assert (found.value, found.low) == (2.5, pytest.approx(2.5 - half, rel=1e-6))
     assert found.high - 2.5 == 2.5 - found.low
-    assert sums.student(0.25, 0.0, 16) == Estimated(value=0.25, low=0.25, high=0.25)
+    assert sums.student(0.25, 0.0, 16) == Interval(value=0.25, low=0.25, high=0.25)

@@ -78,6 +78,6 @@ def kernel_difference(source, options):
     )
     for side in (planned, everything):
         scene = with_sampler(side.pair.heuristic, planned.plan.sampler).instantiate()
-        renderer = Renderer(scene, None, planned.heuristic.spp, "heuristic image")
+        renderer = Renderer(scene, None, planned.heuristic.pass_spp, "heuristic image")
         images.append(np.array(renderer.render(pass_seed(options.seed, 0))))
     return float(np.abs(images[0] - images[1]).max())

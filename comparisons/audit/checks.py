@@ -116,7 +116,7 @@ class Audit(Record):
 
 
 def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "") -> Audit:
-    """Make every check of a heuristic, as ``compare --heuristic`` accepts it, or of a type of BSDF.
+    """Make every check of a heuristic, as a comparison accepts it, or of a type of BSDF.
 
     In the current variant. ``command`` is the one that was run, for the record.
     """

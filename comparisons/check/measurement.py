@@ -25,7 +25,7 @@ from fotismos.comparisons.departure.colour import Array, Viewing
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, log2_luminance_ratio
 from fotismos.comparisons.departure.statistics import noise_floor
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import guarded, require_light
+from fotismos.comparisons.prepared import guarded
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError
 from fotismos.reference import records
@@ -158,19 +158,16 @@ def measure_scene(
     ``spp`` of the options counts all passes, and is the plan's if omitted.
     """
     ready = guarded(source, options)
-    spp = options.spp or ready.reference.spp * ready.passes
-    halves = ready.heuristic, ready.reference
-    for half in halves:
-        half.spp = max(1, spp // count)
+    spp = options.spp or ready.reference.pass_spp * ready.passes
+    pass_spp = max(1, spp // count)
+    halves = ready.heuristic.sampled(pass_spp), ready.reference.sampled(pass_spp)
     loop = passes(halves, options.seed, count, progress=progress)
     images = np.array(
         [[np.array(image) for image in rendered.images] for rendered in loop], np.float64
     )
     numbers = measurement(images, ready.counted, options.viewing)
     heuristic, reference = images.mean(axis=0)
-    caution = require_light(
-        heuristic, reference, counted=ready.counted, name=source.name, options=options
-    )
+    caution = ready.require_light(heuristic, reference)
     pictures = {"heuristic": heuristic, "reference": reference}
     return MeasuredScene(measurement=numbers, pictures=pictures, spp=spp, caution=caution)
 

@@ -252,7 +252,7 @@ def check(
     if old != new:
         raise InputError(
             f"{source.name}: the baseline has {old[0]} by {old[1]} blocks, but the scene {new[0]}"
-            f" by {new[1]}. Write it again with --update."
+            f" by {new[1]}. Write it again with `update`."
         )
     moves = differences(before, after)
     return Check(before=before, now=now, moves=moves, moved=tuple(moved(moves, level)), level=level)

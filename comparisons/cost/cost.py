@@ -136,15 +136,15 @@ def require(name: str, target: Size, size: Size, is_measured: bool) -> None:
     (width, height), (wide, high) = sorted([size, target])
     if abs(high * width / wide - height) > 1:  # a pixel of the smaller one is tolerated
         raise InputError(
-            f"{width}x{height} and {wide}x{high} differ in shape: give --resolution the shape of"
-            " --at, or omit it."
+            f"{width}x{height} and {wide}x{high} differ in shape: give `resolution` the shape of"
+            " `at`, or omit it."
         )
     if is_measured:
         most = LARGEST_PASS // LARGEST_CERTAIN
         if target[0] * target[1] > most:
             raise InputError(
                 f"{target[0]}x{target[1]} is too large to measure: at most {most} pixels are"
-                " allowed. Omit --measure to predict it."
+                " allowed. Omit `measure` to predict it."
             )
         require_memory(name, *target)
 
@@ -244,7 +244,7 @@ def choose(
         measured=found.size,
         within=within,
         chosen=chosen,
-        best=min(points, key=lambda point: (point.tolerance.mean, point.seconds.value)),
+        best=min(points, key=lambda point: (point.tolerance.value, point.seconds.value)),
         full=sufficient(of_full, within) or max(of_full, key=lambda point: point.spp),
         left_out=found.ladder.left_out,
         reach=None if chosen else reach(points, within),

@@ -12,7 +12,7 @@ from fotismos.reference.records import (
     VERSION,
     Amount,
     Count,
-    Estimated,
+    Interval,
     Machine,
     Pixels,
     Positive,
@@ -88,19 +88,19 @@ class TimedMethod(Method):
         Time of the first image, which is also compiled, and of preparing the scene for it.
     """
 
-    overhead_s: Estimated
-    per_sample_s: Estimated
-    ratio: Estimated
+    overhead_s: Interval
+    per_sample_s: Interval
+    ratio: Interval
     processor_s: float
     bend: float
     first_s: Positive
     prepare_s: Amount = 0.0
 
-    def seconds(self, samples: int) -> Estimated:
+    def seconds(self, samples: int) -> Interval:
         """Return the time of an image with some samples over all pixels."""
         fixed = self.overhead_s
         slope = self.per_sample_s
-        return Estimated(
+        return Interval(
             value=max(fixed.value + samples * slope.value, 0.0),
             low=max(fixed.low + samples * slope.low, 0.0),
             high=max(fixed.high + samples * slope.high, 0.0),
@@ -130,7 +130,7 @@ class Point(Record):
 
     method: str
     spp: Size
-    seconds: Estimated
+    seconds: Interval
     error: MeanError
     tolerance: MeanError
     front: bool = False
@@ -150,7 +150,7 @@ class Converged(Record):
 class EffectCost(Contribution):
     """What simulating one effect removes, and the seconds that it adds to an image."""
 
-    adds_s: Estimated
+    adds_s: Interval
 
 
 class CostAttribution(Record):
@@ -178,9 +178,9 @@ class CostAttribution(Record):
     effects: tuple[EffectCost, ...]
     departure: float
     size: Resolution
-    kernel_s: Estimated
-    plan_s: Estimated
-    renderer_s: Estimated
+    kernel_s: Interval
+    plan_s: Interval
+    renderer_s: Interval
     resolution: Resolution
     spp: Size
 

@@ -10,11 +10,8 @@ from math import ceil, sqrt
 
 from msgspec import structs
 
-from fotismos.comparisons.comparison import MeanError
 from fotismos.comparisons.cost.cost_record import Point, TimedMethod
-from fotismos.reference.records import Estimated, Record
-
-Interval = Estimated | MeanError
+from fotismos.reference.records import Interval, Record
 
 
 def is_below(first: Interval, other: Interval) -> bool:
@@ -64,7 +61,7 @@ def sufficient(points: Sequence[Point], tolerance: float) -> Point | None:
         return None
     fastest = min(enough, key=lambda point: point.seconds.value)
     alike = [point for point in enough if not is_below(fastest.seconds, point.seconds)]
-    best = min(alike, key=lambda point: point.tolerance.mean)
+    best = min(alike, key=lambda point: point.tolerance.value)
     ties = dict.fromkeys(point.method for point in alike if point.method != best.method)
     return structs.replace(best, ties=tuple(ties))
 
@@ -111,8 +108,8 @@ def reach(points: Sequence[Point], tolerance: float) -> Reach | None:
             continue
         fewer, more = of_method[-2:]
         step = more.spp - fewer.spp
-        square = more.tolerance.mean**2
-        left = max(square - (fewer.tolerance.mean**2 - square) * fewer.spp / step, 0.0)
+        square = more.tolerance.value**2
+        left = max(square - (fewer.tolerance.value**2 - square) * fewer.spp / step, 0.0)
         room = tolerance**2 - left
         spp = None
         if room > 0:

@@ -30,7 +30,7 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.prepare import film_size
-from fotismos.reference.records import Estimated
+from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import gbuffer, image_size, resize
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, Renderer, Stream, passes
 from fotismos.reference.rendering.sums import Accumulator, Estimate
@@ -226,7 +226,7 @@ def converged(
     integrator = ready.reference.integrator
     width, height = size or image_size(ready.scene)
     spp = min(REFERENCE_SPP, LARGEST_PASS // (width * height))
-    renderer = Renderer(ready.scene, integrator, spp=spp, label="reference image", size=size)
+    renderer = Renderer(ready.scene, integrator, pass_spp=spp, label="reference image", size=size)
     total = Accumulator()
     count = max(REFERENCE_PASSES, ready.plan.passes)
     stream = Stream.OTHER_SIDE
@@ -251,20 +251,22 @@ def tried(
     renderers: dict[Key, Renderer] = {}
     for number, (name, first) in enumerate(firsts.items()):
         progress("compiling", number, len(firsts))
-        by_spp = {first.spp: first}
+        by_spp = {first.pass_spp: first}
         last = first
         while True:
             warm(last)
             seconds = last.times[-1]
-            if seconds >= times.LEAST_S or 4 * last.spp * pixels > MOST_SAMPLES:
+            if seconds >= times.LEAST_S or 4 * last.pass_spp * pixels > MOST_SAMPLES:
                 break
             # With a fourth of these samples it would take less than LEAST_S: counts are skipped.
+            most = MOST_SAMPLES / (last.pass_spp * pixels)
             more = 4
-            while more * seconds < times.LEAST_S and 4 * more * last.spp * pixels <= MOST_SAMPLES:
+            while more * seconds < times.LEAST_S and 4 * more <= most:
                 more *= 4
-            last = first.sampled(more * last.spp)
-            by_spp[last.spp] = last
-        for spp in {*counts[name], max(1, last.spp // 4), max(1, last.spp // 16)} - by_spp.keys():
+            last = first.sampled(more * last.pass_spp)
+            by_spp[last.pass_spp] = last
+        fewer = {max(1, last.pass_spp // 4), max(1, last.pass_spp // 16)}
+        for spp in {*counts[name], *fewer} - by_spp.keys():
             by_spp[spp] = first.sampled(spp)
             warm(by_spp[spp])
         renderers |= {(name, spp): by_spp[spp] for spp in sorted(by_spp)}
@@ -308,8 +310,8 @@ def _mean_errors(errors: ArrayLike) -> tuple[MeanError, MeanError]:
     halves = SURE * values.std(axis=0, ddof=1) / sqrt(len(values))
     lows = means - halves
     highs = means + halves
-    error = MeanError(mean=float(means[0]), low=float(lows[0]), high=float(highs[0]))
-    tolerance = MeanError(mean=float(means[1]), low=float(lows[1]), high=float(highs[1]))
+    error = MeanError(value=float(means[0]), low=float(lows[0]), high=float(highs[0]))
+    tolerance = MeanError(value=float(means[1]), low=float(lows[1]), high=float(highs[1]))
     return error, tolerance
 
 
@@ -366,7 +368,7 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
             Point(
                 method=name,
                 spp=spp,
-                seconds=Estimated(value=min(took), low=min(took), high=max(took)),
+                seconds=Interval(value=min(took), low=min(took), high=max(took)),
                 error=error,
                 tolerance=tolerance,
             )

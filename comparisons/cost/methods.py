@@ -36,6 +36,9 @@ from fotismos.reference.planning.effects import (
     POLYGONS,
     SPECTRAL,
     TRANSMISSION,
+    GlowingEffect,
+    PrunedEffect,
+    ReplacedEffect,
 )
 from fotismos.reference.planning.facts import SHAPE
 from fotismos.reference.planning.plan import physical_integrator
@@ -109,7 +112,10 @@ def declare(method: Method) -> Method:
             f"method {method.name!r} is already declared by fotismos: give another name."
         )
     allowed = [
-        effect.label for effect in EFFECTS if effect.pruning or (effect.put and not effect.emission)
+        effect.label
+        for effect in EFFECTS
+        if isinstance(effect, (PrunedEffect, ReplacedEffect))
+        and not isinstance(effect, GlowingEffect)
     ]
     for effect in method.without:
         if effect not in allowed:
@@ -246,13 +252,17 @@ class Ladder:
             with variant(method.variant or self.pairs.heuristic_variant):
                 scene = self._kernel_scene(method.interpolation, mi.variant())
                 return Renderer(
-                    scene, self._kernel(method), spp=spp, label="image of the kernel", size=size
+                    scene,
+                    self._kernel(method),
+                    pass_spp=spp,
+                    label="image of the kernel",
+                    size=size,
                 )
         simulated = {effect for effect in EFFECTS if effect.label not in method.without}
         plan = self.ready.plan.simulating(simulated, method.max_depth)
         scene = self._plan_scene(self.scenes.key(simulated))
         integrator = physical_integrator(plan, scene, self.ready.pair.hide_emitters)
-        return Renderer(scene, integrator, spp=spp, label=f"image of {method.name}", size=size)
+        return Renderer(scene, integrator, pass_spp=spp, label=f"image of {method.name}", size=size)
 
     def forget(self) -> None:
         """Release the scenes of methods."""
@@ -322,7 +332,7 @@ class Ladder:
                     if self._shapes(interpolation) != smooth:
                         refused[interpolation.value] = (
                             "it needs a mesh, and the others have the scene's own shapes: give"
-                            " --tessellation to measure all on one mesh"
+                            " `tessellation` to measure all on one mesh"
                         )
                 except InputError as error:
                     refused[interpolation.value] = str(error)

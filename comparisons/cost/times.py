@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fotismos.reference.records import Estimated
+from fotismos.reference.records import Interval
 
 LEAST_S = 0.05
 """Seconds that the largest rendering of a method takes, at least."""
@@ -97,27 +97,27 @@ def _line(counts: NDArray, wall: NDArray, per_sample: Draws, processors: float) 
     )
 
 
-def interval(values: ArrayLike, unseen: float) -> Estimated:
+def interval(values: ArrayLike, unseen: float) -> Interval:
     """Return the first of some draws with a 95 % interval, at least ``unseen`` to each side."""
     values = np.asarray(values, float)
     low, high = np.quantile(values, (0.025, 0.975))
     value = float(values[0])
     below = max(value - low, 0.0)
     above = max(high - value, 0.0)
-    return Estimated(
+    return Interval(
         value=value,
         low=value - float(np.hypot(below, unseen)),
         high=value + float(np.hypot(above, unseen)),
     )
 
 
-def ratio(line: Line, to: Line) -> Estimated:
+def ratio(line: Line, to: Line) -> Interval:
     """Return a time per sample over another's."""
     values = line.per_sample / to.per_sample
     return interval(values, 0.0 if line is to else UNSEEN * float(values[0]))
 
 
-def difference(steps: Iterable[tuple[float, Line, Line]], samples: int) -> Estimated:
+def difference(steps: Iterable[tuple[float, Line, Line]], samples: int) -> Interval:
     """Return the seconds that steps ``(weight, before, after)`` add to an image of some samples."""
     total = np.zeros(1 + DRAWS)
     unseen = []

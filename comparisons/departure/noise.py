@@ -46,7 +46,7 @@ from numpy.typing import ArrayLike
 from fotismos.comparisons.departure.blocks import ratio
 from fotismos.comparisons.departure.colour import Array, Floats, Viewing
 from fotismos.comparisons.departure.metrics import Distances, Metric, Pixelwise
-from fotismos.reference.records import Positive, Record, Share
+from fotismos.reference.records import Interval, Positive, Share
 from fotismos.reference.rendering.sums import Grouped, jackknife_error, student
 
 CONTRASTS = 3
@@ -71,7 +71,7 @@ def without_noise(measured: ArrayLike, noisier: ArrayLike) -> Array:
     return np.sign(squares) * np.sqrt(np.abs(squares))
 
 
-class VisibleShare(Record):
+class VisibleShare(Interval):
     """The share of counted pixels above a threshold, without noise, and its 95 % interval."""
 
     threshold: Positive

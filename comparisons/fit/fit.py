@@ -133,7 +133,7 @@ def fit(
         variant=ready.reference.variant,
         seed=options.seed,
         resolution=options.resolution or RESOLUTION,
-        spp=ready.reference.spp * ready.passes,
+        spp=ready.reference.pass_spp * ready.passes,
         passes=ready.passes,
         viewing=options.viewing,
         pairing=options.pairing,
@@ -162,13 +162,13 @@ def _completed(options: Options) -> Options:
     heuristic = named(options.heuristic)
     if heuristic is not PHONG and heuristic.is_own:
         raise InputError(
-            f"heuristic {options.heuristic} cannot be fitted: --form has the built-in lobes,"
-            f" {' and '.join(FORMS)}. Omit --heuristic."
+            f"heuristic {options.heuristic} cannot be fitted: `form` has the built-in lobes,"
+            f" {' and '.join(FORMS)}. Omit `heuristic`."
         )
     if options.polygon_shading is not Interpolation.PHONG:
         raise InputError(
             f"interpolation {options.polygon_shading.value} cannot be fitted: it shades vertices or"
-            " faces. Give --interpolation phong."
+            " faces. Give `interpolation=phong`."
         )
     advice = "`def shade(point, gloss: Range(0, 1) = 0.5)`"
     if not heuristic.traced:
@@ -205,7 +205,7 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
     if ready.heuristic.variant != VARIANT:
         raise InputError(
             f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"
-            f" --heuristic-variant {VARIANT}."
+            f" `heuristic_variant={VARIANT}`."
         )
     sums = [Accumulator() for _ in range(3)]
     halves = (ready.heuristic, ready.reference)

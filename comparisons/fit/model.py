@@ -36,7 +36,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from fotismos.heuristic.convention import Colour
+from fotismos.heuristic.convention import Colour, Mask, Scene
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Heuristic
 from fotismos.heuristic.kernel import shade
@@ -126,7 +126,13 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
         names = _names(scene, bsdfs)
         _require_fittable(names, bsdfs)
         eye = _eye(shading)
-        eyes = Renderer(scene, eye, spp=renderer.spp, label="heuristic samples")
+        eyes = Renderer(
+            scene,
+            eye,
+            pass_spp=renderer.pass_spp,
+            label="heuristic samples",
+            is_traced=True,  # else it would see nothing
+        )
         fixed: Any = 0.0
         passes = []
         samples_per_pixel = 0
@@ -181,42 +187,47 @@ def _require_fittable(names: Sequence[str], bsdfs: Sequence[Any]) -> None:
 
 
 def _eye(shading: Any) -> Any:
-    """Make an integrator that keeps the points that ``shading`` would shade, and shows emission."""
-    kind: Any = type(shading)
+    """Return an integrator that keeps the points that ``shading`` would shade, and shows emission.
 
-    class Eye(kind):
-        def shaded(self, scene: Any, si: Any, view: Any, normal: Any, active: Any) -> Any:
-            materials = self.known(scene).materials
-            number = materials.index(si, active) if len(materials.bsdfs) > 1 else mi.UInt32(0)
+    Each rendering puts them into ``seen``, by the names of :class:`Surface`.
+    """
+
+    class Eye(mi.SamplingIntegrator):
+        """Rays and backgrounds of ``shading``, with its surfaces' emission as the image."""
+
+        def sample(
+            self, scene: Scene, sampler: Any, ray: Any, medium: Any = None, active: Mask = True
+        ) -> tuple[Colour, Mask, list[Any]]:
+            si = scene.ray_intersect(ray, active)
+            hit = active & si.is_valid()
+            normal, is_shaded = shading.seen_side(scene, si, hit)
+            materials = shading.known(scene).materials
+            number = materials.index(si, hit) if len(materials.bsdfs) > 1 else mi.UInt32(0)
 
             def read(name: str) -> Any:
                 """Return one coefficient of the material at each sample, as the scene gives it."""
                 readers = [partial(_coefficient, bsdf, name) for bsdf in materials.bsdfs]
-                return materials.switch(readers, si, active)
+                return materials.switch(readers, si, hit)
 
+            position = mi.Vector3f(si.p)
             seen = {
-                "position": mi.Vector3f(si.p),
+                "position": position,
                 "normal": mi.Vector3f(normal),
-                "view": mi.Vector3f(view),
-                "facing": active & (materials.twosided(si, active) | (si.wi.z > 0)),
+                "view": mi.Vector3f(-ray.d),
+                "facing": hit & is_shaded,
                 "material": number + dr.zeros(mi.UInt32, dr.width(si.p)),
             }
             for name in {name for bsdf in materials.bsdfs for name in _textured(bsdf)}:
                 seen[name] = read(name)
-            if shading.occlusion:
-                test = shading.visibility(scene, si, active)
-
-                def keep(toward: Any, distance: Any) -> Any:
-                    seen[f"light {len(seen) - before}"] = visible = test(toward, distance)
-                    return visible
-
-                before = len(seen)
-                position = mi.Vector3f(si.p)
-                lights = shading.lights(scene, si, active)
-                shade(position, position, position, Material(k_d=1), lights, 0, keep)
+            visible = shading.visibility(scene, si, hit)
+            if visible is not None:
+                for index, light in enumerate(shading.lights(scene, si, hit)):
+                    arrival = light.illuminate(position)
+                    seen[f"light {index}"] = visible(arrival.toward, arrival.distance)
             dr.schedule(seen)
             self.seen = seen
-            return read("k_i")
+            emission = dr.select(hit & is_shaded, read("k_i"), 0)
+            return emission + shading.background(scene, si, active & ~hit), hit, []
 
     props = mi.Properties("heuristic")
     props["hide_emitters"] = shading.hide_emitters
@@ -487,7 +498,7 @@ class OwnModel:
                 dr.enable_grad(varied)
             for seed in self._seeds:
                 image = integrator.render(scene, seed=dr.opaque(mi.UInt32, seed),
-                                          spp=self._renderer.spp)  # fmt: skip
+                                          spp=self._renderer.pass_spp)  # fmt: skip
                 if by is not None:
                     dr.set_grad(varied, 1)
                     dr.enqueue(dr.ADMode.Forward, varied)

@@ -109,7 +109,7 @@ def _chapter_six() -> Iterator[BuiltIn]:
         yield BuiltIn(f"fig-6-5-m{m:g}", title, partial(_scene, "spot", m))
     yield BuiltIn(
         "fig-6-10",
-        "Figure 6.10: flat shading of a coarse sphere; see it with --interpolation gouraud, phong",
+        "Figure 6.10: flat shading of a coarse sphere; see it with gouraud or phong interpolation",
         partial(_scene, "coarse_sphere"),
         interpolation="flat",
         tessellation=4,

@@ -91,29 +91,22 @@ Player = TypeVar("Player", bound=Hashable)
 """An effect; in tests of the sums, any name."""
 
 
-def explained(
-    comparison: Comparison,
-    ready: Prepared,
-    source: Source,
-    options: Options,
-    progress: Progress | None = None,
+def with_causes(
+    comparison: Comparison, ready: Prepared, progress: Progress | None = None
 ) -> Comparison:
     """Return a comparison with its causes, found with its own scenes and plan at a small size.
 
     If they cannot be found, a warning says why.
     """
     begin = perf_counter()
-    record = comparison.record
     try:
         clean = comparison.images.reference, comparison.images.reference_stderr
-        causes = find(ready, source, options, progress, clean)
+        causes = find(ready, ready.source, ready.options, progress, clean)
     except FotismosError as error:
-        warnings = (*record.warnings, f"The causes are unknown: {error}")
-        return replace(comparison, record=structs.replace(record, warnings=warnings))
-    stages = record.time.stages | {CAUSES: perf_counter() - begin}
-    time = structs.replace(record.time, stages=stages)
-    record = structs.replace(named(comparison, causes.maps), why=causes.record, time=time)
-    return replace(comparison, record=record, causes=causes)
+        return comparison.warned(f"The causes are unknown: {error}")
+    record = structs.replace(named(comparison, causes.maps), why=causes.record)
+    comparison = replace(comparison, record=record, causes=causes)
+    return comparison.timed(CAUSES, perf_counter() - begin)
 
 
 def find(
@@ -139,7 +132,7 @@ def find(
     surface = gbuffer(ready.scene, size)
     require_surface(surface.hit, source.name)
     reference = Renderer(
-        ready.scene, ready.reference.integrator, spp=spp, label="reference image", size=size
+        ready.scene, ready.reference.integrator, pass_spp=spp, label="reference image", size=size
     )
     # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
     loop = passes(
@@ -151,7 +144,7 @@ def find(
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
     images = HybridImages(
-        pairs, scenes, replicates=REPLICATES, spp=spp, seed=options.seed, size=size
+        pairs, scenes, replicates=REPLICATES, replicate_spp=spp, seed=options.seed, size=size
     )
     if progress:
         progress(CAUSES, 0, 1)
@@ -287,10 +280,10 @@ def attribute(
         record=Attribution(
             effects=contributions,
             departure=float(departure[0].mean()),
-            closure=MeanError(mean=closure.value, low=closure.low, high=closure.high),
+            closure=MeanError(value=closure.value, low=closure.low, high=closure.high),
             implementation=float(rounding.mean()),
             resolution=meter.counted.shape[::-1],
-            spp=images.spp,
+            spp=images.replicate_spp,
             replicates=images.replicates,
             orders=drawn,
             hybrids=tuple(

@@ -33,6 +33,8 @@ from fotismos.reference.planning.effects import (
     POLYGONS,
     SPECTRAL,
     Effect,
+    GlowingEffect,
+    ReplacedEffect,
 )
 from fotismos.reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
 from fotismos.reference.planning.plan import Plan, physical_integrator
@@ -44,11 +46,11 @@ from fotismos.reference.rendering.transport import Transport
 from fotismos.reference.scene.graph import properties
 from fotismos.reference.scene.source import Source
 
-REPLACED = tuple(effect for effect in EFFECTS if effect.put)
+REPLACED = tuple(effect for effect in EFFECTS if isinstance(effect, ReplacedEffect))
 IN_SCENE: frozenset[Effect] = frozenset(REPLACED)
 """Effects that change the scene; the others change only what the integrator does."""
 
-IN_EMISSION = tuple(effect for effect in REPLACED if effect.emission)
+IN_EMISSION = tuple(effect for effect in REPLACED if isinstance(effect, GlowingEffect))
 """Effects that change the emission pass."""
 
 OF_KERNEL = frozenset({POLYGONS, ONE_INTENSITY})
@@ -141,7 +143,6 @@ class HybridScenes:
         graph = self.pair.physical.copy()
         for effect in REPLACED:
             if effect not in simulated:
-                assert effect.put, "REPLACED has only such effects"
                 effect.put(graph, self.facts, effect.sites(self.facts))
         return with_sampler(graph, self.plan.sampler).instantiate()
 
@@ -161,7 +162,7 @@ class HybridScenes:
         integrator.transports = tuple(
             Transport(plan.shadows, plan.bsdf_samples, plan.max_depth) for plan in plans
         )
-        return Renderer(scene, integrator, spp=spp, label="image of some effects")
+        return Renderer(scene, integrator, pass_spp=spp, label="image of some effects")
 
     def emission(self, simulated: Set[Effect], spp: int) -> Renderer | None:
         """Return the renderer of the emission pass: emission, ambient light and background.
@@ -181,7 +182,6 @@ class HybridScenes:
                 phong = graph.props(index)
                 emitted: dict[str, Any] = {}
                 for effect in left_out:
-                    assert effect.emission, "IN_EMISSION has only such effects"
                     emitted |= effect.emission(phong, self.facts)
                 if emitted:
                     emitted["twosided"] = phong.get("twosided", False)
@@ -193,15 +193,17 @@ class HybridScenes:
         # Hiding emitters would hide the emission; a hidden environment was detached above.
         direct.register()
         integrator = mi.load_dict({"type": "direct_all", "max_depth": 1, "hide_emitters": False})
-        return Renderer(scene, integrator, spp=spp, label="image of emission and ambient light")
+        return Renderer(
+            scene, integrator, pass_spp=spp, label="image of emission and ambient light"
+        )
 
 
 class HybridImages:
     """The images between the heuristic half as requested and the reference, each rendered once.
 
-    Of each image there are ``replicates``, at least 3, with ``spp`` samples per pixel, and of a
-    ``size`` of (width, height). ``scenes`` are in the reference's variant. Images are arrays (R,
-    f H, f W, 3) of ``finer`` pixels, ``f`` per pixel in each direction.
+    Of each image there are ``replicates``, at least 3, with ``replicate_spp`` samples per pixel,
+    and of a ``size`` of (width, height). ``scenes`` are in the reference's variant. Images are
+    arrays (R, f H, f W, 3) of ``finer`` pixels, ``f`` per pixel in each direction.
     """
 
     def __init__(
@@ -209,12 +211,12 @@ class HybridImages:
         pairs: Pairs,
         scenes: HybridScenes,
         replicates: int,
-        spp: int,
+        replicate_spp: int,
         seed: int,
         size: tuple[int, int],
     ) -> None:
         self.replicates = replicates
-        self.spp = spp
+        self.replicate_spp = replicate_spp
         self.size = size
         self._pairs = pairs
         self._ready = pairs.ready
@@ -239,7 +241,9 @@ class HybridImages:
         for (name, _), group in sorted(groups.items(), key=lambda found: found[0][0]):
             # In one order of transports: scenes that differ only in data share a kernel.
             group.sort(
-                key=lambda simulated: [effect in simulated for effect in EFFECTS if not effect.put]
+                key=lambda simulated: [
+                    effect in simulated for effect in EFFECTS if effect not in IN_SCENE
+                ]
             )
             with variant(name):
                 self._known |= zip(group, self._rendered(group), strict=True)
@@ -292,7 +296,9 @@ class HybridImages:
                     if ONE_INTENSITY in effects:
                         lights.give_one_intensity(graph)
                     scene = graph.instantiate()
-                renderer = Renderer(scene, None, spp=self._finer_spp, label="image of the kernel")
+                renderer = Renderer(
+                    scene, None, pass_spp=self._pass_spp, label="image of the kernel"
+                )
                 (self._kernels[effects],) = self._passes(renderer)
         return self._kernels[effects]
 
@@ -312,17 +318,17 @@ class HybridImages:
             physical = with_sampler(pair.physical, self._ready.plan.sampler).instantiate()
             self._scenes[mi.variant()] = HybridScenes(pair, self._ready.plan, physical)
         scenes = self._scenes[mi.variant()]
-        found = self._passes(scenes.transport(sets, self._finer_spp), len(sets))
+        found = self._passes(scenes.transport(sets, self._pass_spp), len(sets))
         key = mi.variant(), frozenset(IN_EMISSION) & sets[0]
         if key not in self._emission:
-            renderer = scenes.emission(sets[0], self._finer_spp)
+            renderer = scenes.emission(sets[0], self._pass_spp)
             self._emission[key] = self._passes(renderer)[0] if renderer else None
         emission = self._emission[key]
         return found if emission is None else [image + emission for image in found]
 
     @property
-    def _finer_spp(self) -> int:
-        return self.spp // self.finer**2
+    def _pass_spp(self) -> int:
+        return self.replicate_spp // self.finer**2
 
     def _passes(self, renderer: Renderer, count: int = 1) -> list[NDArray]:
         """Render the replicates on a film of the preview's size, then restore the film's.

@@ -22,7 +22,7 @@ from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO
 from fotismos.comparisons.study.design import OWN, StudyFile
 from fotismos.comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
 from fotismos.heuristic.errors import InputError, unknown
-from fotismos.reference.planning.effects import EFFECTS
+from fotismos.reference.planning.effects import PRUNED
 
 Row: TypeAlias = dict[str, Any]
 """Values by column."""
@@ -31,8 +31,7 @@ Row: TypeAlias = dict[str, Any]
 Column: TypeAlias = tuple[str, str, type]
 """A column's unit (``1`` for pure numbers), its meaning, and its Python type."""
 
-STEPPED = tuple(effect for effect in EFFECTS if effect.step)
-STEPS = ("form", *(effect.label for effect in STEPPED))
+STEPS = ("form", *(effect.label for effect in PRUNED))
 """The steps between the halves, in the order in which they are added to the heuristic image: the
 form of BSDFs and lights, then one effect after another."""
 
@@ -75,7 +74,7 @@ def results() -> dict[str, Column]:
     }
     changes = {
         STEPS[0]: "RMS change by the physical BSDFs and lights, without shadows",
-        **{effect.label: f"RMS change by {effect.step}" for effect in STEPPED},
+        **{effect.label: f"RMS change by {effect.step}" for effect in PRUNED},
     }
     return {
         **{key: ("1", meaning, float) for key, meaning in numbers.items()},

@@ -23,13 +23,13 @@ from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.comparisons.study import dataset, scenes
-from fotismos.comparisons.study.dataset import STEPPED, STEPS, Row, measure
+from fotismos.comparisons.study.dataset import STEPS, Row, measure
 from fotismos.comparisons.study.design import OWN, StudyFile, StudyPart
 from fotismos.comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, largest_miss
 from fotismos.heuristic import plugins
 from fotismos.heuristic.errors import FotismosError, InputError, unknown
 from fotismos.heuristic.heuristics import named
-from fotismos.reference.planning.effects import EFFECTS
+from fotismos.reference.planning.effects import EFFECTS, PRUNED
 from fotismos.reference.planning.plan import Plan, physical_integrator
 from fotismos.reference.rendering import direct
 from fotismos.reference.rendering.renderer import Progress, Renderer, passes
@@ -199,16 +199,16 @@ def _rendered(point: StudyPoint) -> Row:
     ready = guarded(source, part.options)
     spp = max(1, (part.options.spp or 0) // PASSES)
     scene = ready.scene
-    ready.heuristic.spp = spp
-    parameters = mi.traverse(ready.heuristic.integrator)
+    heuristic = ready.heuristic.sampled(spp)
+    parameters = mi.traverse(heuristic.integrator)
     for name, value in tuned.items():
         parameters[name] = value
     parameters.update()
-    renderers = [ready.heuristic]
+    renderers = [heuristic]
     plans = _plans(ready.plan)
     for stage in plans.values():
         integrator = physical_integrator(stage, scene, ready.pair.hide_emitters)
-        renderers.append(Renderer(scene, integrator, spp=spp, label="reference image"))
+        renderers.append(Renderer(scene, integrator, pass_spp=spp, label="reference image"))
     sums = [Accumulator() for _ in renderers]
     difference = Accumulator()
     for rendered in passes(renderers, part.options.seed, PASSES):
@@ -250,9 +250,9 @@ def _read(scene: str, identity: str) -> Source:
 
 def _plans(chosen: Plan) -> dict[str, Plan]:
     """Return the plan of each step that changes something; the last is the chosen plan."""
-    simulated = set(EFFECTS) - set(STEPPED)
+    simulated = set(EFFECTS) - set(PRUNED)
     plans = {STEPS[0]: chosen.simulating(simulated)}
-    for effect in STEPPED:
+    for effect in PRUNED:
         simulated.add(effect)
         more = chosen.simulating(simulated)
         if more != list(plans.values())[-1]:

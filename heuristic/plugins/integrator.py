@@ -27,6 +27,7 @@ equal rays. Python::
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from operator import is_
 from time import perf_counter
 from typing import Any, Self
@@ -70,6 +71,7 @@ def define() -> dict[str, Any]:
                 for parameter in self.model.parameters
             }
             self.parameters_changed()
+            self.shares: dict[str, Any] | None = None
             self.parts: Any = None
             self.values: Any = None
             self.preparation = 0.0
@@ -98,10 +100,14 @@ def define() -> dict[str, Any]:
             si = scene.ray_intersect(ray, active)
             hit = active & si.is_valid()
             colour = self.surface_colour(scene, si, mi.Vector3f(-ray.d), hit)
+            return colour + self.background(scene, si, active & ~hit), hit, si
+
+        def background(self, scene: Scene, si: Interaction, active: Mask) -> Colour:
+            """Return the environment's light where rays hit nothing; a plain 0 if it is hidden."""
             environment = scene.environment()
-            if environment is not None and not self.hide_emitters:
-                colour += dr.select(active & ~hit, environment.eval(si, active & ~hit), 0)
-            return colour, hit, si
+            if environment is None or self.hide_emitters:
+                return 0
+            return dr.select(active, environment.eval(si, active), 0)
 
         def surface_colour(
             self, scene: Scene, si: Interaction, view: Direction, active: Mask
@@ -135,11 +141,20 @@ def define() -> dict[str, Any]:
             return colour
 
         def model_at(self, scene: Scene, si: Interaction) -> Callable[..., Colour]:
-            """Return the heuristic as a function of the arguments of the kernel's ``shade``."""
+            """Return the heuristic as a function of the arguments of the kernel's ``shade``.
+
+            ``shares`` are factors on the material's coefficients, for images of single terms.
+            """
             prepared = self.known(scene).prepared
 
             def evaluate(*arguments: Any) -> Colour:
                 shading = ShadingArguments._make(arguments)
+                if self.shares is not None:
+                    changed = {
+                        name: getattr(shading.material, name) * share
+                        for name, share in self.shares.items()
+                    }
+                    shading = shading._replace(material=replace(shading.material, **changed))
                 return self.model.evaluate(
                     shading, si.uv, self.parameters, prepared, si.wavelengths
                 )

@@ -208,5 +208,5 @@ def require_colours() -> None:
     if mi.is_spectral:
         raise InputError(
             f"{mi.variant()} has wavelengths, and flat and Gouraud shading need RGB: give"
-            " --heuristic-variant llvm_ad_rgb, or use phong interpolation."
+            " `heuristic_variant=llvm_ad_rgb`, or use phong interpolation."
         )

@@ -32,7 +32,7 @@ def replace_shapes(
         if props.id() not in shapes or graph.plugin(index) == "instance":
             raise InputError(
                 f"{graph.name}: {graph.label(index)}: instances and their groups cannot become"
-                " separate meshes. Use --interpolation phong."
+                " separate meshes. Give `interpolation=phong`."
             )
         mesh = tessellation.to_mesh(shapes[props.id()], resolution or tessellation.RESOLUTION)
         if mesh.has_face_normals():

@@ -5,7 +5,7 @@ a study, charts and pages.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import mitsuba as mi
@@ -35,23 +35,22 @@ class Decision(Record):
     rule: str
 
 
+Rule = Callable[[Facts], tuple[bool, str]]
+"""Whether a scene needs an effect, and the evidence."""
+
+Sites = Callable[[Facts], Sequence[Any]]
+"""The nodes or keys of the physical half's graph that have an effect."""
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Effect:
     """An effect of light. Two are equal only if they are the same.
 
     ``heuristic``, ``reference`` and ``cost`` are its form in each half and its cost, in words;
     ``noun`` is what an image without it lacks, in words, unless its label says it; ``colour`` is a
-    CSS colour, None for effects equal in both halves. ``step`` is what it changes in an image, if
-    studies have a step for it. ``rule(facts)`` returns whether the scene needs it, and the
-    evidence; with ``undecided`` a yes only means that it is not ruled out. ``sampled`` is whether
-    its direct light needs random numbers.
-
-    The integrator leaves an effect with a ``pruning`` rule out, with the parameters ``without`` of
-    `direct_all`; ``is_alike(facts)``: both halves treat it alike. Other effects are left out by
-    giving the physical half the heuristic half's form: ``sites(facts)`` returns the nodes or keys
-    of the physical half's graph that have it, and ``put(graph, facts, sites)`` replaces them in a
-    copy of that graph. ``emission(phong, facts)`` returns the light of a heuristic material that a
-    camera ray sees without the effect, as parameters of ``heuristic_glow``.
+    CSS colour, None for effects equal in both halves. With ``undecided`` a yes of its ``rule`` only
+    means that it is not ruled out. ``sampled`` is whether its direct light needs random numbers.
+    The halves differ in it where it has ``sites``.
     """
 
     label: str
@@ -59,25 +58,14 @@ class Effect:
     heuristic: str
     reference: str
     cost: str
-    rule: Callable[[Facts], tuple[bool, str]] | None = None
+    rule: Rule
     undecided: bool = False
     colour: str | None = None
     sampled: bool = False
-    step: str = ""
-    pruning: PruningRule | None = None
-    without: dict[str, Any] = field(default_factory=dict)
-    is_alike: Callable[[Facts], bool] = lambda facts: True
-    sites: Callable[[Facts], Sequence[Any]] = lambda facts: ()
-    put: Callable[[Graph, Facts, Sequence[Any]], None] | None = None
-    emission: Callable[[mi.Properties, Facts], dict] | None = None
+    sites: Sites = lambda facts: ()
 
     def decide(self, facts: Facts) -> Decision:
-        """Apply the rule, or the rule of pruning."""
-        if self.pruning:
-            result = self.pruning.check(facts)
-            kind = "structural" if result.applies else "simulated"
-            return self.decision(not result.applies, kind, result.evidence)
-        assert self.rule, "an effect has a rule or a way to be pruned"
+        """Apply the rule."""
         called_for, evidence = self.rule(facts)
         kind = "simulated" if called_for and self.undecided else "structural"
         return self.decision(called_for, kind, evidence)
@@ -88,7 +76,7 @@ class Effect:
 
     def differs(self, facts: Facts, called_for: bool) -> bool:
         """Return whether the two halves differ in it, given whether the scene calls for it."""
-        return bool(self.sites(facts)) or (called_for and not self.is_alike(facts))
+        return bool(self.sites(facts))
 
     def __repr__(self) -> str:
         return f"<effect {self.label}>"
@@ -96,6 +84,53 @@ class Effect:
     def __reduce__(self) -> tuple:
         # A copy in another process must be the same effect, for sets and `is`.
         return labelled, (self.label,)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class PrunedEffect(Effect):
+    """An effect that the integrator leaves out if the rule ``pruning`` allows it.
+
+    ``without`` are the parameters of `direct_all` that do so. ``is_alike(facts)``: both halves
+    treat it alike. ``step`` is what it changes in an image, in words.
+    """
+
+    rule: Rule = lambda facts: (False, "")
+    pruning: PruningRule
+    without: dict[str, Any]
+    is_alike: Callable[[Facts], bool]
+    step: str
+
+    def decide(self, facts: Facts) -> Decision:
+        """Apply the rule of pruning."""
+        result = self.pruning.check(facts)
+        kind = "structural" if result.applies else "simulated"
+        return self.decision(not result.applies, kind, result.evidence)
+
+    def differs(self, facts: Facts, called_for: bool) -> bool:
+        """Return whether the scene calls for it, and the halves treat it differently."""
+        return called_for and not self.is_alike(facts)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class ReplacedEffect(Effect):
+    """An effect that is left out by giving the physical half the heuristic half's form.
+
+    ``put(graph, facts, sites)`` replaces the ``sites`` in a copy of the physical half's graph.
+    """
+
+    sites: Sites
+    put: Callable[[Graph, Facts, Sequence[Any]], None]
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class GlowingEffect(ReplacedEffect):
+    """A replaced effect without which a heuristic material shines of itself.
+
+    ``emission(phong, facts)`` returns the light that a camera ray then sees, as parameters of
+    ``heuristic_glow``.
+    """
+
+    emission: Callable[[mi.Properties, Facts], dict[str, Any]]
 
 
 # --- Terms of the heuristic kernel -----------------------------------------------------------
@@ -270,13 +305,13 @@ def _detach(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
         graph.detach(0, key)
 
 
-def _ambient_light(phong: mi.Properties, facts: Facts) -> dict:
+def _ambient_light(phong: mi.Properties, facts: Facts) -> dict[str, Any]:
     if "k_a" not in phong or "ambient" not in facts.kernel:
         return {}
     return {"k_a": phong["k_a"], "ambient": facts.kernel["ambient"]}
 
 
-ATTENUATION = Effect(
+ATTENUATION = ReplacedEffect(
     label="distance attenuation",
     heuristic="f_att (6.1, 8.6)",
     reference="1 / d^2",
@@ -287,7 +322,7 @@ ATTENUATION = Effect(
     put=_put_lights,
 )
 
-CONE = Effect(
+CONE = ReplacedEffect(
     label="spot cone",
     heuristic="6.2-6.4",
     reference="spot",
@@ -298,7 +333,7 @@ CONE = Effect(
     put=_put_lights,
 )
 
-EXTENDED = Effect(
+EXTENDED = GlowingEffect(
     label="extended lights",
     heuristic="a spot or point",
     reference="sampled area lights",
@@ -311,7 +346,7 @@ EXTENDED = Effect(
     emission=lambda phong, facts: {"k_i": phong["k_i"]} if "k_i" in phong else {},
 )
 
-ENVIRONMENT = Effect(
+ENVIRONMENT = GlowingEffect(
     label="environment",
     noun="environment light",
     heuristic="ambient light",
@@ -364,7 +399,7 @@ def _reflected(facts: Facts) -> tuple[bool, str]:
     return bool(plugins - {"diffuse", "null", *WRAPPERS}), f"BSDFs: {', '.join(sorted(plugins))}"
 
 
-MICROFACETS = Effect(
+MICROFACETS = ReplacedEffect(
     label="microfacets and Fresnel",
     heuristic="none",
     reference="roughplastic",
@@ -375,7 +410,7 @@ MICROFACETS = Effect(
     put=_put_materials,
 )
 
-TRANSMISSION = Effect(
+TRANSMISSION = ReplacedEffect(
     label="transmission",
     heuristic="none",
     reference="refraction and media",
@@ -393,7 +428,7 @@ TRANSMISSION = Effect(
 
 # --- Obstacles of light ----------------------------------------------------------------------
 
-OCCLUSION = Effect(
+OCCLUSION = PrunedEffect(
     label="occlusion",
     heuristic="none, or if requested",
     reference="shadow rays",
@@ -406,7 +441,7 @@ OCCLUSION = Effect(
     step="shadows",
 )
 
-INTERREFLECTION = Effect(
+INTERREFLECTION = PrunedEffect(
     label="interreflection",
     heuristic="none",
     reference="paths",
@@ -417,6 +452,8 @@ INTERREFLECTION = Effect(
     without={"max_depth": 2},
     step="light reflected more than once",
 )
+
+PRUNED = (OCCLUSION, INTERREFLECTION)
 
 EFFECTS: tuple[Effect, ...] = (
     EMISSION,

@@ -40,6 +40,7 @@ from fotismos.reference.planning.effects import (
     EFFECTS,
     INTERREFLECTION,
     OCCLUSION,
+    PRUNED,
     Decision,
     Effect,
 )
@@ -162,11 +163,7 @@ class Plan(Record):
         """
         if max_depth == 2:
             effects = set(effects) - {INTERREFLECTION}
-        omitted = [
-            effect
-            for effect in EFFECTS
-            if effect.pruning and effect not in effects and self.calls_for(effect)
-        ]
+        omitted = [effect for effect in PRUNED if effect not in effects and self.calls_for(effect)]
         plan = self.directly() if omitted else self
         for effect in omitted:
             plan = replace(plan, **effect.without)
@@ -188,7 +185,7 @@ class Plan(Record):
             bsdf_samples=1,
         )
 
-    def unpruned(self, rule: str = "asked", evidence: str = "--everything") -> "Plan":
+    def unpruned(self, rule: str = "asked", evidence: str = "pruning is off") -> "Plan":
         """Return the plan that prunes nothing, Mitsuba's default, and the reason for it."""
         return Plan(
             effects=tuple(effect.decision(True, rule, evidence) for effect in EFFECTS),

@@ -66,7 +66,7 @@ def require_surface(hit: np.ndarray, name: str) -> None:
             f"{name}: no pixel sees a surface: the rays through the centres of all"
             f" {width}x{height} pixels hit nothing. Check the camera (to_world, fov, near_clip,"
             " far_clip, the film's crop) and the shapes in front of it. To allow an empty picture,"
-            " give --allow-empty."
+            " give `allow_empty`."
         )
 
 

@@ -78,21 +78,23 @@ class Times(Record):
 class Renderer:
     """One half of a pair, ready to render passes in the variant that it was made in.
 
-    ``integrator`` None takes the scene's own; ``spp`` are samples per pixel and pass; ``size`` is a
-    width and height in place of the film's, of the same shape.
+    ``integrator`` None takes the scene's own; ``pass_spp`` are samples per pixel and pass; ``size``
+    is a width and height in place of the film's, of the same shape. Passes replay the kernels of
+    the first, unless the integrator's code ``is_traced`` at each.
     """
 
     def __init__(
         self,
         scene: Scene,
         integrator: Any,
-        spp: int,
+        pass_spp: int,
         label: str,
         size: tuple[int, int] | None = None,
+        is_traced: bool = False,
     ):
         self.scene = scene
         self.integrator = integrator or scene.integrator()
-        self.spp = spp
+        self.pass_spp = pass_spp
         shading = getattr(self.integrator, "model", None)  # only the integrator `heuristic` has it
         self._is_users = shading is not None and not shading.is_own
         self.label = f"{label} ({shading.name})" if shading and self._is_users else label
@@ -102,18 +104,19 @@ class Renderer:
         self.processor_times: list[float] = []
         self.compilation = 0.0
         # A user's code may be impossible to record: NumPy ends the process.
-        self._replayed = None if self._is_users else dr.freeze(_rendered, warn_after=100)
+        is_traced = is_traced or self._is_users
+        self._replayed = None if is_traced else dr.freeze(_rendered, warn_after=100)
 
     def render(self, seed: int) -> Any:
         """Render one pass and return it as a tensor (H, W, 3), noting the time."""
         if self.size:
             resize(self.scene, self.size)
         width, height = image_size(self.scene)
-        if width * height * self.spp > LARGEST_PASS:
+        if width * height * self.pass_spp > LARGEST_PASS:
             raise InputError(
-                f"{self.label}: {self.spp} samples per pixel of {width}x{height} pixels at once"
-                f" are too many: at most {LARGEST_PASS} samples per pass are allowed."
-                " Give fewer with --spp, or a smaller image with --resolution."
+                f"{self.label}: {self.pass_spp} samples per pixel of {width}x{height} pixels at"
+                f" once are too many: at most {LARGEST_PASS} samples per pass are allowed."
+                " Give a smaller `spp` or `resolution`."
             )
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             _reset(self.scene)
@@ -155,10 +158,10 @@ class Renderer:
                 )
         return image
 
-    def sampled(self, spp: int) -> "Renderer":
+    def sampled(self, pass_spp: int) -> "Renderer":
         """Return the same renderer with another number of samples."""
         other = copy(self)
-        other.spp = spp
+        other.pass_spp = pass_spp
         other.times = []
         other.processor_times = []
         other.compilation = 0.0
@@ -166,7 +169,7 @@ class Renderer:
 
     def _image(self, seed: int) -> Any:
         """Render; later passes replay the kernels of the first if Dr.Jit knows all their arrays."""
-        arguments = self.scene, self.integrator, self.spp, seed
+        arguments = self.scene, self.integrator, self.pass_spp, seed
         if self._replayed is not None:
             try:
                 if hasattr(self.integrator, "prepare"):  # what cannot be recorded
@@ -350,7 +353,7 @@ def require_memory(name: str, width: int, height: int) -> None:
     if free is not None and need > free:
         raise InputError(
             f"{name}: an image of {width}x{height} pixels needs {need / 1e9:.2g} GB of memory, and"
-            f" {free / 1e9:.2g} GB are free. Give a smaller --resolution, free some memory, or"
+            f" {free / 1e9:.2g} GB are free. Give a smaller `resolution`, free some memory, or"
             " raise the limits of the process (ulimit -d, ulimit -v)."
         )
 

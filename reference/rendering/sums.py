@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.heuristic.convention import Array
-from fotismos.reference.records import Estimated
+from fotismos.reference.records import Interval
 
 GROUPS = 8
 """Groups of passes, at most: seven degrees of freedom for an interval."""
@@ -238,7 +238,7 @@ def jackknife_error(left_out: ArrayLike) -> NDArray[np.float64]:
     return np.sqrt((len(left_out) - 1) * left_out.var(axis=0))
 
 
-def student(value: float, error: float, count: int, bias: float = 0.0) -> Estimated:
+def student(value: float, error: float, count: int, bias: float = 0.0) -> Interval:
     """Return the interval around a value whose standard error comes from ``count`` repeats.
 
     ``bias`` is an error that all repeats share, which widens it: ``half = hypot(t error, bias)``.
@@ -246,10 +246,10 @@ def student(value: float, error: float, count: int, bias: float = 0.0) -> Estima
     from scipy.special import stdtrit  # scipy.stats takes a second to import
 
     half = hypot(float(stdtrit(count - 1, 0.5 + LEVEL / 2)) * error, bias)
-    return Estimated(value=value, low=value - half, high=value + half)
+    return Interval(value=value, low=value - half, high=value + half)
 
 
-def jackknifed(values: ArrayLike, bias: float = 0.0) -> Estimated:
+def jackknifed(values: ArrayLike, bias: float = 0.0) -> Interval:
     """Return the first of values (1 + n), with an interval from the others.
 
     The first is of all repeats, each other one leaves out one of them. ``bias`` is what all share.

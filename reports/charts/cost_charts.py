@@ -97,7 +97,7 @@ def _rows(record: Cost) -> list[dict[str, Any]]:
             "time": 1e3 * point.seconds.value,
             "fastest": 1e3 * max(point.seconds.low, point.seconds.value / 10),
             "slowest": 1e3 * point.seconds.high,
-            "error": point.error.mean,
+            "error": point.error.value,
             "front": point.front,
         }
         for point in record.points

@@ -17,6 +17,7 @@ from fotismos.comparisons.departure.blocks import averaged
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.comparisons.steps import steps
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.records import VERSION, Amount, Count, Record, Share, to_json
@@ -153,7 +154,8 @@ def examine(
     )
     if folder is None:
         return made, None
-    comparison = compare(case.source, case.options, progress, case.command())
+    added = steps(case.options, why=False)
+    comparison = compare(case.source, case.options, progress, case.command(), then=added)
     view = scene.write(folder.parent, folder.name, comparison)
     results.write(folder / RECORD, to_json(made))
     return made, structs.replace(view, before=_before(made, kept or {}, found.now.pictures))

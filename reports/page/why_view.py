@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
-from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.hybrids.attribution import dominating
+from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
+from fotismos.reference.records import Missing
 from fotismos.reports.charts.theme import EFFECT_COLOURS
 from fotismos.reports.page.embedding import COUNTED, encode, packed
 from fotismos.reports.page.scene_view import EffectMap, LiveView, TermsView, WhyView
-
-if TYPE_CHECKING:
-    from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
 
 LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789a"))
 """Codes of the map: no effect, a pixel that does not count, and the effects' places."""
@@ -31,20 +27,17 @@ LARGEST_CODE = 65535
 """The largest code of the planes of terms and normals."""
 
 
-def why_view(
-    maps: Mapping[str, NDArray],
-    counted: NDArray[np.bool_],
-    previews: Sequence[NDArray],
-    viewing: Viewing,
-) -> WhyView:
-    """Return the view of causes.
-
-    ``maps`` (H, W) are what each effect removes, and ``counted`` (H, W) the pixels in the
-    statistics. ``previews`` are linear images of the hybrids, the last with all effects; their
-    sides are a multiple of the maps'.
-    """
-    places = dominating(maps, counted)
-    names = tuple(maps)
+def causes_view(comparison: Comparison) -> WhyView | None:
+    """Return the view of causes: where each effect dominates, and small images of the hybrids."""
+    causes = comparison.causes
+    if causes is None:
+        return None
+    counted = causes.counted
+    viewing = comparison.record.viewing
+    # The last has all effects; the sides of all are a multiple of the maps'.
+    previews = [causes.previews[hybrid.effects] for hybrid in causes.record.hybrids]
+    places = dominating(causes.maps, counted)
+    names = tuple(causes.maps)
     found = EffectMap(
         width=places.shape[1],
         height=places.shape[0],
@@ -63,14 +56,16 @@ def why_view(
     return WhyView(effects=found, pictures=packed(planes))
 
 
-def terms_view(grid: TermGrid) -> TermsView:
-    """Return the page's data of a grid of terms: 16-bit codes of their factors.
+def terms_view(grid: TermGrid | Missing) -> TermsView:
+    """Return the page's data of a grid of terms, 16-bit codes of their factors; or why not.
 
     A cosine ``c`` has the code ``65535 (1 + c) / 2``; a value ``v`` ≥ 0 has
     ``65535 sqrt(v / top)``, with the plane's ``top``, and is off by at most ``top`` / 65000. The
     planes are packed like those of images (:mod:`fotismos.reports.page.embedding`).
     ``templates/viewer/terms.js`` reads them.
     """
+    if isinstance(grid, Missing):
+        return TermsView(missing=grid.reason)
     seen = grid.material >= 0
     shiny = np.array([any(material.k_s) for material in grid.materials] + [False])[grid.material]
     cosines = {"cos_view": grid.cos_view}
@@ -110,12 +105,14 @@ def terms_view(grid: TermGrid) -> TermsView:
     )
 
 
-def live_view(points: LivePoints) -> LiveView:
-    """Return the page's data of the points that it can shade again.
+def live_view(points: LivePoints | Missing) -> LiveView:
+    """Return the page's data of the points that it can shade again; or why it cannot.
 
     A value ``v`` has the code ``16383 (1 + v / top) / 2``, with the plane's ``top``.
     ``templates/viewer/shading.js`` reads them.
     """
+    if isinstance(points, Missing):
+        return LiveView(missing=points.reason)
     tops = {}
     rows = {}
     for name, plane in points.planes.items():

@@ -29,7 +29,7 @@ from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene
 from fotismos.reports.terminal import progress, tables
 from fotismos.reports.terminal.progress import Bar
-from fotismos.reports.terminal.words import remark, tell, tell_where
+from fotismos.reports.terminal.words import as_typed, remark, tell, tell_where
 
 if TYPE_CHECKING:  # a comparison has no hard cases
     from fotismos.comparisons.hard_cases import HardCases
@@ -74,7 +74,7 @@ class Batch:
         """The scenes that could not be compared, in order."""
         errors = self.errors
         return [
-            Failure(scene=target, error=str(errors[target]))
+            Failure(scene=target, error=as_typed(str(errors[target])))
             for target in self.places
             if target in errors
         ]

@@ -21,19 +21,18 @@ from fotismos.comparisons.comparison import (
 )
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, drawn
 from fotismos.comparisons.processes.pool import Turn
+from fotismos.comparisons.steps import steps
 from fotismos.heuristic import program
 from fotismos.heuristic.heuristics import named
-from fotismos.reference.records import VERSION, Record, plain, to_json
+from fotismos.reference.records import VERSION, Missing, Record, plain, to_json
 from fotismos.reference.scene.source import digest
 from fotismos.reports.files import images, results
 from fotismos.reports.jobs import Job
 from fotismos.reports.page import embedding
-from fotismos.reports.page.scene_view import LiveView, SceneView, TermsView, WhyView
-from fotismos.reports.page.why_view import live_view, terms_view, why_view
+from fotismos.reports.page.scene_view import LiveView, SceneView, TermsView
 
-if TYPE_CHECKING:  # few scenes have these
+if TYPE_CHECKING:  # few scenes have one
     from fotismos.comparisons.cost.cost import Study
-    from fotismos.comparisons.pixel_terms import LivePoints
 
 RECORD = "comparison.json"
 PICTURE = "comparison.exr"
@@ -72,7 +71,12 @@ def compare(
         source = case.source
         options = case.options
         comparison = compare_scene(
-            source, options, in_turn, case.command(), job.with_causes, turn.alone()
+            source,
+            options,
+            in_turn,
+            command=case.command(),
+            alone=turn.alone(),
+            then=steps(options, job.with_causes),
         )
         spent = _stages(comparison.record, perf_counter() - begin)
         study = None
@@ -227,28 +231,25 @@ def view_of(comparison: Comparison) -> SceneView:
     """Return a comparison's part of the page without links."""
     record = comparison.record
     shown = comparison.images
-    return SceneView(
+    view = SceneView(
         record=record,
         thumbnails=images.thumbnails(shown, record.viewing.exposure),
         embedded=embedding.embed(images.channels(_layers(shown)), shown.counted),
-        terms=_terms(comparison),
-        live=_live(comparison.live),
-        why=_why(comparison),
     )
+    terms = comparison.terms
+    live = comparison.live
+    if isinstance(terms, Missing) and isinstance(live, Missing) and comparison.causes is None:
+        return structs.replace(
+            view, terms=TermsView(missing=terms.reason), live=LiveView(missing=live.reason)
+        )
+    from fotismos.reports.page import why_view  # loaded late: --no-why has none
 
-
-def _terms(comparison: Comparison) -> TermsView | None:
-    """Return the terms at pixels for the page, or why there are none."""
-    if comparison.terms is None:
-        return TermsView(missing=comparison.no_terms) if comparison.no_terms else None
-    return terms_view(comparison.terms)
-
-
-def _live(points: "LivePoints | str") -> LiveView | None:
-    """Return the points that the page shades again, or why it does not."""
-    if isinstance(points, str):
-        return LiveView(missing=points) if points else None
-    return live_view(points)
+    return structs.replace(
+        view,
+        terms=why_view.terms_view(terms),
+        live=why_view.live_view(live),
+        why=why_view.causes_view(comparison),
+    )
 
 
 def with_fit(view: SceneView, folder: Path) -> SceneView:
@@ -263,17 +264,6 @@ def with_fit(view: SceneView, folder: Path) -> SceneView:
     if view.live and is_same:
         return structs.replace(view, live=structs.replace(view.live, fit=found))
     return view
-
-
-def _why(comparison: Comparison) -> WhyView | None:
-    """Return the causes for the page; None without."""
-    causes = comparison.causes
-    if causes is None:
-        return None
-    previews = [causes.previews[hybrid.effects] for hybrid in causes.record.hybrids]
-    return why_view(
-        causes.maps, causes.counted, previews=previews, viewing=comparison.record.viewing
-    )
 
 
 def _files(folder: Path) -> set[str]:

@@ -15,7 +15,7 @@ from fotismos.reports.terminal.words import number, parameter, seconds
 if TYPE_CHECKING:
     from fotismos.comparisons.cost.cost import Choice
     from fotismos.comparisons.cost.cost_record import Cost, Point
-    from fotismos.reference.records import Estimated
+    from fotismos.reference.records import Interval
 
 Rows: TypeAlias = Iterator[Sequence[str]]
 
@@ -105,7 +105,7 @@ def closure(record: Cost) -> str:
     closes = left.low <= 0
     verdict = "no more than noise" if closes else "more than noise: some effect is missing"
     return (
-        f"With all effects simulated ΔE2000 = {left.mean:.2g} is left ({left.low:.2g} to"
+        f"With all effects simulated ΔE2000 = {left.value:.2g} is left ({left.low:.2g} to"
         f" {left.high:.2g}; {verdict}). What the effects remove and what is left add up to the"
         f" departure, ΔE2000 = {departure:.4g}."
     )
@@ -158,7 +158,7 @@ def _offer(point: Point, measured: str) -> str:
     """Return a method, its time, and the error that 5 % exceed, at the size ``measured``."""
     return (
         f"{point.method} with {point.spp} samples per pixel in {seconds(point.seconds.value)}:"
-        f" {measured}5 % of the pixels exceed {LEADING.label} {number(point.tolerance.mean)}"
+        f" {measured}5 % of the pixels exceed {LEADING.label} {number(point.tolerance.value)}"
     )
 
 
@@ -185,8 +185,8 @@ def _points(points: Sequence[Point]) -> Rows:
             point.method,
             f"{point.spp}",
             *timed(point.seconds),
-            f"{point.error.mean:.3f} ± {point.error.high - point.error.mean:.3f}",
-            f"{point.tolerance.mean:.2f} ± {point.tolerance.high - point.tolerance.mean:.2f}",
+            f"{point.error.value:.3f} ± {point.error.high - point.error.value:.3f}",
+            f"{point.tolerance.value:.2f} ± {point.tolerance.high - point.tolerance.value:.2f}",
             close if point.front else "",
         )
 
@@ -198,15 +198,15 @@ def _off(record: Cost) -> Rows:
     for point in record.measured:
         forecast = forecasts[point.method, point.spp]
         time = point.seconds.value
-        error = point.error.mean
+        error = point.error.value
         yield (
             point.method,
             seconds(time),
             seconds(forecast.seconds.value),
             f"{forecast.seconds.value / time - 1:+.0%}",
             f"{error:.3f}",
-            f"{forecast.error.mean:.3f}",
-            f"{forecast.error.mean / error - 1:+.0%}" if error else "",
+            f"{forecast.error.value:.3f}",
+            f"{forecast.error.value / error - 1:+.0%}" if error else "",
         )
 
 
@@ -227,7 +227,7 @@ def _attribution(record: Cost) -> Rows:
         )
 
 
-def timed(time: Estimated) -> tuple[str, str]:
+def timed(time: Interval) -> tuple[str, str]:
     """Return a time, which may be below 0, and its interval."""
     return _seconds(time.value), f"{_seconds(time.low)} to {_seconds(time.high)}"
 

@@ -14,6 +14,8 @@ from typing import Any
 
 import click
 
+from fotismos.comparisons.options import Options
+
 LEVEL = "fotismos.verbosity"
 """Key of the level in click's context: -1 quiet, 0 normal, 1 verbose."""
 
@@ -58,16 +60,37 @@ def visible(text: str) -> str:
     return re.sub(r"##(?=\w*\[)", "# #", re.sub(r"^(\s*)::", r"\1\\::", shown))
 
 
+OPTION_NAMES = frozenset({*Options.__struct_fields__, "at", "form", "measure", "output", "update"})
+
+OPTION = re.compile(r"`(\w+)(?:=([^`]*))?`")
+
+
+def as_typed(text: str) -> str:
+    """Return text with options as one types them: `` `spp=64` `` becomes ``--spp 64``.
+
+    The rooms below name options as Python does.
+    """
+
+    def typed(match: re.Match[str]) -> str:
+        name, value = match.groups()
+        if name not in OPTION_NAMES:
+            return match[0]
+        option = f"--{name.replace('_', '-')}"
+        return option if value is None else f"{option} {value}"
+
+    return OPTION.sub(typed, text)
+
+
 def echo(text: str, err: bool = False) -> None:
     """Print text, each line as :func:`visible` returns it."""
-    click.echo("\n".join(map(visible, text.split("\n"))), err=err)
+    click.echo("\n".join(visible(line) for line in as_typed(text).split("\n")), err=err)
 
 
 def tell(lines: Iterable[str]) -> None:
     """Print lines of a result, unless the command is quiet."""
     if not is_quiet():
         for line in lines:
-            click.echo(visible(line))
+            echo(line)
 
 
 def tell_where(path: Path) -> None:
@@ -80,7 +103,7 @@ def remark(lines: Iterable[str]) -> None:
     """Print lines on standard error, if the command is verbose."""
     if level() > 0:
         for line in lines:
-            click.echo(visible(line), err=True)
+            echo(line, err=True)
 
 
 # --- Numbers ---------------------------------------------------------------------------------

@@ -73,7 +73,7 @@ def drawn(name):
         return lambda rng, count: [NOISES[name](rng) for _ in range(count)]
     case = open_case(name, Options(resolution=(WIDTH, HEIGHT)))
     half = prepare(case.source, case.options).reference
-    half.spp = 16
+    half.pass_spp = 16
     pool = np.array([np.array(half.render(pass_seed(9, number))) for number in range(64)])
 
     def draw(rng, count):

@@ -60,12 +60,12 @@ def _deviations(name, rounds):
     known = {(point.method, point.spp): point for point in record.predicted}
     found = []
     for point in record.measured:
-        said, error = known[point.method, point.spp], point.error.mean
+        said, error = known[point.method, point.spp], point.error.value
         found.append(
             {
                 "method": point.method,
                 "time": said.seconds.value / point.seconds.value - 1,
-                "error": _deviation(said.error.mean, error),
+                "error": _deviation(said.error.value, error),
             }
         )
     return found

@@ -15,7 +15,7 @@ from fotismos.comparisons.cost.cost import Study
 from fotismos.comparisons.departure import regions
 from fotismos.comparisons.departure.metrics import THRESHOLDS, drawn, log2_luminance_ratio
 from fotismos.comparisons.departure.regions import Region
-from fotismos.reference.records import Machine, Pixels, plain
+from fotismos.reference.records import Machine, Missing, Pixels, plain
 from fotismos.reference.rendering.gbuffer import ObjectIds
 from fotismos.reports.files import results
 from fotismos.reports.files.results import Failure, RunRecord
@@ -108,7 +108,9 @@ def exact():
         unrepresentable=(),
     )
     reason = "Flat shading does not evaluate 8.10 at pixels."
-    return Comparison(record, found.images, no_terms=reason, live="There are more than 16 lights.")
+    return Comparison(
+        record, found.images, Missing(reason), Missing("There are more than 16 lights.")
+    )
 
 
 def comparison(name, heuristic, reference, maps, significant):

@@ -88,7 +88,7 @@ def rendered(witness: Witness, everything: bool = False) -> tuple[np.ndarray, in
     case = open_case(witness.scene, request, witness.name)
     ready = prepare(case.source, case.options)
     images = [np.mean(one.images[0], axis=2) for one in passes((ready.reference,), 0, ready.passes)]
-    return np.array(images, float), ready.reference.spp * ready.passes
+    return np.array(images, float), ready.reference.pass_spp * ready.passes
 
 
 def deviation(witness: Witness, everything: bool = False, factor: float = 1.0) -> Deviation:
