@@ -8,7 +8,6 @@ from typing import Any
 from fotismos.comparisons import atomic
 from fotismos.comparisons.gallery.builtin import builtin
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.processes.pool import end_after_task
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError, suggestion
 from fotismos.reference.planning.plan import wants_spectra
@@ -73,7 +72,6 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
     if path is not None:
         content: Any = path
         if path.suffix == ".py":
-            end_after_task()  # the script may change this process
             content = Script(path)
         return _complete(Source(name or path.stem, content, options.define), options, str(path))
     if isinstance(scene, (str, Path)):
@@ -118,6 +116,11 @@ def file_of(scene: str | Path) -> Path | None:
             " UTF-8. Rename the file, or its folder."
         ) from error
     return path
+
+
+def is_script(scene: str | Path) -> bool:
+    """Return whether opening a scene runs a user's code, which may change the process."""
+    return Path(scene).suffix == ".py"
 
 
 def name_of(scene: str | Path) -> str:

@@ -7,7 +7,7 @@ The seed of pass ``i`` is hashed from the run's seed and ``i``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
@@ -31,7 +31,6 @@ from fotismos.comparisons.comparison import (
 )
 from fotismos.comparisons.departure import marks, regions, statistics
 from fotismos.comparisons.departure.blocks import bands
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
@@ -97,18 +96,12 @@ def compare(
     options = options or Options()
     _require_colour_science()
     printed: list[str] = []
-    with ExitStack() as formulas:
-        if options.colour_science:
-            from fotismos.comparisons.departure import definitions  # loaded late: it takes a second
-
-            formulas.enter_context(definitions.in_use())
-        with collect_messages(printed):
-            comparison, ready = _measured(source, options, progress, command, alone)
-        lines = count_messages([*source.messages, *printed])
-        comparison = comparison.warned(*lines)
-        for step in then:
-            comparison = step(comparison, ready, progress)
-        return _computed_twice(comparison)
+    with collect_messages(printed):
+        comparison, ready = _measured(source, options, progress, command, alone)
+    comparison = comparison.warned(*count_messages([*source.messages, *printed]))
+    for step in then:
+        comparison = step(comparison, ready, progress)
+    return _computed_twice(comparison)
 
 
 def _require_colour_science() -> None:
@@ -243,6 +236,7 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
     ``counted`` (H, W) are the pixels whose noise counts.
     """
     options = ready.options
+    distance = leading_distance(options.viewing, ready.metrics())
     sums = Accumulator(MEAN), Accumulator(DEVIATION), DifferenceSums(counted)
     done = 0
     reached = None
@@ -252,7 +246,7 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
         done = rendered.number + 1
         del rendered
         if options.noise is not None and is_checked(done, ready.passes):
-            reached = noise_percentile(sums, counted, options.viewing)
+            reached = noise_percentile(sums, counted, distance)
             if reached <= options.noise:
                 break
     loop.close()
@@ -289,17 +283,19 @@ def is_checked(done: int, passes: int) -> bool:
 
 
 def noise_percentile(
-    sums: tuple[Accumulator, Accumulator, DifferenceSums], counted: np.ndarray, viewing: Viewing
+    sums: tuple[Accumulator, Accumulator, DifferenceSums],
+    counted: np.ndarray,
+    distance: Callable[[np.ndarray, np.ndarray], np.ndarray],
 ) -> float:
     """Predict the noise: 95th percentile of ΔE2000 between the reference and itself with noise.
 
-    The noise is that of the difference of the halves, in which shared noise cancels.
+    The noise is that of the difference of the halves, in which shared noise cancels. ``distance``
+    is the leading metric's.
     """
     reference = sums[1].mean(np.float32)
     noise = sums[2].noise(np.float32)
     if not noise[counted].any():
         return 0.0
-    distance = leading_distance(viewing)
     distances = []
     for rows in bands(len(counted)):
         truth = reference[rows][counted[rows]].astype(np.float64)
@@ -319,10 +315,11 @@ def _measure(estimates: Estimates, ready: Prepared) -> tuple[dict[str, Any], Ima
     reference = estimates.reference
     noise = estimates.difference.noise
     counted = surface.hit
-    metrics = {}
+    metrics = ready.metrics()
+    summaries = {}
     maps = {}
-    for name, metric in METRICS.items():
-        metrics[name], distances = statistics.summarise(
+    for name, metric in metrics.items():
+        summaries[name], distances = statistics.summarise(
             metric,
             test,
             reference=reference,
@@ -335,7 +332,7 @@ def _measure(estimates: Estimates, ready: Prepared) -> tuple[dict[str, Any], Ima
             maps[name] = distances
     ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(test, reference, counted)
     significant = marks.find(
-        estimates.difference, test, counted, leading_distance(options.viewing), exact=exact
+        estimates.difference, test, counted, leading_distance(options.viewing, metrics), exact=exact
     )
     error = maps[LEADING.name]
     shapes, seen = regions.find_objects(
@@ -357,7 +354,7 @@ def _measure(estimates: Estimates, ready: Prepared) -> tuple[dict[str, Any], Ima
     numbers = {
         "objects": shapes,
         "materials": materials,
-        "metrics": metrics,
+        "metrics": summaries,
         "log2_luminance": ratio,
         "significant": Significant(
             fraction=statistics.share(significant[counted] == marks.MARKED),

@@ -1,7 +1,7 @@
 """A scene made ready to be rendered: paired, planned, probed, with a renderer for each half."""
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
+from fotismos.comparisons.departure.metrics import METRICS, Metric
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
@@ -88,6 +89,14 @@ class Prepared:
         surface = gbuffer(self.scene, image_size(self.scene))
         dr.flush_malloc_cache()
         return surface
+
+    def metrics(self) -> Mapping[str, Metric]:
+        """Return the metrics, computed by colour-science if the options say so."""
+        if not self.options.colour_science:
+            return METRICS
+        from fotismos.comparisons.departure import definitions  # loaded late: it takes a second
+
+        return definitions.metrics()
 
     @cached_property
     def counted(self) -> np.ndarray:

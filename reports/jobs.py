@@ -247,9 +247,6 @@ scheduler_option = click.option(
 process_options = with_options(timeout_option, workers_option, scheduler_option)
 verbosity_options = with_options(quiet_option, verbose_option)
 
-IN_PROCESSES = True
-"""Whether scenes are read and rendered in separate processes; tests use their own process."""
-
 
 def percentage(text: str) -> float:
     """Parse a percentage with its sign, from 0 % to 100 %, as a share from 0 to 1."""
@@ -309,16 +306,15 @@ def pool(
     if scheduler is None:
         workers = min(workers or cores(), max(1, tasks))
         threads = max(1, cores() // workers) if workers > 1 else None
-        return Pool(workers if IN_PROCESSES else 0, Ready(level(), threads), timeout)
+        return Pool(workers, Ready(level(), threads), timeout)
     if workers and workers > 1:
         raise click.UsageError("--workers and --scheduler exclude each other.")
     from fotismos.comparisons.processes import cluster  # loaded late: Dask is an extra
 
-    # As a context it gives a Cluster, which does what a Pool does.
     ready = Ready(
         level=level(), threads=None, folder=os.getcwd(), program=shlex.join(program.program())
     )
-    return cast(Pool, cluster.connected(scheduler, ready))
+    return cluster.connected(scheduler, ready)
 
 
 def work(command_name: str, processes: Pool, /, **options: Any) -> Any:

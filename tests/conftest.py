@@ -12,6 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import pytest
 
+from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic import plugins
 from fotismos.reference.rendering import direct
 from fotismos.reports import jobs
@@ -47,7 +48,7 @@ WHY = next(option for option in compare.params if option.name == "with_causes")
 """Whether `compare` finds causes, which takes nine tenths of a small run."""
 
 # In tests, commands render in this process, which has loaded all that they need, without causes.
-jobs.IN_PROCESSES = False
+jobs.Pool = lambda count, *others: Pool(0, *others)
 BY_DEFAULT, WHY.default = WHY.default, False
 
 
@@ -60,7 +61,7 @@ def causes(monkeypatch):
 @pytest.fixture
 def apart(monkeypatch):
     """Let commands render in a process apart, as they do for their users."""
-    monkeypatch.setattr(jobs, "IN_PROCESSES", True)
+    monkeypatch.setattr(jobs, "Pool", Pool)
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -80,7 +80,7 @@ def test_a_study_has_its_effects_files_and_tables(name, scene_file):
 @pytest.fixture
 def declared(monkeypatch):
     """Forget afterwards what a test declares."""
-    monkeypatch.setattr(methods, "_DECLARED", {})
+    monkeypatch.setattr(methods.METHODS, "added", {})
 
 
 def ladder(source, **options):
@@ -160,7 +160,7 @@ def test_a_declared_method_replaces_one_of_its_name_but_none_of_the_package(decl
 def test_kernels_that_are_compared_have_the_same_mesh(rgb):
     source = SCENES["fig-8-9"].source()
     reason = ladder(source).left_out["flat kernel"]
-    assert reason.endswith("give --tessellation to measure all on one mesh")
+    assert reason.endswith("give `tessellation` to measure all on one mesh")
     for options in ({"tessellation": 4}, {"interpolation": "gouraud"}):
         found = ladder(source, **options)
         names = [method.name for method in found.methods[:3]]

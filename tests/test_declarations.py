@@ -164,7 +164,7 @@ def test_a_method_and_a_heuristic_are_in_json_tables_page_and_chart(
     run, scene_file, tmp_path, monkeypatch
 ):
     """Nothing but their declarations names them in the product."""
-    monkeypatch.setattr(methods, "_DECLARED", {})
+    monkeypatch.setattr(methods.METHODS, "added", {})
     methods.declare(NO_SHADOWS)
     monkeypatch.setitem(HEURISTICS.added, TONE.name, TONE)
     scene_file.write_text(PLAIN, encoding="utf-8")

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from fotismos.comparisons.processes import cluster
-from fotismos.comparisons.processes.pool import Pool, Task, end_after_task
+from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import InputError, LostProcessError
 from tests import dask_cluster
 from tests.outputs import results
@@ -84,11 +84,6 @@ def unready():
 
 def give_what_cannot_be_sent():
     return lambda: None
-
-
-def spend():
-    end_after_task()
-    return os.getpid()
 
 
 def is_alive(pid):
@@ -166,7 +161,7 @@ def test_processes_answer_once_and_are_replaced_when_spent_or_dead():
     with Pool(1) as pool:
         found = do(pool, *(Task(name, fork_and, (name,)) for name in "abc"))
         assert found == {name: f"{name} of the parent" for name in "abc"}
-        pids = list(do(pool, Task("d", process, ()), Task("e", spend, ()),
+        pids = list(do(pool, Task("d", process, ()), Task("e", process, (), ends_process=True),
                        Task("f", process, ())).values())  # fmt: skip
         assert pids[0] == pids[1] != pids[2]
         os.kill(pids[2], signal.SIGKILL)

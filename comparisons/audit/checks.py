@@ -122,12 +122,11 @@ def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "
     """
     try:
         return _audited(kind, name, parameters=parameters, command=command)
-    except FotismosError:
-        raise
-    except Exception as error:
-        if kind == "bsdf" and heuristics.in_file(name):  # a user's code may raise anything
-            raise InputError(f"{error_text(error)} (BSDF {name}).") from error
-        raise
+    except Exception as error:  # a user's code may raise anything
+        is_users = kind == "bsdf" and heuristics.in_file(name)
+        if isinstance(error, FotismosError) or not is_users:
+            raise
+        raise InputError(f"{error_text(error)} (BSDF {name}).") from error
 
 
 def _audited(kind: Kind, name: str, parameters: Mapping[str, Any], command: str) -> Audit:

@@ -21,6 +21,7 @@ from fotismos.comparisons.cost.cost_record import Method
 from fotismos.comparisons.hybrids.hybrids import HybridScenes, Pairs
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
+from fotismos.heuristic.declared import Declared
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named
 from fotismos.heuristic.plugins.interpolated import require_colours
@@ -86,7 +87,39 @@ FULL_PLAN = Method(name="full plan", family="physical")
 BUILT_IN = (*KERNELS, *STAND_INS, PHONG_BSDF, DIRECT, *PATHS, FULL_PLAN)
 """The package's own methods, cheapest idea first."""
 
-_DECLARED: dict[str, Method] = {}
+
+class Methods(Declared[Method]):
+    """All methods; one from outside leaves out what a plan can leave out."""
+
+    def declare(self, declaration: Method) -> Method:
+        """Add a method to every ladder and return it; it replaces a declared one of its name.
+
+        ``InputError`` for a name of the package itself, and for an effect that a plan cannot leave
+        out: it needs the kernel, or a second image.
+        """
+        allowed = [
+            effect.label
+            for effect in EFFECTS
+            if isinstance(effect, (PrunedEffect, ReplacedEffect))
+            and not isinstance(effect, GlowingEffect)
+        ]
+        for effect in declaration.without:
+            if effect not in allowed:
+                raise InputError(
+                    f"a method without {effect} is not possible: leave out some of"
+                    f" {', '.join(allowed)}."
+                )
+        return super().declare(declaration)
+
+
+METHODS = Methods("method", "fotismos.methods")
+"""All methods, the package's own first."""
+
+for _method in BUILT_IN:
+    METHODS.own(_method)
+
+declare = METHODS.declare
+"""Declare a method and return it; every ladder then has it."""
 
 
 def all_methods(is_short: bool = False) -> tuple[Method, ...]:
@@ -94,37 +127,8 @@ def all_methods(is_short: bool = False) -> tuple[Method, ...]:
 
     A short ladder has only the shortest of the paths, and nothing that stands in for transport.
     """
-    *cheaper, full = BUILT_IN
-    left_out = (*STAND_INS, *PATHS[1:]) if is_short else ()
-    return tuple(
-        method for method in (*cheaper, *_DECLARED.values(), full) if method not in left_out
-    )
-
-
-def declare(method: Method) -> Method:
-    """Add a method to every ladder and return it; it replaces a declared one of the same name.
-
-    ``InputError`` for a name of the package itself, and for an effect that a plan cannot leave out:
-    it needs the kernel, or a second image.
-    """
-    if method.name in {method.name for method in BUILT_IN}:
-        raise InputError(
-            f"method {method.name!r} is already declared by fotismos: give another name."
-        )
-    allowed = [
-        effect.label
-        for effect in EFFECTS
-        if isinstance(effect, (PrunedEffect, ReplacedEffect))
-        and not isinstance(effect, GlowingEffect)
-    ]
-    for effect in method.without:
-        if effect not in allowed:
-            raise InputError(
-                f"a method without {effect} is not possible: leave out some of"
-                f" {', '.join(allowed)}."
-            )
-    _DECLARED[method.name] = method
-    return method
+    left_out = (FULL_PLAN, *STAND_INS, *PATHS[1:]) if is_short else (FULL_PLAN,)
+    return (*(method for method in METHODS.values() if method not in left_out), FULL_PLAN)
 
 
 class Step(NamedTuple):

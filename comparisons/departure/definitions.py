@@ -4,8 +4,8 @@ They take ten times as long as the compiled ones (`fotismos.comparisons.departur
 are used instead. Every comparison, ``fotismos doctor`` and the tests compare the two.
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from colour.models import (
 )
 
 from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, PQ_PEAK, Array, Viewing
-from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.departure.metrics import METRICS, Metric
 
 AGREEMENT = 1e-4
 """Largest allowed deviation of the compiled colour differences from colour-science's."""
@@ -95,15 +95,15 @@ def farthest() -> float:
     return max(deviations(test, reference, distances).values())
 
 
-@contextmanager
-def in_use() -> Iterator[None]:
-    """Let metrics be computed by colour-science in the block, not by the compiled formulas."""
-    compiled = {name: dict(vars(METRICS[name])) for name in DEFINED}
-    try:
-        for name, (space, difference) in DEFINED.items():
-            vars(METRICS[name]).update(coordinates=space, difference=difference)
-        with np.errstate(all="ignore"):
-            yield
-    finally:
-        for name, fields in compiled.items():
-            vars(METRICS[name]).update(fields)
+def metrics() -> dict[str, Metric]:
+    """Return all metrics; colour-science computes those that it defines."""
+    chosen = dict(METRICS)
+    for name, (space, difference) in DEFINED.items():
+        metric: Any = chosen[name]
+        chosen[name] = replace(metric, coordinates=_quiet(space), difference=_quiet(difference))
+    return chosen
+
+
+def _quiet(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Let a function ignore the warnings of black colours, which have no hue."""
+    return np.errstate(all="ignore")(function)

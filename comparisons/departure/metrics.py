@@ -33,7 +33,7 @@ Every image is a float array (H, W, 3) of linear light with the sRGB primaries (
 1.0 is display white. Statistics over an image are in `fotismos.comparisons.departure.statistics`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import EllipsisType
 from typing import Any
@@ -339,6 +339,9 @@ def log2_luminance_ratio(test: ArrayLike, reference: ArrayLike) -> Array:
     return np.log2(lift[0] / lift[1])
 
 
-def leading_distance(viewing: Viewing) -> Callable[[Array, Array], Array]:
-    """Return the leading metric, ``(test, reference) -> (N,)``, for colours (N, 3)."""
-    return lambda test, reference: LEADING.against(reference, ..., viewing)(test)
+def leading_distance(
+    viewing: Viewing, metrics: Mapping[str, Metric] = METRICS
+) -> Callable[[Array, Array], Array]:
+    """Return the leading one of the metrics, ``(test, reference) -> (N,)``, for colours (N, 3)."""
+    leading: Any = metrics[LEADING.name]
+    return lambda test, reference: leading.against(reference, ..., viewing)(test)

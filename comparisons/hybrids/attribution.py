@@ -37,7 +37,7 @@ from fotismos.comparisons.comparison import (
 )
 from fotismos.comparisons.departure.blocks import ratio
 from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
 from fotismos.comparisons.departure.noise import contrasts, without_noise
 from fotismos.comparisons.departure.regions import Region, find_objects
 from fotismos.comparisons.hybrids.hybrids import HybridImages, HybridScenes, Pairs, labels
@@ -140,7 +140,8 @@ def find(
         progress=progress, stage="reference",
     )  # fmt: skip
     groups = np.stack([np.array(rendered.images[0]) for rendered in loop])
-    meter = ErrorMeter(groups, surface.hit, options.viewing)
+    leading: Any = ready.metrics()[LEADING.name]
+    meter = ErrorMeter(groups, surface.hit, options.viewing, leading)
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
     images = HybridImages(
@@ -159,11 +160,18 @@ class ErrorMeter:
     """Errors in ΔE2000 against a reference, without the noise of both.
 
     ``groups`` (R, H, W, 3) are passes of the reference, one per replicate of an image. ``counted``
-    (H, W) are the pixels that count.
+    (H, W) are the pixels that count. ``metric`` is ΔE2000.
     """
 
-    def __init__(self, groups: NDArray, counted: NDArray[np.bool_], viewing: Viewing) -> None:
+    def __init__(
+        self,
+        groups: NDArray,
+        counted: NDArray[np.bool_],
+        viewing: Viewing,
+        metric: Pixelwise = LEADING,
+    ) -> None:
         self.viewing = viewing
+        self.metric = metric
         self.counted = counted
         self._groups = np.asarray(groups)[:, counted].astype(float)
         _, self._blocks = np.unique(block_numbers(counted), return_inverse=True)
@@ -185,7 +193,7 @@ class ErrorMeter:
         found = []
         for chosen, references in self._references:
             noisier = self._noisier(images[chosen])
-            differences = map(LEADING.difference, references, noisier)
+            differences = map(self.metric.difference, references, noisier)
             plain = next(differences)
             noisy = list(differences)
             before = np.bincount(self._blocks, plain).astype(float)
@@ -209,7 +217,7 @@ class ErrorMeter:
         mean = images.mean(axis=0)
         noise = np.tensordot(contrasts(np.ones(len(images))), images, 1)
         shown = (mean, *(mean + sign * deviation for deviation in noise))
-        return [LEADING.coordinates(pixels, self.viewing) for pixels in shown]
+        return [self.metric.coordinates(pixels, self.viewing) for pixels in shown]
 
 
 def attribute(
@@ -275,7 +283,7 @@ def attribute(
     previews = images.previews(errors, clean)
     kernel = images.pixels(images.plain_kernel).mean(axis=0)
     plugin = images.pixels(images.plugin(nothing)).mean(axis=0)
-    rounding = LEADING(plugin, kernel, meter.viewing)[meter.counted]
+    rounding = meter.metric(plugin, kernel, meter.viewing)[meter.counted]
     return Causes(
         record=Attribution(
             effects=contributions,

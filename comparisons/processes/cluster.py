@@ -9,7 +9,6 @@ makes in its worker persist.
 import logging
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager
 from itertools import islice
 from threading import Lock
 from typing import Any
@@ -107,9 +106,8 @@ class Cluster(Pool):
             queue.update(submit(islice(waiting, 1)))
 
 
-@contextmanager
-def connected(address: str, prepare: Callable[[], object] = tuple) -> Iterator[Cluster]:
-    """Use the Dask cluster whose scheduler is at an address, such as ``tcp://host:8786``.
+def connected(address: str, prepare: Callable[[], object] = tuple) -> Cluster:
+    """Return the Dask cluster whose scheduler is at an address, such as ``tcp://host:8786``.
 
     ``InstallationError`` if the extra is not installed, or the scheduler does not answer.
     """
@@ -129,5 +127,4 @@ def connected(address: str, prepare: Callable[[], object] = tuple) -> Iterator[C
     # Messages about lost workers and schedulers are Dask's own affair.
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    with client:
-        yield Cluster(client, prepare)
+    return Cluster(client, prepare)

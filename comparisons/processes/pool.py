@@ -1,9 +1,9 @@
 """A pool of processes: a task that ends its process, or hangs, harms no other task.
 
 A process does task after task, so its start-up is paid once. A new one replaces one that died, or
-that ran a user's code (:func:`end_after_task`). Each leads its own process group, which ends as a
-whole: with the process, when its time is up, or when the parent ends in any way. The processes of a
-command take turns: while one measures times, the others wait.
+that ran a user's script. Each leads its own process group, which ends as a whole: with the process,
+when its time is up, or when the parent ends in any way. The processes of a command take turns:
+while one measures times, the others wait.
 """
 
 import fcntl
@@ -32,14 +32,6 @@ LOOK_S = 1.0
 LOGGER = logging.getLogger(__name__)
 """Receives the traceback of unexpected errors."""
 
-_is_spent = False
-
-
-def end_after_task() -> None:
-    """End this process of a pool once its task is done: other tasks need a clean one."""
-    global _is_spent
-    _is_spent = True
-
 
 @cache
 def once(prepare: Callable[[], object]) -> None:
@@ -59,13 +51,15 @@ class Task:
     """A call of ``function(*arguments)``, both of them picklable.
 
     ``name`` appears in messages. ``progress``, if given, is called in the parent; the function
-    takes a callable that forwards to it as its last argument.
+    takes a callable that forwards to it as its last argument. If it runs a user's script, which may
+    change its process, it ``ends_process``: other tasks need a clean one.
     """
 
     name: str
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
     progress: Callable[..., None] | None = None
+    ends_process: bool = False
 
 
 class Pool:
@@ -156,7 +150,7 @@ class Pool:
                 worker.lose(f"it made no progress for {self._limit_s:g} s, and was ended.")
             if worker.outcome.done():
                 over.append(worker)
-                if worker.is_spent:
+                if worker.is_over or worker.task.ends_process:
                     worker.end()
                 else:
                     self._idle.append(worker)
@@ -173,7 +167,7 @@ class Worker:
 
     def __init__(self, prepare: Callable[[], object]) -> None:
         context = get_context("spawn")  # a fork would share threads' locks with its parent
-        self.is_spent = False
+        self.is_over = False
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_work, args=(theirs, prepare), daemon=True)
         resource_tracker.ensure_running()  # here, because it unblocks signals
@@ -190,7 +184,7 @@ class Worker:
     def receive(self, limit_s: float) -> None:
         """Take one message, which may be the outcome of the task."""
         try:
-            kind, content, self.is_spent = self.pipe.recv()
+            kind, content = self.pipe.recv()
         except (EOFError, OSError):
             self.lose()
             return
@@ -232,7 +226,7 @@ class Worker:
 
     def end(self) -> None:
         """End the process and its group."""
-        self.is_spent = True
+        self.is_over = True
         self.pipe.close()
         assert self.process.pid is not None
         with suppress(ProcessLookupError, PermissionError):  # no group yet, or only dead ones in it
@@ -286,12 +280,12 @@ def _answer(
 
 def _send(pipe: Any, kind: str, content: Any) -> None:
     try:
-        pipe.send((kind, content, _is_spent))
+        pipe.send((kind, content))
     except OSError:  # the parent is gone, or this is a fork
         os._exit(0)
     except Exception as error:  # pickling can raise anything
         reason = f"its result cannot be sent: {type(error).__name__}: {error}"
-        pipe.send(("set_exception", LostProcessError(reason), _is_spent))
+        pipe.send(("set_exception", LostProcessError(reason)))
 
 
 # --- Turns --------------------------------------------------------------------------------------

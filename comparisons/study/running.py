@@ -18,7 +18,7 @@ import numpy as np
 import pyarrow as pa
 
 from fotismos.comparisons.atomic import Entry
-from fotismos.comparisons.case import RGB, open_case
+from fotismos.comparisons.case import RGB, is_script, open_case
 from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.processes.pool import Pool, Task
@@ -147,7 +147,15 @@ def run(
     report = progress or (lambda *_: None)
     begin = total - len(left)
     report("points", begin, total)
-    tasks = [Task(f"points of {point.part.name}", row, (point,)) for point in left.values()]
+    tasks = [
+        Task(
+            name=f"points of {point.part.name}",
+            function=row,
+            arguments=(point,),
+            ends_process=is_script(point.part.scene),
+        )
+        for point in left.values()
+    ]
     for done, (task, outcome) in enumerate((pool or Pool(0)).each(tasks), start=begin + 1):
         (point,) = task.arguments
         error = outcome.exception()

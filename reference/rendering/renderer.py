@@ -6,6 +6,7 @@ both. Samples within a pass are stratified; passes are independent, and give the
 """
 
 import gc
+import logging
 import resource
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -26,6 +27,9 @@ from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import FotismosError, InputError, NonFiniteError
 from fotismos.reference.records import Amount, Record, Size
 from fotismos.reference.rendering.gbuffer import image_size, resize
+
+LOGGER = logging.getLogger(__name__)
+"""Receives why passes cannot be replayed."""
 
 LARGEST_PASS = 2**26
 """Samples of one pass, and pixels of an image; memory may allow fewer."""
@@ -179,6 +183,7 @@ class Renderer:
             except InputError:  # the scene cannot be prepared
                 raise
             except Exception:  # a plugin's message is better when it is traced
+                LOGGER.info("%s: passes are traced, not replayed", self.label, exc_info=True)
                 self._replayed = None
         return _rendered(*arguments)
 

@@ -194,7 +194,7 @@ def _wrong_mesh(plugin: str, path: str, number: int, stamp: tuple) -> str:
         description["shape_index"] = number
     try:
         mesh = mi.load_dict(description)
-    except Exception:  # making the scene raises it again
+    except RuntimeError:  # making the scene raises it again
         return ""
     if not mesh.face_count():
         return "it has no faces, which a shape must have."

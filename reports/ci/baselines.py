@@ -1,5 +1,6 @@
 """Baselines as files: finding them, reading and writing them, and the scenes that they name."""
 
+import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from fotismos.comparisons import atomic
 from fotismos.comparisons.atomic import content, require_regular
-from fotismos.comparisons.case import SUFFIXES, Case, file_of, open_case
+from fotismos.comparisons.case import SUFFIXES, Case, file_of, is_script, open_case
 from fotismos.comparisons.check.measurement import HALVES, Baseline, read_baseline
 from fotismos.comparisons.departure.blocks import averaged, shrunk
 from fotismos.comparisons.options import Options
@@ -77,6 +78,14 @@ def read(path: Path) -> BaselineFile:
     return BaselineFile(path, read_baseline(read_text(path), str(path)))
 
 
+def may_run_script(path: Path) -> bool:
+    """Return whether a check of a baseline runs a script: its scene is one, or not yet known."""
+    try:
+        return is_script(json.loads(content(path, LARGEST)).get("scene", ""))
+    except (OSError, ValueError, AttributeError, TypeError, RecursionError):
+        return True
+
+
 def read_text(path: Path, of_pictures: bool = False) -> str:
     """Read the text of a baseline: of a scene, or of pictures."""
     try:
@@ -96,17 +105,18 @@ def require_own_pictures(path: Path) -> None:
         return
     import OpenEXR
 
+    foreign = InputError(
+        f"{images}: fotismos did not make this file, which the baseline's would replace. Move it"
+        " away, or give another baseline."
+    )
     try:
         require_regular(images)
         with OpenEXR.File(str(images), separate_channels=True, header_only=True) as file:
-            is_own = all(name.startswith("baseline.") for name in file.channels())
-    except Exception:  # the library has many for a file that is not EXR
-        is_own = False
-    if not is_own:
-        raise InputError(
-            f"{images}: fotismos did not make this file, which the baseline's would replace. Move"
-            " it away, or give another baseline."
-        )
+            names = [*file.channels()]
+    except Exception as error:  # the library has many for a file that is not EXR
+        raise foreign from error
+    if not all(name.startswith("baseline.") for name in names):
+        raise foreign
 
 
 def write(path: Path, baseline: Baseline, pictures: Kept | None = None) -> None:

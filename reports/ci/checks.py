@@ -363,7 +363,11 @@ def _each(
     with progress.shown() as bar:
         tasks = [
             Task(
-                name=call[0].name, function=function, arguments=call, progress=bar.of(call[0].stem)
+                name=call[0].name,
+                function=function,
+                arguments=call,
+                progress=bar.of(call[0].stem),
+                ends_process=baselines.may_run_script(call[0]),
             )
             for call in calls
         ]

@@ -12,7 +12,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from fotismos.comparisons.case import name_of, picture_parts
+from fotismos.comparisons.case import is_script, name_of, picture_parts
 from fotismos.comparisons.comparison import machine, versions
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.options import Options
@@ -207,6 +207,7 @@ def _compare(
             function=scene.compare,
             arguments=call,
             progress=bar.of(name_of(call[0]), stages),
+            ends_process=is_script(call[0]),
         )
         for target, call in calls.items()
     ]

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from fotismos.comparisons.case import file_of, name_of
+from fotismos.comparisons.case import file_of, is_script, name_of
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.reports.files import results
 from fotismos.reports.jobs import command_line
@@ -33,6 +33,7 @@ def results_of(
                 function=work,
                 arguments=(scene, *arguments, target),
                 progress=bar.of(target.name),
+                ends_process=is_script(scene),
             )
             for target, scene in zip(places, scenes, strict=True)
         ]
