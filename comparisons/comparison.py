@@ -19,6 +19,7 @@ from fotismos.comparisons.departure.regions import ObjectShare, Region
 from fotismos.comparisons.departure.statistics import RatioSummary, Summary
 from fotismos.comparisons.processes.pool import cores
 from fotismos.heuristic import __version__
+from fotismos.heuristic.convention import Floats
 from fotismos.reference.pairing.factors import Unrepresentable
 from fotismos.reference.pairing.halves import Pairing
 from fotismos.reference.pairing.prepare import Override
@@ -231,11 +232,11 @@ class Causes:
     """
 
     record: Attribution
-    maps: dict[str, NDArray]
-    departure: NDArray
-    left: NDArray
+    maps: dict[str, Floats]
+    departure: Floats
+    left: Floats
     counted: NDArray[np.bool_]
-    previews: dict[tuple[str, ...], NDArray]
+    previews: dict[tuple[str, ...], Floats]
 
 
 class PictureRecord(Record):

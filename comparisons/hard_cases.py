@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons import textbook
 from fotismos.comparisons.textbook import NAIVE, Setting, unit
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.kernel import shade
 from fotismos.heuristic.lights import PointLight, SpotLight
 from fotismos.heuristic.materials import Material
@@ -36,7 +37,7 @@ class HardCase:
     bound: float
     setting: Setting
     difficulty: str
-    exactly: NDArray | None = None
+    exactly: Floats | None = None
     naive_error: float = np.inf
     our_error: float = np.inf
 
@@ -45,7 +46,7 @@ class HardCase:
         """Whether ours keeps the bound."""
         return self.our_error <= self.bound
 
-    def exact(self) -> NDArray:
+    def exact(self) -> Floats:
         """Return the exact values, (N,)."""
         return textbook.shade_exactly(self.setting) if self.exactly is None else self.exactly
 
@@ -121,7 +122,7 @@ LIGHT = (1.0, 2.0, 4.0)
 NORMAL = (0.1, 0.2, 0.9)
 
 
-def _about_mirror(angle: NDArray) -> NDArray:
+def _about_mirror(angle: Floats) -> Floats:
     """Return views at angles from the mirror image of :data:`LIGHT` about :data:`NORMAL`."""
     light = unit(np.array(LIGHT, np.float32).astype(float))
     normal = unit(np.array(NORMAL, np.float32).astype(float))
@@ -155,7 +156,7 @@ def _grazing() -> Setting:
     return Setting(normal=normal, light=along + height, view=height - along, k_s=1.0, n=100.5)
 
 
-def _under_spot(angle: NDArray, **changes: Any) -> Setting:
+def _under_spot(angle: Floats, **changes: Any) -> Setting:
     """Return points of a plane at angles from the axis of a spot above it."""
     position = np.stack([2 * np.tan(angle), 0 * angle, 0 * angle], axis=1)
     return replace(_SPOT, position=position, normal=(0.0, 0.0, 1.0), **changes)

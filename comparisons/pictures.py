@@ -277,7 +277,8 @@ def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Place:
 def _edges(layers: np.ndarray) -> np.ndarray:
     """Return the size of the gradient, on a scale that is 1/2 at 1/4 and ends at 1."""
     size = np.sqrt((np.array(np.gradient(layers, axis=(0, 1))) ** 2).sum(axis=(0, -1)))
-    return size / (size + 0.25)
+    strength: np.ndarray = size / (size + 0.25)
+    return strength
 
 
 def _shift(edges: np.ndarray, seen: np.ndarray) -> Place:
@@ -477,7 +478,8 @@ def _blocks(image: np.ndarray, counted: np.ndarray) -> np.ndarray:
     weighted = np.where(counted[..., None], image, 0)[:height, :width].astype(float)
     sums = weighted.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3).sum(axis=(1, 3))
     sums = sums.reshape(-1, 3)
-    return np.maximum(sums, 1e-3 * max(sums.mean(), 1e-9))
+    means: np.ndarray = np.maximum(sums, 1e-3 * max(sums.mean(), 1e-9))
+    return means
 
 
 def _other_reading(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> str:

@@ -18,7 +18,7 @@ from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.heuristic import kernel, materials, terms, vectors
-from fotismos.heuristic.convention import Scene
+from fotismos.heuristic.convention import Floats, Scene
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.heuristic.kernel import LightContribution
@@ -60,6 +60,8 @@ MODELS = "phong", "blinn"
 
 Colour = tuple[float, float, float]
 """Linear RGB."""
+
+Whole = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -138,10 +140,10 @@ class TermGrid:
     """
 
     resolution: tuple[int, int]
-    columns: NDArray[np.int64]
-    rows: NDArray[np.int64]
+    columns: Whole
+    rows: Whole
     materials: tuple[TermMaterial, ...]
-    material: NDArray[np.int64]
+    material: Whole
     cos_view: NDArray[np.float64]
     lights: tuple[GridLight, ...]
     others: NDArray[np.float64] | None = None
@@ -175,9 +177,10 @@ class TermGrid:
         diffuse = k_d[self.material] * np.maximum(light.cos_incidence, 0)[..., None]
         specular = k_s[self.material] * light.lobe[..., None]
         reflected = light.intensity * diffuse + light.specular_intensity * specular
-        return light.attenuation[..., None] * reflected
+        image: NDArray[np.float64] = light.attenuation[..., None] * reflected
+        return image
 
-    def _light(self, light: GridLight, material: TermMaterial, cell: tuple) -> LightTerms:
+    def _light(self, light: GridLight, material: TermMaterial, cell: tuple[int, int]) -> LightTerms:
         arrays = ("attenuation", "cos_incidence", "cos_view", "lobe")
         here = vars(light) | {name: float(getattr(light, name)[cell]) for name in arrays}
         n_l = here["cos_incidence"]
@@ -205,10 +208,10 @@ class LivePoints:
     again below.
     """
 
-    planes: dict[str, NDArray]
+    planes: dict[str, Floats]
     materials: tuple[TermMaterial, ...]
     lights: tuple[dict[str, Any], ...]
-    rays: list
+    rays: list[Any]
     is_flat: bool
 
 
@@ -300,7 +303,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | Missing:
     if not points.hit.any():
         return Missing("No pixel’s centre sees a shaded surface.")
     materials, places = points.materials()
-    vectors = dict[str, NDArray]()
+    vectors = dict[str, Floats]()
     if len(materials) > MATERIALS:
         vectors["k_d"] = points.select(lambda material: points.colours(material.k_d))
         has_ambient = points.colours(points.ambient).any()  # else k_a, too, does not matter
@@ -363,7 +366,7 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | Missing:
     return replace(grid, lights=tuple(lights[number] for number in strongest), others=others)
 
 
-def _pixels(resolution: tuple[int, int], lights: int) -> tuple[NDArray, NDArray]:
+def _pixels(resolution: tuple[int, int], lights: int) -> tuple[Whole, Whole]:
     """Return the columns and rows of the pixels in the middles of the cells."""
     longest = min(SIDE, int((VALUES / 2 / lights) ** 0.5) if lights > 2 else SIDE)
     across, down = shrunk(resolution, longest)
@@ -404,7 +407,7 @@ class _Points:
         value = value[0] if dr.depth_v(value) > 1 and len(value) == 1 else value
         return np.array(mi.Color3f(value) + dr.zeros(mi.Color3f, len(self.hit)), np.float64).T
 
-    def select(self, read: Callable[[Material], NDArray]) -> NDArray[np.float64]:
+    def select(self, read: Callable[[Material], Floats]) -> NDArray[np.float64]:
         """Return numbers read from the material at each point, (N, C)."""
         total = np.zeros(())
         for material, mask in self.present:
@@ -412,7 +415,7 @@ class _Points:
             total = total + np.where(here, read(material), 0.0)
         return total
 
-    def materials(self, ones: Sequence[str] = ()) -> tuple[tuple[TermMaterial, ...], NDArray]:
+    def materials(self, ones: Sequence[str] = ()) -> tuple[tuple[TermMaterial, ...], Whole]:
         """Return the different materials, with 1 for some of `ROW`, and each point's index."""
         number = self.floats(self.known.index(self.si, self.si.is_valid()))
         rows = np.column_stack((number, self.select(self._row), self.colours(self.ambient)))
@@ -453,7 +456,7 @@ class _Points:
             at = (self.position, self.normal, self.view)
             return next(kernel.contributions(*at, material, [light]))
 
-        def lobe(material: Material) -> NDArray:
+        def lobe(material: Material) -> Floats:
             cosine = contribution(material).cos_lobe
             if cosine is None:  # a mirror shows no light
                 return np.zeros((len(self.hit), 1))
@@ -487,7 +490,7 @@ TERMS = dict(zip(("emission", "ambient", "diffuse", "specular"), COEFFICIENTS, s
 """The coefficient of each term."""
 
 
-def layers(half: Renderer, options: Options, whole: NDArray) -> dict[str, NDArray]:
+def layers(half: Renderer, options: Options, whole: Floats) -> dict[str, Floats]:
     """Return the terms of a heuristic half as layers that add up to its image ``whole``, (H, W, 3).
 
     Each has its share of the half's first pass, rendered once more: all passes would add a quarter

@@ -49,10 +49,10 @@ class PlainScene:
     """
 
     name: str
-    camera: dict
+    camera: dict[str, Any]
     shapes: tuple[Triangles, ...]
-    materials: tuple[dict, ...]
-    lights: tuple[dict, ...]
+    materials: tuple[dict[str, Any], ...]
+    lights: tuple[dict[str, Any], ...]
     ambient: tuple[float, ...]
     layers: dict[str, np.ndarray]
 
@@ -95,7 +95,7 @@ def _layers(scene: Scene) -> dict[str, np.ndarray]:
     return {"P": seen.position, "N": seen.normal, "shape": shape}
 
 
-def camera(scene: mi.Scene) -> dict:
+def camera(scene: mi.Scene) -> dict[str, Any]:
     """Return the camera as matrices, rows of numbers.
 
     ``to_world`` is Mitsuba's: the camera looks along +z, +y is up, +x to the left. ``view`` and
@@ -158,7 +158,7 @@ def triangles_of(shape: mi.Shape, material: int, resolution: int | None) -> Tria
     )
 
 
-def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict:
+def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict[str, Any]:
     """Return a material; a texture gives the value in its middle."""
     point = dr.zeros(mi.SurfaceInteraction3f)
     point.uv = mi.Point2f(0.5)
@@ -183,7 +183,7 @@ def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict:
     }
 
 
-def light_of(emitter: mi.Emitter, point: mi.SurfaceInteraction3f) -> dict:
+def light_of(emitter: mi.Emitter, point: mi.SurfaceInteraction3f) -> dict[str, Any]:
     """Return a light as paired; ``intensity`` is I_p, and ``attenuation`` k0, k1, k2 of 6.1.
 
     A light of two intensities has them too.

@@ -12,38 +12,40 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from fotismos.heuristic.convention import Floats
 
 NAIVE = np.float32
 EXACT = np.longdouble
 
 
-def dot(a: NDArray, b: NDArray) -> NDArray:
+def dot(a: Floats, b: Floats) -> Floats:
     """Return the dot products (..., 1) of vectors."""
-    return (a * b).sum(axis=-1, keepdims=True)
+    product: Floats = (a * b).sum(axis=-1, keepdims=True)
+    return product
 
 
-def unit(vectors: NDArray) -> NDArray:
+def unit(vectors: Floats) -> Floats:
     """Return vectors over their length, without precautions."""
     return vectors / np.sqrt(dot(vectors, vectors))
 
 
-def mirrored(normal: NDArray, toward: NDArray, view: NDArray) -> NDArray:
+def mirrored(normal: Floats, toward: Floats, view: Floats) -> Floats:
     """Return ``R.V``, where ``R = 2 (N.L) N - L`` (8.7)."""
     return dot(2 * normal * dot(normal, toward) - toward, view)
 
 
-def halfway(normal: NDArray, toward: NDArray, view: NDArray) -> NDArray:
+def halfway(normal: Floats, toward: Floats, view: Floats) -> Floats:
     """Return ``N.H`` of Blinn (1977)."""
     return dot(normal, unit(toward + view))
 
 
-def clamped(cosine: NDArray) -> NDArray:
+def clamped(cosine: Floats) -> Floats:
     """Return a cosine, or 0 if it is negative."""
     return np.maximum(cosine, 0)
 
 
-def lobe(cosine: NDArray, n: Any, incidence: NDArray) -> NDArray:
+def lobe(cosine: Floats, n: Any, incidence: Floats) -> Floats:
     """Return ``cosine^n``, 0 where the light is not above the surface."""
     return np.where(incidence > 0, clamped(cosine) ** n, 0)
 
@@ -76,7 +78,7 @@ class Setting:
         return replace(self, **single)
 
 
-def shade(setting: Setting, dtype: Any) -> NDArray:
+def shade(setting: Setting, dtype: Any) -> Floats:
     """Evaluate equation 8.10 for one light, without precautions: an array (N,) of a precision."""
     s = setting
     with np.errstate(all="ignore"):
@@ -99,7 +101,7 @@ def shade(setting: Setting, dtype: Any) -> NDArray:
         return np.atleast_1d(np.where(cosine <= 0, 0, value))
 
 
-def shade_exactly(setting: Setting) -> NDArray:
+def shade_exactly(setting: Setting) -> Floats:
     """Evaluate the same in extended precision, and define it where the equations do not.
 
     A direction that does not exist receives no light, and the lobe ends where ``R.V <= 0``, for
@@ -114,7 +116,7 @@ def shade_exactly(setting: Setting) -> NDArray:
     return np.where(exists, value, 0)
 
 
-def _vectors(s: Setting, dtype: Any) -> tuple[NDArray, NDArray, NDArray]:
+def _vectors(s: Setting, dtype: Any) -> tuple[Floats, Floats, Floats]:
     """Return normal, view, and the way to the light."""
     normal = np.asarray(s.normal).astype(dtype)
     view = np.asarray(s.view).astype(dtype)

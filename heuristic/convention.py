@@ -31,6 +31,7 @@ RADIANCE_PER_IRRADIANCE = 1.0 / pi
 
 Array: TypeAlias = Any  # numbers of any shape; the docstring gives it
 Doubles: TypeAlias = NDArray[np.float64]  # the same in NumPy, where no kernel needs them
+Floats: TypeAlias = NDArray[np.floating]  # the same, of either precision
 Number: TypeAlias = Any  # one number per point, or one for all, which may be a plain number
 Cosines: TypeAlias = Any  # a fotismos.heuristic.numerics.Cosine, or the cosine alone, -1..1
 Mask: TypeAlias = Any  # one truth value per point

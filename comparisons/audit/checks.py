@@ -350,4 +350,5 @@ def disagreement(centre: float, shade: Any) -> float:
 def _central(shade: Any, centre: float, step: float) -> np.ndarray:
     above = np.array(dr.detach(shade(mi.Float(centre + step))), float)
     below = np.array(dr.detach(shade(mi.Float(centre + (-step)))), float)
-    return (above - below) / (2 * step)
+    slope: np.ndarray = (above - below) / (2 * step)
+    return slope

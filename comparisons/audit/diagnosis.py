@@ -256,7 +256,8 @@ def _spaces() -> Iterator[Mistake]:
 
 
 def _without_gate(cosine: Array, n: Array, incidence: Array) -> Array:
-    return clamped(cosine) ** n
+    power: Array = clamped(cosine) ** n
+    return power
 
 
 def _mirrored_behind(normal: Array, toward: Array, view: Array) -> Array:

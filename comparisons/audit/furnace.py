@@ -18,11 +18,13 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from fotismos.heuristic.convention import Floats
 
 UP = np.array([[0.0], [0.0], [1.0]])
 
-Response = Callable[[NDArray, NDArray], NDArray]
+Response = Callable[[Floats, Floats], Floats]
 """Of directions (3, N) to the light and the viewer: values (C, N)."""
 
 GRID = (240, 180)
@@ -36,7 +38,7 @@ def of_bsdf(bsdf: Any) -> Response:
     return lambda light, view: np.atleast_2d(np.array(evaluate(bsdf, light, view), float))
 
 
-def evaluate(bsdf: Any, light: NDArray, view: NDArray) -> Any:
+def evaluate(bsdf: Any, light: Floats, view: Floats) -> Any:
     """Return a BSDF's response as a Dr.Jit array; Mitsuba's ``wi`` is the viewer's side."""
     count = max(light.shape[1], view.shape[1])
     toward = mi.Vector3f(np.broadcast_to(light, (3, count)))
@@ -48,14 +50,14 @@ def evaluate(bsdf: Any, light: NDArray, view: NDArray) -> Any:
     return dr.pi * mi.Spectrum(bsdf.eval(mi.BSDFContext(), si, toward))
 
 
-def direction(theta: ArrayLike, phi: ArrayLike) -> NDArray:
+def direction(theta: ArrayLike, phi: ArrayLike) -> Floats:
     """Return unit vectors (3, N) at angles from the normal and about it, in radians."""
     theta, phi = np.broadcast_arrays(np.atleast_1d(theta), phi)
     return np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
 
 
 @lru_cache(maxsize=20)
-def sphere(azimuths: int, heights: int, edge: float = 1.0) -> tuple[NDArray, NDArray]:
+def sphere(azimuths: int, heights: int, edge: float = 1.0) -> tuple[Floats, Floats]:
     """Return directions (2, 3, N) above a surface and below it, and the solid angle (N,) of each.
 
     They are dense about the normal, ``|cos(theta)| = 1 - t^2`` at the nodes ``t`` of Gauss and
@@ -78,12 +80,12 @@ def both_sides(degrees: tuple[float, ...], eta: float | None) -> tuple[float, ..
     return degrees if eta is None else degrees + tuple(180 - degree for degree in reversed(degrees))
 
 
-def radiance(eta: float | None, directions: NDArray) -> NDArray:
+def radiance(eta: float | None, directions: Floats) -> Floats:
     """Return the square of the index of refraction on the side of directions; 1 above."""
     return np.where(directions[2] < 0, (eta or 1) ** 2, 1.0)
 
 
-def _about(degrees: float, grid: tuple[int, int], eta: float | None) -> tuple[NDArray, ...]:
+def _about(degrees: float, grid: tuple[int, int], eta: float | None) -> tuple[Floats, ...]:
     """Return the direction (3, 1) at an angle, and :func:`sphere` about it.
 
     Its edge is the cosine of what an upright facet refracts there: beyond it, none does.
@@ -99,7 +101,7 @@ def seen(
 ) -> float:
     """Return what a viewer at an angle sees in the furnace: the channel that is farthest from 1."""
     view, lights, solid_angle = _about(degrees, grid, eta)
-    values = sum(
+    values: Any = sum(
         response(light, view) @ (solid_angle * radiance(eta, light) / radiance(eta, view) / np.pi)
         for light in lights
     )
@@ -111,7 +113,7 @@ def returned(
 ) -> float:
     """Return the share of the light from an angle that leaves, of the brightest channel."""
     light, views, solid_angle = _about(degrees, grid, eta)
-    values = sum(
+    values: Any = sum(
         response(light, view) @ (np.abs(view[2] / light[2]) * solid_angle / np.pi)
         for view in (views if eta else views[:1])
     )
@@ -123,17 +125,18 @@ def single_scattering(alpha: float, degrees: float) -> float:
     """Return what GGX with Smith's correlated masking (Heitz 2014) reflects of a white metal."""
     square = alpha * alpha
 
-    def response(light: NDArray, view: NDArray) -> NDArray:
+    def response(light: Floats, view: Floats) -> Floats:
         half = light + view
         top = half[2] ** 2 / (half**2).sum(axis=0)
         paths = (np.sqrt(square + (1 - square) * direction[2] ** 2) for direction in (view, light))
         masked = light[2] * next(paths) + view[2] * next(paths)
-        return (light[2] * square / (1 - top + square * top) ** 2 / (2 * masked))[None]
+        density: Floats = (light[2] * square / (1 - top + square * top) ** 2 / (2 * masked))[None]
+        return density
 
     return returned(response, degrees, GRID)
 
 
-def random_pairs(count: int, eta: float | None = None) -> list[NDArray]:
+def random_pairs(count: int, eta: float | None = None) -> list[Floats]:
     """Return two sets of random directions (3, N), within 80 degrees of the normal.
 
     Of what transmits light, half lie below.
@@ -149,7 +152,7 @@ def random_pairs(count: int, eta: float | None = None) -> list[NDArray]:
     return pairs
 
 
-def asymmetries(response: Response, a: NDArray, b: NDArray, eta: float | None = None) -> NDArray:
+def asymmetries(response: Response, a: Floats, b: Floats, eta: float | None = None) -> Floats:
     """Return ``|g(a, b) - g(b, a)|``, ``g = f / n_v^2``, over the mean of both, (C, N).
 
     It is 0 where the mean is below a thousandth of the largest.
@@ -158,7 +161,8 @@ def asymmetries(response: Response, a: NDArray, b: NDArray, eta: float | None = 
     back = response(b, a) / np.abs(b[2]) / radiance(eta, a)
     mean = (there + back) / 2
     counted = mean > 1e-3 * mean.max()
-    return np.divide(np.abs(there - back), mean, out=np.zeros_like(mean), where=counted)
+    relative: Floats = np.divide(np.abs(there - back), mean, out=np.zeros_like(mean), where=counted)
+    return relative
 
 
 def describe(light: np.ndarray, view: np.ndarray, index: int) -> str:

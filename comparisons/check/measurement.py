@@ -16,7 +16,6 @@ from typing import Annotated, Any
 import msgspec
 import numpy as np
 from msgspec import Meta, structs
-from numpy.typing import NDArray
 
 from fotismos.comparisons.case import Case
 from fotismos.comparisons.comparison import versions
@@ -27,6 +26,7 @@ from fotismos.comparisons.departure.statistics import noise_floor
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
 from fotismos.heuristic import program
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference import records
 from fotismos.reference.pairing.prepare import film_size
@@ -219,7 +219,7 @@ def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metri
 def _half(images: Array) -> Half:
     """Return the colours of the passes (n, H, W, 3) of one half."""
 
-    def estimate(values: Array) -> tuple[NDArray, NDArray]:
+    def estimate(values: Array) -> tuple[Floats, Floats]:
         return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(len(values))
 
     whole = estimate(images.mean(axis=(1, 2)))

@@ -156,7 +156,8 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
 def sidak(p: ArrayLike, tests: int) -> NDArray[np.float64]:
     """Return the chance of a p-value as small as `p` among this many independent tests."""
     with np.errstate(divide="ignore"):  # p = 1
-        return -np.expm1(tests * np.log1p(-np.asarray(p, float)))
+        chances: NDArray[np.float64] = -np.expm1(tests * np.log1p(-np.asarray(p, float)))
+        return chances
 
 
 def level_of_each(level: float, checks: int) -> float:

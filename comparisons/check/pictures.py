@@ -143,7 +143,8 @@ class Means:
         c = -stdtrit(self.freedom, level_of_each(level, self.tests) / 2.0)
         errors = c * (1.0 - 0.25 / self.freedom)
         errors += QUANTILE * np.sqrt(1.0 + c**2 / (2.0 * self.freedom))
-        return np.maximum(errors * self.error, self.rounding)
+        error: NDArray[np.float64] = np.maximum(errors * self.error, self.rounding)
+        return error
 
 
 def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
@@ -186,8 +187,9 @@ def _tiles(image: Array) -> Array:
     return block_sums(image[:height, :width], side)
 
 
-def _total(values: NDArray) -> Array:
-    return values.sum(axis=(0, 1, 2))
+def _total(values: np.ndarray) -> Array:
+    total: NDArray[np.float64] = values.sum(axis=(0, 1, 2))
+    return total
 
 
 # --- Baselines -----------------------------------------------------------------------------------

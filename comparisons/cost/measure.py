@@ -28,6 +28,7 @@ from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.prepare import film_size
 from fotismos.reference.records import Interval
@@ -101,7 +102,7 @@ def reduced(source: Source, options: Options, width: int) -> Size:
     return width, max(1, round(size[1] * width / size[0]))
 
 
-Judge = Callable[[NDArray], tuple[float, float]]
+Judge = Callable[[Floats], tuple[float, float]]
 """Returns an image's mean ΔE2000, and the ΔE2000 that a share LIMIT of its pixels exceed."""
 
 
@@ -109,7 +110,7 @@ def judge_by(reference: Estimate, counted: NDArray[np.bool_], viewing: Viewing) 
     """Return what measures the errors of single images against a converged reference."""
     distances = LEADING.against(reference.mean, counted, viewing)
 
-    def judge(image: NDArray) -> tuple[float, float]:
+    def judge(image: Floats) -> tuple[float, float]:
         found = distances(image)
         return LEADING.mean(found), float(np.quantile(found, 1 - LIMIT))
 
@@ -135,7 +136,7 @@ class Measurements:
     points: tuple[Point, ...]
     lines: Mapping[str, times.Line]
     steps: tuple[Step, ...]
-    images: Mapping[str, NDArray]
+    images: Mapping[str, Floats]
 
 
 def measure_ladder(
@@ -288,13 +289,13 @@ def rendered(
     seed: int,
     progress: Progress | None,
     stage: str,
-) -> tuple[dict[Key, tuple[MeanError, MeanError]], dict[Key, NDArray]]:
+) -> tuple[dict[Key, tuple[MeanError, MeanError]], dict[Key, Floats]]:
     """Render in turn, at least twice; the renderers note their times.
 
     Returns the errors of those that are ``judged``, mean and tolerance, and their last images.
     """
     errors: dict[Key, list[tuple[float, float]]] = {key: [] for key in renderers if key in judged}
-    images: dict[Key, NDArray] = {}
+    images: dict[Key, Floats] = {}
     loop = passes([*renderers.values()], seed, rounds, progress=progress, stage=stage)
     for images_of_pass in loop:
         for key, image in zip(renderers, images_of_pass.images, strict=True):

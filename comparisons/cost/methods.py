@@ -109,7 +109,8 @@ class Methods(Declared[Method]):
                     f"a method without {effect} is not possible: leave out some of"
                     f" {', '.join(allowed)}."
                 )
-        return super().declare(declaration)
+        super().declare(declaration)
+        return declaration
 
 
 METHODS = Methods("method", "fotismos.methods")

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Interval
 
 LEAST_S = 0.05
@@ -63,7 +64,7 @@ def lines(measured: Mapping[str, Mapping[int, Rounds]], seed: int = 0) -> dict[s
     }
     drawn = np.random.default_rng(seed).integers(rounds, size=(DRAWS, rounds))
     drawn = np.vstack([np.arange(rounds), drawn])
-    best: dict[str, tuple[NDArray, NDArray]] = {}
+    best: dict[str, tuple[Floats, Floats]] = {}
     slopes: list[Draws] = []
     work: list[Draws] = []
     for name, by_count in measured.items():
@@ -83,7 +84,7 @@ def lines(measured: Mapping[str, Mapping[int, Rounds]], seed: int = 0) -> dict[s
     }
 
 
-def _line(counts: NDArray, wall: NDArray, per_sample: Draws, processors: float) -> Line:
+def _line(counts: Floats, wall: Floats, per_sample: Draws, processors: float) -> Line:
     overhead = np.maximum(wall[0] - per_sample * counts[0], 0.0)
     between = int(np.argmin(np.abs(counts - counts[-1] / 4)))
     chord = np.interp(counts[between], counts[[0, -1]], wall[[0, -1], 0])

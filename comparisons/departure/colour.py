@@ -25,7 +25,6 @@ from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Positive, Record
 
 Array = NDArray[np.float64]
-Floats = NDArray[np.floating]  # of either precision
 Colour = TypeVar("Colour", Array3f, Array3f64)
 Formula = Callable[[Array3f64], Array3f64]
 

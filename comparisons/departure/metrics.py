@@ -44,7 +44,6 @@ from numpy.typing import ArrayLike, NDArray
 from fotismos.comparisons.departure.colour import (
     DEFAULT_VIEWING,
     Array,
-    Floats,
     Viewing,
     cam16ucs,
     ciede2000,
@@ -56,6 +55,7 @@ from fotismos.comparisons.departure.colour import (
     root_mean_square,
 )
 from fotismos.comparisons.departure.flip import hdr_flip, ldr_flip
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.declared import Declared
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.rendering.renderer import require_finite

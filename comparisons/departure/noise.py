@@ -44,8 +44,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fotismos.comparisons.departure.blocks import ratio
-from fotismos.comparisons.departure.colour import Array, Floats, Viewing
+from fotismos.comparisons.departure.colour import Array, Viewing
 from fotismos.comparisons.departure.metrics import Distances, Metric, Pixelwise
+from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Interval, Positive, Share
 from fotismos.reference.rendering.sums import Grouped, jackknife_error, student
 

@@ -18,7 +18,7 @@ from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons.departure.blocks import block_sums
-from fotismos.comparisons.departure.colour import Floats
+from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Amount, Count, Record, Share, Size
 from fotismos.reference.rendering.gbuffer import ObjectIds
 

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Array, Floats, Viewing
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Array, Viewing
 from fotismos.comparisons.departure.metrics import (
     Metric,
     Pixelwise,
@@ -20,6 +20,7 @@ from fotismos.comparisons.departure.metrics import (
     log2_luminance_ratio,
 )
 from fotismos.comparisons.departure.noise import VisibleShare, debiased, exactly, roughly
+from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Amount, Positive, Record
 from fotismos.reference.rendering.sums import Grouped
 

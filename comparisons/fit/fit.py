@@ -43,6 +43,7 @@ from fotismos.comparisons.fit.search import (
 )
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named
 from fotismos.heuristic.materials import FORMS
@@ -73,10 +74,10 @@ class Fit:
     """A fit: its record, linear images (H, W, 3), and maps (H, W) of the best form, by metric."""
 
     record: FitRecord
-    before: NDArray
-    reference: NDArray
-    after: NDArray
-    maps: dict[str, NDArray]
+    before: Floats
+    reference: Floats
+    after: Floats
+    maps: dict[str, Floats]
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class RenderedHalves:
 
     ready: Prepared
     seeds: tuple[int, ...]
-    before: NDArray
+    before: Floats
     reference: Estimate
     difference: Estimate
     counted: NDArray[np.bool_]
@@ -231,9 +232,9 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
 def _best(
     rendered: RenderedHalves,
     fitted: PhongModel | OwnModel,
-    starts: Callable[[Objective], list[NDArray]],
+    starts: Callable[[Objective], list[Floats]],
     loss: Loss,
-) -> tuple[FormFit, NDArray, dict[str, NDArray]]:
+) -> tuple[FormFit, Floats, dict[str, Floats]]:
     """Return the record of a fit, its image, and the maps of what it leaves."""
     counted = rendered.counted
     objective = Objective(
@@ -275,7 +276,7 @@ def _best(
     return record, after, maps
 
 
-def form_starts(objective: Objective) -> list[NDArray]:
+def form_starts(objective: Objective) -> list[Floats]:
     """Return the paired parameters, and lobes of several widths with coefficients that suit each.
 
     The latter are the best in linear RGB.
@@ -285,7 +286,7 @@ def form_starts(objective: Objective) -> list[NDArray]:
     low, high = model.bounds(phong.parameters)
     at_n = np.array([parameter.name == "n" for parameter in phong.parameters])
     linear = phong.linear
-    starts = [paired]
+    starts: list[Floats] = [paired]
     for n in STARTS:
         x = np.where(at_n, log(n * 4 if phong.form == "blinn" else n), paired)
         columns = phong.columns(x)[linear].reshape(linear.sum(), -1)
@@ -297,7 +298,7 @@ def form_starts(objective: Objective) -> list[NDArray]:
     return starts
 
 
-def own_starts(objective: Objective) -> list[NDArray]:
+def own_starts(objective: Objective) -> list[Floats]:
     """Return the defaults of a heuristic's parameters, and places within their bounds."""
     parameters = objective.model.parameters
     default = np.array([parameter.paired for parameter in parameters])
@@ -309,8 +310,8 @@ def own_starts(objective: Objective) -> list[NDArray]:
 
 
 def departures(
-    rendered: RenderedHalves, after: NDArray
-) -> tuple[dict[str, FitDeparture], dict[str, NDArray]]:
+    rendered: RenderedHalves, after: Floats
+) -> tuple[dict[str, FitDeparture], dict[str, Floats]]:
     """Return the departures by metric, and the metrics' maps (H, W) after the fit."""
     reference = rendered.reference.mean
     counted = rendered.counted

@@ -6,12 +6,12 @@ from typing import Annotated, Any, Literal
 import mitsuba as mi
 import numpy as np
 from msgspec import Meta
-from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.fit.model import OwnModel, PhongModel
 from fotismos.comparisons.fit.search import AT_BOUND, COVERAGE, Certainty
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.terms import normalisation
 from fotismos.reference.records import (
     VERSION,
@@ -136,9 +136,9 @@ def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
 def parameter_record(
     model: PhongModel | OwnModel,
     index: int,
-    x: NDArray,
+    x: Floats,
     certainties: list[Certainty],
-    covariance: NDArray,
+    covariance: Floats,
 ) -> FittedParameter:
     """Return one parameter at the best vector ``x``, ``k_s`` and ``n`` in the chapters' units."""
     parameter = model.parameters[index]
@@ -163,7 +163,8 @@ def parameter_record(
         above = normalisation(phong.form, exp(x[at_n] + step))
         slopes = np.zeros(len(x))
         slopes[[index, at_n]] = per_albedo, value * (above - below) / (2 * step)
-        spread = COVERAGE * sqrt(max(slopes @ covariance @ slopes, 0))
+        variance = float(slopes @ covariance @ slopes)
+        spread = COVERAGE * sqrt(max(variance, 0))
         at_pairing = normalisation(phong.form, exp(phong.parameters[at_n].paired))
         k_s = value * per_albedo
         limits = (0.0, per_albedo)

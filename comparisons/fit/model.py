@@ -36,7 +36,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from fotismos.heuristic.convention import Colour, Mask, Scene
+from fotismos.heuristic.convention import Colour, Doubles, Floats, Mask, Scene
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Heuristic
 from fotismos.heuristic.kernel import shade
@@ -99,7 +99,7 @@ class Surface:
 
     names: tuple[str, ...]
     materials: tuple[Material, ...]
-    samples: tuple[dict[str, NDArray], ...]
+    samples: tuple[dict[str, Floats], ...]
     lights: tuple[Any, ...]
     ambient: Colour
     fixed: NDArray[np.float64]
@@ -341,7 +341,11 @@ class PhongModel:
     """
 
     def __init__(
-        self, surface: Surface, form: str, counted: NDArray | None = None, vector: Any = None
+        self,
+        surface: Surface,
+        form: str,
+        counted: NDArray[np.bool_] | None = None,
+        vector: Any = None,
     ) -> None:
         self.surface = surface
         self.form = form
@@ -358,22 +362,24 @@ class PhongModel:
         self._lobe = lru_cache(maxsize=len(surface.names))(self._rendered_lobe)
         self._columns = lru_cache(maxsize=1)(self._derivatives)
 
-    def whole(self, x: NDArray) -> NDArray[np.float64]:
+    def whole(self, x: Floats) -> NDArray[np.float64]:
         """Return the image of all pixels for a vector of parameters."""
         columns = self._columns(tuple(x))[self.linear]
         return self.surface.fixed + np.tensordot(x[self.linear], columns, 1)
 
-    def image(self, x: NDArray) -> NDArray[np.float64]:
+    def image(self, x: Floats) -> NDArray[np.float64]:
         """Return the image (N, 3) of the counted pixels."""
-        return self.whole(x)[self.counted]
+        image: Doubles = self.whole(x)[self.counted]
+        return image
 
-    def columns(self, x: NDArray) -> NDArray[np.float64]:
+    def columns(self, x: Floats) -> NDArray[np.float64]:
         """Return the derivatives (number of parameters, N, 3) of the image."""
-        return self._columns(tuple(x))[:, self.counted]
+        derivatives: Doubles = self._columns(tuple(x))[:, self.counted]
+        return derivatives
 
-    def coefficients(self, x: NDArray, name: str) -> dict[int, NDArray]:
+    def coefficients(self, x: Floats, name: str) -> dict[int, Floats]:
         """Return RGB of a coefficient for each material (for ``k_s``, the lobe's albedo)."""
-        sums = {owner: np.zeros(3) for owner in range(len(self.surface.samples))}
+        sums: dict[int, Floats] = {owner: np.zeros(3) for owner in range(len(self.surface.samples))}
         for number, parameter in zip(x, self.parameters, strict=True):
             if parameter.name == name:
                 sums[parameter.owner] += number * np.array(parameter.tint)
@@ -383,7 +389,7 @@ class PhongModel:
         """Return the index of a material's ``n``."""
         return [(p.name, p.owner) for p in self.parameters].index(("n", owner))
 
-    def _derivatives(self, x: NDArray) -> Any:
+    def _derivatives(self, x: Floats) -> Any:
         result = np.empty((len(x), *self.surface.fixed.shape))
         albedo = self.coefficients(x, "k_s")
         for index, parameter in enumerate(self.parameters):
@@ -449,7 +455,11 @@ class OwnModel:
     """
 
     def __init__(
-        self, renderer: Renderer, heuristic: Heuristic, seeds: Sequence[int], counted: NDArray
+        self,
+        renderer: Renderer,
+        heuristic: Heuristic,
+        seeds: Sequence[int],
+        counted: NDArray[np.bool_],
     ) -> None:
         self.parameters = tuple(
             FitParameter(
@@ -469,20 +479,21 @@ class OwnModel:
         self._counted = counted
         self._kept = lru_cache(maxsize=2 + len(self.parameters))(self._rendered)
 
-    def whole(self, x: NDArray) -> NDArray:
+    def whole(self, x: Floats) -> Floats:
         """Return the whole image, (H, W, 3)."""
         return self._kept(tuple(x))
 
-    def image(self, x: NDArray) -> NDArray:
+    def image(self, x: Floats) -> Floats:
         """Return the image (N, 3) of the counted pixels."""
-        return self.whole(x)[self._counted]
+        image: Floats = self.whole(x)[self._counted]
+        return image
 
-    def columns(self, x: NDArray) -> NDArray:
+    def columns(self, x: Floats) -> Floats:
         """Return the derivatives (number of parameters, N, 3) of the image."""
         images = (self._kept(tuple(x), index) for index in range(len(x)))
         return np.stack([image[self._counted] for image in images])
 
-    def _rendered(self, x: tuple[float, ...], by: int | None = None) -> NDArray:
+    def _rendered(self, x: tuple[float, ...], by: int | None = None) -> Floats:
         """Return the mean of the passes, or of their derivatives by one parameter."""
         integrator = self._renderer.integrator
         scene = self._renderer.scene

@@ -35,6 +35,7 @@ from scipy.optimize import lsq_linear
 
 from fotismos.comparisons.departure.colour import Viewing, cam16ucs_unclipped
 from fotismos.comparisons.fit.model import bounds
+from fotismos.heuristic.convention import Floats
 
 STEP = 1e-4
 SMALLEST_STEP = 1e-8
@@ -74,13 +75,13 @@ class Loss:
     """
 
     unit: str
-    coordinates: Callable[[NDArray, Viewing], NDArray]
-    derivative: Callable[[NDArray, Viewing], NDArray]
+    coordinates: Callable[[Floats, Viewing], Floats]
+    derivative: Callable[[Floats, Viewing], Floats]
     threshold: float
     rounding: float = inf
 
 
-def _perceptual_derivative(rgb: NDArray, viewing: Viewing) -> NDArray:
+def _perceptual_derivative(rgb: Floats, viewing: Viewing) -> Floats:
     """Return central differences; all six images are converted at once."""
     step = STEP * np.abs(rgb) + SMALLEST_STEP
     shifts = np.concatenate([sign * np.eye(3) for sign in (1, -1)])
@@ -113,7 +114,7 @@ class Objective:
     ``columns(x)`` (P, N, 3), its derivatives.
     """
 
-    def __init__(self, model: Any, reference: NDArray, loss: Loss, viewing: Viewing) -> None:
+    def __init__(self, model: Any, reference: Floats, loss: Loss, viewing: Viewing) -> None:
         self.model = model
         self.reference = reference
         self.loss = loss
@@ -125,11 +126,11 @@ class Objective:
         loss = replace(self.loss, rounding=max(self.loss.rounding, SMOOTH))
         return Objective(self.model, self.reference, loss=loss, viewing=self.viewing)
 
-    def value(self, x: NDArray) -> float:
+    def value(self, x: Floats) -> float:
         """Return the loss of a vector of parameters."""
         return self.value_of(self.model.image(x))
 
-    def value_of(self, image: NDArray) -> float:
+    def value_of(self, image: Floats) -> float:
         """Return the loss of an image (N, 3)."""
         differences = self.loss.coordinates(image, self.viewing) - self._target
         square = np.sum(differences**2, axis=1)
@@ -138,7 +139,7 @@ class Objective:
         values = square / (np.sqrt(square + c * c) + c) if isfinite(c) else square / 2
         return float(values.mean())
 
-    def changes(self, x: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def changes(self, x: Floats) -> tuple[Floats, Floats, Floats]:
         """Return the slopes of the loss by a pixel's coordinates, its curvatures, and a Jacobian.
 
         ``d / s`` (N, K) and ``I / s - d d^T / s^3`` (N, K, K), with ``s = sqrt(d^2 + c^2)``, and
@@ -157,7 +158,7 @@ class Objective:
         curvature = identity / s[..., None] - d[:, :, None] * d[:, None, :] / s[..., None] ** 3
         return d / s, curvature, jacobian
 
-    def quadratic(self, x: NDArray) -> tuple[NDArray, NDArray]:
+    def quadratic(self, x: Floats) -> tuple[Floats, Floats]:
         """Return gradient (P,) and second derivative (P, P) of the loss by the parameters."""
         slopes, curvature, jacobian = self.changes(x)
         gradient = np.einsum("nkp,nk->p", jacobian, slopes)
@@ -166,7 +167,7 @@ class Objective:
         return gradient / len(slopes), second / len(slopes)
 
 
-def search(objective: Objective, starts: Sequence[NDArray]) -> tuple[NDArray, float, bool]:
+def search(objective: Objective, starts: Sequence[Floats]) -> tuple[Floats, float, bool]:
     """Return the parameters of least loss, the loss there, and whether that search converged.
 
     The paired start, which is the first, and the best others are followed to their minimum.
@@ -180,7 +181,7 @@ def search(objective: Objective, starts: Sequence[NDArray]) -> tuple[NDArray, fl
     return min(minima, key=lambda minimum: minimum[1])
 
 
-def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, bool]:
+def descend(objective: Objective, x: Floats) -> tuple[Floats, float, bool]:
     """Return the minimum that a search from ``x`` finds, its loss, and whether it converged."""
     low, high = bounds(objective.model.parameters)
     loss = objective.value(x)
@@ -204,7 +205,7 @@ def descend(objective: Objective, x: NDArray) -> tuple[NDArray, float, bool]:
     return x, loss, False
 
 
-def bounded_minimum(second: NDArray, gradient: NDArray, low: NDArray, high: NDArray) -> NDArray:
+def bounded_minimum(second: Floats, gradient: Floats, low: Floats, high: Floats) -> Floats:
     """Return the minimum of ``g x + x H x / 2`` within bounds, by bounded least squares.
 
     Directions without curvature get as much of it as rounding would leave, and stay in place.
@@ -214,7 +215,8 @@ def bounded_minimum(second: NDArray, gradient: NDArray, low: NDArray, high: NDAr
     solved = lsq_linear(
         roots[:, None] * vectors.T, -(vectors.T @ gradient) / roots, (low, high), method="bvls"
     )
-    return np.clip(solved.x, low, high)
+    solution: Floats = np.clip(solved.x, low, high)
+    return solution
 
 
 @dataclass(frozen=True)
@@ -231,7 +233,7 @@ class Certainty:
 
 
 def identify(
-    objective: Objective, x: NDArray, pixels: NDArray[np.int64], standard_error: NDArray
+    objective: Objective, x: Floats, pixels: NDArray[np.int64], standard_error: Floats
 ) -> tuple[list[Certainty], NDArray[np.float64]]:
     """Judge each parameter at the best fit ``x``, and return the covariance (P, P) of them.
 
@@ -279,10 +281,11 @@ def identify(
     return certainties, covariance
 
 
-def _inverse_normal(jacobian: NDArray) -> NDArray:
+def _inverse_normal(jacobian: Floats) -> Floats:
     """Return ``(J^T J)^-1``; singular values below rounding are raised to it."""
     if not jacobian.shape[1]:
         return np.zeros((0, 0))
     _, singular, rows = np.linalg.svd(jacobian, full_matrices=False)
     scaled = rows.T / np.maximum(singular, 1e-12 * singular[0])
-    return scaled @ scaled.T
+    covariance: Floats = scaled @ scaled.T
+    return covariance

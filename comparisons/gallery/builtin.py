@@ -33,7 +33,7 @@ class BuiltIn:
 
     name: str
     title: str
-    make: Callable[[], dict]
+    make: Callable[[], dict[str, Any]]
     variant: str = "llvm_ad_rgb"
     heuristic_variant: str | None = None
     interpolation: str = "phong"
@@ -60,14 +60,16 @@ def _scene(function: str, *arguments: Any, **more: Any) -> dict[str, Any]:
     """Make a scene by a function of ``gallery.scenes``, which imports Mitsuba."""
     from fotismos.comparisons.gallery import scenes  # loaded late: names need no Mitsuba
 
-    return getattr(scenes, function)(*arguments, **more)
+    scene: dict[str, Any] = getattr(scenes, function)(*arguments, **more)
+    return scene
 
 
 def _spectral(function: str) -> dict[str, Any]:
     """Make a scene by a function of ``gallery.spectra``, which few scenes load."""
     from fotismos.comparisons.gallery import spectra  # loaded late: few scenes have any
 
-    return getattr(spectra, function)()
+    scene: dict[str, Any] = getattr(spectra, function)()
+    return scene
 
 
 def _figure(name: str, title: str, lights: Any, viewer: Any, **coefficients: float) -> BuiltIn:

@@ -119,7 +119,7 @@ def highlight_in_a_triangle() -> dict[str, Any]:
 
 def cornell_box() -> dict[str, Any]:
     """Mitsuba's Cornell box, with independent pixels."""
-    scene = mi.cornell_box()
+    scene: dict[str, Any] = mi.cornell_box()
     scene["sensor"]["film"]["rfilter"] = {"type": "box"}
     return scene
 

@@ -43,6 +43,7 @@ from fotismos.comparisons.departure.regions import Region, find_objects
 from fotismos.comparisons.hybrids.hybrids import HybridImages, HybridScenes, Pairs, labels
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
+from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.heuristic.errors import FotismosError
 from fotismos.reference.planning.effects import Effect
 from fotismos.reference.rendering.gbuffer import (
@@ -114,7 +115,7 @@ def find(
     source: Source,
     options: Options,
     progress: Progress | None = None,
-    clean: tuple[NDArray, NDArray] | None = None,
+    clean: tuple[Floats, Floats] | None = None,
     most: int | None = None,
 ) -> "Causes":
     """Attribute the departure of a prepared scene, on a film of at most ``most`` pixels' width.
@@ -165,7 +166,7 @@ class ErrorMeter:
 
     def __init__(
         self,
-        groups: NDArray,
+        groups: Floats,
         counted: NDArray[np.bool_],
         viewing: Viewing,
         metric: Pixelwise = LEADING,
@@ -176,7 +177,7 @@ class ErrorMeter:
         self._groups = np.asarray(groups)[:, counted].astype(float)
         _, self._blocks = np.unique(block_numbers(counted), return_inverse=True)
 
-    def without_noise(self, images: NDArray) -> NDArray[np.float64]:
+    def without_noise(self, images: Floats) -> NDArray[np.float64]:
         """Return the error (R + 1, N) of each counted pixel, without the noise of both images.
 
         First for the mean of all replicates (R, H, W, 3), then leaving out each in turn.
@@ -202,7 +203,7 @@ class ErrorMeter:
         return np.stack(found)
 
     @cached_property
-    def _references(self) -> list[tuple[NDArray, list[NDArray]]]:
+    def _references(self) -> list[tuple[NDArray[np.int64], list[Doubles]]]:
         """For each jackknifed set: which replicates it holds, and the reference's coordinates.
 
         The coordinates are without added noise first, then with noise added in each way.
@@ -212,7 +213,7 @@ class ErrorMeter:
         # The opposite sign of an image's: the noise of both is independent.
         return [(chosen, self._noisier(self._groups[chosen], -1)) for chosen in sets]
 
-    def _noisier(self, images: NDArray, sign: int = 1) -> list[NDArray]:
+    def _noisier(self, images: Floats, sign: int = 1) -> list[Doubles]:
         """Return the coordinates of the mean of images (n, N, 3), and of it with added noise."""
         mean = images.mean(axis=0)
         noise = np.tensordot(contrasts(np.ones(len(images))), images, 1)
@@ -225,7 +226,7 @@ def attribute(
     meter: ErrorMeter,
     shapes: ObjectIds,
     seed: int,
-    clean: tuple[NDArray, NDArray] | None = None,
+    clean: tuple[Floats, Floats] | None = None,
 ) -> Causes:
     """Attribute the departure to the effects, as a whole, on each shape, and in each pixel.
 
@@ -244,9 +245,9 @@ def attribute(
 
     shares(effects, note, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS)
     images.render(sets)
-    errors: dict[frozenset[Effect], NDArray] = {}
+    errors: dict[frozenset[Effect], Floats] = {}
 
-    def error(simulated: frozenset[Effect]) -> NDArray:
+    def error(simulated: frozenset[Effect]) -> Floats:
         """Errors (R + 1, N) in ΔE2000: of all replicates, then leaving out each in turn."""
         if simulated not in errors:
             errors[simulated] = meter.without_noise(images.pixels(images.simulating(simulated)))
@@ -275,7 +276,7 @@ def attribute(
         for simulated, found in errors.items()
     ]
 
-    def filled(values: NDArray) -> NDArray[np.float64]:
+    def filled(values: Floats) -> NDArray[np.float64]:
         whole = np.zeros(meter.counted.shape)
         whole[meter.counted] = values
         return whole
@@ -310,9 +311,9 @@ def attribute(
 
 
 def by_object(
-    departure: NDArray,
-    removed: Mapping[str, NDArray],
-    left: NDArray,
+    departure: Floats,
+    removed: Mapping[str, Floats],
+    left: Floats,
     counted: NDArray[np.bool_],
     shapes: ObjectIds,
 ) -> tuple[ObjectContribution, ...]:
@@ -335,7 +336,7 @@ def by_object(
     )
 
 
-def means(values: NDArray, rows: NDArray, count: int) -> NDArray[np.float64]:
+def means(values: Floats, rows: NDArray[np.int64], count: int) -> NDArray[np.float64]:
     """Return the means (..., count) of values (..., N) by object; ``rows`` (N,) names it."""
     sums = [np.bincount(rows, weights, count) for weights in values.reshape(-1, len(rows))]
     return np.reshape(sums, (*values.shape[:-1], count)) / np.bincount(rows, minlength=count)
@@ -380,7 +381,7 @@ def shares(
     return found, tuple(errors), orders
 
 
-def dominating(effects: Mapping[str, NDArray], counted: NDArray[np.bool_]) -> NDArray[np.int64]:
+def dominating(effects: Mapping[str, Floats], counted: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return (H, W): the place of the dominating effect among ``{name: ΔE2000 removed (H, W)}``.
 
     :data:`NONE` if no effect removes :data:`LEAST`, :data:`UNCOUNTED` if a pixel does not count.
@@ -392,7 +393,7 @@ def dominating(effects: Mapping[str, NDArray], counted: NDArray[np.bool_]) -> ND
     return np.where(counted, places, UNCOUNTED)
 
 
-def named(comparison: Comparison, effects: Mapping[str, NDArray]) -> ComparisonRecord:
+def named(comparison: Comparison, effects: Mapping[str, Floats]) -> ComparisonRecord:
     """Return a comparison's record in which regions, shapes and materials name their effect.
 
     ``effects`` are ``{name: (h, w)}``, the ΔE2000 that each removes; the maps may be smaller.
@@ -441,7 +442,7 @@ def in_words(found: Mapping[str, float]) -> str | None:
     return first
 
 
-def _enlarged(values: NDArray, shape: tuple[int, ...]) -> NDArray:
+def _enlarged(values: Floats, shape: tuple[int, ...]) -> Floats:
     height, width = shape
     rows = np.arange(height) * values.shape[0] // height
     columns = np.arange(width) * values.shape[1] // width

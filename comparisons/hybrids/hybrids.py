@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from fotismos.comparisons.departure.blocks import averaged, ratio
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
-from fotismos.heuristic.convention import Scene
+from fotismos.heuristic.convention import Floats, Scene
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.pairing import lights
 from fotismos.reference.pairing.halves import Pair
@@ -223,9 +223,9 @@ class HybridImages:
         self._seed = seed
         self._variant = pairs.ready.reference.variant
         self._scenes = {self._variant: scenes}
-        self._known: dict[frozenset[Effect], NDArray] = {}
-        self._emission: dict[tuple[str, frozenset[Effect]], NDArray | None] = {}
-        self._kernels: dict[frozenset[Effect], NDArray] = {}
+        self._known: dict[frozenset[Effect], Floats] = {}
+        self._emission: dict[tuple[str, frozenset[Effect]], Floats | None] = {}
+        self._kernels: dict[frozenset[Effect], Floats] = {}
         self.effects = pairs.effects(scenes.differences)
         rfilter = scenes.scene.sensors()[0].film().rfilter()
         self.finer = FINER if "Box" in rfilter.class_name() else 1
@@ -248,7 +248,7 @@ class HybridImages:
             with variant(name):
                 self._known |= zip(group, self._rendered(group), strict=True)
 
-    def plugin(self, effects: Set[Effect]) -> NDArray:
+    def plugin(self, effects: Set[Effect]) -> Floats:
         """Return the image of Mitsuba's plugins in which some of ``effects`` are simulated.
 
         None has the kernel's terms; all are the scene of the reference, edited, which would show
@@ -259,7 +259,7 @@ class HybridImages:
             self.render([key])
         return self._known[key]
 
-    def simulating(self, effects: Set[Effect]) -> NDArray:
+    def simulating(self, effects: Set[Effect]) -> Floats:
         """Return the image in which some of ``effects`` are simulated; for none it is the kernel's.
 
         Where an effect is missing that only the kernel can do without, an image gets the difference
@@ -274,16 +274,16 @@ class HybridImages:
         return found + (self._kernel(of_kernel.intersection(effects)) - self.plain_kernel)
 
     @property
-    def kernel(self) -> NDArray:
+    def kernel(self) -> Floats:
         """The kernel as requested."""
         return self._kernel(frozenset())
 
     @property
-    def plain_kernel(self) -> NDArray:
+    def plain_kernel(self) -> Floats:
         """The kernel with an exact normal at each point, and one intensity of each light."""
         return self._kernel(OF_KERNEL.intersection(self.effects))
 
-    def _kernel(self, effects: frozenset[Effect]) -> NDArray:
+    def _kernel(self, effects: frozenset[Effect]) -> Floats:
         """Return the image of the kernel with some of :data:`OF_KERNEL`."""
         pairs = self._pairs
         scene = self._ready.heuristic.scene
@@ -311,7 +311,7 @@ class HybridImages:
         is_weighted = "spectral" in name or scenes.facts.camera.plugin not in UNWEIGHTED
         return name, effects if is_weighted else scenes.key(effects)
 
-    def _rendered(self, sets: Sequence[frozenset[Effect]]) -> list[NDArray]:
+    def _rendered(self, sets: Sequence[frozenset[Effect]]) -> list[Floats]:
         """Render images of one scene, in their variant, which is current."""
         if mi.variant() not in self._scenes:
             pair = self._pairs.plain()
@@ -330,7 +330,7 @@ class HybridImages:
     def _pass_spp(self) -> int:
         return self.replicate_spp // self.finer**2
 
-    def _passes(self, renderer: Renderer, count: int = 1) -> list[NDArray]:
+    def _passes(self, renderer: Renderer, count: int = 1) -> list[Floats]:
         """Render the replicates on a film of the preview's size, then restore the film's.
 
         The channels of a pass are those of ``count`` images.
@@ -346,14 +346,15 @@ class HybridImages:
             np.broadcast_to(image, (*image.shape[:3], 3)) for image in np.split(made, count, axis=3)
         ]
 
-    def pixels(self, fine: NDArray) -> NDArray:
+    def pixels(self, fine: Floats) -> Floats:
         """Return the images (R, H, W, 3): means over blocks of finer pixels."""
         width, height = self.size
         blocks = fine.reshape(len(fine), height, self.finer, width, self.finer, 3)
-        return blocks.mean(axis=(2, 4))
+        means: Floats = blocks.mean(axis=(2, 4))
+        return means
 
     def previews(
-        self, sets: Iterable[Set[Effect]], clean: tuple[NDArray, NDArray] | None = None
+        self, sets: Iterable[Set[Effect]], clean: tuple[Floats, Floats] | None = None
     ) -> list[NDArray[np.float64]]:
         """Return the means (f H, f W, 3) of images' replicates, with less noise if possible.
 
@@ -376,11 +377,17 @@ class HybridImages:
         error = averaged(clean[1], (height, width))
         error *= np.sqrt(height * width / clean[1][..., 0].size)
 
-        def covariance(first: NDArray, other: NDArray) -> NDArray[np.float64]:
-            return (first * other).sum(axis=0).mean(axis=-1) / (count * (count - 1))
+        def covariance(first: Floats, other: Floats) -> NDArray[np.float64]:
+            covariances: NDArray[np.float64] = (first * other).sum(axis=0).mean(axis=-1) / (
+                count * (count - 1)
+            )
+            return covariances
 
-        def deviation(centred: NDArray) -> NDArray[np.float64]:
-            return np.sqrt(np.maximum(uniform_filter(covariance(centred, centred), 3), 0))
+        def deviation(centred: Floats) -> NDArray[np.float64]:
+            deviations: NDArray[np.float64] = np.sqrt(
+                np.maximum(uniform_filter(covariance(centred, centred), 3), 0)
+            )
+            return deviations
 
         beyond = full.mean(axis=0) - picture
         other = full - full.mean(axis=0)

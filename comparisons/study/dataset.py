@@ -162,7 +162,8 @@ def file_of(data: pa.Table) -> bytes:
     """Return the Parquet file of a table."""
     stream = pa.BufferOutputStream()
     pq.write_table(data, stream, compression="zstd", write_page_checksum=True)
-    return stream.getvalue().to_pybytes()
+    content: bytes = stream.getvalue().to_pybytes()
+    return content
 
 
 def read(path: str | Path) -> pa.Table:
@@ -205,7 +206,8 @@ def require(data: pa.Table, column: str) -> None:
 
 def unit(data: pa.Table, column: str) -> str:
     """Return the unit of a column, from its metadata."""
-    return data.schema.field(column).metadata[b"unit"].decode()
+    unit: str = data.schema.field(column).metadata[b"unit"].decode()
+    return unit
 
 
 def _matches(value: Any, allowed: Any) -> bool:

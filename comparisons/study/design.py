@@ -88,7 +88,8 @@ class Levels:
     def at(self, u: np.ndarray) -> np.ndarray:
         """Return the values at ``u``, an array of numbers in [0, 1); listed ones equally often."""
         if not self.is_range:
-            return np.array(self.values)[(u * len(self.values)).astype(int)]
+            chosen: np.ndarray = np.array(self.values)[(u * len(self.values)).astype(int)]
+            return chosen
         low = self.values[0]
         high = self.values[-1]
         return low * (high / low) ** u if self.is_log else low + (high - low) * u

@@ -188,7 +188,8 @@ def nearest_ior(plastic: RoughPlastic, albedo: Albedo) -> float:
     def distance(log_ior: float) -> float:
         reached = of_roughplastic(replace(plastic, int_ior=exp(log_ior)))
         diffuse = np.minimum(albedo.diffuse, reached.diffuse)
-        return np.sum((diffuse - albedo.diffuse) ** 2 + (reached.specular - albedo.specular) ** 2)
+        squares = (diffuse - albedo.diffuse) ** 2 + (reached.specular - albedo.specular) ** 2
+        return float(np.sum(squares))
 
     # At the minimum the values one step to either side are equal: the minimum itself is too flat
     # to locate in single precision.
@@ -270,7 +271,7 @@ def _sums(distribution: str, alpha: float, eta: float, size: int, is_refracted: 
 
 
 @cache
-def _rule(variant: str, size: int) -> tuple:
+def _rule(variant: str, size: int) -> tuple[np.ndarray, ...]:
     """Return a rule at all cosines, as arrays of a variant.
 
     Directions of light, two nodes in (0, 1), Beckmann's slopes along the second axis for a

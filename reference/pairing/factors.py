@@ -129,7 +129,9 @@ class Replacements:
         record = Unrepresentable(name=name, plugin=plugin, lost=lost, nearest=nearest)
         self.lost.append(record)
 
-    def bsdf(self, name: str, given: str, derived: str, parameters: dict, note: str = "") -> None:
+    def bsdf(
+        self, name: str, given: str, derived: str, parameters: dict[str, Any], note: str = ""
+    ) -> None:
         """Record the partner of a BSDF; a tuple of equal components becomes one number."""
         short = {
             key: value[0] if isinstance(value, tuple) and len(set(value)) == 1 else value

@@ -157,7 +157,7 @@ def exponent_for(cutoff: float, beam_width: float) -> float:
     def distance(log_m: float) -> float:
         m = np.expm1(log_m)
         fitted = flux / power_flux(cutoff, m) * power_falloff(theta, m)
-        return np.sum(weight * (fitted - target) ** 2)
+        return float(np.sum(weight * (fitted - target) ** 2))
 
     # In log(1 + m), because sharp spots differ little from one exponent to the next.
     return float(np.expm1(_least(distance, 0.0, np.log(LARGEST_EXPONENT))))
@@ -175,7 +175,7 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
 
     def distance(edge: float, beam_width: float) -> float:
         fitted = flux / linear_flux(edge, beam_width) * linear_falloff(theta, edge, beam_width)
-        return np.sum(weight * (fitted - target) ** 2)
+        return float(np.sum(weight * (fitted - target) ** 2))
 
     def best_beam(edge: float) -> Any:
         # Mitsuba rejects a beam as wide as the cone; just below it the cone is even.
@@ -208,7 +208,8 @@ def power_falloff(theta: np.ndarray, exponent: float) -> np.ndarray:
     """Return ``cos^m(theta)``, 0 beyond a right angle unless ``m = 0``; ``theta`` in degrees."""
     if exponent == 0:
         return np.ones_like(theta)
-    return np.maximum(np.cos(np.radians(theta)), 0) ** exponent * (theta < 90)
+    cone: np.ndarray = np.maximum(np.cos(np.radians(theta)), 0) ** exponent * (theta < 90)
+    return cone
 
 
 def power_flux(cutoff: float, exponent: float) -> float:

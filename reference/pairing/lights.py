@@ -72,7 +72,7 @@ class LightNode:
         matrix = self.value("to_world", mi.ScalarTransform4f()).matrix
         return [float(component) for component in np.array(matrix)[:3, number]]
 
-    def vector(self, key: str, default: tuple, column: int) -> np.ndarray:
+    def vector(self, key: str, default: tuple[float, ...], column: int) -> np.ndarray:
         """Return a position or direction (3,), given directly or as a column of ``to_world``."""
         is_moved = "to_world" in self.graph.props(self.index)
         components = self.column(column) if is_moved else self.value(key, default)
@@ -86,7 +86,7 @@ class LightNode:
         """Return the direction in which parallel light travels, (3,) in world space."""
         return self.vector("direction", (0, 0, 1), 2)
 
-    def intensities(self) -> tuple:
+    def intensities(self) -> tuple[Any, ...]:
         """Return ``L_d`` and ``L_s`` of a heuristic light, without its scale."""
         colour = partial(values.colour, self.graph, self.index)
         common = colour("intensity", 1.0)
@@ -207,7 +207,7 @@ def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: Any) -> mi
 
 
 def level(
-    light: LightNode, cone: Callable, derived_cone: Callable, flux_ratio: float
+    light: LightNode, cone: Callable[..., Any], derived_cone: Callable[..., Any], flux_ratio: float
 ) -> tuple[float, str]:
     """Return the factor from ``I_p0`` of a point or spot to Mitsuba's intensity, and its rule.
 

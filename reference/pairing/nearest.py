@@ -248,7 +248,10 @@ def _of_base(graph: Graph, rho: Any, whole: float, half: float) -> Any:
 
 
 def _roughplastic(
-    graph: Graph, index: int, base: tuple | None = None, coat: tuple | None = None
+    graph: Graph,
+    index: int,
+    base: tuple[Any, ...] | None = None,
+    coat: tuple[Any, ...] | None = None,
 ) -> RoughPlastic:
     """Read a roughplastic's parameters, with Mitsuba's defaults; reflectances can be given."""
     props = graph.props(index)

@@ -122,7 +122,7 @@ def keep_sensor(graph: Graph, number: int) -> int:
     for choice, (parent, key, _) in enumerate(places):
         if choice != number:
             graph.detach(parent, key)
-    return places[number][2]
+    return int(places[number][2])
 
 
 def _prepare_film(

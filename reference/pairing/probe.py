@@ -159,7 +159,7 @@ def _at(si: Any, wavelengths: np.ndarray | None) -> Any:
     return si
 
 
-def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple[tuple, float]:
+def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple[tuple[Any, ...], float]:
     points = [mi.Float(row) for row in lattice(SAMPLES)]
     lobe, x, y, u, v = points
     si = _at(dr.zeros(mi.SurfaceInteraction3f, SAMPLES), wavelengths)

@@ -81,7 +81,7 @@ class Effect:
     def __repr__(self) -> str:
         return f"<effect {self.label}>"
 
-    def __reduce__(self) -> tuple:
+    def __reduce__(self) -> tuple[Any, ...]:
         # A copy in another process must be the same effect, for sets and `is`.
         return labelled, (self.label,)
 

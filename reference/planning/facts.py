@@ -145,7 +145,10 @@ def _mesh(mesh: mi.Mesh, is_rectangle: bool) -> Geometry:
 
 def _are_alike(normals: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return which vectors (..., 3), of any length, point along unit vectors."""
-    return np.sum(normals * others, axis=-1) > ALIKE * np.linalg.norm(normals, axis=-1)
+    is_alike: np.ndarray = np.sum(normals * others, axis=-1) > ALIKE * np.linalg.norm(
+        normals, axis=-1
+    )
+    return is_alike
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +169,7 @@ class ShapeFacts:
     outer: bool
     inner: bool
     shines_outwards: bool
-    plane: tuple | None
+    plane: tuple[Any, ...] | None
     opaque: bool
     sampled_as_hit: bool
     is_mesh: bool
@@ -388,7 +391,7 @@ class Facts:
     @property
     def has_shadows(self) -> bool:
         """Whether the heuristic half itself has shadows."""
-        return self.kernel.get("occlusion", False)
+        return bool(self.kernel.get("occlusion", False))
 
     @cached_property
     def materials(self) -> list[mi.Properties]:

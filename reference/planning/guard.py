@@ -138,7 +138,9 @@ def _looks(budget: int) -> list[int]:
     return [*sizes, last] if last > sizes[-1] else sizes
 
 
-def radiances(scene: mi.Scene, integrators: list, count: int, seeds: Iterator[int]) -> np.ndarray:
+def radiances(
+    scene: mi.Scene, integrators: Sequence[mi.Integrator], count: int, seeds: Iterator[int]
+) -> np.ndarray:
     """Return the radiances of random camera rays by each integrator, (2, count), mean of channels.
 
     The rays come from everywhere on the film and lens, like those of a picture.

@@ -81,7 +81,8 @@ class PruningRule:
             facts.rule_results[self.name] = RuleResult(
                 name=self.name, applies=fault is None, premise=premise, evidence=evidence
             )
-        return facts.rule_results[self.name]
+        result: RuleResult = facts.rule_results[self.name]
+        return result
 
     def objection(self, facts: Facts) -> str | None:
         """Return why the rule does not apply; None if it does."""

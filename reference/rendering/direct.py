@@ -36,7 +36,7 @@ import drjit as dr
 import mitsuba as mi
 
 from fotismos.heuristic import numerics
-from fotismos.heuristic.convention import Colour
+from fotismos.heuristic.convention import Colour, Mask, Scene
 from fotismos.reference.rendering.transport import Transport, found_by_bsdf, sums, visibility
 
 UNROLLED = 16
@@ -66,10 +66,12 @@ def _define(_variant: str) -> None:
             """An `AlbedoTable` (:mod:`fotismos.reference.pairing.probe`) in place of samples of the
             environment, for one BSDF and nothing that hides it; set after construction."""
 
-        def sample(self, scene, sampler, ray, medium=None, active=True):
-            delta = []
+        def sample(
+            self, scene: Scene, sampler: Any, ray: Any, medium: Any = None, active: Mask = True
+        ) -> tuple[Colour, Mask, list[Any]]:
+            delta: list[Any] = []
             lamps = []
-            others = []
+            others: list[Any] = []
             for emitter in scene.emitters():
                 is_delta = mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta)
                 (delta if is_delta else others).append(emitter)
@@ -208,7 +210,8 @@ def _of_all(
     targets = [partial(_sampled, light) for light in lights]
     nothing = [mi.Spectrum(0)] * len(transports)
     if len(lights) > UNROLLED:
-        return _looped(targets, of_light, sampler=sampler, nothing=nothing)
+        looped: list[Colour] = _looped(targets, of_light, sampler=sampler, nothing=nothing)
+        return looped
     return reduce(sums, (of_light(target, sampler) for target in targets), nothing)
 
 
@@ -219,7 +222,10 @@ def _sampled(light: Any, si: Any, sample: Any, active: Any) -> Any:
 
 @dr.syntax
 def _looped(
-    targets: Sequence[Callable], of_light: Callable, sampler: Any, nothing: list[Colour]
+    targets: Sequence[Callable[..., Any]],
+    of_light: Callable[..., list[Colour]],
+    sampler: Any,
+    nothing: list[Colour],
 ) -> list[Colour]:
     """Sum over lights in a loop, for each image.
 

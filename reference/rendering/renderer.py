@@ -225,7 +225,8 @@ def syntax(f: FunctionType | None = None, **options: Any) -> Callable[..., Any]:
     transform the same functions again: 0.1 s, as long as a pass.
     """
     if f is None or options:
-        return _transform(f, **options)
+        decorated: Callable[..., Any] = _transform(f, **options)
+        return decorated
     key = f.__code__.co_filename, f.__code__
     if key not in _transformed:
         _transformed[key] = _transform(f).__code__
@@ -286,7 +287,7 @@ class Pass:
 
     number: int
     seed: int
-    images: tuple
+    images: tuple[Any, ...]
 
 
 def passes(
@@ -318,7 +319,7 @@ def passes(
             progress(stage, done, done)
 
 
-def _images(renderers: Sequence[Renderer], seed: int, backwards: bool) -> tuple:
+def _images(renderers: Sequence[Renderer], seed: int, backwards: bool) -> tuple[Any, ...]:
     """Render one pass, grouped by variant: a change takes as long as a small image."""
     images: dict[int, Any] = {}
     order = list(enumerate(renderers))

@@ -131,7 +131,8 @@ class Accumulator:
         """Return the standard error of the mean."""
         squares = self._array("squares")
         squares /= max(self.count - 1, 1) * self.count
-        return np.sqrt(squares, out=squares).astype(dtype, copy=False)
+        deviation: np.ndarray = np.sqrt(squares, out=squares).astype(dtype, copy=False)
+        return deviation
 
     def noise(self, dtype: type = float) -> np.ndarray:
         """Return the noise image of :class:`Estimate`; the number of passes should be even."""
@@ -194,7 +195,8 @@ def block_numbers(counted: np.ndarray) -> np.ndarray:
     """Return the number of the block of each counted pixel, (N,), in reading order."""
     rows, columns = np.nonzero(counted)
     across = -(-counted.shape[1] // BLOCK)
-    return rows // BLOCK * across + columns // BLOCK
+    numbers: np.ndarray = rows // BLOCK * across + columns // BLOCK
+    return numbers
 
 
 def sample(counted: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -235,7 +237,8 @@ def jackknife_error(left_out: ArrayLike) -> NDArray[np.float64]:
     average to their value for the mean.
     """
     left_out = np.asarray(left_out, float)
-    return np.sqrt((len(left_out) - 1) * left_out.var(axis=0))
+    error: NDArray[np.float64] = np.sqrt((len(left_out) - 1) * left_out.var(axis=0))
+    return error
 
 
 def student(value: float, error: float, count: int, bias: float = 0.0) -> Interval:

@@ -187,7 +187,7 @@ def damage(graph: Graph, index: int) -> str:
 
 
 @lru_cache(maxsize=1024)
-def _wrong_mesh(plugin: str, path: str, number: int, stamp: tuple) -> str:
+def _wrong_mesh(plugin: str, path: str, number: int, stamp: tuple[Any, ...]) -> str:
     # With face normals nothing is computed at vertices, which may not exist.
     description = {"type": plugin, "filename": path, "face_normals": True}
     if plugin == "serialized":

@@ -166,7 +166,7 @@ class Graph:
 
     def plugin(self, index: int) -> str:
         """Return the name of a node's plugin."""
-        return self.props(index).plugin_name()
+        return str(self.props(index).plugin_name())
 
     def props(self, index: int) -> Any:
         """Return a node's properties. Changing them changes the graph."""
@@ -175,7 +175,7 @@ class Graph:
     def label(self, index: int) -> str:
         """Return a short name of a node for records and messages: its id, or else its location."""
         if identifier := self.props(index).id():
-            return identifier
+            return str(identifier)
         location = Parser.file_location(self.state, self.state.nodes[index])
         return f"{self.plugin(index)} at {location}"
 

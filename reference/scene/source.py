@@ -31,7 +31,7 @@ from fotismos.reference.scene.graph import (
 )
 
 Parser = mi.parser
-Content = str | PathLike | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
+Content = str | PathLike[str] | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
 Edit = Callable[[Graph], None]
 
 
@@ -204,7 +204,7 @@ class _Plain(mi.Formatter):
     """Only the words of a message, without time, thread and line of code."""
 
     def format(self, *parts: Any) -> str:
-        return parts[-1]
+        return str(parts[-1])
 
 
 def divert_messages(hear: Callable[[str], Any]) -> None:

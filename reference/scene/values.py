@@ -147,7 +147,7 @@ def node(graph: Graph, plugin: str, **values: Any) -> Reference:
     return Reference(graph.add(mi.ObjectType.Texture, properties(plugin, **values)))
 
 
-def _combined(graph: Graph, plugin: str, function: Callable, **operands: Any) -> Any:
+def _combined(graph: Graph, plugin: str, function: Callable[..., Any], **operands: Any) -> Any:
     numbers = [plain(value) for value in operands.values()]
     if all(value is not None for value in numbers):
         result = np.asarray(function(*(np.asarray(value) for value in numbers)), float)
@@ -157,7 +157,7 @@ def _combined(graph: Graph, plugin: str, function: Callable, **operands: Any) ->
 
 def _same(a: Any, b: Any) -> bool:
     if isinstance(a, Reference) and isinstance(b, Reference):
-        return a.index() == b.index()
+        return bool(a.index() == b.index())
     first = plain(a)
     other = plain(b)
     return first is not None and other is not None and bool(np.all(np.equal(first, other)))

@@ -148,7 +148,10 @@ def _guide(ends: Sequence[float], times: Ends, errors: Ends, dash: list[int]) ->
     """Return a faint line between errors at both ends of the time axis."""
     rows = [{"time": time, "error": end} for time, end in zip(times, ends, strict=True)]
     chart = _charted(rows, times, errors)
-    return chart.mark_line(color=FAINT, strokeWidth=1.2, strokeDash=dash, clip=True, aria=False)
+    line: alt.Chart = chart.mark_line(
+        color=FAINT, strokeWidth=1.2, strokeDash=dash, clip=True, aria=False
+    )
+    return line
 
 
 def _names_beside(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
@@ -180,4 +183,5 @@ def spread(places: Sequence[float], gap: float, length: float) -> list[float]:
     """
     least = gap * np.arange(len(places))  # the room that the places before take
     moved = isotonic_regression(np.asarray(places) - least).x
-    return (np.clip(moved, 0, max(length - least[-1], 0)) + least).tolist()
+    apart: list[float] = (np.clip(moved, 0, max(length - least[-1], 0)) + least).tolist()
+    return apart

@@ -198,7 +198,8 @@ def _document(command: str, cases: Sequence[Element]) -> bytes:
     root = Element("testsuites", totals)
     SubElement(root, "testsuite", totals).extend(cases)
     indent(root)
-    return tostring(root, encoding="utf-8", xml_declaration=True)
+    document: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
+    return document
 
 
 def _element(tag: str, attributes: dict[str, str]) -> Element:

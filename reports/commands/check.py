@@ -54,6 +54,7 @@ from fotismos.reports import jobs
 @click.pass_context
 def check(
     context: click.Context,
+    /,
     baseline: Path,
     update: bool,
     scenes: tuple[str, ...],

@@ -38,6 +38,7 @@ from fotismos.reports import jobs
 @click.pass_context
 def compare(
     context: click.Context,
+    /,
     scenes: tuple[str, ...],
     output: Path,
     figures: bool,

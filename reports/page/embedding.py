@@ -49,7 +49,7 @@ class Embedded(Record):
 
     def manifest(self) -> dict[str, Any]:
         """Return the description needed to read `data`, as plain data."""
-        shown = plain(self)
+        shown: dict[str, Any] = plain(self)
         del shown["data"]
         return shown
 

@@ -48,7 +48,8 @@ class TermsView(Record):
 
     def manifest(self) -> dict[str, Any]:
         """The data of the page's script, except the grid's planes, as plain data."""
-        return plain(self) | {"grid": self.grid.manifest() if self.grid else None}
+        shown: dict[str, Any] = plain(self)
+        return shown | {"grid": self.grid.manifest() if self.grid else None}
 
 
 class LiveView(TermsView):
@@ -59,7 +60,7 @@ class LiveView(TermsView):
     that a fit of the scene reached, with its width and height.
     """
 
-    rays: list = field(default_factory=list)
+    rays: list[Any] = field(default_factory=list)
     is_flat: bool = False
     fit: tuple[float, int, int] | None = None
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.metrics import LEADING
@@ -69,7 +68,7 @@ def terms_view(grid: TermGrid | Missing) -> TermsView:
     seen = grid.material >= 0
     shiny = np.array([any(material.k_s) for material in grid.materials] + [False])[grid.material]
     cosines = {"cos_view": grid.cos_view}
-    amounts = dict[str, NDArray]()
+    amounts = dict[str, np.ndarray]()
     for number, light in enumerate(grid.lights):
         cosines |= {
             f"{number}.cos_incidence": light.cos_incidence,
@@ -83,7 +82,7 @@ def terms_view(grid: TermGrid | Missing) -> TermsView:
         amounts |= {f"others.{c}": grid.others[..., i] * seen for i, c in enumerate("RGB")}
     tops = {name: float(values.max(initial=0)) or 1.0 for name, values in amounts.items()}
 
-    planes = {"material": (grid.material + 1).astype(np.uint16)}
+    planes: dict[str, np.ndarray] = {"material": (grid.material + 1).astype(np.uint16)}
     for name, values in cosines.items():
         code = np.rint(LARGEST_CODE * (1 + np.clip(values, -1, 1)) / 2)
         planes[name] = np.where(seen, code, 0).astype(np.uint16)
