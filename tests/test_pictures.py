@@ -19,6 +19,7 @@ from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.steps import steps
 from fotismos.heuristic.errors import InputError, NonFiniteError
 
 SIDE = 64
@@ -37,7 +38,7 @@ def write(path, image, header=None, alpha=None):
 
 def picture_of(scene, words, spp=64, **more):
     case = open_case(scene, Options(image=words, spp=spp, **more))
-    return compare(case.source, case.options).record
+    return compare(case.source, case.options, then=steps(case.options, False)).record
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +167,7 @@ ODD = {
     "pi twice": (lambda image: image / np.pi, "a division by pi too many"),
     "exposure": (lambda image: image * 5, "times as bright as the reference: another exposure"),
     "white": (lambda image: image * [1, 0.9, 0.8], "another white"),
-    "gamma": (to_srgb, "sRGB-encoded: give --transfer srgb"),
+    "gamma": (to_srgb, "sRGB-encoded: give `transfer=srgb`"),
     "gamma twice": (lambda image: image.clip(0) ** 2.2, "decoded twice"),
     "red and blue": (lambda image: image[..., ::-1], "channels look like blue, green, red"),
     "channels turned": (lambda image: np.roll(image, 1, 2), "channels look like green, blue, red"),
@@ -269,10 +270,10 @@ def test_sizes_and_repeats_must_fit(rgb, tmp_path):
     eight, other, nine = sized(8, 8, "8"), sized(8, 8, "other"), sized(9, 9, "9")
     for files, more, message in (
         (sized(8, 12, "wide"), {}, "12x8 pixels, an aspect ratio of 1.5, and the .* film .*x.*, 1"),
-        (eight, {"resolution": (16, 16)}, "8x8 pixels, and --resolution 16x16 is requested"),
+        (eight, {"resolution": (16, 16)}, "8x8 pixels, and `resolution=16x16` is requested"),
         ((eight, nine), {}, "pictures of 8x8, 9x9: give repeats of one size"),
         ((eight, other, eight), {}, "3 repeats: give one, or an even number"),
-        ((eight, other), {"noise": 1.0, "spp": None}, r"noise = 1 and 2 repeats: .* Give --spp"),
+        ((eight, other), {"noise": 1.0, "spp": None}, r"noise = 1 and 2 repeats: .* Give `spp`"),
     ):
         with pytest.raises(InputError, match=message):
             picture_of("fig-8-9", files, **more)

@@ -194,7 +194,7 @@ def _wrong_mesh(plugin: str, path: str, number: int, stamp: tuple[Any, ...]) -> 
         description["shape_index"] = number
     try:
         mesh = mi.load_dict(description)
-    except RuntimeError:  # making the scene raises it again
+    except (RuntimeError, ValueError):  # making the scene raises it again
         return ""
     if not mesh.face_count():
         return "it has no faces, which a shape must have."
