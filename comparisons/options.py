@@ -5,9 +5,9 @@ The command line, the notebook, baselines and studies name them alike.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
 import msgspec
 from msgspec import Meta, inspect, structs
@@ -212,6 +212,32 @@ class Options(
                 f"{what} needs a heuristic to render, and {self.image[0]} is a picture. Omit the"
                 " image."
             )
+
+
+class OptionValues(TypedDict, total=False):
+    """What :class:`Options` takes, so that editors complete it; each option says what it means.
+
+    ``heuristic`` may also be a function of a point, or a ``Heuristic``; ``image`` may be one name.
+    """
+
+    variant: Variant | None
+    heuristic_variant: Variant | None
+    seed: int
+    spp: int | None
+    noise: float | None
+    resolution: tuple[int, int] | None
+    heuristic: Any
+    interpolation: Literal["flat", "gouraud", "phong"] | None
+    tessellation: int | None
+    everything: bool
+    pairing: Literal["literal", "matched"]
+    define: Mapping[str, str]
+    sensor: int
+    allow_empty: bool
+    image: str | Sequence[str]
+    transfer: Literal["linear", "srgb"] | None
+    pixels_per_degree: float | None
+    colour_science: bool
 
 
 def _plain(name: str, value: Any) -> Any:

@@ -10,33 +10,75 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from fotismos.comparisons.cost.cost_record import Method
-    from fotismos.comparisons.departure.metrics import Metric
-    from fotismos.heuristic.errors import FotismosError, InputError
+    from fotismos.comparisons.audit.checks import Audit
+    from fotismos.comparisons.case import Scene
+    from fotismos.comparisons.comparison import Comparison, ComparisonRecord
+    from fotismos.comparisons.cost.cost_record import Cost, Method
+    from fotismos.comparisons.departure.metrics import Metric, Pixelwise
+    from fotismos.comparisons.fit.fit_record import FitRecord
+    from fotismos.comparisons.options import Options
+    from fotismos.comparisons.pixel_terms import PixelTerms
+    from fotismos.heuristic.errors import (
+        FotismosError,
+        InputError,
+        InstallationError,
+        LostProcessError,
+        NonFiniteError,
+        OutputError,
+    )
     from fotismos.heuristic.heuristics import Heuristic, Parameter, Range
     from fotismos.heuristic.kernel import shade
     from fotismos.heuristic.lights import DirectionalLight, PointLight, SpotLight
     from fotismos.heuristic.materials import Material
-    from fotismos.reports.notebook import audit, check, compare, cost, declare, fit, plan
+    from fotismos.reports.ci.checks import CheckRecord
+    from fotismos.reports.notebook import Shown, audit, check, compare, cost, declare, fit, plan
+    from fotismos.reports.terminal.plan_lines import PlanReport
 
 __version__ = heuristic.__version__
 register = heuristic.register
 
-HOMES = heuristic.HOMES | {
-    "FotismosError": "fotismos.heuristic.errors",
-    "InputError": "fotismos.heuristic.errors",
-    "Method": "fotismos.comparisons.cost.cost_record",
-    "Metric": "fotismos.comparisons.departure.metrics",
-    **dict.fromkeys(
-        ("audit", "check", "compare", "cost", "declare", "fit", "plan"), "fotismos.reports.notebook"
+NAMES = {
+    "comparisons.audit.checks": ("Audit",),
+    "comparisons.case": ("Scene",),
+    "comparisons.comparison": ("Comparison", "ComparisonRecord"),
+    "comparisons.cost.cost_record": ("Cost", "Method"),
+    "comparisons.departure.metrics": ("Metric", "Pixelwise"),
+    "comparisons.fit.fit_record": ("FitRecord",),
+    "comparisons.options": ("Options",),
+    "comparisons.pixel_terms": ("PixelTerms",),
+    "heuristic.errors": (
+        "FotismosError",
+        "InputError",
+        "InstallationError",
+        "LostProcessError",
+        "NonFiniteError",
+        "OutputError",
     ),
+    "reports.ci.checks": ("CheckRecord",),
+    "reports.notebook": (
+        "Shown",
+        "audit",
+        "check",
+        "compare",
+        "cost",
+        "declare",
+        "fit",
+        "plan",
+    ),
+    "reports.terminal.plan_lines": ("PlanReport",),
+}
+
+HOMES = heuristic.HOMES | {
+    name: f"fotismos.{module}" for module, names in NAMES.items() for name in names
 }
 """Where names come from when they are first used."""
 
 __all__ = [
-    "DirectionalLight", "FotismosError", "Heuristic", "InputError", "Material", "Method", "Metric",
-    "Parameter", "PointLight", "Range", "SpotLight", "audit", "check", "compare", "cost", "declare",
-    "fit", "plan", "register", "shade",
+    "Audit", "CheckRecord", "Comparison", "ComparisonRecord", "Cost", "DirectionalLight",
+    "FitRecord", "FotismosError", "Heuristic", "InputError", "InstallationError",
+    "LostProcessError", "Material", "Method", "Metric", "NonFiniteError", "Options", "OutputError",
+    "Parameter", "PixelTerms", "Pixelwise", "PlanReport", "PointLight", "Range", "Scene", "Shown",
+    "SpotLight", "audit", "check", "compare", "cost", "declare", "fit", "plan", "register", "shade",
 ]  # fmt: skip
 
 

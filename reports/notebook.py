@@ -16,7 +16,7 @@ from functools import wraps
 from html import escape
 from pathlib import Path
 from threading import RLock
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, Unpack
 
 import fotismos.comparisons.compare
 from fotismos.comparisons.audit.checks import Audit, Kind
@@ -31,7 +31,7 @@ from fotismos.comparisons.departure.metrics import Metric
 from fotismos.comparisons.departure.metrics import declare as declare_metric
 from fotismos.comparisons.fit.fit import fit as fit_parameters
 from fotismos.comparisons.fit.fit_record import FitRecord
-from fotismos.comparisons.options import Options
+from fotismos.comparisons.options import Options, OptionValues
 from fotismos.comparisons.pixel_terms import PixelTerms
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.steps import steps
@@ -112,12 +112,19 @@ class Shown:
 
 
 @_alone
-def compare(scene: Scene, name: str | None = None, why: bool = True, **options: Any) -> Shown:
+def compare(
+    scene: Scene, name: str | None = None, why: bool = True, **options: Unpack[OptionValues]
+) -> Shown:
     """Compare a scene as ``fotismos compare`` does.
 
-    A scene is a built-in name, the path of one, a dictionary for ``mitsuba.load_dict``, or a
-    function that returns one; ``name`` replaces its name. ``options`` are those of the command
-    line, such as ``spp=64`` or ``resolution=(128, 128)``; ``why`` finds causes.
+    ``scene`` is a built-in name, the path of a file (.xml, .py), a dictionary for
+    ``mitsuba.load_dict``, or a function that returns one; ``name`` replaces its name. ``options``
+    are those of the command line, such as ``spp=64`` samples per pixel in all, or
+    ``resolution=(128, 128)`` pixels. ``why`` finds causes, which takes some seconds.
+
+    Colours of the images are linear, in units of display white; times are in seconds. Raises
+    `InputError` for a scene or an option that is not allowed, `NonFiniteError` for a NaN or an
+    infinity in a rendering, and `InstallationError` if a library is missing.
     """
     case = open_case(scene, Options.of(options), name)
     comparison = fotismos.comparisons.compare.compare(
@@ -127,8 +134,11 @@ def compare(scene: Scene, name: str | None = None, why: bool = True, **options: 
 
 
 @_alone
-def plan(scene: Scene, name: str | None = None, **options: Any) -> PlanReport:
-    """Return which effects a scene calls for, and what will be simulated; see :func:`compare`."""
+def plan(scene: Scene, name: str | None = None, **options: Unpack[OptionValues]) -> PlanReport:
+    """Return which effects a scene calls for, and what will be simulated.
+
+    Arguments and errors are those of :func:`compare`; only the plan's probe is rendered.
+    """
     case = open_case(scene, Options.of(options), name)
     return plan_report(case.name, prepare(case.source, case.options), case.variant)
 
@@ -139,11 +149,13 @@ def cost(
     name: str | None = None,
     at: tuple[int, int] | None = None,
     measure: bool = False,
-    **options: Any,
+    **options: Unpack[OptionValues],
 ) -> Cost:
-    """Return what each step of accuracy costs in time; see :func:`compare`.
+    """Return what each step of accuracy costs: seconds and ΔE2000 by method and samples.
 
-    ``at`` is a width and height to predict for, where ``measure`` also measures.
+    ``at`` is a width and height in pixels to predict for, where ``measure`` also measures. ``spp``
+    is the largest number of samples. It takes about a minute. Other arguments and errors are those
+    of :func:`compare`.
     """
     case = open_case(scene, Options.of(options), name)
     command = case.command("cost")
@@ -152,9 +164,13 @@ def cost(
 
 @_alone
 def fit(
-    scene: Scene, name: str | None = None, loss: str = "perceptual", **options: Any
+    scene: Scene, name: str | None = None, loss: str = "perceptual", **options: Unpack[OptionValues]
 ) -> FitRecord:
-    """Return the best heuristic parameters, and the error that remains; see :func:`compare`."""
+    """Return the best heuristic parameters, and the error that remains.
+
+    ``loss`` is ``perceptual``, the mean ΔE2000, or ``mse``, the squared difference of linear
+    colours. Other arguments and errors are those of :func:`compare`.
+    """
     case = open_case(scene, Options.of(options), name)
     command = case.command("fit")
     return fit_parameters(case.source, case.options, loss, command=command).record
@@ -164,7 +180,8 @@ def fit(
 def check(baseline: str | Path, significance: float = LEVEL) -> CheckRecord:
     """Return whether the scene of a baseline's file moved from what was measured before.
 
-    ``significance`` is the chance of a false alarm, above 0 and below 1.
+    ``significance`` is the chance of a false alarm, above 0 and below 1. Raises `InputError` if the
+    baseline or its scene cannot be read.
     """
     if not isinstance(significance, (int, float)) or not 0 < significance < 1:
         raise InputError(
@@ -178,7 +195,10 @@ def check(baseline: str | Path, significance: float = LEVEL) -> CheckRecord:
 
 @_alone
 def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: Any) -> Audit:
-    """Return the checks of a heuristic, or of a type of BSDF, by itself."""
+    """Return the checks of a heuristic, or of a type of BSDF, by itself.
+
+    ``parameters`` are its own. Raises `InputError` for an unknown name or parameter.
+    """
     if (heuristic is None) == (bsdf is None):
         raise InputError("audit needs one of heuristic and bsdf.")
     set_variant(RGB)
