@@ -16,7 +16,7 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.reference.scene.source import Source
 from fotismos.reports.terminal.tables import markdown
-from tests.wrong_shaders import WRONG
+from tests.shared.wrong_shaders import WRONG
 
 SHADERS = Path(__file__).parent / "shaders"
 NAMES = ("phong", "wrapped", "oren_nayar", "toon", "cook_torrance")

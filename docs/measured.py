@@ -25,7 +25,7 @@ from fotismos.reports.charts import vega
 from fotismos.reports.charts.cost_charts import titled
 from fotismos.reports.terminal.tables import markdown
 from tests.benchmarks import kernel
-from tests.verification import verify
+from tests.shared.verification import verify
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"

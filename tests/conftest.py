@@ -17,9 +17,9 @@ from fotismos.heuristic import plugins
 from fotismos.reference.rendering import direct
 from fotismos.reports import jobs
 from fotismos.reports.commands.compare import compare
-from tests import small_baselines
-from tests.programs import command_line
-from tests.small_scene import SCENE
+from tests.shared import small_baselines
+from tests.shared.programs import command_line
+from tests.shared.small_scene import SCENE
 
 # An installed fotismos brings its pytest plugin along; from a checkout it is named here.
 if "fotismos" not in entry_points(group="pytest11").names:

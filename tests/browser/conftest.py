@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import OpenEXR
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from msgspec import structs
 from playwright.sync_api import sync_playwright
 
@@ -21,7 +22,7 @@ from fotismos.reports.files import results
 from fotismos.reports.files.results import Failure, RunRecord
 from fotismos.reports.page import page
 from fotismos.reports.run import scene
-from tests import cost_records, records, term_grids
+from tests.shared import cost_records, records, term_grids
 
 WIDTH, HEIGHT = 48, 32
 
@@ -259,3 +260,26 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if Path(__file__).parent in item.path.parents:
             item.add_marker(pytest.mark.browser)
+
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+
+
+VIEWS = [
+    "",
+    f"#scene={NOISY_ID}",
+    f"#scene={NOISY_ID}&mode=error&map=effects",
+    f"#scene={NOISY_ID}&t=5&box=4,4,20,9&pixel=6,6&on=0",
+]
+
+
+def violations(page):
+    """What axe objects to: rules, and where."""
+    found = Axe().run(page).response["violations"]
+    return [(rule["id"], [node["html"][:120] for node in rule["nodes"]]) for rule in found]
+
+
+def top_of(report):
+    """The end of the map's colours: the least that 95 % of the counted pixels keep within."""
+    held = np.quantile(report.channels[NOISY]["dE2000.Y"][1:], 0.95, method="lower")
+    return next(top for top in (5, 10, 20, 40, 100) if top >= held)

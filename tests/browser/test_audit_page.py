@@ -2,8 +2,7 @@
 
 from fotismos.comparisons.audit.checks import audit
 from fotismos.reports.run import audit_files
-from tests.browser.conftest import Visitor
-from tests.browser.test_page_at_large import violations
+from tests.browser.conftest import Visitor, violations
 
 
 def test_axe_finds_no_violation_and_nothing_is_cut_off(rgb, chromium, tmp_path):

@@ -6,8 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from tests.browser.conftest import EXACT, HEIGHT, NOISY, NOISY_ID, WIDTH
-from tests.browser.test_viewer import top_of
+from tests.browser.conftest import EXACT, HEIGHT, NOISY, NOISY_ID, WIDTH, top_of
 
 SCENE = f"#scene={NOISY_ID}&mode=error"
 

@@ -6,9 +6,9 @@ import pytest
 from fotismos.comparisons.hybrids.attribution import dominating
 from fotismos.reports.charts import theme
 from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
-from tests.cost_records import HEIGHT as ROWS
-from tests.cost_records import WIDTH as COLUMNS
-from tests.cost_records import causes
+from tests.shared.cost_records import HEIGHT as ROWS
+from tests.shared.cost_records import WIDTH as COLUMNS
+from tests.shared.cost_records import causes
 
 SCENE = f"#scene={NOISY_ID}&mode=error"
 

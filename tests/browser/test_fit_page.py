@@ -4,7 +4,7 @@ from fotismos.comparisons.fit.fit import fit
 from fotismos.comparisons.gallery.builtin import builtin
 from fotismos.comparisons.options import Options
 from fotismos.reports.run import fit_files
-from tests.browser.test_page_at_large import violations
+from tests.browser.conftest import violations
 
 
 def test_axe_finds_no_violation_and_tables_are_whole_on_a_phone(rgb, chromium, tmp_path):

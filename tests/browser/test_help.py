@@ -3,8 +3,7 @@
 import pytest
 
 from fotismos.reports import glossary
-from tests.browser.conftest import NOISY_ID
-from tests.browser.test_page_at_large import PHONE, VIEWS
+from tests.browser.conftest import NOISY_ID, PHONE, VIEWS
 
 SCENE = f"#scene={NOISY_ID}"
 

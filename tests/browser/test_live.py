@@ -16,9 +16,8 @@ from fotismos.reference.rendering.gbuffer import image_size, pixel_rays
 from fotismos.reference.rendering.renderer import variant
 from fotismos.reports.page.templating import TEMPLATES
 from fotismos.reports.page.why_view import live_view
-from tests.browser.conftest import EXACT, NOISY, NOISY_ID
-from tests.browser.test_page_at_large import PHONE, violations
-from tests.test_pixel_terms import prepared
+from tests.browser.conftest import EXACT, NOISY, NOISY_ID, PHONE, violations
+from tests.shared.spheres import prepared
 
 SCENE = f"#scene={NOISY_ID}"
 SCENES = (

@@ -1,17 +1,8 @@
 """What holds for the whole page: offline, without scripts, narrow, on paper, for everybody."""
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
 
-from tests.browser.conftest import NOISY_ID
-
-PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
-VIEWS = [
-    "",
-    f"#scene={NOISY_ID}",
-    f"#scene={NOISY_ID}&mode=error&map=effects",
-    f"#scene={NOISY_ID}&t=5&box=4,4,20,9&pixel=6,6&on=0",
-]
+from tests.browser.conftest import NOISY_ID, PHONE, VIEWS, violations
 
 
 def test_it_opens_from_disk_and_asks_for_nothing_else(visitor):
@@ -40,12 +31,6 @@ def test_the_policy_stops_what_is_not_the_pages_own(visitor):
     assert len(stopped) == 2
     visitor.complaints.clear()
     visitor.requests.remove("http://localhost:1/picture.png")
-
-
-def violations(page):
-    """What axe objects to: rules, and where."""
-    found = Axe().run(page).response["violations"]
-    return [(rule["id"], [node["html"][:120] for node in rule["nodes"]]) for rule in found]
 
 
 @pytest.mark.parametrize(

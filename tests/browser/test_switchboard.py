@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.departure.metrics import LEADING
-from tests.browser.conftest import NOISY_ID
-from tests.browser.test_page_at_large import PHONE
-from tests.cost_records import EFFECTS, HYBRIDS
+from tests.browser.conftest import NOISY_ID, PHONE
+from tests.shared.cost_records import EFFECTS, HYBRIDS
 
 SCENE = f"#scene={NOISY_ID}"
 NEVER = "microfacets and Fresnel"

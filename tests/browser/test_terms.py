@@ -2,8 +2,8 @@
 
 import pytest
 
-from tests import term_grids
 from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
+from tests.shared import term_grids
 
 SCENE = f"#scene={NOISY_ID}&mode=error"
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True}

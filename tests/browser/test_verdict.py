@@ -3,9 +3,8 @@
 import pytest
 
 from fotismos.reports.page.page import render
-from tests import records
-from tests.browser.conftest import EXACT, FAILED, NOISY, NOISY_ID
-from tests.browser.test_page_at_large import PHONE
+from tests.browser.conftest import EXACT, FAILED, NOISY, NOISY_ID, PHONE
+from tests.shared import records
 
 DESK = {"viewport": {"width": 1440, "height": 900}}
 PLACE = "document.querySelector('.worst li img').getBoundingClientRect().bottom"

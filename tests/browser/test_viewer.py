@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.departure.metrics import log2_luminance_ratio
-from tests.browser.conftest import EXACT, HEIGHT, NOISY, NOISY_ID, WIDTH
+from tests.browser.conftest import EXACT, HEIGHT, NOISY, NOISY_ID, WIDTH, top_of
 
 SCENE = f"#scene={NOISY_ID}"
 
@@ -35,12 +35,6 @@ def rgb(channels, half, x, y):
 
 def box_of(region):
     return [region[key] for key in ("x", "y", "width", "height")]
-
-
-def top_of(report):
-    """The end of the map's colours: the least that 95 % of the counted pixels keep within."""
-    held = np.quantile(report.channels[NOISY]["dE2000.Y"][1:], 0.95, method="lower")
-    return next(top for top in (5, 10, 20, 40, 100) if top >= held)
 
 
 def difference_colour(value, threshold, top):

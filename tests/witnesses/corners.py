@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
-from tests.parts import moved
+from tests.shared.parts import moved
 from tests.witnesses import configuration, stage
 from tests.witnesses.witness import Witness
 

@@ -6,7 +6,7 @@ a lamp of radiance ``L`` sends it the irradiance ``E = pi L F``.
 
 import numpy as np
 
-from tests.parts import look_at
+from tests.shared.parts import look_at
 from tests.witnesses import configuration, stage
 from tests.witnesses.stage import GREY
 from tests.witnesses.witness import Witness

@@ -1,6 +1,6 @@
 """What the scenes of the witnesses are made of: a camera without perspective, plates and lamps."""
 
-from tests import parts
+from tests.shared import parts
 
 GREY = 0.5
 """Reflectance of what is looked at, unless a case says otherwise."""

@@ -11,7 +11,7 @@ from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.reference.rendering.renderer import passes
-from tests import parts
+from tests.shared import parts
 from tests.witnesses import radiance, stage
 from tests.witnesses.witness import BLOCKS, CHANCE, ROUNDING, means
 

@@ -1,0 +1,383 @@
+"""Audits, against closed forms, and of ways to shade that are wrong in one respect each."""
+
+import json
+from functools import cache, partial
+from pathlib import Path
+
+import drjit as dr
+import jsonschema
+import mitsuba as mi
+import numpy as np
+import pytest
+from msgspec import structs
+
+from fotismos.comparisons.audit import checks, furnace
+from fotismos.comparisons.audit.subjects import (
+    DISTANCES,
+    EXTREMES,
+    ScatteringSubject,
+    ShadingSubject,
+)
+from fotismos.heuristic import Range, heuristics
+from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.heuristics import HEURISTICS
+from fotismos.heuristic.user_shaders import of_function
+from fotismos.reference.pairing import albedo, factors
+from fotismos.reports.run import audit_files
+from tests.shared.opengl import opengl
+from tests.shared.quadrature import dot, integral
+from tests.shared.schemas import schema
+
+DOCS = Path(__file__).parents[2] / "docs/shaders"
+FUNCTIONS = ("filament", "bevy", "gltf", "layered")
+SHADERS = [str(path) for path in sorted(DOCS.glob("*.py")) if path.stem != "standard_material"]
+SHADERS += [f"{DOCS / 'standard_material.py'}:{name}" for name in FUNCTIONS]
+
+
+def lambert(point):
+    value = mi.Spectrum(0)
+    for light in point.lights:
+        cosine = dr.maximum(dr.dot(point.normal, light.toward), 0)
+        value += point.material.base_color * light.intensity * cosine
+    return value
+
+
+def small(subject, grid=(120, 90)):
+    subject.grid = grid
+    return subject
+
+
+def named(name, grid=(120, 90)):
+    return small(ShadingSubject(heuristics.named(name), {}), grid)
+
+
+def shaded(function):
+    return small(ShadingSubject(of_function(function, "mine"), {}))
+
+
+def checked(subject):
+    """Make all checks; return them by name, and the curves by material."""
+    curves = tuple(checks.curve(subject, material) for material in subject.materials)
+    derivatives = {by: checks.disagreement(value, shade) for by, value, shade in subject.numbers()}
+    found = checks.all_checks(subject, curves, derivatives)
+    return {each.name: each for each in found}, {each.material: each for each in curves}
+
+
+def failing(found):
+    return {name for name, each in found.items() if each.verdict == "does not hold"}
+
+
+# --- Closed forms --------------------------------------------------------------------------------
+
+
+def test_lamberts_albedo_is_one_at_every_angle(rgb):
+    found, curves = checked(shaded(lambert))
+    for curve in curves.values():
+        np.testing.assert_allclose([curve.seen, curve.returned], 1, atol=1e-3)
+    assert failing(found) == set()
+    found, curves = checked(small(ScatteringSubject("diffuse", {"reflectance": 0.5})))
+    np.testing.assert_allclose([curves["diffuse"].seen, curves["diffuse"].returned], 0.5, rtol=1e-3)
+    assert failing(found) == {"white furnace"}
+
+
+def test_wrapped_light_has_its_closed_form(rgb):
+    """``s = max(c + w, 0) / (1 + w)``: seen is its mean over the sphere, which is ``1 + w``."""
+    wrap = 0.5
+    wrapped = of_each_light(
+        lambda point, light: dr.maximum(cosine(point, light) + wrap, 0) / (1 + wrap)
+    )
+    found, curves = checked(shaded(wrapped))
+    curve = curves["matte"]
+    np.testing.assert_allclose(curve.seen, 1 + wrap, rtol=2e-3)
+    of_light = np.cos(np.deg2rad(checks.ANGLES))
+    expected = (of_light + wrap) / ((1 + wrap) * of_light)
+    np.testing.assert_allclose(curve.returned, expected, rtol=2e-3)
+    below = found["light from below"].value
+    assert below == pytest.approx((wrap - np.sin(np.deg2rad(1))) / (1 + wrap), rel=1e-4)
+    assert failing(found) == {"white furnace", "energy", "reciprocity", "light from below"}
+
+
+def lobe(form, n, degrees):
+    """The light returned of a lobe as a textbook prints it, by the quadrature of engines."""
+
+    def reflected(light, view, half):
+        mirrored = np.stack([-light[0], -light[1], light[2]])
+        cosine = dot(mirrored, view) if form == "phong" else half[2]
+        return np.maximum(cosine, 0) ** n / light[2]
+
+    return integral(reflected, degrees)
+
+
+def test_the_textbooks_lobes_return_what_a_quadrature_finds(rgb):
+    for form in ("phong", "blinn"):
+        subject = named(form)
+        found, curves = checked(subject)
+        curve = curves["metal, alpha 0.3"]
+        n = factors.exponent_of(curve.alpha, form)
+        for degrees in (0.0, 45.0, 80.0):
+            expected = lobe(form, n, degrees) / lobe(form, n, 0)
+            returned = curve.returned[checks.ANGLES.index(degrees)]
+            assert returned == pytest.approx(expected, rel=5e-3)
+        assert failing(found) == {"white furnace", "energy", "reciprocity", "horizon"}
+
+
+def test_roughplastic_loses_light_is_reciprocal_and_has_a_wrong_derivative(rgb):
+    """By ``alpha`` the diffuse part depends on tables that Dr.Jit does not see."""
+    subject = small(ScatteringSubject("roughplastic", {"alpha": 0.5}))
+    found, curves = checked(subject)
+    known = albedo.of_roughplastic(albedo.RoughPlastic((1.0, 1.0, 1.0), 0.5, 1.49 / 1.000277))
+    seen = curves["roughplastic"].seen[0]
+    assert seen == pytest.approx(known.diffuse[0] + known.specular[0], abs=3e-3)
+    assert failing(found) == {"white furnace", "gradient"}
+    assert found["gradient"].worst == "by alpha"
+
+
+legendre = cache(np.polynomial.legendre.leggauss)
+
+
+def facets(alpha, eta, degrees):
+    """The light that GGX of an interface scatters once, over its facets (Walter et al. 2007)."""
+    cosine, eta = abs(np.cos(np.deg2rad(degrees))), eta if degrees < 90 else 1 / eta
+    nodes, weights = legendre(400)
+    x = (nodes + 1) / 2
+    share, weight = x**3 * (10 - 15 * x + 6 * x * x), 15 * weights * (x * (1 - x)) ** 2
+    tangent = alpha * np.sqrt(share / np.maximum(1 - share, 1e-15))[:, None]
+    top = 1 / np.sqrt(1 + tangent**2)
+    facing = (np.sqrt(1 - cosine**2) * tangent * np.cos(np.pi * (nodes + 1)) + cosine) * top
+    met = np.maximum(facing, 1e-9)
+    inside = np.sqrt(np.maximum(1 - (1 - met**2) / eta**2, 0))
+    parts = (met - eta * inside) / (met + eta * inside), (eta * met - inside) / (eta * met + inside)
+    fresnel = sum(part**2 for part in parts) / 2
+
+    def lit(z):
+        slope = alpha**2 * (1 / np.maximum(z, 1e-9) ** 2 - 1)
+        return np.where(z > 0, 2 / (1 + np.sqrt(1 + slope)), 0)
+
+    refracted = cosine / eta - (met / eta - inside) * top
+    scattered = fresnel * lit(2 * met * top - cosine) + (1 - fresnel) * lit(refracted)
+    seen = np.maximum(facing, 0) / top * lit(cosine) / cosine
+    return weight @ (scattered * seen) @ weights / 2
+
+
+@pytest.mark.thorough
+@pytest.mark.guarantee(
+    "kernel", "An audit's energies are those of an independent quadrature, to 0.1 %."
+)
+def test_rough_glass_passes_what_a_quadrature_over_its_facets_finds(rgb):
+    for alpha, ior in ((0.1, 1.5), (0.3, 1.1), (1.0, 2.0)):
+        given = {"alpha": alpha, "int_ior": ior, "ext_ior": 1.0, "distribution": "ggx"}
+        subject = ScatteringSubject("roughdielectric", given)
+        curve = checks.curve(subject, "roughdielectric")
+        angles = furnace.both_sides(checks.ANGLES, subject.eta)
+        expected = [facets(alpha, subject.eta, degrees) for degrees in angles]
+        np.testing.assert_allclose([curve.seen, curve.returned], [expected] * 2, rtol=1e-3)
+    found, _ = checked(small(subject, (48, 36)))
+    assert failing(found) == {"white furnace"}
+    assert found["sampling"].verdict == "holds"
+    subject.eta = 1.9  # not its own
+    expected = 2 * (4 - 1.9**2) / (4 + 1.9**2)
+    assert checks.reciprocity(subject).value == pytest.approx(expected, rel=0.02)
+
+
+def test_principled_glass_keeps_a_share_of_spec_trans_inside(rgb):
+    """mitsuba3#465: light that leaves is scaled by ``spec_trans``, though nothing else takes it."""
+    whole, half = (
+        furnace.returned(partial(subject.response, "principled"), 180.0, subject.grid, subject.eta)
+        for share in (1, 0.5)
+        for subject in [ScatteringSubject("principled", {"roughness": 0.5, "spec_trans": share})]
+    )
+    assert half == pytest.approx(whole / 2, rel=1e-4)
+    assert whole > 0.92
+
+
+# --- Each check can fail -------------------------------------------------------------------------
+
+
+def of_each_light(reflected):
+    """Return a way to shade that adds up a function of point and light."""
+
+    def shade(point):
+        value = mi.Spectrum(0)
+        for light in point.lights:
+            value += light.intensity * reflected(point, light)
+        return value
+
+    return shade
+
+
+def cosine(point, light):
+    return dr.dot(point.normal, light.toward)
+
+
+def facing(point):
+    return dr.dot(point.normal, point.view)
+
+
+def undefined_at_grazing(point):
+    """The trial has no viewer so low."""
+    return lambert(point) * dr.select(facing(point) < 1e-5, dr.log(facing(point) - 1), 1)
+
+
+def detached_parameter(point, gloss: Range(0, 1) = 0.5):
+    return lambert(point) * (1 - 0.5 * dr.detach(gloss)) / 0.75
+
+
+def infinite_derivative(point):
+    return lambert(point) * (
+        1 + dr.maximum(point.material.alpha - 1.5, 0) ** (point.material.n + 1)
+    )
+
+
+FAILING = (
+    (lambda point: 2 * lambert(point), {"white furnace", "energy"}),
+    (lambda point: lambert(point) * (0.25 + 0.75 * facing(point)),
+     {"white furnace", "reciprocity"}),
+    (of_each_light(lambda point, light: dr.select(cosine(point, light) > 0, 0.5, 0.0)),
+     {"energy", "reciprocity", "horizon"}),
+    (of_each_light(lambda point, light: dr.abs(cosine(point, light)) / 2), {"light from below"}),
+    (undefined_at_grazing, {"values"}),
+    (lambda point: lambert(point) - dr.select(point.lights[0].distance < 1e-5, 1.0, 0.0)
+     if point.lights else lambert(point), {"values"}),
+
+    (detached_parameter, {"gradient"}),
+    (infinite_derivative, {"gradient"}),
+)  # fmt: skip
+
+
+@pytest.mark.thorough
+def test_each_check_can_fail(rgb):
+    for number, (function, expected) in enumerate(FAILING):
+        found = failing(checked(small(shaded(function), (48, 36)))[0])
+        allowed = {"white furnace", "energy"} if expected & {"horizon", "reciprocity"} else set()
+        assert expected <= found <= expected | allowed, number
+
+
+MATTE = """
+import drjit as dr
+import mitsuba as mi
+
+class Matte(mi.BSDF):
+    def __init__(self, properties):
+        super().__init__(properties)
+        self.m_flags = mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide
+
+    def sample(self, context, si, sample1, sample2, active=True):
+        bs = dr.zeros(mi.BSDFSample3f)
+        bs.wo = mi.warp.square_to_cosine_hemisphere(sample2)
+        return bs, mi.Spectrum(1)
+
+    def eval(self, context, si, wo, active=True):
+        return mi.Spectrum(dr.maximum(wo.z, 0) / dr.pi) & (si.wi.z > 0)
+
+    def pdf(self, context, si, wo, active=True):
+        return mi.warp.square_to_cosine_hemisphere_pdf(wo)
+
+mi.register_bsdf("matte", Matte)
+"""
+
+
+def test_a_bsdf_in_a_file_has_its_density_checked(rgb, written):
+    for text, verdict in (
+        (MATTE, "holds"),
+        (MATTE.replace("to_cosine_hemisphere(", "to_uniform_hemisphere("), "does not hold"),
+    ):
+        found, _ = checked(small(ScatteringSubject(f"{written(text)}:matte", {}), (24, 18)))
+        assert found["sampling"].verdict == verdict
+        assert failing(found) <= {"sampling"}
+    written(MATTE.replace("wo.z, 0)", "wo.w, 0)"))
+    with pytest.raises(InputError, match=r"^mine.py, line 16: .* 'w' .*BSDF mine.py:matte"):
+        checks.audit("bsdf", "mine.py:matte", {})
+
+
+# --- Hard cases ----------------------------------------------------------------------------------
+
+
+@pytest.mark.thorough
+@pytest.mark.guarantee(
+    "kernel", "Every built-in heuristic and example shader passes an audit's hard cases."
+)
+def test_every_heuristic_goes_through_the_hard_cases(rgb):
+    for name in [*sorted(HEURISTICS), *SHADERS]:
+        subject = named(name)
+        assert len(list(subject.hard_cases())) >= len(EXTREMES) + len(DISTANCES)
+        checks.reciprocity(subject), checks.horizon(subject)
+        found = checks.values(subject)
+        assert (found.verdict, found.worst) == ("holds", "none"), name
+
+
+@pytest.mark.thorough
+@opengl
+def test_a_shader_in_glsl_is_audited_without_derivatives(rgb):
+    found, _ = checked(named(str(DOCS / "phong.glsl"), (24, 18)))
+    assert found["gradient"].verdict == "not asked"
+    assert found["values"].verdict == "holds"
+
+
+# --- The command and its files -------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def grey():
+    """The audit of a grey diffuse BSDF."""
+    mi.set_variant("llvm_ad_rgb")
+    return checks.audit("bsdf", "diffuse", {"reflectance": 0.5})
+
+
+def test_the_headline_and_the_page_name_every_failure(grey):
+    assert audit_files.headline(grey) == "diffuse, reflectance 0.5: white furnace does not hold"
+    failed = [structs.replace(check, verdict="does not hold", value=2.0) for check in grey.checks]
+    wrong = structs.replace(grey, checks=tuple(failed), faults=("nan (<i>)", "nan (there)"))
+    html = audit_files.render(wrong)
+    for check in grey.checks:
+        assert check.name in audit_files.headline(wrong)
+        assert f"{check.name.capitalize()}</th>" in html
+    assert "nan (&lt;i&gt;)" in html
+    assert "<i>" not in html
+    assert "<script" not in html
+    assert "default-src 'none'" in html
+
+
+@pytest.mark.thorough
+def test_only_values_that_no_light_has_fail_the_command(run, tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "import drjit as dr\n"
+        "def even(point):\n"
+        "    facing = dr.dot(point.normal, point.view)\n"
+        "    return dr.select(facing < 1e-5, dr.log(facing - 1), 1) * point.material.k_s\n"
+    )
+    assert run("audit", "--bsdf", "diffuse", "-p", "reflectance=0.5", "-o", tmp_path)[0] == 0
+    code, said, _ = run("audit", "--heuristic", f"{file}:even", "-o", tmp_path)
+    assert (code, "nan" in said) == (1, True)
+    folder = tmp_path / "audit/mine-even"
+    assert (folder / "audit.svg").read_text().startswith("<svg")
+    record = json.loads((folder / "audit.json").read_text())
+    jsonschema.validate(record, schema("audit"))
+    html = (folder / "index.html").read_text()
+    assert all(check["worst"] in html for check in record["checks"])
+
+
+def test_mistakes_in_words_are_refused(run, tmp_path, rgb, written):
+    scalar = written("import mitsuba as mi\nmi.set_variant('scalar_rgb')\n")
+    for words, message in (
+        (("--heuristic", "phong", "--bsdf", "diffuse"), "one of --heuristic and --bsdf"),
+        (("--bsdf", "diffuse", "-p", "reflectance"), "is not a parameter"),
+    ):
+        code, _, said = run("audit", *words, "-o", tmp_path)
+        assert (code, message in said) == (2, True)
+    for kind, name, given, message in (
+        ("heuristic", "phong", {"gloss": 1.0}, "gloss"),
+        ("heuristic", "phnog", {}, "phnog"),
+        ("bsdf", "plastic", {}, "mirror"),
+        ("bsdf", "dielectric", {}, "passes it in one direction"),
+        ("bsdf", "roughdielectric", {"int_ior": 1.05}, "too narrow"),
+        ("bsdf", "none.py:matte", {}, "^none.py: there is no such file"),
+        ("bsdf", scalar, {}, "in variant llvm_ad_rgb"),
+        ("bsdf", "roughplastic", {"alpha": 0.01}, "too narrow"),
+        ("bsdf", "phong", {"n": 1000.0}, "too narrow"),
+        ("bsdf", "roughplastic", {"alhpa": 1.0}, "alhpa"),
+    ):
+        with pytest.raises(InputError, match=message):
+            checks.audit(kind, name, given)
+    with pytest.raises(InputError, match="give a value from 0 to 1"):
+        ShadingSubject(of_function(detached_parameter, "mine"), {"gloss": 2.0})

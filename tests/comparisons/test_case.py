@@ -1,0 +1,139 @@
+"""One door: whatever names a scene is read once, in the same way by all who open it."""
+
+import json
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.departure.colour import MOST_PIXELS
+from fotismos.comparisons.options import LARGEST_SPP, Options
+from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.tessellation import FINEST
+from fotismos.reference.scene import source
+from tests.shared.small_scene import PLAIN
+
+SMALL = ("--spp", 4, "--resolution", "12x12")
+
+SCRIPT = """
+from pathlib import Path
+import mitsuba as mi
+
+with Path(__file__).with_suffix(".runs").open("a") as file:
+    file.write("x")
+
+def scene():
+    return mi.cornell_box()
+"""
+
+LAMP = {"type": "spectrum", "value": [(580.0, 0.0), (590.0, 50.0), (600.0, 0.0)]}
+
+
+def spectral_scene():
+    """A sphere under a lamp that three numbers cannot stand for."""
+    return {
+        "type": "scene",
+        "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 8, "height": 8}},
+        "ball": {"type": "sphere", "center": (0, 0, 4), "bsdf": {"type": "diffuse"}},
+        "lamp": {"type": "point", "position": (0, 2, 0), "intensity": LAMP},
+    }
+
+
+@pytest.fixture
+def parses(monkeypatch):
+    """The files that Mitsuba's parser reads."""
+    read = []
+    parse = source.Parser.parse_file
+
+    def counted(config, path, **parameters):
+        read.append(path)
+        return parse(config, path, **parameters)
+
+    monkeypatch.setattr(source.Parser, "parse_file", counted)
+    return read
+
+
+def test_a_file_is_parsed_once(run, scene_file, tmp_path, parses):
+    scene_file.write_text(PLAIN)
+    assert run("compare", scene_file, "-o", tmp_path / "out", *SMALL)[0] == 0
+    assert parses == [str(scene_file)]
+
+
+def test_a_script_runs_once_in_each_attempt(run, tmp_path):
+    """Also where the result is found finished."""
+    script, runs = tmp_path / "s.py", tmp_path / "s.runs"
+    script.write_text(SCRIPT)
+    for attempt in (1, 2):
+        assert run("compare", script, "-o", tmp_path / "out", *SMALL)[0] == 0
+        assert runs.read_text() == "x" * attempt
+
+
+def test_notebook_and_command_line_choose_one_variant(rgb):
+    from fotismos.reports import notebook
+
+    shown = notebook.compare(spectral_scene, spp=4)
+    assert open_case(spectral_scene).variant == "llvm_ad_spectral"
+    assert "--variant llvm_ad_spectral" in shown.comparison.record.command
+    assert open_case(mi.cornell_box(), name="box").variant == "llvm_ad_rgb"
+
+
+def test_a_command_repeats_what_was_given(rgb, tmp_path):
+    case = open_case("fig-6-10", Options(resolution=(12, 10)))
+    assert case.command() == (
+        "fotismos compare fig-6-10 --variant llvm_ad_rgb --resolution 12x10"
+        " --interpolation flat --tessellation 4"
+    )
+    words = {"define": {"a": 1}, "image": ("a.png", "b.png"), "everything": True, "seed": 3}
+    assert Options(**words).command("cost", "s.xml", rounds=2) == (
+        "fotismos cost s.xml --seed 3 --everything -D a=1 --image a.png --image b.png --rounds 2"
+    )
+
+
+def test_values_for_placeholders_are_refused_where_there_are_none(rgb, tmp_path):
+    script = tmp_path / "s.py"
+    script.write_text(SCRIPT)
+    for scene in ("fig-8-9", script, spectral_scene):
+        with pytest.raises(InputError, match=r"-D foo: only Mitsuba files"):
+            open_case(scene, Options(define={"foo": 1}))
+
+
+REFUSED = [
+    ({"spp": 99999999999999}, f"spp = .* to {LARGEST_SPP}"),
+    ({"spp": 2.5}, "spp = 2.5 .*whole number"),
+    ({"spp": True}, "spp = True .*whole number"),
+    ({"tessellation": 10**8}, f"tessellation = .* to {FINEST}"),
+    ({"seed": -1}, "seed = -1"),
+    ({"noise": float("nan")}, "noise = nan"),
+    ({"noise": 0}, "noise = 0"),
+    ({"noise": "little"}, "noise = 'little'"),
+    ({"resolution": (0, 5)}, "resolution"),
+    ({"resolution": (5,)}, "resolution"),
+    ({"pixels_per_degree": 0.5}, f"from 1 to {MOST_PIXELS:g}"),
+    ({"allow_empty": 3}, "True or False"),
+    ({"transfer": 3}, "linear, srgb"),
+    ({"image": 3}, "image = 3"),
+]
+
+
+def test_options_beyond_their_bounds_are_refused():
+    for words, message in REFUSED:
+        with pytest.raises(InputError, match=message):
+            Options(**words)
+
+
+def test_stated_options_are_read_back():
+    words = {"heuristic": "blinn", "resolution": [np.int64(3), 4], "noise": 0.5, "image": None}
+    options = Options.of(words)
+    assert options.stated() == {
+        "heuristic": "blinn", "resolution": [3, 4], "noise": 0.5, "seed": 0, "pairing": "matched"
+    }  # fmt: skip
+    assert Options.of(json.loads(json.dumps(options.stated()))) == options
+
+
+def test_a_word_that_is_not_known_is_told_with_what_is_allowed():
+    message = str(unknown("form =", "cook", ["phong", "blinn"]))
+    assert message == "form = 'cook' is not known: choose one of phong, blinn."
+    message = str(unknown("form =", "blin", ["phong", "blinn"]))
+    assert message.startswith("form = 'blin' is not known (did you mean blinn?): choose one of")
+    assert "did you mean" not in str(unknown("n =", None, ["phong"]))

@@ -1,0 +1,116 @@
+"""Every comparison computes some colour differences with colour-science, too, and says how far."""
+
+import numpy as np
+import pytest
+
+import fotismos.comparisons.compare
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.comparison import Deviations
+from fotismos.comparisons.departure import definitions
+from fotismos.comparisons.departure.colour import ciede2000
+from fotismos.comparisons.departure.definitions import AGREEMENT, DEFINED
+from fotismos.comparisons.departure.metrics import LEADING, METRICS
+from fotismos.comparisons.options import Options
+from fotismos.reports.page import page
+from fotismos.reports.terminal import tables
+from tests.shared import records
+from tests.shared.misplanned import SKY, scene, sphere
+from tests.shared.programs import python
+
+
+def compared(**options):
+    case = open_case("fig-8-9", Options(spp=16, resolution=(24, 16), **options))
+    return fotismos.comparisons.compare.compare(case.source, case.options)
+
+
+@pytest.fixture(scope="module")
+def usual():
+    return compared()
+
+
+@pytest.fixture
+def broken(monkeypatch):
+    """A formula that is wrong by 1 %."""
+    monkeypatch.setitem(vars(LEADING), "difference", lambda a, b: 1.01 * ciede2000(a, b))
+
+
+@pytest.mark.guarantee("means", "Every comparison computes 4,096 pixels with colour-science, too.")
+def test_the_record_says_how_far_its_colour_differences_are_and_at_how_many_pixels(
+    usual, monkeypatch
+):
+    found = usual.record.colour_science
+    assert found.pixels == usual.record.pixels.counted
+    assert set(found.largest) == set(DEFINED)
+    assert min(found.largest.values()) > 0
+    assert max(found.largest.values()) < AGREEMENT
+    assert not usual.record.warnings
+    monkeypatch.setattr(fotismos.comparisons.compare, "COMPUTED_TWICE", 5)
+    assert compared().record.colour_science.pixels == 5
+
+
+def test_a_formula_that_is_off_by_a_hundredth_is_found_and_named(broken):
+    record = compared().record
+    largest = record.colour_science.largest
+    assert largest["dE2000"] == pytest.approx(record.metrics["dE2000"].max / 101, rel=1e-3)
+    assert max(most for name, most in largest.items() if name != "dE2000") < AGREEMENT
+    (warning,) = record.warnings
+    assert f"ΔE2000 deviates from colour-science's by up to {largest['dE2000']:.2g}" in warning
+    (line,) = (line for line in tables.details(record) if "colour-science, at" in line)
+    assert f"at {record.pixels.counted} pixels: dE2000 {largest['dE2000']:.1e}" in line
+
+
+def test_with_the_option_colour_science_computes_everything(broken, usual):
+    found = compared(colour_science=True).record
+    assert not found.warnings
+    assert max(found.colour_science.largest.values()) < 1e-5
+    for name in DEFINED:
+        now, before = found.metrics[name], usual.record.metrics[name]
+        for field in ("mean", "p50", "p95", "max", "debiased", "low", "high", "noise_floor"):
+            assert getattr(now, field) == pytest.approx(getattr(before, field), abs=1e-3), field
+    assert found.significant == usual.record.significant
+
+
+def test_hostile_colours_deviate_by_little():
+    """Equal, black, white, negative, beyond white, and nearly grey pixels."""
+    rng = np.random.default_rng(3)
+    values = np.array([0, 1e-12, 1e-6, 0.0031308, 0.18, 0.5, 1, 1 + 1e-7, 7, 1e4, -1e-3])
+    for _ in range(20):
+        halves = rng.choice(values, (2, 64, 64, 3)).astype(np.float32)
+        halves[1, :8] = halves[0, :8]
+        halves[:, 8:16] = halves[:, 8:16, :, :1] * (1 + 1e-7 * rng.normal(size=(8, 64, 3)))
+        maps = {name: METRICS[name](*halves).ravel() for name in DEFINED}
+        apart = definitions.deviations(*halves.reshape(2, -1, 3), maps)
+        assert max(apart.values()) < AGREEMENT
+
+
+def test_details_give_the_largest_deviation_of_all_scenes():
+    one, other = (
+        records.record(colour_science=Deviations(pixels=4096, largest=dict.fromkeys(DEFINED, most)))
+        for most in (1.25e-6, 3.75e-5)
+    )
+    text = page.details(records=[one, other])
+    assert "at 8192 pixels" in text
+    assert text.count('<data value="3.75e-05">') == len(DEFINED)
+    assert "1.25e-06" not in text
+    assert "It has no RMSE, LDR-FLIP, HDR-FLIP." in text
+    assert "Colours against" not in page.details(records=[records.record()])
+
+
+def test_it_is_loaded_once_it_is_needed_and_leaves_numpy_as_it_was():
+    code = """
+import fotismos, sys, numpy
+import fotismos.comparisons.compare as c
+print("colour" in sys.modules)
+c._load()
+from fotismos.comparisons.departure import definitions
+print("colour" in sys.modules, numpy.get_printoptions()["legacy"])
+"""
+    done = python("-c", code)
+    assert done.stdout.split() == ["False", "True", "False"], done.stderr
+
+
+def test_a_view_of_nothing_has_nothing_to_compute():
+    away = scene(viewer=(0, -4, 0), target=(0, -9, 0), size=8, ball=sphere(), sky=SKY)
+    case = open_case(lambda: away, Options(spp=4, allow_empty=True))
+    found = fotismos.comparisons.compare.compare(case.source, case.options).record
+    assert found.colour_science == Deviations(pixels=0, largest=dict.fromkeys(DEFINED, 0))

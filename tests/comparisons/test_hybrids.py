@@ -1,0 +1,291 @@
+"""Hybrids and attributions on real scenes: sums, closure, previews."""
+
+from itertools import combinations
+from types import SimpleNamespace
+
+import mitsuba as mi
+import numpy as np
+import pytest
+
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.cost.cost_record import Method
+from fotismos.comparisons.cost.methods import Ladder
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.hybrids import attribution
+from fotismos.comparisons.hybrids.hybrids import HybridImages, HybridScenes
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import guarded, prepare
+from fotismos.comparisons.steps import steps
+from fotismos.reference.planning.effects import EXTENDED, INTERREFLECTION, OCCLUSION, labelled
+from fotismos.reference.rendering.renderer import Stream, passes
+from fotismos.reference.scene.graph import set_variant
+from fotismos.reference.scene.source import Source
+from tests.shared.misplanned import BLACK, DIFFUSE
+from tests.shared.misplanned import scene as described
+from tests.shared.noisy import require_equal, whole
+from tests.shared.parts import camera, moved, shadowed
+from tests.shared.programs import ROOT
+
+MADE_OF = {
+    "cornell-box": {"occlusion", "extended lights", "interreflection"},
+    "fig-6-10": {
+        "distance attenuation", "polygon interpolation", "microfacets and Fresnel", "environment",
+    },
+    "two-intensities": {"one intensity", "microfacets and Fresnel"},
+    "narrow-band-lamp": {"occlusion", "spectral"},
+}  # fmt: skip
+"""Effects of scenes that between them have all that the built-in ones have."""
+
+
+# -- Attribution -----------------------------------------------------------------------------------
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        "cornell-box",
+        "fig-6-10",
+        "two-intensities",
+        pytest.param("narrow-band-lamp", marks=pytest.mark.thorough),
+    ],
+)
+def found(request):
+    """The causes of one small scene, and its kernel and reference, rendered anew."""
+    case = open_case(request.param, Options(resolution=(24, 24)))
+    ready = guarded(case.source, case.options)
+    causes = attribution.find(ready, case.source, case.options)
+    images = [whole(half).mean for half in (ready.heuristic, ready.reference)]
+    yield SimpleNamespace(name=request.param, causes=causes, images=images)
+    set_variant("llvm_ad_rgb")
+
+
+def test_a_clamped_fall_off_is_a_cause(rgb):
+    """A floor 0.4 below the lamp, where 1/d^2 exceeds 1."""
+    lamp = {"type": "heuristic_point", "position": (0, 0, 0.4), "intensity": 0.5}
+    description = {
+        "type": "scene",
+        "sensor": camera((0, -3, 3), size=24),
+        "floor": {"type": "rectangle", "to_world": moved((0, 0, 0), 2), "bsdf": DIFFUSE},
+        "lamp": lamp | {"k0": 0.0, "k2": 1.0, "clamped": True},
+    }
+    source = Source("clamped", description)
+    ready = guarded(source, Options())
+    record = attribution.find(ready, source, Options()).record
+    assert record.departure > 0.5
+    assert [entry.effect for entry in record.effects] == ["distance attenuation"]
+    assert abs(record.closure.value) < 0.01 * record.departure
+
+
+@pytest.mark.thorough
+def test_a_pane_counts_as_an_obstacle(rgb):
+    """As docs/reading.md says, with numbers."""
+    case = open_case(ROOT / "docs/scenes/pane.xml", Options())
+    ready = guarded(case.source, case.options)
+    record = attribution.find(ready, case.source, case.options).record
+    removed = {entry.effect: entry.removes.value for entry in record.effects}
+    expected = {"occlusion": -11, "interreflection": 6, "extended lights": 6, "transmission": 0}
+    assert removed == pytest.approx(expected, abs=2)
+
+
+@pytest.mark.guarantee(
+    "attribution", "Attributions and closure add up to the departure in every pixel."
+)
+def test_attributions_add_up_to_the_departure_in_the_mean_and_in_every_pixel(found):
+    causes = found.causes
+    record = causes.record
+    assert set(causes.maps) == MADE_OF[found.name]
+    removed = [one.removes.value for one in record.effects]
+    assert sum(removed) + record.closure.value == pytest.approx(record.departure, abs=1e-9)
+    total = sum(causes.maps.values()) + causes.left
+    np.testing.assert_allclose(total, causes.departure, atol=1e-9)
+    assert causes.departure.max() > 1
+    assert (causes.departure[~causes.counted] == 0).all()
+    # Single precision: a few units in the last place of values around 1.
+    assert record.implementation < 1e-3
+
+
+def test_the_departure_is_that_of_the_kernel_rendered_anew(found):
+    """Noise of a few samples on both sides; the mean over all pixels is sharper than one."""
+    causes, (kernel, reference) = found.causes, found.images
+    error = LEADING(kernel, reference, Options().viewing)[causes.counted].mean()
+    departure = causes.departure[causes.counted].mean()
+    assert departure == pytest.approx(error, abs=0.05 * error + 0.5)
+    first, *_, last = causes.record.hybrids
+    assert (first.effects, first.error) == ((), pytest.approx(departure))
+    assert set(last.effects) == set(causes.maps)
+    assert set(causes.previews) == {each.effects for each in causes.record.hybrids}
+
+
+def removes(options, name="cornell-box"):
+    source = SCENES[name].source()
+    return attribution.find(guarded(source, options), source, options).record
+
+
+@pytest.mark.thorough
+@pytest.mark.guarantee("attribution", "With all effects simulated, no departure remains.")
+def test_with_all_effects_nothing_is_left(rgb, monkeypatch):
+    monkeypatch.setattr(attribution, "REPLICATES", 8)
+    record = removes(Options(resolution=(32, 32)))
+    closure = record.closure
+    assert closure.low <= 0 <= closure.high or abs(closure.value) < 0.02
+    assert closure.high - closure.low < 0.1 * record.departure
+
+
+@pytest.mark.slow
+@pytest.mark.guarantee("attribution", "A quick closure is unbiased to 1 % of the departure.")
+def test_a_quick_closure_is_not_biased(rgb):
+    records = [removes(Options(resolution=(48, 48), seed=seed)) for seed in range(5)]
+    mean = np.mean([record.closure.value for record in records])
+    assert abs(mean) < 0.01 * records[0].departure
+
+
+@pytest.mark.guarantee(
+    "attribution", "Intervals of attributions contain the converged value in 35 of 40 runs."
+)
+@pytest.mark.slow
+def test_intervals_of_attributions_hold_the_converged_value(rgb, capsys, monkeypatch):
+    def effects(seed):
+        record = removes(Options(resolution=(48, 48), seed=seed))
+        return {one.effect: one.removes for one in record.effects}
+
+    runs = [effects(seed) for seed in range(40)]
+    monkeypatch.setattr(attribution, "SPP", 64 * attribution.SPP)
+    for effect, exact in effects(1_000).items():
+        held = sum(one[effect].low <= exact.value <= one[effect].high for one in runs)
+        width = np.median([one[effect].high - one[effect].low for one in runs])
+        with capsys.disabled():
+            print(f"\n{effect}: {exact.value:.3f}, held {held} of 40, median width {width:.3f}")
+        assert held >= 35
+        assert width < max(0.2, exact.value / 2)
+
+
+# -- Hybrids ---------------------------------------------------------------------------------------
+
+
+class Shown:
+    """Renders the hybrid of some effects: transported light, and the emission pass."""
+
+    def __init__(self, scenes, simulated, spp):
+        made = scenes.transport([simulated], spp), scenes.emission(simulated, spp)
+        self.parts = [renderer for renderer in made if renderer is not None]
+
+    def render(self, seed):
+        return sum(mi.TensorXf(part.render(seed)) for part in self.parts)
+
+
+def hybrid_scenes(source, size=24):
+    ready = prepare(source, Options(resolution=(size, size)))
+    return ready, HybridScenes(ready.pair, ready.plan, ready.scene)
+
+
+def test_without_effects_the_plugins_give_the_kernels_image(rgb):
+    for name in ("fig-8-9", "plastic-spheres", "fig-6-5-m40"):
+        ready, scenes = hybrid_scenes(SCENES[name].source())
+        found = np.array(Shown(scenes, (), ready.heuristic.pass_spp).render(3))
+        expected = np.array(ready.heuristic.render(3))
+        assert expected.max() > 0.1
+        np.testing.assert_allclose(found, expected, atol=2e-5)
+
+
+@pytest.mark.thorough
+def test_images_of_one_rendering_are_those_of_a_rendering_each(rgb):
+    """Alone, only the image with all effects draws the same random numbers: paths come first."""
+    _, scenes = hybrid_scenes(SCENES["cornell-box"].source())
+    more = set(), {OCCLUSION}, {INTERREFLECTION}, {OCCLUSION, INTERREFLECTION}
+    sets = [{EXTENDED} | each for each in more]
+    together = np.split(np.array(scenes.transport(sets, 64).render(3)), len(sets), axis=2)
+    for simulated, image in zip(sets, together, strict=True):
+        alone = np.array(scenes.transport([simulated], 64).render(3))
+        if simulated == sets[-1]:
+            np.testing.assert_allclose(image, alone, rtol=1e-4, atol=1e-5)
+        else:
+            assert image.mean() == pytest.approx(alone.mean(), rel=0.01)
+    assert min(abs(one - two).mean() for one, two in combinations(together, 2)) > 1e-3
+
+
+def test_with_all_effects_they_give_the_reference(rgb):
+    for name in ("fig-8-9", "cornell-box"):
+        ready, scenes = hybrid_scenes(SCENES[name].source())
+        found = whole(Shown(scenes, scenes.differences, 64))
+        ready.reference.pass_spp = 64
+        require_equal(found, whole(ready.reference, seed=90), name)
+
+
+def test_light_without_shadows_passes_through_what_is_in_its_way(rgb):
+    """A lamp behind a board: black with shadows, and without them what the lamp gives alone."""
+
+    def board(factor, height=0, bsdf=BLACK, **more):
+        return {"type": "rectangle", "to_world": moved((0, 0, height), factor), "bsdf": bsdf} | more
+
+    # The camera stands under the board, which it does not see.
+    lamp = board((0.5, 0.5, -0.5), 3, emitter={"type": "area", "radiance": 20.0})
+    view = described((0, -3, 1.5), size=16, floor=board(2, bsdf=DIFFUSE), lamp=lamp)
+    images = {}
+    for key, parts in (("open", {}), ("hidden", {"board": board(4, 2)})):
+        _, scenes = hybrid_scenes(Source(key, view | parts), 16)
+        everything = set(scenes.differences)
+        shown = (Shown(scenes, each, 64) for each in (everything, everything - {OCCLUSION}))
+        images[key] = [whole(each) for each in shown]
+    assert images["open"][0].mean.max() > 0.1
+    assert images["hidden"][0].mean.max() < 1e-6
+    found = images["hidden"][1]
+    np.testing.assert_allclose(
+        found.mean, images["open"][0].mean, atol=8 * found.standard_error.max() + 1e-4
+    )
+
+
+@pytest.mark.guarantee(
+    "attribution", "A preview of the switchboard equals a rendering with its effects."
+)
+def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
+    """By the kernel's own shadow rays, where the hybrid has Mitsuba's direct light."""
+    scene = shadowed(24)
+    scene["sensor"]["film"]["rfilter"] = {"type": "box"}
+    case = open_case(scene, Options.of({"resolution": (24, 24)}), "shadowed")
+    found = Ladder(case.source, case.options, guarded(case.source, case.options))
+    hybrids = HybridImages(found.pairs, found.scenes, 3, 16, 0, (24, 24))
+    for effects in ((), ("occlusion",)):
+        image = hybrids.simulating({labelled(effect) for effect in effects})
+        assert image.shape == (3, 48, 48, 3)
+        corner = hybrids.pixels(image)[:, 1, 2]
+        np.testing.assert_allclose(corner, image[:, 2:4, 4:6].mean(axis=(1, 2)), rtol=1e-5)
+    for rendered in (found.ready.scene, found.ready.heuristic.scene):
+        assert tuple(rendered.sensors()[0].film().size()) == (24, 24)
+    shadows = Method(name="shadows", family="kernel", shadows=True)
+    loop = passes([found.renderer(shadows, 4, (48, 48))], 0, 3, stream=Stream.REPLICATES)
+    expected = np.mean([np.array(one.images[0]) for one in loop], axis=0)
+    np.testing.assert_allclose(image.mean(axis=0), expected, rtol=1e-3, atol=1e-4)
+    assert abs(image - hybrids.simulating(())).max() > 0.05
+
+
+@pytest.mark.guarantee(
+    "attribution", "Previews with light between surfaces have half the noise of their samples."
+)
+def test_a_clean_reference_takes_noise_out_of_previews(rgb):
+    """By two runs that share nothing but the scene; the means stay."""
+    case = open_case("cornell-box", Options(resolution=(48, 48)))
+    ladder = Ladder(case.source, case.options, guarded(case.source, case.options))
+    ladder.ready.reference.pass_spp = 256
+    total = whole(ladder.ready.reference)
+    clean = total.mean, total.standard_error
+    runs = [HybridImages(ladder.pairs, ladder.scenes, 4, 16, seed, (24, 24)) for seed in (1, 2)]
+    for effects in ({INTERREFLECTION}, {INTERREFLECTION, OCCLUSION}, runs[0].effects):
+        plain, quiet = (
+            [each.previews([frozenset(effects)], given)[0] for each in runs]
+            for given in (None, clean)
+        )
+        before, after = (np.sqrt(np.mean((one - two) ** 2)) for one, two in (plain, quiet))
+        assert after < 0.5 * before
+        assert np.mean(quiet) == pytest.approx(np.mean(plain), rel=0.02)
+
+
+def test_a_crop_keeps_its_place_in_finer_pixels(rgb):
+    parts = shadowed(64)
+    crop = {"crop_width": 24, "crop_height": 32, "crop_offset_x": 21, "crop_offset_y": 17}
+    parts["sensor"]["film"] |= crop
+    case = open_case(parts, Options(), "cropped")
+    record = compare(case.source, case.options, then=steps(case.options, True)).record
+    assert abs(record.why.closure.value) < 0.05 < record.why.departure
+    assert record.why.departure == pytest.approx(record.metrics["dE2000"].mean, rel=0.1)

@@ -1,0 +1,281 @@
+"""Pictures of other renderers: read, placed, doubted in words, and compared."""
+
+import json
+import os
+import re
+from pathlib import Path
+
+import mitsuba as mi
+import numpy as np
+import OpenEXR
+import pytest
+from PIL import Image
+
+from fotismos.comparisons import pictures
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.comparison import PictureRecord
+from fotismos.comparisons.departure.colour import from_srgb, to_srgb
+from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.steps import steps
+from fotismos.heuristic.errors import InputError, NonFiniteError
+from tests.shared.outputs import write
+
+SIDE = 64
+
+
+def picture_of(scene, words, spp=64, **more):
+    case = open_case(scene, Options(image=words, spp=spp, **more))
+    return compare(case.source, case.options, then=steps(case.options, False)).record
+
+
+@pytest.fixture(scope="module")
+def cornell():
+    """Two renderings of one scene: the reference with one seed, and the textbook's kernel."""
+    mi.set_variant("llvm_ad_rgb")
+    case = open_case("cornell-box", Options(resolution=(SIDE, SIDE), spp=512))
+    ready = prepare(case.source, case.options)
+    images = [np.array(half.render(5), float) for half in (ready.reference, ready.heuristic)]
+    edges = pictures.geometry_edges(ready.scene, SIDE, SIDE)
+    return images[0], images[1], [edges, pictures.picture_edges(images[1])], ready.counted
+
+
+# --- The same departure --------------------------------------------------------------------------
+
+
+@pytest.mark.guarantee("runs", "A picture from another run has that run's departure.")
+def test_a_picture_of_another_run_has_its_departure(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    scene = "plastic-spheres"
+    words = ("compare", scene, "--spp", 16, "--resolution", f"{SIDE}x48", "--no-why")
+    assert run(*words, "-o", "own")[0] == 0
+    file = f"own/{scene}/comparison.exr:heuristic"
+    code, said, _ = run(*words, "--image", file, "-o", "theirs")
+    assert code == 0
+    assert said.splitlines()[1].startswith("shift ")
+    first, second = (
+        json.loads((tmp_path / out / scene / "comparison.json").read_text())
+        for out in ("own", "theirs")
+    )
+    assert second["resolution"] == [SIDE, 48]
+    for name in METRICS:
+        own = first["metrics"][name]["mean"]
+        assert second["metrics"][name]["mean"] == pytest.approx(own, rel=1e-6)
+    assert second["picture"]["files"] == [file]
+    assert second["heuristic"] == f"picture {file}"
+    assert max(map(abs, second["picture"]["shift"])) < 0.3
+    assert file in second["command"]
+    page = (tmp_path / "theirs/index.html").read_text()
+    assert "Its content is moved by" in page
+
+
+def test_a_png_is_read_to_its_bits_by_its_transfer_function(rgb, tmp_path):
+    values = np.linspace(0, 1, 1001)
+    np.testing.assert_allclose(from_srgb(to_srgb(values)), values, atol=1e-7)
+    assert from_srgb(np.array([0.5]))[0] == pytest.approx(0.21404, abs=1e-5)
+    path = tmp_path / "x.png"
+    for bits, kind in ((8, np.uint8), (16, np.uint16)):
+        codes = np.arange(48).reshape(4, 4, 3) * (2**bits // 50)
+        mi.Bitmap(codes.astype(kind)).write(str(path))
+        linear, decoded = (pictures.read(str(path), word) for word in ("linear", "srgb"))
+        np.testing.assert_allclose(linear, codes / (2**bits - 1), atol=1e-7)
+        np.testing.assert_allclose(decoded, from_srgb(codes / (2**bits - 1)), atol=1e-6)
+
+
+# --- Repeats -------------------------------------------------------------------------------------
+
+
+def test_repeats_tell_the_pictures_noise(rgb, tmp_path):
+    """Without a difference but noise, the floor is the departure; one file cannot tell.
+
+    The plan of this scene is exact; pictures of it need not be.
+    """
+    case = open_case("lambert-sphere", Options(resolution=(32, 32), spp=64))
+    clean = np.array(prepare(case.source, case.options).reference.render(5), float)
+    random = np.random.default_rng(3)
+    files = [
+        write(tmp_path / f"{number}.exr", clean * random.normal(1, 0.3, clean.shape).clip(0))
+        for number in range(8)
+    ]
+    record = picture_of("lambert-sphere", tuple(files))
+    alone = picture_of("lambert-sphere", files[0])
+    several, one = (each.metrics["dE2000"] for each in (record, alone))
+    assert record.picture.repeats == record.plan.passes == 8
+    assert record.plan.spp == 64
+    assert several.mean > 1
+    assert record.significant.fraction < 0.1
+    assert several.noise_floor > 0.7 * several.mean
+    assert one.noise_floor < 0.7 * one.mean
+    assert not any("one file" in words for words in record.warnings)
+    assert any("one file" in words for words in alone.warnings)
+
+
+# --- Where it lies -------------------------------------------------------------------------------
+
+
+def test_shifts_are_measured_to_a_fraction_of_a_pixel(cornell):
+    reference, kernel, expected, _ = cornell
+    for x, y in ((-3, 0), (-1, 1), (0, -2), (1, 1), (2, -2)):
+        shift, _ = pictures.measure(np.roll(reference, (y, x), (0, 1)), expected)
+        assert shift == pytest.approx((x, y), abs=0.35)
+    for part in (0.25, 0.5, 0.75):
+        moved = (1 - part) * kernel + part * np.roll(kernel, 1, 1)
+        shift, _ = pictures.measure(moved, expected)
+        assert shift == pytest.approx((part, 0), abs=0.2)
+
+
+@pytest.mark.parametrize("scene", ["plastic-spheres", "narrow-band-lamp", "fig-8-9"])
+def test_a_right_picture_that_is_shifted_is_said_to_be_shifted_by_that_alone(rgb, tmp_path, scene):
+    case = open_case(scene, Options(resolution=(SIDE, SIDE), spp=256))
+    image = np.array(prepare(case.source, case.options).reference.render(5), float).clip(0)
+    for x, y, words in ((2, 0, "2 pixels to the right,"), (0, -1, "1 pixel up,")):
+        moved = np.roll(image, (y, x), (0, 1))
+        record = picture_of(scene, write(tmp_path / "x.exr", moved), resolution=(SIDE, SIDE))
+        (sentence,) = [odd for odd in record.picture.odd if "shifted" in odd]
+        assert f"are shifted by {words}" in sentence
+        assert record.picture.shift == pytest.approx((x, y), abs=0.25)
+
+
+# --- What is odd, in words -----------------------------------------------------------------------
+
+
+def odd(picture, cornell):
+    """Return what is said of a picture of two repeats."""
+    reference, _, expected, counted = cornell
+    shift, edges = pictures.measure(picture, expected)
+    record = PictureRecord(
+        files=("x", "y"), transfer=None, repeats=2, shift=shift, edges=edges,
+        ratio=pictures.ratios(picture[counted], reference[counted]),
+    )  # fmt: skip
+    return list(pictures.describe(record, picture, reference, counted))
+
+
+ODD = {
+    "a missing pi": (lambda image: image * np.pi, "a missing division by pi"),
+    "pi twice": (lambda image: image / np.pi, "a division by pi too many"),
+    "exposure": (lambda image: image * 5, "times as bright as the reference: another exposure"),
+    "white": (lambda image: image * [1, 0.9, 0.8], "another white"),
+    "gamma": (to_srgb, "sRGB-encoded: give `transfer=srgb`"),
+    "gamma twice": (lambda image: image.clip(0) ** 2.2, "decoded twice"),
+    "red and blue": (lambda image: image[..., ::-1], "channels look like blue, green, red"),
+    "channels turned": (lambda image: np.roll(image, 1, 2), "channels look like green, blue, red"),
+    "one pixel": (lambda image: np.roll(image, 1, 1), r"shifted by 1 pixels? to the right, which"),
+    "two down": (lambda image: np.roll(image, 2, 0), r"shifted by [12](\.5)? pixels down"),
+    "upside down": (lambda image: image[::-1], "looks upside down"),
+    "mirrored": (lambda image: image[:, ::-1], "looks mirrored left to right"),
+}
+
+
+@pytest.mark.guarantee("runs", "Each of twelve mistakes in how a picture was made is named.")
+def test_mistakes_in_a_picture_are_named(rgb, tmp_path, cornell):
+    """And nothing of the reference of another seed, or the kernel, whose shading alone is wrong."""
+    for name, (spoil, message) in ODD.items():
+        words = odd(spoil(cornell[0]), cornell)
+        assert any(re.search(message, each) for each in words), (name, words)
+    assert odd(cornell[0], cornell) == odd(cornell[1], cornell) == []
+    record = picture_of("cornell-box", write(tmp_path / "x.exr", cornell[0] * np.pi))
+    assert any("a missing division by pi" in each for each in record.picture.odd)
+    assert record.warnings[: len(record.picture.odd)] == record.picture.odd
+
+
+def test_a_lamp_that_a_picture_clips_does_not_count_as_exposure():
+    reference = np.array([[0.2, 0.3, 0.4], [40.0, 30.0, 20.0]])
+    assert pictures.ratios(reference.clip(0, 1), reference) == (1, 1, 1)
+    assert pictures.ratios(2 * reference, reference) == pytest.approx((2, 2, 2))
+
+
+# --- Bad input -----------------------------------------------------------------------------------
+
+GREY = np.full((8, 8, 3), 0.5)
+NAN = np.where(np.arange(8)[None, :, None] == 3, np.nan, GREY)
+BT2020 = (0.708, 0.292, 0.17, 0.797, 0.131, 0.046, 0.3127, 0.329)
+WINDOW = (np.array([0, 0], np.int32), np.array([15, 15], np.int32))
+
+
+def layered(path, *names):
+    """Write an EXR of which every channel is the number of its name, such as ``beauty.R``."""
+    channels = {name: np.full((8, 8), number, np.float32) for number, name in enumerate(names)}
+    with OpenEXR.File({"type": OpenEXR.scanlineimage}, channels) as file:
+        file.write(str(path))
+    return str(path)
+
+
+def in_parts(path, *names):
+    """Write an EXR of several parts, each with R, G and B."""
+    grey = {c: np.full((8, 8), 0.5, np.float32) for c in "RGB"}
+    parts = [OpenEXR.Part({"type": OpenEXR.scanlineimage}, dict(grey), name) for name in names]
+    with OpenEXR.File(parts) as file:
+        file.write(str(path))
+    return str(path)
+
+
+BAD = (
+    (lambda path: write(path, NAN), r"8 of 64 pixels, the first at .* = \(3, 0\), are NaN"),
+    (lambda path: write(path, GREY * 4e30), "64 of 64 pixels, .* are above 1e.18, .* too bright"),
+    (lambda path: write(path, GREY - 0.6), "64 of 64 pixels, .* are negative. Colours outside"),
+    (lambda path: write(path, GREY, alpha=np.full((8, 8), 0.5)), "alpha below 1"),
+    (lambda path: write(path, GREY, {"chromaticities": BT2020}),
+     r"its primaries and white are \(0.708.*Convert it to BT.709"),
+    (lambda path: write(path, GREY, {"displayWindow": WINDOW}),
+     "it is cropped: its data window is 8x8 .* display window 16x16"),
+    (lambda path: path.write_bytes(b"no picture") and str(path), "not a readable EXR file"),
+    (lambda path: f"{path}.tga", "pictures are .exr or .png files"),
+    (lambda path: f"{path}.exr", "there is no such file"),
+    (lambda path: write(path, GREY) + ":beauty", "it has R, G and B but no layer 'beauty'"),
+    (lambda path: layered(path, "a.R", "a.G", "a.B"), r"no channel R. .* are a: give .*x.exr:a"),
+    (lambda path: layered(path, "beauty.R", "beauty.G", "beauty.B") + ":beuty",
+     r"no layer 'beuty' \(did you mean beauty\?\)"),
+    (lambda path: layered(path, "Z", "Y", "beauty.G") + ":beauty",
+     r"its channels are Y, Z, beauty.G. Give R, G and B"),
+    (lambda path: in_parts(path, "left", "right"), "it has 2 parts, 'left', 'right'. Save the"),
+    (lambda path: in_parts(path, "left", "right") + ":right", "it has 2 parts, 'left', 'right'"),
+)  # fmt: skip
+
+
+def test_what_is_no_picture_is_refused(rgb, tmp_path):
+    for make, message in BAD:
+        with pytest.raises((InputError, NonFiniteError), match=f"(?s){message}"):
+            pictures.read(make(tmp_path / "x.exr"))
+    for name, make in (("folder.png", Path.mkdir), ("pipe.exr", os.mkfifo)):
+        make(tmp_path / name)
+        with pytest.raises(InputError, match=f"{name}: it is not a regular file. Give a .exr or"):
+            pictures.read(str(tmp_path / name), "srgb")
+    path = tmp_path / "x.png"
+    path.write_bytes(b"no picture")
+    with pytest.raises(InputError, match=r"x.png: not a readable PNG file"):
+        pictures.read(str(path), "srgb")
+    Image.fromarray(np.full((8, 8, 4), 128, np.uint8)).save(path)
+    with pytest.raises(InputError, match=r"not state its transfer function.*`transfer=srgb`"):
+        pictures.read(str(path))
+    with pytest.raises(InputError, match="64 of 64 pixels have an alpha below 1"):
+        pictures.read(str(path), "srgb")
+
+
+def test_sizes_and_repeats_must_fit(rgb, tmp_path):
+    def sized(height, width, name):
+        return write(tmp_path / f"{name}.exr", np.full((height, width, 3), 0.5))
+
+    eight, other, nine = sized(8, 8, "8"), sized(8, 8, "other"), sized(9, 9, "9")
+    for files, more, message in (
+        (sized(8, 12, "wide"), {}, "12x8 pixels, an aspect ratio of 1.5, and the .* film .*x.*, 1"),
+        (eight, {"resolution": (16, 16)}, "8x8 pixels, and `resolution=16x16` is requested"),
+        ((eight, nine), {}, "pictures of 8x8, 9x9: give repeats of one size"),
+        ((eight, other, eight), {}, "3 repeats: give one, or an even number"),
+        ((eight, other), {"noise": 1.0, "spp": None}, r"noise = 1 and 2 repeats: .* Give `spp`"),
+    ):
+        with pytest.raises(InputError, match=message):
+            picture_of("fig-8-9", files, **more)
+
+
+def test_a_changed_picture_is_compared_again(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ("compare", "fig-8-9", "--image", "x.exr", "--spp", 4, "--no-why", "-o", "out")
+    records = []
+    for value in (0.5, 0.5, 0.25):
+        write(tmp_path / "x.exr", np.full((16, 16, 3), value))
+        assert run(*words)[::2] == (0, "")
+        path = tmp_path / "out/fig-8-9/comparison.json"
+        records.append((path.stat().st_mtime_ns, path.read_text()))
+    assert records[0] == records[1] != records[2]

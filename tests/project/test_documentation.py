@@ -1,0 +1,87 @@
+"""The documentation keeps to the code: its links resolve, its commands and programs run."""
+
+import importlib
+import re
+import shlex
+from urllib.parse import unquote
+
+import click
+import nbformat
+import pytest
+from markdown_it import MarkdownIt
+from nbclient import NotebookClient
+from PIL import Image
+
+from fotismos.reports import cli
+from tests.shared.programs import ROOT, python
+
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
+OF_RUN = {"test", "lint", "bench", "docs"}
+
+
+def links(page):
+    tokens = MarkdownIt().enable("table").parse(page.read_text())
+    for token in tokens:
+        for child in token.children or ():
+            target = child.attrGet("href") or child.attrGet("src")
+            if target and not re.match(r"https?://", target):
+                yield unquote(target)
+
+
+def headings(page):
+    """The anchors of a page, as code hosts make them of headings."""
+    found = re.findall(r"^#+ (.*)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in found}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    for target in links(page):
+        path, _, anchor = target.partition("#")
+        place = page.parent / path if path else page
+        assert place.exists(), target
+        if anchor:
+            assert anchor in headings(place), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_commands_in_examples_exist_with_their_options(page):
+    blocks = MarkdownIt().parse(page.read_text())
+    code = "\n".join(b.content for b in blocks if b.type in ("fence", "code_block"))
+    pattern = r"^ *(?:- (?:run: )?)?((?:\./run|fotismos|fotismos/run) .*)"
+    for line in re.findall(pattern, code, re.MULTILINE):
+        words = shlex.split(line, comments=True)
+        if words[1] not in OF_RUN:
+            command = cli.cli.get_command(click.Context(cli.cli), words[1])
+            assert command, line
+            command.make_context(words[1], words[2:])
+
+
+@pytest.mark.thorough
+def test_the_notebook_runs():
+    notebook = nbformat.read(ROOT / "docs/tutorial.ipynb", as_version=4)
+    client = NotebookClient(notebook, timeout=60, resources={"metadata": {"path": str(ROOT)}})
+    client.execute()  # raises where a cell does
+    shown = [output for cell in notebook.cells for output in cell.get("outputs", ())]
+    assert any("mean ΔE2000" in output.get("text", "") for output in shown)
+    assert sum("image/png" in output.get("data", ()) for output in shown) == 2
+
+
+def test_the_readmes_example_runs(tmp_path):
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    done = python("-c", code + "print(colour)", cwd=tmp_path, PYTHONWARNINGS="error")
+    assert (done.returncode, done.stderr) == (0, "")
+    # k_a + k_d (N.L) with N.L = 4 / 5; the mirror direction is as far off the viewer, to the ninth.
+    expected = [0.3 + k_d * 0.8 + 0.7 * 0.8**9 for k_d in (0.5, 0.4, 0.3)]
+    found = [float(number) for number in re.findall(r"[\d.]+", done.stdout)]
+    assert all(abs(a - b) < 1e-5 for a, b in zip(found, expected, strict=True))
+
+
+def test_the_readme_shows_a_picture_with_the_command_that_makes_its_numbers(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    text = (ROOT / "README.md").read_text()
+    (caption,) = re.findall(r"made by ./run docs -->\n\n(\*`.*)\n", text)
+    assert f"`./run compare {importlib.import_module('hero').SCENE}`" in caption
+    with Image.open(ROOT / "docs/hero.webp") as picture:
+        assert picture.width >= 900
+    assert (ROOT / "docs/hero.webp").stat().st_size < 150_000

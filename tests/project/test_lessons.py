@@ -1,0 +1,65 @@
+"""docs/lessons.md: its numbers are fresh, and what its words say of them holds."""
+
+import importlib
+import re
+
+import numpy as np
+import pytest
+
+from tests.shared.programs import ROOT
+
+SECTIONS = re.split(r"^## ", (ROOT / "docs/lessons.md").read_text(), flags=re.MULTILINE)[1:]
+TABLE = re.compile(r"<!-- (.*?): made by ./run docs -->(.*)<!-- end of \1 -->", re.DOTALL)
+
+
+def same(values, expected, within=2e-3):
+    return np.all(np.abs(values - expected) <= within)
+
+
+def falls_off(t, p):
+    """Is physics the textbook's 0.5 N.L over the distance squared from 4.24 to the unit sphere?"""
+    distance = np.sqrt((2 * t) ** 2 - 1 + 4.24**2) - 2 * t
+    return np.ptp(p / t * distance**2) < 0.02 * p[0] / t[0] * distance[0] ** 2
+
+
+CLAIMS = {
+    "sky": lambda t, p: (same(t, 0.5), same(p, 0.5)),
+    "distance": lambda t, p: (p[0] > t[0], p[1] < t[1], same(t[2], p[2]),
+                              falls_off(t[:2], p[:2])),
+    "rim": lambda t, p: (same(t[0], t[1], 0.02), p[0] > 1.5 * p[1]),
+    "shadow": lambda t, p: (same(t, 0.3), 0.35 < p[0] < 0.6),
+    "sum": lambda t, p: (1 < t[0] <= 1.5, p[0] > 1),
+    "exponent": lambda t, p: (same(t[0], t[1], 0.01), p[1] > 1.1 * p[0], t[3] < t[2], p[3] < p[2]),
+    "half vector": lambda t, p: (t[1] > t[0], same(p[0], p[1])),
+    "beam": lambda t, p: (t[2] < t[1] / 10 < t[0], t[2] > 0.01, p[2] == 0, p[0] > 0.5),
+    "edges": lambda t, p: (t[0] > 1.3 * t[1], same(t[2], t[3], 0.02), same(p[0], p[1], 0.02)),
+    "vertices": lambda t, p: (t[1] > 3 * t[0], p[0] > 3 * t[0]),
+    "surfaces": lambda t, p: (t[0] == t[1] == 0, min(p[:2]) > 0.01, t[2] > 3 * p[2]),
+}  # fmt: skip
+"""What each lesson says of the means over RGB at its pixels, textbook and physics."""
+
+
+@pytest.fixture(scope="module")
+def lessons():
+    with pytest.MonkeyPatch.context() as patched:
+        patched.syspath_prepend(ROOT / "docs")
+        yield importlib.import_module("lessons")
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.partition("\n")[0])
+def test_a_lesson_says_what_a_rendering_shows(section, lessons):
+    assert len(SECTIONS) == 12
+    ((name, table),) = TABLE.findall(section)
+    assert len(TABLE.sub("", section).split()) <= 80
+    found = lessons.values(name)
+    rows = re.findall(r"^\| `(.*)` at (\d+), (\d+) \| (.*) \| (.*) \|$", table, re.MULTILINE)
+    assert [(scene, int(x), int(y)) for scene, x, y, *_ in rows] == [*lessons.LESSONS[name]]
+    for (*_, textbook, physical), halves in zip(rows, found, strict=True):
+        for shown, colour in zip((textbook, physical), halves, strict=True):
+            assert colour == pytest.approx(np.float64(shown.split(", ")) * np.ones(3), 0.02, 2e-3)
+    if name == "channels":  # the red lamp's is the white lamp's
+        assert same(found[0, :, 0], found[1, :, 0])
+        assert found[0, 0, 1] > 1.5 * found[0, 0, 0]
+    else:
+        assert all(CLAIMS[name](*found.mean(axis=2).T)), found

@@ -1,0 +1,150 @@
+"""Lights in scenes with occluders, by the thousands, and against closed forms."""
+
+import drjit as dr
+import numpy as np
+import pytest
+
+import fotismos
+from fotismos.heuristic import kernel
+from tests.shared import checks, oracle
+from tests.shared.parts import camera, moved, rgb_of
+
+COLOUR = rgb_of(1.0, 0.8, 0.6)
+PLACE = {"position": (-4.24, -1, 3), "intensity": COLOUR}
+AXIS = {"direction": (4.24, 1, -3)}
+LIGHTS = {
+    "point": {"type": "heuristic_point", **PLACE},
+    "attenuated point": {"type": "heuristic_point", **PLACE, "k0": 0.5, "k1": 0.1, "k2": 0.05},
+    "clamped point": {
+        "type": "heuristic_point", **PLACE, "k0": 0.1, "k2": 0.02, "clamped": True
+    },
+    "directional": {"type": "heuristic_directional", **AXIS, "intensity": COLOUR},
+    "spot": {"type": "heuristic_spot", **PLACE, **AXIS, "cutoff": 20.0},
+    "fading spot": {
+        "type": "heuristic_spot", **PLACE, **AXIS, "cutoff": 20.0, "exponent": 5.0, "k2": 0.05
+    },
+}  # fmt: skip
+
+
+def with_occluders(light, occlusion=True, **sphere):
+    """A sphere and a small ball over a floor, each of another material."""
+    bsdf, dark, even = (
+        {"type": "phong", "k_d": k_d, "k_s": k_s, "n": n}
+        for k_d, k_s, n in ((rgb_of(0.5, 0.3, 0.2), 0.4, 9), (0.2, 0.5, 3), (0.5, 0.2, 20))
+    )
+    ball = {"center": (-1.5, -0.8, 0.6), "radius": 0.4}
+    return {
+        "type": "scene",
+        "integrator": {"type": "heuristic", "occlusion": occlusion},
+        "sensor": camera((-3, 0, 1), fov=45.0),
+        "sphere": {"type": "sphere", "bsdf": {**bsdf, **sphere}},
+        "ball": {"type": "sphere", "bsdf": dark, **ball},
+        "floor": {"type": "rectangle", "to_world": moved((0, 0, -1), 5), "bsdf": even},
+        "light": light,
+    }
+
+
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
+def test_kernel_and_plugins_agree_on_every_pixel_with_occluders(variant):
+    lobes = [{"form": "blinn"}, {"form": "blinn", "normalised": True}, {"normalised": True}]
+    cases = [(light, {}) for light in LIGHTS] + [("point", lobe) for lobe in lobes]
+    for light, lobe in cases:
+        scene = checks.with_film(with_occluders(LIGHTS[light], **lobe), 96, 9)
+        shaded = checks.render(scene, 9, 3)
+        path = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
+        direct = checks.render(scene, 9, 3, path)
+        assert (direct[48:, 24:72] == 0).any(), "there should be a shadow to disagree on"
+        oracle.require_close(shaded, direct, relative=1e-5, absolute=2.0**-23)
+
+
+def many(count, seed=1):
+    """Point, spot and directional lights in no order, of intensities that differ a thousandfold."""
+    rng = np.random.default_rng(seed)
+    made = []
+    for number in range(count):
+        position, direction = rng.normal(size=(2, 3))
+        intensity = tuple(10.0 ** rng.uniform(-3, 0, 3))
+        attenuation = [(1, 0, 0), (0.5, 0.1, 0.2)][number % 2]
+        kind = number % 3
+        own = {"specular_intensity": intensity[::-1]} if number % 5 == 1 else {}
+        if kind == 0:
+            light = oracle.Light(
+                "point", intensity, tuple(4 * position), attenuation=attenuation, **own
+            )
+        elif kind == 1:
+            light = oracle.Light("directional", intensity, direction=tuple(direction), **own)
+        else:
+            light = oracle.Light(
+                "spot", intensity, tuple(4 * position), tuple(direction), 60.0, float(number % 4),
+                attenuation, **own,
+            )  # fmt: skip
+        made.append(light)
+    return made
+
+
+@pytest.mark.parametrize("count", [kernel.BLOCK, kernel.BLOCK + 1, 150])
+def test_any_number_of_lights_adds_up(count):
+    points, lights = checks.random_points(4000), many(count)
+    arrays = (points.position, points.normal, points.view)
+    material = {"k_a": 0.1, "k_d": (0.5, 0.4, 0.1), "k_s": 0.7, "n": 9}
+    expected = oracle.shade(*arrays, oracle.Material(**material), lights, 0.5)
+    away = ~oracle.near_an_edge(points.position, points.normal, lights, 1e-6)
+    for vector_type, tolerance in ((dr.llvm.Array3f64, 1e-12), (dr.llvm.Array3f, 4e-6)):
+        found = fotismos.shade(
+            *(vector_type(array.T) for array in arrays),
+            fotismos.Material(**material),
+            [checks.kernel_light(light) for light in lights],
+            0.5,
+        )
+        largest = np.abs(expected).max()
+        oracle.require_close(
+            checks.as_rows(found), expected, absolute=tolerance * largest, where=away
+        )
+
+
+def test_many_lights_pass_gradients():
+    position = dr.llvm.ad.Array3f([0, 0.5], [0, 0.1], [0, 0.2])
+    k_d = dr.llvm.ad.Float(0.5)
+    dr.enable_grad(k_d)
+    lights = [fotismos.PointLight((x, 1.0, 3.0), 0.1) for x in np.linspace(-1, 1, 20)]
+    up = dr.llvm.ad.Array3f(0, 0, 1)
+    value = fotismos.shade(position, up, up, fotismos.Material(k_d=k_d), lights)
+    dr.backward(dr.sum(value))
+    assert dr.grad(k_d)[0] == pytest.approx(dr.sum(value)[0] / 0.5, rel=1e-5)
+
+
+# -- Lights of two intensities (6.6, 6.8) ----------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["point", "directional", "spot"])
+@pytest.mark.parametrize("omitted", [None, *checks.OWN])
+def test_two_intensities_are_those_of_the_equations_in_random_sets(kind, omitted):
+    """Each point has a light, a material and a view of its own."""
+    rng, count = np.random.default_rng(66), 4000
+    points = checks.random_points(count, seed=6)
+    names = [name for name in ("intensity", *checks.OWN) if name != omitted]
+    numbers = {name: rng.uniform(0, 2, (count, 3)) for name in (*names, "k_d", "k_s")}
+    place, travel = rng.normal(size=(2, count, 3)).astype(np.float32)
+    numbers |= {"position": 4 * place} if kind != "directional" else {}
+    numbers |= {"direction": travel} if kind != "point" else {}
+    numbers |= {"n": rng.uniform(1, 40, count)}
+    more = {"cutoff": 70.0, "exponent": 2.0} if kind == "spot" else {}
+    more |= {"attenuation": (0.5, 0.1, 0.2)} if kind != "directional" else {}
+
+    def split(values):
+        own = {name: values.pop(name) for name in ("k_d", "k_s", "n")}
+        return own, values | more
+
+    material, light = split(dict(numbers))
+    light = oracle.Light(kind, **light)
+    arrays = points.position, points.normal, points.view
+    expected = oracle.shade(*arrays, oracle.Material(**material), [light])
+    float64 = dr.llvm.Array3f64
+    given = {n: float64(v.T) if v.ndim > 1 else dr.llvm.Float64(v) for n, v in numbers.items()}
+    material, lamp = split(given)
+    classes = fotismos.PointLight, fotismos.DirectionalLight, fotismos.SpotLight
+    made = dict(zip(("point", "directional", "spot"), classes, strict=True))[kind](**lamp)
+    found = fotismos.shade(*(float64(a.T) for a in arrays), fotismos.Material(**material), [made])
+    away = ~oracle.near_an_edge(points.position, points.normal, [light], 1e-9)
+    assert (expected > 0.01).any(axis=1).sum() > 500
+    oracle.require_close(checks.as_rows(found), expected, absolute=1e-12, where=away)

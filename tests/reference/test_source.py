@@ -1,0 +1,80 @@
+"""What a command takes from a scene file: values for its placeholders, and one of its sensors."""
+
+import json
+import re
+
+import pytest
+
+from fotismos.reference import Source
+from fotismos.reference.pairing import halves
+from tests.shared.small_scene import PLAIN
+
+BALL = '<bsdf type="diffuse"><rgb name="reflectance" value="$grey"/></bsdf>'
+GREY = PLAIN.replace('<bsdf type="diffuse"/>', BALL, 1)
+SECOND = PLAIN[PLAIN.index("<sensor") : PLAIN.index("</sensor>") + len("</sensor>")]
+SMALL = ("--resolution", "16x16", "--spp", 4)
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A file with a placeholder, and a second sensor whose film is 40 by 20 pixels."""
+    assert "$grey" in GREY
+    second = SECOND.replace('value="24"', 'value="40"').replace('value="16"', 'value="20"')
+    path = tmp_path / "grey.xml"
+    path.write_text(GREY.replace("</scene>", f"{second}</scene>"), encoding="utf-8")
+    return path
+
+
+def test_what_a_scene_does_not_have_is_refused_by_name(run, scene, tmp_path):
+    out, grey, gray = ("-o", tmp_path / "out"), ("-D", "grey=0.5"), ("-D", "gray=0.2")
+    hint = "Found unused parameters"
+    for command, words, message in (
+        ("compare", out, "grey"),
+        ("compare", (*grey, *gray, *out), hint),
+        ("plan", (*grey, *gray), hint),
+        ("compare", (*grey, "--sensor", 2, *out), "no sensor 2: choose one from 0 to 1"),
+    ):
+        code, _, messages = run(command, scene, *words, *SMALL)
+        assert code == 2
+        assert message in messages.replace("grey.xml", "")
+
+
+def test_a_value_and_a_sensor_are_used_and_recorded(run, scene, tmp_path):
+    records = {}
+    for value, sensor in (("0.2", 0), ("0.6", 0), ("0.6", 1)):
+        out = tmp_path / f"{value}-{sensor}"
+        words = ("-D", f"grey={value}", "--sensor", sensor, "--spp", 4, "-o", out)
+        size = () if sensor else ("--resolution", "16x16")
+        assert run("compare", scene, *words, *size)[0] == 0
+        record = json.loads((out / "grey/comparison.json").read_text(encoding="utf-8"))
+        assert f"-D grey={value}" in record["command"]
+        records[value, sensor] = record
+    means = [records[value, 0]["metrics"]["dE2000"]["mean"] for value in ("0.2", "0.6")]
+    assert means[0] != means[1]
+    assert records["0.6", 1]["resolution"] == [40, 20]
+
+
+SPECTRAL_FILM = """<film type="specfilm">
+  <integer name="width" value="24"/><integer name="height" value="16"/>
+  <integer name="crop_offset_x" value="3"/><integer name="crop_width" value="8"/>
+  <rfilter type="tent"><float name="radius" value="1.5"/></rfilter>{bands}
+</film>"""
+BANDS = '<spectrum name="band" value="400:0, 500:1, 600:0"/>'
+
+
+def test_another_film_keeps_its_size_its_crop_and_its_filter(rgb, tmp_path):
+    """A film of bands becomes one of colours, and the record says so."""
+    made = {}
+    for kind, text in {
+        "specfilm": SPECTRAL_FILM.format(bands=BANDS),
+        "hdrfilm": SPECTRAL_FILM.format(bands="").replace("specfilm", "hdrfilm"),
+    }.items():
+        path = tmp_path / f"{kind}.xml"
+        path.write_text(re.sub("<film.*?</film>", text, PLAIN, flags=re.DOTALL), encoding="utf-8")
+        made[kind] = halves.pair(Source("a test", path))
+    films = [each.physical.instantiate().sensors()[0].film() for each in made.values()]
+    assert [str(film) for film in films] == 2 * [str(films[1])]
+    assert (*films[0].crop_size(), *films[0].crop_offset()) == (8, 16, 3, 0)
+    assert films[0].rfilter().radius() == 1.5
+    told = {kind: [each.what for each in one.overridden] for kind, one in made.items()}
+    assert told == {"specfilm": ["film"], "hdrfilm": []}

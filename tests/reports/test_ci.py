@@ -1,0 +1,384 @@
+"""Checks, gates and what CI reads of them: exit codes, JUnit, Markdown, and what they replace."""
+
+import json
+import re
+import shutil
+from types import SimpleNamespace
+from xml.etree import ElementTree
+
+import jsonschema
+import numpy as np
+import OpenEXR
+import pytest
+from msgspec import structs
+
+from fotismos.comparisons.check.measurement import HALVES, MeasuredScene, measurement
+from fotismos.comparisons.check.moved import Check, Move, differences, moved
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.reports.ci import checks, summary
+from tests.shared import records
+from tests.shared.programs import command_line
+from tests.shared.schemas import schema
+from tests.shared.small_baselines import FAST, change
+from tests.shared.small_scene import SCENE
+
+SMALL = ("--spp", 4, "--resolution", "12x8")
+
+# --- Gates -----------------------------------------------------------------------------------
+
+
+@pytest.mark.guarantee("checks", "A gate neither passes nor fails because of noise.")
+def test_a_gate_is_undecided_where_noise_may_be_the_reason():
+    share = VisibleShare(threshold=2.0, value=0.4, low=0.3, high=0.5)
+    lead = structs.replace(records.summary(3.0), visible=(share,))
+    record = structs.replace(records.record(), metrics={"dE2000": lead})
+    states = {0.2: "fail", 0.3: "undecided", 0.4: "undecided", 0.5: "pass"}
+    assert {bound: summary.gates([record], bound)[0].state for bound in states} == states
+    assert summary.gates([record], None) == []
+    outcome = summary.gate_outcome([summary.gates([record], bound)[0] for bound in states])
+    assert outcome.startswith("gates: 1 failed, 2 undecided, 1 passed. More samples")
+
+
+def test_a_run_beyond_its_bounds_ends_with_1_and_says_so_everywhere(two_scenes):
+    assert two_scenes.code == 1
+    assert "gates: 1 failed, 1 passed" in two_scenes.printed
+    suite = ElementTree.parse(two_scenes.folder / "j.xml").getroot().find("testsuite")
+    assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
+    assert "at most 10.0 % may: fail" in suite.find("testcase/failure").get("message")
+    text = (two_scenes.folder / "s.md").read_text()
+    assert "| fail |" in text
+    assert f"`{two_scenes.out / 'index.html'}`" in text
+
+
+@pytest.mark.parametrize("others", [(), ("lambert-sphere",)])
+def test_a_scene_that_fails_is_an_error_in_what_ci_reads(run, tmp_path, others):
+    (tmp_path / "bad.xml").write_text("<scene")
+    files = ("--junit", tmp_path / "j.xml", "--summary", tmp_path / "s.md")
+    words = (tmp_path / "bad.xml", *others, *SMALL, "-o", tmp_path / "out", "--max-visible", "99%")
+    assert run("compare", *words, *files)[0] == 2
+    suite = ElementTree.parse(tmp_path / "j.xml").getroot().find("testsuite")
+    assert (suite.get("tests"), suite.get("errors")) == (str(1 + len(others)), "1")
+    case = suite.find("testcase/error/..")
+    assert (case.get("name"), case.find("error").get("type")) == ("bad", "InputError")
+    assert "bad.xml" in case.find("error").get("message")
+    assert "bad.xml" in (tmp_path / "s.md").read_text()
+    assert (tmp_path / "out").exists() == bool(others)
+
+
+def test_junit_and_a_summary_are_two_files(run, tmp_path):
+    for first, second in (("a.md", "a.md"), ("a.md", "b/../a.md")):
+        files = ("--junit", tmp_path / first, "--summary", tmp_path / second)
+        code, _, messages = run("compare", "lambert-sphere", *SMALL, "-o", tmp_path / "out", *files)
+        assert code == 2
+        assert "they are one file. Name two." in messages
+        assert not list(tmp_path.iterdir())
+
+
+def test_a_picture_among_the_results_is_not_replaced(run, tmp_path):
+    words = ("compare", "lambert-sphere", *SMALL, "-o", tmp_path / "out")
+    assert run(*words)[0] == 0
+    picture = tmp_path / "out/lambert-sphere/comparison.exr"
+    content = picture.read_bytes()
+    code, _, messages = run(*words, "--image", f"{picture}:reference")
+    assert code == 2
+    assert "this picture is in the folder of the results" in messages
+    assert picture.read_bytes() == content
+    words = ("compare", "lambert-sphere", *SMALL, "-o", tmp_path / "another")
+    assert run(*words, "--image", f"{picture}:reference")[0] == 0
+
+
+# --- Checks ----------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def failure(made_baselines, tmp_path_factory):
+    """A check of two baselines, one of which moved, and then one of which none did."""
+    folder = tmp_path_factory.mktemp("failed")
+    baselines = shutil.copytree(made_baselines, folder / "baselines")
+    change(baselines / "fig-8-6b.json")
+    (baselines / "broken.json").write_text("{")
+    words = ("check", baselines, "-o", folder / "out")
+    files = ("--junit", folder / "j.xml", "--summary", folder / "s.md")
+    code, printed, messages = command_line(*words, *files)
+    shutil.copytree(folder / "out", folder / "kept")
+    (baselines / "broken.json").unlink()
+    change(baselines / "fig-8-6b.json", factor=1 / 1.5)
+    again = command_line(*words, "--seed", 7)
+    return SimpleNamespace(
+        folder=folder, baselines=baselines, code=code, printed=printed, messages=messages,
+        out=folder / "kept/check", again=again,
+    )  # fmt: skip
+
+
+def test_what_moved_fails_with_a_table_and_the_others_are_checked(failure):
+    assert failure.code == 2, "one baseline could not be read"
+    assert "1 of 3 moved" in failure.printed
+    assert "fig-8-6b: failed. reference R, block 2,3 moved from " in failure.printed
+    assert "1 could not be checked" in failure.printed
+    assert re.search(r"reference R, block 2,3 +\S+ +\S+ +-33 % +-\S+ +\S+", failure.printed)
+    accepting = f"fotismos check {failure.baselines / 'fig-8-6b.json'} --update"
+    assert accepting in failure.printed
+    assert re.search(r"error: .*broken\.json: this is not JSON", failure.messages)
+
+
+@pytest.mark.guarantee("checks", "A failure writes one page: before, now, where, and why.")
+def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
+    html = (failure.out / "index.html").read_text()
+    headline = re.search(r'<h1 id="headline">(.*?)</h1>', html)[1]
+    assert "fig-8-6b: reference R, block 2,3 moved from " in headline
+    assert "-33 %" in headline
+    assert "differ visibly</h1>" not in html
+    for part in ("1 of 3 moved", "row 2, column 3", "reference, before", "--update"):
+        assert part in html, part
+    names = {path.name for path in (failure.out / "fig-8-6b").iterdir()}
+    assert {"check.json", "comparison.json", "comparison.exr", "reference.png"} <= names
+    record = json.loads((failure.out / "fig-8-6b/check.json").read_text())
+    assert record["causes"][0].startswith("Only the reference moved")
+    (move,) = record["moved"]
+    assert (move["half"], move["block"]) == ("reference", [2, 3])
+    assert move["before"] == pytest.approx(1.5 * move["after"], rel=1e-6)
+    assert record["tested"] == len(METRICS) + 1 + 2 * 3 * (1 + 4 * 4)  # halves, channels, blocks
+
+
+def test_once_it_passes_nothing_speaks_of_the_failure(failure):
+    code, printed, messages = failure.again
+    assert (code, messages) == (0, "")
+    assert "2 of 2 unmoved" in printed
+    assert list((failure.folder / "out").iterdir()) == []
+
+
+def test_ci_reads_what_moved_and_what_was_not_checked(failure):
+    suite = ElementTree.parse(failure.folder / "j.xml").getroot().find("testsuite")
+    assert [suite.get(key) for key in ("tests", "failures", "errors")] == ["3", "1", "1"]
+    (message,) = suite.findall("testcase/failure")
+    assert message.get("message").startswith("reference R, block 2,3 moved from ")
+    assert "standard errors" in message.text
+    text = (failure.folder / "s.md").read_text()
+    assert "| fig-8-6b | failed | reference R, block 2,3, -33 % (1 in all) |" in text
+    assert f"`{failure.folder / 'out/check/index.html'}`" in text
+
+
+def test_json_follows_its_schema_and_a_lost_metric_is_not_tested(run, baselines_folder, tmp_path):
+    path = baselines_folder / "fig-8-6a.json"
+    data = json.loads(path.read_text())
+    jsonschema.validate(data, schema("baseline"))
+    for name in ("ldr_flip", "hdr_flip"):
+        del data["metrics"][name]
+    path.write_text(json.dumps(data))
+    code, printed, _ = run("check", path, "--json", "-o", tmp_path / "out")
+    found = json.loads(printed)
+    jsonschema.validate(found, schema("check"))
+    assert (code, set(found["checks"][0]["metrics"])) == (0, set(data["metrics"]))
+
+
+def test_names_that_xml_and_utf_8_forbid_are_shown():
+    move = Move(
+        quantity="dE2000",
+        half=None,
+        block=None,
+        before=2.0,
+        after=3.0,
+        error=0.1,
+        standard_errors=9.0,
+        p=1e-8,
+        p_corrected=1e-7,
+    )
+    made = checks.CheckRecord(
+        baseline="a\x00\udcff<b>.json", scene="s", status="failed", seconds=1.0, moved=(move,)
+    )
+    case = ElementTree.fromstring(summary.junit_of_checks([made])).find("testsuite/testcase")
+    assert case.get("name") == "a��<b>"
+    assert "x00" in summary.of_checks([made], 0.01, "").encode().decode()
+
+
+def test_bad_words_are_refused(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("empty", "a", "b"):
+        (tmp_path / name).mkdir()
+    for name in ("a/x.xml", "b/x.xml"):
+        (tmp_path / name).write_text(SCENE)
+    for words, expected in {
+        ("check", "nix.json"): "no such baseline",
+        ("check", "empty"): "no baseline",
+        ("check", "nix.json", "--update"): "--scene",
+        ("check", "nix.json", "--update", "--scene", "fig-0"): "'fig-0' is neither",
+        ("check", "n.json", "--update", "--scene", "fig-8-6a", "--scene", "a/x.xml"): "one --scene",
+        ("check", "new", "--update", "--scene", "a/x.xml", "--scene", "b/x.xml"): "one name",
+        ("check", "nix.json", "--spp", "4"): "--spp.*--update",
+        ("check", "nix.json", "--scene", "fig-8-6b"): "--scene.*--update",
+        ("check", "nix.json", "--significance", "nan"): "range",
+        ("compare", "fig-8-9", "--within", "2.1"): "2.1 is not a threshold",
+        ("compare", "fig-8-9", "--max-visible", "5"): "such as 5%",
+        ("compare", "fig-8-9", "--max-visible", "101%"): "from 0% to 100%",
+    }.items():
+        code, _, messages = run(*words)
+        assert (code, bool(re.search(expected, messages))) == (2, True), (words, messages)
+        assert "Traceback" not in messages
+
+
+# --- Updates ---------------------------------------------------------------------------------
+
+
+def test_an_update_rewrites_what_moved_and_nothing_else(run, baselines_folder):
+    def content():
+        return {path.name: path.read_bytes() for path in baselines_folder.iterdir()}
+
+    whole = content()
+    change(baselines_folder / "fig-8-6b.json")
+    code, printed, _ = run("check", baselines_folder, "--update")
+    assert code == 0
+    for words in ("fig-8-6b: updated", "reference R, block 2,3", "1 of 2 baselines written"):
+        assert words in printed
+    assert content() == whole
+
+
+def test_other_options_write_a_baseline_anew(run, baselines_folder):
+    path = baselines_folder / "fig-8-6b.json"
+    assert run("check", path, "--update", "--pairing", "literal", "--seed", 4)[0] == 0
+    options = json.loads(path.read_text())["options"]
+    assert (options["pairing"], options["seed"]) == ("literal", 4)
+    assert (options["spp"], options["resolution"]) == (32, [16, 12])
+
+
+def test_an_update_replaces_no_other_baseline_and_no_other_file(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "x.xml").write_text(SCENE)
+
+    def update(baseline, scene):
+        return run("check", baseline, "--update", "--scene", scene, *FAST)
+
+    assert update("base", "a/x.xml")[0] == 0
+    before = (tmp_path / "base/x.json").read_bytes()
+    assert json.loads(before)["scene"] == "../a/x.xml", "found from anywhere"
+    code, _, messages = update("base", "b/x.xml")
+    assert (code, (tmp_path / "base/x.json").read_bytes()) == (2, before)
+    assert "the baseline of ../a/x.xml, not of b/x.xml" in messages
+    other = tmp_path / "package.json"
+    for text in ('{"name": "mine"}', "[]", "mine", before[:99].decode()):
+        other.write_text(text)
+        code, _, messages = update(other, "a/x.xml")
+        assert (code, "Delete it, and write it again" in messages) == (2, True)
+        assert other.read_text() == text
+
+
+# --- Causes ----------------------------------------------------------------------------------
+
+
+def check_of(heuristic=lambda image: image, reference=lambda image: image):
+    """Return a check of halves that were changed by functions of images (16, 16, 3)."""
+    rng = np.random.default_rng(0)
+    before = rng.uniform(0.3, 0.7, (2, 16, 16, 3)) + 1e-4 * rng.normal(size=(4, 2, 16, 16, 3))
+    after = np.stack(
+        [[heuristic(one[0].copy()), reference(one[1].copy())] for one in before]
+    ) + 1e-4 * rng.normal(size=before.shape)
+    sides = [
+        measurement(each, np.ones((16, 16), bool), DEFAULT_VIEWING) for each in (before, after)
+    ]
+    moves = differences(*sides)
+    pictures = dict(zip(HALVES, after.mean(axis=0), strict=True))
+    now = MeasuredScene(sides[1], pictures, 4)
+    return Check(sides[0], now, moves, tuple(moved(moves)), 0.01)
+
+
+def redder(image):
+    image[4:8, 8:12, 0] *= 1.5
+    return image
+
+
+def test_what_moved_most_is_the_largest_not_the_most_certain():
+    change = {"half": None, "block": None, "error": 0.0, "standard_errors": 1.0, "p_corrected": 0.0}
+    moves = [
+        Move(quantity="certain", before=100.0, after=101.0, p=1e-30, **change),
+        Move(quantity="large", before=0.1, after=0.2, p=1e-4, **change),
+        Move(quantity="larger", before=0.0, after=0.01, p=1e-5, **change),
+        Move(quantity="odd", before=0.1, after=float("nan"), p=1e-5, **change),
+    ]
+    found = moved(moves)
+    assert [move.quantity for move in found] == ["odd", "larger", "large", "certain"]
+    assert [move.change for move in found[1:]] == ["+0.01", "+1e+02 %", "+1 %"]
+
+
+def test_causes_name_the_half_the_place_and_the_colour():
+    found = check_of(reference=redder)
+    causes = " ".join(found.causes())
+    assert "Only the reference moved" in causes
+    assert "in 1 of 16 blocks, most in row 2, column 3, from luminance 0.5" in causes
+    level = " ".join(check_of(heuristic=lambda image: 1.3 * image).causes())
+    assert "1.3 times the light everywhere" in level
+    assert check_of(redder, redder).causes()[0].startswith("Both halves moved: look at what")
+
+
+# --- Files of others -------------------------------------------------------------------------
+
+
+@pytest.mark.guarantee("runs", "`--junit`, `--summary` and `--images` do not replace your files.")
+def test_a_file_of_others_is_not_replaced_by_compare(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    files = {"a.xml": SCENE, "mine.txt": "mine", "b.md": SCENE}
+    for each, text in files.items():
+        (tmp_path / each).write_text(text)
+    (tmp_path / "b.xml").symlink_to("b.md")
+    for option, name, scene in (
+        ("--junit", "a.xml", "a.xml"), ("--summary", "a.xml", "a.xml"),
+        ("--junit", "mine.txt", "a.xml"), ("--summary", "b.md", "b.xml"),
+    ):  # fmt: skip
+        code, _, messages = run("compare", scene, *SMALL, option, name)
+        assert (code, f"{option} {name}: " in messages) == (2, True)
+        assert {each: (tmp_path / each).read_text() for each in files} == files
+        assert not (tmp_path / "out").exists(), "refused before anything is rendered"
+
+
+def test_a_picture_of_others_is_not_replaced_by_a_baselines(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "b.exr").write_bytes(b"mine")
+    words = ("check", "b.json", "--update", "--scene", "fig-8-6b", "--images", *SMALL)
+    code, _, messages = run(*words)
+    assert code == 2
+    assert "b.exr" in messages
+    assert (tmp_path / "b.exr").read_bytes() == b"mine"
+    (tmp_path / "b.exr").unlink()
+    for seed in range(2):  # its own are
+        assert run(*words, "--seed", seed)[0] == 0
+        with OpenEXR.File("b.exr", separate_channels=True) as file:
+            assert "baseline.reference.R" in file.channels()
+
+
+def test_a_report_replaces_an_earlier_one_and_a_summary_is_appended(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.xml").write_text(SCENE)
+    (tmp_path / "s.md").write_text("before\n")
+    files = ("--max-visible", "100%", "--junit", "j.xml", "--summary", "s.md")
+    for count in (1, 2):
+        assert run("compare", "a.xml", *SMALL, *files)[0] == 0
+        assert (tmp_path / "j.xml").read_text().count("<testcase") == 1
+        text = (tmp_path / "s.md").read_text()
+        assert text.startswith("before\n")
+        assert text.count("### fotismos compare") == count
+
+
+@pytest.mark.guarantee(
+    "runs", "Names from a scene reach terminals, CI logs and tables as mere text."
+)
+def test_hostile_names_are_printed_as_text(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("GITHUB_STEP_SUMMARY", str(tmp_path / "summary"))
+    monkeypatch.setenv("GITHUB_ACTIONS", "true")
+    hidden = "z&#10;::stop-commands::x&#x9b;31m"
+    text = SCENE.replace('<bsdf type="roughplastic"', f'<bsdf type="roughplastic" id="{hidden}"')
+    text = text.replace('<shape type="sphere"', '<shape type="sphere" id="=1+1"', 1)
+    assert text.count(hidden) == 1
+    for name, content in (("*a*|b.xml", text), ("bad.xml", text.replace('"path"', f'"{hidden}"'))):
+        (tmp_path / name).write_text(content)
+        _, printed, messages = run("compare", name, *SMALL, "-v", "-o", "out", "--summary", "s.md")
+        for line in (printed + messages).split("\n"):
+            assert not line.lstrip().startswith("::")
+            assert "\x9b" not in line
+    assert "stop-commands" in messages
+    assert "\\*a\\*\\|b" in (tmp_path / "s.md").read_text()
+    csv = (tmp_path / "out/tables/carriers.csv").read_text()
+    assert "=1+1" in csv
+    assert ",=1+1" not in csv

@@ -1,0 +1,311 @@
+"""The command line: results, messages, exit codes; most of it inside this process, for speed."""
+
+import itertools
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from io import StringIO
+
+import jsonschema
+import pytest
+
+from fotismos.comparisons.cost import measure
+from fotismos.comparisons.fit import fit as fitting
+from fotismos.heuristic.errors import InputError
+from fotismos.reports import cli
+from fotismos.reports.terminal import progress
+from tests.shared.programs import ROOT, python
+from tests.shared.schemas import schema
+from tests.shared.small_scene import SCENE
+
+
+def read(path):
+    return json.loads(path.read_text())
+
+
+def test_compare_writes_what_the_contract_names(two_scenes):
+    out, published = two_scenes.out, schema("comparison")
+    assert str(out / "index.html") in two_scenes.printed
+    for name in ("lambert-sphere", "fig-8-9"):
+        record = read(out / name / "comparison.json")
+        jsonschema.validate(record, published)
+        assert (record["scene"], record["resolution"]) == (name, [24, 16])
+        pictures = {path.name for path in (out / name).iterdir()}
+        assert {"comparison.exr", "heuristic.png", "reference.png"} <= pictures
+    record = read(out / "run.json")
+    jsonschema.validate(record, schema("run"))
+    assert {"rendering", "metrics", "files", "page", "start-up"} <= record["stages"].keys()
+    tables = {path.name for path in (out / "tables").glob("[!.]*")}
+    assert tables == {"carriers.csv", "metrics.csv"}
+    names = {path.name for path in out.glob("[!.]*")}
+    pages = {"index.html", "details.html"}
+    assert names == pages | {"run.json", "tables", "lambert-sphere", "fig-8-9"}
+
+
+def test_the_recorded_command_repeats_the_result(run, scene_file, tmp_path):
+    options = ("--spp", 8, "--seed", 3, "--resolution", "20x12", "--pairing", "literal")
+    run("compare", scene_file, "-o", tmp_path / "a", *options)
+    first = read(tmp_path / "a/my-scene/comparison.json")
+    words = shlex.split(first["command"])
+    assert words[0] == "fotismos"
+    run(*words[1:], "-o", tmp_path / "b")
+    second = read(tmp_path / "b/my-scene/comparison.json")
+    # Mitsuba adds up a wide reconstruction filter in no fixed order.
+    for metric in ("dE2000", "dE_ITP", "dE_CAM16UCS"):
+        wanted, found = (record["metrics"][metric]["mean"] for record in (first, second))
+        assert found == pytest.approx(wanted, rel=1e-4)
+    assert second["command"] == first["command"]
+
+
+def _changed(old, new):
+    assert old in SCENE
+    return SCENE.replace(old, new)
+
+
+def test_bad_words_are_refused(run, tmp_path):
+    for words, expected in {
+        ("nix.xml",): r"nix\.xml: there is no such file",
+        ("fig-9-9",): "'fig-9-9' is neither .*fig-8-9",
+        ("fig-8-9", "--resolution", "0x5"): "at least 1",
+        ("fig-8-9", "--resolution", "big"): "write it like 512x512",
+        ("fig-8-9", "--variant", "cuda_rgb"): "llvm_ad_rgb",
+        ("fig-8-9", "--spp", "1"): "range",
+        ("fig-8-9", "--noise", "nan"): "range",
+        ("fig-8-9", "--pairing", "fit"): "literal",
+        ("fig-8-9", "-D", "grey"): "'grey' is not a definition; write it like name=value",
+        (): "Missing argument",
+        ("",): "'' is neither a file nor",  # an empty variable of a shell is not this folder
+        ("x" * 1000,): "File name too long",
+        ("fig-8-9", "--timeout", "nan"): "'nan' is not in the range",
+    }.items():
+        code, _, messages = run("compare", *words, "-o", tmp_path / "out")
+        assert (code, bool(re.search(expected, messages))) == (2, True), (words, messages)
+
+
+def test_causes_that_cannot_be_found_leave_the_comparison_and_a_warning(
+    run, scene_file, tmp_path, monkeypatch
+):
+    def fails(*_args, **_kwargs):
+        raise InputError("the effects are unknown")
+
+    monkeypatch.setattr("fotismos.comparisons.hybrids.attribution.find", fails)
+    words = ("--spp", 4, "--resolution", "12x8", "-o", tmp_path)
+    assert run("compare", scene_file, "--why", *words)[0] == 0
+    record = read(tmp_path / "my-scene/comparison.json")
+    assert record["metrics"]["dE2000"]["mean"] > 0
+    assert record["warnings"][-1] == "The causes are unknown: the effects are unknown"
+    page = (tmp_path / "index.html").read_text()
+    assert "The causes are unknown: the effects are unknown" in page
+
+
+@pytest.mark.parametrize(
+    ("level", "code", "message"), [("1", 0, ""), ("2", 2, "docstrings .* Unset PYTHONOPTIMIZE")]
+)
+def test_python_without_docstrings_is_refused_before_any_work(level, code, message, tmp_path):
+    words = ("audit", "--heuristic", "phong", "-o", tmp_path / "out")
+    done = python("-m", "fotismos.reports", *words, PYTHONOPTIMIZE=level)
+    assert (done.returncode, done.stderr.count("\n")) == (code, len(message) > 0)
+    assert re.search(message, done.stderr)
+    assert (tmp_path / "out").exists() == (code == 0)
+
+
+def test_any_date_of_building_is_ignored(scene_file, tmp_path):
+    for date in ("x", "", "9" * 30):
+        words = ("compare", scene_file, "-o", tmp_path / f"out{date}", "--figures", *SMALL)
+        done = python("-m", "fotismos.reports", *words, "--no-why", SOURCE_DATE_EPOCH=date)
+        assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_scene_that_fails_is_named_and_the_others_are_compared(run, scene_file, tmp_path):
+    broken = tmp_path / "broken.xml"
+    broken.write_text(_changed('type="diffuse"', 'type="nonesuch"'))
+    out = tmp_path / "out"
+    code, printed, messages = run("compare", broken, scene_file, "-o", out, "--spp", 4)
+    assert code == 2
+    assert "1 of 2 scenes failed" in messages
+    assert "my scene" in printed
+    page = (out / "index.html").read_text()
+    assert "<b>Failed:</b>" in page
+    assert (out / "my-scene/comparison.json").is_file()
+    assert not (out / "broken").exists()
+
+
+def test_plan_prints_a_table_and_json(run):
+    code, printed, _ = run("plan", "cornell-box")
+    assert code == 0
+    for words in ("occlusion", "premise not shown", "integrator    path", "k_a, k_d"):
+        assert words in printed
+    rules = {
+        each["name"]: each for each in json.loads(run("plan", "cornell-box", "--json")[1])["rules"]
+    }
+    assert rules["light by light"]["applies"]
+    shadows = rules["no shadow rays"]
+    assert not shadows["applies"]
+    assert "box around a light" in shadows["premise"]
+    assert "may stand between" in shadows["evidence"]
+    data = json.loads(run("plan", "fig-8-9", "--json", "--everything")[1])
+    assert (data["integrator"], len(data["effects"])) == ("path", 15)
+    assert all(effect["called_for"] for effect in data["effects"])
+
+
+def test_a_file_with_tabulated_spectra_is_compared_spectrally(run, tmp_path):
+    spectrum = '<spectrum name="radiance" value="400:0.1, 700:0.3"/>'
+    path = tmp_path / "scene.xml"
+    path.write_text(_changed('<rgb name="radiance" value="0.2"/>', spectrum))
+    asked = ("--variant", "llvm_ad_rgb")
+    for options, variant in (((), "llvm_ad_spectral"), (asked, "llvm_ad_rgb")):
+        run("compare", path, "-o", tmp_path / "out", "--spp", 4, *options)
+        assert read(tmp_path / "out/scene/comparison.json")["variant"] == variant
+
+
+COMPARE = """
+import sys
+from fotismos.comparisons.processes.pool import Pool
+from fotismos.reports import cli, jobs
+jobs.Pool = lambda count, *others: Pool(0, *others)
+words = "compare fig-8-9 --no-why --resolution 16x16 -q -o".split()
+sys.argv = ["fotismos", *words, sys.argv[1]]
+cli.main()
+print(*sorted(sys.modules))
+"""
+
+
+def test_a_comparison_of_a_built_in_scene_imports_what_it_needs(tmp_path):
+    done = python("-c", COMPARE, tmp_path / "out")
+    assert (done.returncode, done.stderr) == (0, "")
+    modules = done.stdout.split()
+    assert "fotismos.comparisons.compare" in modules
+    assert "altair" not in modules, "the charts of a study of cost alone need it"
+    elsewhere = ("hard", "fit", "study", "check")
+    unneeded = tuple(f"fotismos.comparisons.{name}" for name in elsewhere)
+    assert [name for name in modules if name.startswith(unneeded)] == []
+
+
+@pytest.mark.guarantee("runs", "`--help` installs, writes and renders nothing.")
+@pytest.mark.parametrize("command", ["", "docs", "test", "bench", "lint", "compare"])
+def test_help_only_helps(command, tmp_path):
+    """In a copy without an installation, and without a network to install from."""
+    script = tmp_path / "run"
+    shutil.copy(ROOT / "run", script)
+    words = ["bash", script, *command.split(), "--help"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=20)
+    assert done.returncode == 0
+    assert "./run docs" in done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+
+
+# --- Manners ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", sorted(cli.cli.list_commands(None)))
+def test_help_shows_examples_that_are_commands(name, run):
+    code, printed, _ = run(name, "--help")
+    assert code == 0
+    _, _, examples = printed.partition("Examples")
+    command = cli.cli.get_command(None, name)
+    found = 0
+    for line in examples.partition("\nOptions")[0].splitlines():
+        if line.strip().startswith("fotismos"):
+            words = shlex.split(line.partition("|")[0])
+            command.make_context(name, words[2:])  # fails on an option that is not there
+            assert words[1] == name
+            found += 1
+    assert found or "fotismos " + name in examples
+
+
+def test_help_is_in_groups_with_whole_summaries_and_the_words_of_the_user(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setenv("FOTISMOS_PROGRAM", "./run")
+    _, printed, _ = run("--help")
+    assert "\nOne scene:\n" in printed
+    assert "  ./run compare fig-8-9" in printed
+    assert not re.search(r"…|\.\.\.\n", printed.partition("Options")[2])
+    _, printed, _ = run("compare", "--help")
+    assert [line for line in printed.splitlines() if re.fullmatch(r"\w.*:", line)] == [
+        "Options:", "What is rendered:", "Results:", "Bounds and CI:", "Processes:",
+    ]  # fmt: skip
+
+
+SMALL = ("--resolution", "16x16", "--spp", 4)
+
+
+def test_a_quiet_run_prints_the_page_alone_and_a_verbose_one_says_more(run, tmp_path):
+    quiet = run("compare", "fig-8-9", "-q", "-o", tmp_path, *SMALL)
+    assert quiet == (0, f"{tmp_path / 'index.html'}\n", "")
+    code, usual, messages = run("compare", "fig-8-9", "-o", tmp_path, *SMALL)
+    assert (code, messages) == (0, "")
+    assert "mean ΔE2000" in usual
+    words = ("-v", "--figures", "-o", tmp_path, *SMALL)
+    code, printed, messages = run("compare", "fig-8-8a", *words)
+    assert (code, "mean ΔE2000" in printed) == (0, True)
+    assert (tmp_path / "figures/fig-8-8a.pdf").stat().st_size > 1000
+    for word in ("4 samples per pixel", "heuristic_point as point", "missed: specular", "metrics"):
+        assert word in messages
+
+
+class Terminal(StringIO):
+    def isatty(self):
+        return True
+
+
+def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(monkeypatch):
+    for name in ("NO_COLOR", "FORCE_COLOR", "COLORTERM"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in {"TERM": "xterm-256color", "COLUMNS": "100"}.items():
+        monkeypatch.setenv(name, value)
+    for is_coloured in (True, False):
+        clock = itertools.count()
+        monkeypatch.setattr(sys, "stderr", Terminal())
+        monkeypatch.setattr("rich.console.monotonic", clock.__next__)
+        with progress.shown() as bar:
+            update = bar.of("cornell-box", ("rendering", "causes"))
+            for done in (0, 2, 5):
+                update("rendering", done, 10)
+        shown = sys.stderr.getvalue()
+        assert "cornell-box: rendering 5 of 10 passes, causes next" in shown
+        assert re.search(r"\d:\d\d:\d\d", shown)
+        assert ("\x1b[38;5;" in shown or "\x1b[3" in shown) is is_coloured
+        monkeypatch.setenv("NO_COLOR", "1")
+
+
+def test_a_backend_of_jupyter_that_is_not_installed_does_not_matter(tmp_path):
+    """As in a cell ``!fotismos doctor``: the kernel passes its backend on."""
+    surroundings = os.environ | {"PYTHONPATH": str(ROOT)}
+    surroundings["MPLBACKEND"] = "module://not_installed.backend"
+    words = [
+        sys.executable,
+        "-P",
+        "-m",
+        "fotismos.reports",
+        "compare",
+        "lambert-sphere",
+        "--no-why",
+    ]
+    sizes = ["--resolution", "8x8", "--spp", "4", "-o", str(tmp_path / "out")]
+    ended = subprocess.run([*words, *sizes], env=surroundings, capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("name", sorted(cli.cli.list_commands(None)))
+def test_help_names_only_options_that_the_command_has(name, run):
+    _, printed, _ = run(name, "--help")
+    without_examples, *_ = printed.partition("Examples:")
+    after_examples = printed[len(without_examples) :].partition("Options:")[2]
+    text = re.sub(r"`[^`]*`", "", f"{without_examples} {after_examples}")
+    parameters = cli.cli.get_command(None, name).params
+    has = {option for one in parameters for option in (*one.opts, *one.secondary_opts)}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", text)) <= has | {"--help"}
+
+
+def test_help_of_costs_and_fits_states_their_own_defaults(run):
+    texts = {name: " ".join(run(name, "--help")[1].split()) for name in ("cost", "fit", "export")}
+    assert f"reduced to a width of {measure.WIDTH}]" in texts["cost"]
+    assert f"[default: up to {measure.Effort().largest}]" in texts["cost"]
+    assert "[default: {}x{}]".format(*fitting.RESOLUTION) in texts["fit"]
+    assert f"[default: {fitting.SPP}]" in texts["fit"]
+    for option in ("--spp", "--seed", "--pixels-per-degree"):
+        assert option not in texts["export"]

@@ -1,0 +1,148 @@
+"""What page, files and charts show of a study of cost: the record's figures, and its front."""
+
+import json
+from dataclasses import replace
+from math import ceil
+
+import jsonschema
+import pytest
+import vl_convert
+from msgspec import convert, structs
+
+from fotismos.comparisons.comparison import MeanError
+from fotismos.comparisons.cost.cost_record import Point
+from fotismos.reports.charts import cost_charts
+from fotismos.reports.page import page
+from fotismos.reports.page.scene_view import SceneView
+from fotismos.reports.run import cost_files, scene
+from fotismos.reports.terminal import cost_tables
+from tests.browser.conftest import noisy
+from tests.shared import cost_records, records
+from tests.shared.pages import HOSTILE, Page
+from tests.shared.schemas import schema
+
+
+@pytest.fixture(scope="module")
+def study():
+    return cost_records.study()
+
+
+def shown(study, record=None):
+    """The page of one scene with its study."""
+    view = SceneView(
+        record=record or records.record(),
+        chart=cost_files.figure(study.record),
+        cost=cost_files.view(study),
+    )
+    return page.render([view])
+
+
+def test_the_figures_on_the_page_are_those_of_the_json(study):
+    made = json.loads(cost_files.documents(study)["cost.json"])
+    jsonschema.Draft202012Validator(schema("cost")).validate(made)
+    values = {value for value, _ in Page(shown(study)).values}
+    data = study.record
+    wanted = [data.reference.noise_floor, data.attribution.departure]
+    for method in data.methods:
+        wanted += [*structs.astuple(method.ratio), *structs.astuple(method.per_sample_s)]
+        wanted += [method.overhead_s.value, method.first_s]
+    for point in data.points:
+        wanted += [*structs.astuple(point.seconds), *structs.astuple(point.error)]
+        wanted += [point.spp, point.tolerance.value]
+    for one in data.attribution.effects:
+        wanted += [*structs.astuple(one.removes), one.adds_s.low, one.adds_s.high]
+        wanted += [one.alone, one.last]
+    assert not [number for number in wanted if number not in values]
+
+
+def test_page_and_terminal_name_what_cannot_be_measured_a_busy_machine_and_ties(study):
+    busy = structs.replace(study.record, processor_share=0.625)
+    for record, is_busy in ((study.record, False), (busy, True)):
+        html = Page(shown(replace(study, record=record))).text
+        text = "\n".join(cost_tables.lines(record))
+        for said in (" ".join(html.split()), text):
+            assert said.count("no measurable time") == 1  # of microfacets
+            assert ("The machine was busy: samples got 62%" in said) is is_busy
+            assert "direct <b>" in said
+            assert "the scene's own paths end at depth 3" in said
+    assert "Phong kernel" in text
+    assert "22.25" in text
+
+
+def test_page_and_terminal_say_which_sample_count_would_pass(study):
+    """By the two counts of the full plan: the noise's square falls with the samples."""
+    record = study.record
+    few, many = (point.tolerance.value**2 for point in record.points[1:])
+    left = (4 * many - few) / 3
+    spp = 16 * (many - left) / (4 - left)
+    expected = (
+        f"No measured method passes at ΔE2000 2. About {ceil(spp)} samples per pixel of full plan"
+        " would;"
+    )
+    enough = structs.replace(record.points[2], tolerance=MeanError(value=1.0, low=0.9, high=1.1))
+    for points, is_said in ((record.points, True), ((*record.points, enough), False)):
+        changed = structs.replace(record, points=points)
+        text = "\n".join(cost_tables.lines(changed))
+        for said in (Page(shown(replace(study, record=changed))).text, text):
+            assert (expected in said) is is_said
+
+
+def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_cost(study):
+    machine = structs.replace(study.record.machine, processor=HOSTILE)
+    hostile = replace(study, record=structs.replace(study.record, machine=machine))
+    html = shown(hostile, records.record(scene=HOSTILE))
+    assert HOSTILE not in html
+    assert HOSTILE in Page(html).text
+    bare = page.render([SceneView(record=records.record())])
+    for text in ("What accuracy costs", "What each effect", "Ladder"):
+        assert text in html
+        assert text not in bare
+
+
+def test_the_map_of_effects_tells_halves_none_and_what_does_not_count():
+    found = scene.view_of(cost_records.explained(noisy())).why.effects
+    assert found.names == cost_records.EFFECTS
+    assert len(set(found.colours)) == 3
+    rows = [found.map[start : start + 12] for start in range(0, 96, 12)]
+    assert rows[0] == "-" * 12
+    assert set(rows[1:-1]) == {"000000222222"}
+    assert rows[-1] == "." * 12
+
+
+def test_a_comparison_with_its_study_replaces_an_earlier_one_as_a_whole(tmp_path, study):
+    comparison = noisy()
+    scene.write(tmp_path, "scene", comparison, study)
+    files = {path.name for path in (tmp_path / "scene").glob("cost*")}
+    assert {"cost.json", "cost.svg", "cost-method-full-plan.png"} <= files
+    methods = {name: study.methods[name] for name in ("Phong kernel",)}
+    other = replace(study, record=structs.replace(study.record, seed=8), methods=methods)
+    scene.write(tmp_path, "scene", comparison, other)
+    assert json.loads((tmp_path / "scene" / "cost.json").read_text())["seed"] == 8
+    assert not (tmp_path / "scene" / "cost-method-full-plan.png").exists()
+    scene.write(tmp_path, "scene", comparison)
+    assert not list((tmp_path / "scene").glob("cost*"))
+
+
+# -- Charts ----------------------------------------------------------------------------------------
+
+
+def point(method, spp, time, error, **more):
+    return convert(cost_records.point(method, spp, time, error, **more), Point)
+
+
+def record(points, floor=0.4, **more):
+    whole = cost_records.record("synthetic")
+    reference = structs.replace(whole.reference, noise_floor=floor)
+    return structs.replace(whole, points=tuple(points), reference=reference, **more)
+
+
+SAMPLED = [point("full plan", n, 0.02 * n, 8 / n**0.5, front=True) for n in (4, 16, 64)]
+
+
+def test_a_chart_names_axes_units_and_every_method():
+    for error, points, floor in ((12.0, [], 0.0), (0.0, [], 0.0), (12.0, SAMPLED, 0.4)):
+        points = [point("Phong kernel", 16, 0.01, error, front=True), *points]
+        svg = vl_convert.vegalite_to_svg(cost_charts.titled(record(points, floor)))
+        for word in ("time for one image (ms", "mean ΔE2000", *(p.method for p in points)):
+            assert word in svg
+        assert "NaN" not in svg

@@ -1,0 +1,188 @@
+"""The pytest plugin, in the suite of someone else: passing, failing, updating, skipping."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from fotismos.heuristic.errors import InputError
+from fotismos.reports.ci.testing import Departure, Fotismos
+from tests.shared import small_baselines
+from tests.shared.programs import ROOT, python
+from tests.shared.small_scene import PLAIN, SCENE
+
+SUITE = """
+import pytest
+
+SMALL = {"resolution": (16, 12), "spp": 32}
+
+def plain():
+    return {
+        "type": "scene",
+        "sensor": {"type": "perspective", "film": {"type": "hdrfilm", "width": 16, "height": 12}},
+        "lamp": {"type": "point", "position": (0, 0, -3), "intensity": 9.0},
+        "ball": {"type": "sphere", "center": (0, 0, 4), "bsdf": {"type": "diffuse"}},
+    }
+
+def test_a_close_scene(fotismos):
+    departure = fotismos.departure("lambert-sphere", **SMALL)
+    assert departure <= 0.1
+    assert not departure > 0.1
+    assert 0 <= float(departure) < 0.1
+
+def test_a_far_scene(fotismos):
+    assert fotismos.departure("scenes/scene.xml", spp=32) <= 0.5
+
+def test_another_metric(fotismos):
+    assert fotismos.departure(plain, metric="rmse") <= 1e-3
+
+def test_unchanged(fotismos):
+    assert fotismos.unchanged("scenes/scene.xml", spp=32)
+
+def test_unchanged_in_python(fotismos):
+    fotismos.unchanged(plain, spp=32)
+
+def test_unchanged_dictionary(fotismos):
+    fotismos.unchanged(plain(), name="named", spp=32)
+
+@pytest.mark.fotismos_variant("llvm_ad_rgb", "llvm_ad_mono")
+def test_variants(fotismos):
+    import mitsuba as mi
+    assert mi.variant() == fotismos.variant
+    fotismos.unchanged("lambert-sphere", **SMALL)
+"""
+
+
+@pytest.fixture
+def suite(tmp_path):
+    """A folder with a suite; returns a function that runs it, with arguments and variables."""
+    (tmp_path / "tests/scenes").mkdir(parents=True)
+    (tmp_path / "tests/test_mine.py").write_text(SUITE)
+    (tmp_path / "tests/scenes/scene.xml").write_text(SCENE)
+    (tmp_path / "pytest.ini").write_text("[pytest]\naddopts = --strict-markers\n")
+
+    def run(*arguments, **variables):
+        words = [sys.executable, "-m", "pytest", "-p", "fotismos.reports.ci.plugin", "-W", "error"]
+        # Without the colours and services of the run that this is part of.
+        environment = {
+            k: v for k, v in os.environ.items() if not k.startswith(("PYTEST", "GITHUB"))
+        }
+        environment |= {"PYTHONPATH": str(ROOT), "COLUMNS": "120"} | variables
+        done = subprocess.run(
+            [*words, *arguments], cwd=tmp_path, env=environment, capture_output=True, text=True
+        )
+        return done.returncode, done.stdout + done.stderr
+
+    return run
+
+
+@pytest.mark.thorough
+def test_a_suite_fails_updates_and_passes(suite, tmp_path):
+    code, printed = suite("-rf")
+    assert code == 1
+    assert "6 failed, 2 passed" in printed
+    for words in (
+        "assert dE2000 ", "<= 0.5", "scene: mean dE2000 ", "95 % interval: ", "noise alone: ",
+        "scene.json: there is no such baseline. `pytest --fotismos-update` writes it.",
+    ):  # fmt: skip
+        assert words in printed
+
+    code, printed = suite("--fotismos-update", "-k", "unchanged or variants")
+    assert (code, "5 passed" in printed) == (0, True), printed
+    baselines = tmp_path / "tests/baselines"
+    variants = ["lambert-sphere-llvm_ad_mono", "lambert-sphere-llvm_ad_rgb"]
+    names = sorted(path.stem for path in baselines.iterdir())
+    assert names == [*variants, "named", "plain", "scene"]
+
+    path = baselines / "plain.json"
+    text = path.read_text().replace('"mean": [0.', '"mean": [1.', 1)
+    path.write_text(text)
+    redder = SCENE.replace('value="0.2, 0.3, 0.5"', 'value="0.3, 0.3, 0.5"')
+    (tmp_path / "tests/scenes/scene.xml").write_text(redder)
+    code, printed = suite("-k", "unchanged or variants and rgb")
+    assert "2 failed, 2 passed" in printed
+    for words in ("scene.json: ", "moved", "standard errors", "reference R, block", "pictures: "):
+        assert words in printed
+
+
+@pytest.mark.thorough
+def test_without_llvm_tests_are_skipped_with_the_reason(suite):
+    code, printed = suite("-rs", DRJIT_LIBLLVM_PATH="/nowhere/libLLVM.so")
+    assert code == 0
+    assert "8 skipped" in printed
+    assert "fotismos cannot render here. Dr.Jit cannot find an LLVM" in printed
+
+
+def test_the_plugin_imports_nothing_heavy():
+    heavy = "{'mitsuba', 'drjit', 'numpy'}"
+    code = f"import fotismos.reports.ci.plugin, sys; print({heavy} & {{*sys.modules}})"
+    assert python("-c", code).stdout.strip() == "set()"
+
+
+# --- In this process ------------------------------------------------------------------------------
+
+SMALL = {"spp": 32, "resolution": (8, 6)}
+
+
+@pytest.fixture
+def fixtures(rgb, tmp_path):
+    """What a test gets without and with ``--fotismos-update``, in a folder with a scene."""
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes/scene.xml").write_text(PLAIN)
+    places = tmp_path / "baselines", lambda: tmp_path
+    return Fotismos(*places), Fotismos(*places, update=True)
+
+
+def test_options_other_than_the_baselines_fail_until_it_is_written_again(fixtures, tmp_path):
+    checked, updated = fixtures
+    path = tmp_path / "baselines/scene.json"
+    assert updated.unchanged("scenes/scene.xml", **SMALL)
+    before = path.read_bytes()
+    other = SMALL | {"spp": 48}
+    with pytest.raises(AssertionError, match=r"differ: \{'spp': \(32, 48\)\}.*--fotismos-update"):
+        checked.unchanged("scenes/scene.xml", **other)
+    assert path.read_bytes() == before
+    assert updated.unchanged("scenes/scene.xml", **other)
+    assert json.loads(path.read_bytes())["options"]["spp"] == 48
+
+
+def test_a_baseline_can_be_named_by_its_path(fixtures, tmp_path):
+    checked, updated = fixtures
+    updated.unchanged("scenes/scene.xml", **SMALL)
+    assert checked.unchanged("baselines/scene.json")
+    small_baselines.change(tmp_path / "baselines/scene.json")
+    with pytest.raises(AssertionError, match=r"scene.json: \d+ of \d+ moved"):
+        checked.unchanged("baselines/scene.json")
+    with pytest.raises(AssertionError, match="there is no such baseline"):
+        checked.unchanged(tmp_path / "baselines/none.json")
+
+
+def test_what_cannot_be_measured_is_refused(fixtures):
+    checked, _ = fixtures
+    with pytest.raises(InputError, match=r"metric 'dE2001'.*dE2000"):
+        checked.departure("scenes/scene.xml", metric="dE2001", **SMALL)
+    with pytest.raises(InputError, match="a dictionary needs a name"):
+        checked.unchanged({"type": "scene"})
+
+
+def test_a_departure_is_a_number_that_explains_itself():
+    about = {"scene": "a", "metric": "dE2000", "error": 0.1, "noise_floor": None, "passes": 4}
+    close, far = (Departure(value, **about) for value in (1.0, 2.0))
+    assert close == 1 != far
+    assert close < far <= 2
+    assert repr(far) == "dE2000 2"
+    low, high = far.interval
+    # Student's t of three degrees of freedom: 3.182 standard errors.
+    assert (low, high) == pytest.approx((2 - 0.3182, 2 + 0.3182), abs=1e-4)
+    assert far.fotismos_explanation()[0] == "a: mean dE2000 2, standard error 0.1"
+
+
+@pytest.mark.guarantee("checks", "A baseline's name leads to no other folder.")
+def test_a_baseline_stays_in_its_folder(fixtures, tmp_path):
+    _, updated = fixtures
+    for name in ("../../../esc", "/absolute/esc", "..", "a/b", "a\nb"):
+        with pytest.raises(InputError, match="a file gets that name"):
+            updated.unchanged("scenes/scene.xml", name=name, **SMALL)
+    assert [path.name for path in tmp_path.iterdir()] == ["scenes"]

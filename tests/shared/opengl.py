@@ -1,0 +1,19 @@
+"""Whether shaders in GLSL can be run here."""
+
+import pytest
+
+from fotismos.heuristic import glsl
+from fotismos.heuristic.errors import InstallationError
+
+
+def without_opengl():
+    """Return why no shader can be run here; empty where one can."""
+    try:
+        glsl.opengl()
+    except InstallationError as error:
+        return str(error)
+    return ""
+
+
+MISSING = without_opengl()
+opengl = pytest.mark.skipif(bool(MISSING), reason=MISSING)
