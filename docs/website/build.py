@@ -4,7 +4,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from sphinx.cmd.build import build_main
-from website import sources
+
+from docs.website import sources
 
 
 def build(folder: Path, *options: str) -> int:

@@ -27,8 +27,8 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
-    "website.references",
-    "website.typeset",
+    "docs.website.references",
+    "docs.website.typeset",
 ]
 nitpicky = True
 # Names in signatures of click, which its own pages do not list.

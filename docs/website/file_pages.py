@@ -5,7 +5,8 @@ from functools import cache
 from pathlib import PurePosixPath
 from textwrap import indent
 
-from guarantees import ROOT, Guarantee, guarantees
+from docs.figures.from_tests import ROOT
+from docs.figures.guarantees import Guarantee, guarantees
 
 LANGUAGES = {
     ".py": "python", ".json": "json", ".toml": "toml", ".glsl": "glsl", ".xml": "xml"

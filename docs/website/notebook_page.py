@@ -8,7 +8,8 @@ import nbformat
 
 def page(path: Path) -> tuple[str, dict[str, bytes]]:
     """Return a notebook in Markdown, and its pictures by file name."""
-    parts, pictures = [], {}
+    parts = []
+    pictures: dict[str, bytes] = {}
     for cell in nbformat.read(path, as_version=4).cells:
         is_code = cell.cell_type == "code"
         parts.append(fenced("python", cell.source) if is_code else cell.source)

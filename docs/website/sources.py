@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from posixpath import dirname, normpath, relpath
 
-from guarantees import ROOT
-from website import api_pages, file_pages, notebook_page
+from docs.figures.from_tests import ROOT
+from docs.website import api_pages, file_pages, notebook_page
 
 LINK = re.compile(r"\[(?P<text>[^][]*)\]\((?P<target>[^)\s#]+)(?P<anchor>#[^)\s]*)?\)")
 """A link in Markdown."""
@@ -37,8 +37,8 @@ def gather(folder: Path) -> None:
         write(folder / "docs" / name, picture)
     for name, text in api_pages.pages():
         write(folder / "api" / f"{name}.rst", text)
-    for path in sorted(linked):
-        write(folder / "files" / f"{path}.rst", file_pages.page(path))
+    for name in sorted(linked):
+        write(folder / "files" / f"{name}.rst", file_pages.page(name))
 
 
 def write(path: Path, content: str | bytes) -> None:

@@ -1,6 +1,5 @@
 """Studies: designs, surfaces against formulas, points that are kept, datasets and findings."""
 
-import importlib
 import json
 import re
 
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
+from docs.figures import findings
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.comparisons.study import dataset, design, running, scenes
 from fotismos.heuristic import user_shaders
@@ -416,10 +416,9 @@ def test_the_shipped_dataset_is_that_of_its_study(shipped, rgb):
                     assert value == close, (name, column, row["point"])
 
 
-def test_the_page_says_what_the_dataset_says(shipped, monkeypatch):
+def test_the_page_says_what_the_dataset_says(shipped):
     study, table = shipped
-    monkeypatch.syspath_prepend(ROOT / "docs")
-    findings, text = importlib.import_module("findings"), PAGE.read_text()
+    text = PAGE.read_text()
     assert findings.page(study, table) == text
     column = table.column_names.index("dE2000")
     changed = table.set_column(column, table.schema.field("dE2000"), table["rmse"])

@@ -1,11 +1,11 @@
 """docs/lessons.md: its numbers are fresh, and what its words say of them holds."""
 
-import importlib
 import re
 
 import numpy as np
 import pytest
 
+from docs.figures import lessons
 from tests.shared.programs import ROOT
 
 SECTIONS = re.split(r"^## ", (ROOT / "docs/lessons.md").read_text(), flags=re.MULTILINE)[1:]
@@ -39,16 +39,9 @@ CLAIMS = {
 """What each lesson says of the means over RGB at its pixels, textbook and physics."""
 
 
-@pytest.fixture(scope="module")
-def lessons():
-    with pytest.MonkeyPatch.context() as patched:
-        patched.syspath_prepend(ROOT / "docs")
-        yield importlib.import_module("lessons")
-
-
 @pytest.mark.thorough
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.partition("\n")[0])
-def test_a_lesson_says_what_a_rendering_shows(section, lessons):
+def test_a_lesson_says_what_a_rendering_shows(section):
     assert len(SECTIONS) == 12
     ((name, table),) = TABLE.findall(section)
     assert len(TABLE.sub("", section).split()) <= 80

@@ -5,23 +5,16 @@ from pydoc import locate
 
 import pytest
 
+from docs.figures import guarantees, schemes
+from docs.website import api_pages, typeset
+from docs.website.sources import gather
 from tests.shared.programs import ROOT
 
 
 @pytest.fixture(scope="module")
-def docs():
-    """The scripts of the documentation, which import each other from their folder."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.syspath_prepend(ROOT / "docs")
-        yield
-
-
-@pytest.fixture(scope="module")
-def sources(docs, tmp_path_factory):
-    from website import sources
-
+def sources(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sources")
-    sources.gather(folder)
+    gather(folder)
     return folder
 
 
@@ -33,8 +26,6 @@ def test_the_contents_have_the_order_of_the_list(sources):
 
 
 def test_each_guarantee_leads_to_the_source_of_its_test(sources):
-    import guarantees
-
     page = (sources / "docs/guarantees.md").read_text()
     for each in guarantees.guarantees():
         label = re.search(rf"\[{each.test}\]\(#([^)]+)\)", page)[1]
@@ -53,9 +44,7 @@ def test_links_to_modules_name_what_exists(sources):
     assert "fotismos.heuristic.kernel.shade" in names  # by its other name, fotismos.heuristic.shade
 
 
-def test_every_equation_of_the_models_can_be_drawn(docs):
-    from website import typeset
-
+def test_every_equation_of_the_models_can_be_drawn():
     page = (ROOT / "docs/models.md").read_text()
     found = [a or b for a, b in re.findall(r"\$\$(.+?)\$\$|\$([^$\n]+?)\$", page)]
     assert len(found) > 20
@@ -82,17 +71,13 @@ def test_an_index_has_each_number_of_both_chapters_once(heading, eighth, sixth):
     assert sorted(listed) == sorted(numbers(f"8.1-8.{eighth} 6.1-6.{sixth}"))
 
 
-def test_the_home_of_an_equation_names_it(docs):
-    from website import api_pages
-
+def test_the_home_of_an_equation_names_it():
     for row, home in index("equations"):
         ((words, path),) = re.findall(r"\[`(.*)`\]\(\.\./(.*?)\)", home)
         assert set(numbers(row)) <= set(numbers(locate(api_pages.name(path, words)).__doc__)), row
 
 
-def test_every_figure_is_a_scene_or_drawn(docs):
-    import schemes
-
+def test_every_figure_is_a_scene_or_drawn():
     from fotismos.comparisons.gallery.builtin import SCENES
 
     drawn = []

@@ -7,22 +7,39 @@ rest is written by hand.
 """
 
 import sys
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import nbformat
 from nbclient import NotebookClient
 
+from docs.figures import (
+    accuracy,
+    audits,
+    density,
+    examples,
+    guarantees,
+    hero,
+    lessons,
+    measured,
+    model_figures,
+    renderers,
+    rooms,
+    schemes,
+)
+from docs.figures.from_tests import ROOT, fact
+from docs.website import build
 from fotismos.comparisons import atomic
 from fotismos.comparisons.compare import compare
+from fotismos.comparisons.comparison import Images
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.gallery.builtin import builtin
 from fotismos.comparisons.options import Options
 from fotismos.heuristic import plugins
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.planning.rules import RULES
-from fotismos.reference.rendering import direct
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.charts import figures, vega
 from fotismos.reports.charts.cost_charts import titled
@@ -30,9 +47,8 @@ from fotismos.reports.files import images
 from fotismos.reports.run import audit_files
 from fotismos.reports.terminal import tables
 from fotismos.reports.terminal.words import number, percent
-from tests.witnesses import page
 
-DOCS = Path(__file__).parent
+DOCS = ROOT / "docs"
 SIDE, SAMPLES = 192, 64
 
 SHEETS = {
@@ -53,7 +69,7 @@ POLYGONS = (
 )
 
 
-def main(words):
+def main(words: Sequence[str]) -> None:
     """Make everything; ``--all`` adds the slow parts, ``--accuracy`` makes only one page."""
     if not set(words) <= {"--all", "--accuracy", "--site"}:
         sys.exit(__doc__)
@@ -79,7 +95,7 @@ def main(words):
     _notebook()
 
 
-def replace(page, part, lines):
+def replace(page: str, part: str, lines: Iterable[str]) -> None:
     """Replace the text between the marks of a part of a page."""
     path = DOCS / page
     text = path.read_text(encoding="utf-8")
@@ -89,12 +105,12 @@ def replace(page, part, lines):
     atomic.write(path, "\n".join([head + begin, "", *lines, "", end + tail]))
 
 
-def marks(part):
+def marks(part: str) -> tuple[str, str]:
     """Return the marks at the beginning and end of a part of a page."""
     return f"<!-- {part}: made by ./run docs -->", f"<!-- end of {part} -->"
 
 
-def rules():
+def rules() -> Iterator[str]:
     """Yield the rules of pruning: what each omits, its proof, and its premises, numbered once."""
     numbers: dict[str, int] = {}
     for rule in RULES:
@@ -111,7 +127,7 @@ def rules():
                 yield f"{len(numbers)}. {premise.sentence}"
 
 
-def _images(name, interpolation=None):
+def _images(name: str, interpolation: Interpolation | None = None) -> Images:
     scene = builtin(name)
     options = Options(
         spp=SAMPLES,
@@ -122,12 +138,9 @@ def _images(name, interpolation=None):
     return compare(scene.source(), options).images
 
 
-def _models():
+def _models() -> None:
     """Draw the pictures of docs/models.md."""
-    import model_figures  # next to this script
-    import schemes
-
-    drawn = {name: schemes.sheet(panels) for name, panels in schemes.SHEETS.items()}
+    drawn: dict[str, Any] = {name: schemes.sheet(panels) for name, panels in schemes.SHEETS.items()}
     for name, figure in (drawn | {"lobes": model_figures.lobes()}).items():
         atomic.write(DOCS / f"models-{name}.svg", figures.drawn(figure, "svg"))
     for name, scenes in SHEETS.items():
@@ -137,38 +150,29 @@ def _models():
     _sheet("models-polygons.png", [f"{s}, {kind.value}" for s, kind in POLYGONS], [shaded])
 
 
-def _sheet(name, titles, rows):
+def _sheet(name: str, titles: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
     """Write rows of pictures, with a title above each column."""
-    import model_figures  # next to this script
-
     shown = [[images.tonemap(picture) for picture in row] for row in rows]
     atomic.write(DOCS / name, figures.drawn(model_figures.sheet(titles, shown), "png", 100))
 
 
-def _hero():
+def _hero() -> None:
     """Draw the README's first picture, and write its caption."""
-    import hero  # next to this script
-
     found = hero.made()
     atomic.write(DOCS / "hero.webp", hero.encoded(hero.picture(found)))
     replace("../README.md", "hero", hero.caption(found))
 
 
-def _site():
+def _site() -> None:
     """Build the site from what is there, in out/site."""
-    from website import build  # next to this script
-
-    folder = DOCS.parent / "out/site"
+    folder = ROOT / "out/site"
     if build.build(folder):
         raise SystemExit(f"The site in {folder} is not whole: mend the faults above.")
     print(folder / "index.html")
 
 
-def _measurements():
+def _measurements() -> None:
     """Measure all errors and times in the documents again, for a quarter of an hour."""
-    import density  # next to this script
-    import measured
-
     found = density.measured()
     atomic.write(DOCS / "models-density.svg", figures.drawn(density.chart(found), "svg"))
     replace("models.md", "density", density.sentences(found))
@@ -180,10 +184,8 @@ def _measurements():
     replace("speed.md", "speed", measured.speed())
 
 
-def _accuracy():
+def _accuracy() -> None:
     """Study what accuracy costs over many scenes, for 40 minutes on an idle machine."""
-    import accuracy  # next to this script
-
     records = accuracy.measured()
     for part in ("setting", "findings", "methods", "attribution", "pictures"):
         replace("accuracy.md", part, getattr(accuracy, part)(records))
@@ -193,22 +195,18 @@ def _accuracy():
         atomic.write(DOCS / path, vega.paper(titled(record)))
 
 
-def _guarantees():
+def _guarantees() -> None:
     """List what the tests guarantee."""
-    import guarantees  # next to this script
-
     replace("guarantees.md", "guarantees", guarantees.lines())
 
 
-def _architecture():
+def _architecture() -> None:
     """Draw the rooms that one comparison passes through."""
-    import rooms  # next to this script
-
     found = rooms.rooms(rooms.way())
     atomic.write(DOCS / "architecture.svg", figures.drawn(rooms.picture(found), "svg"))
 
 
-def _example():
+def _example() -> None:
     """Write the example of docs/reading.md: one scene with few and with many samples."""
     results = []
     for samples in (16, 256):
@@ -218,7 +216,7 @@ def _example():
     replace("reading.md", "example", _departures([result.record for result in results]))
 
 
-def _departures(records):
+def _departures(records: Sequence[Any]) -> Iterator[str]:
     """Yield a table of the means of each metric, and what its brackets hold."""
     rows = [("", *(f"{record.plan.spp} samples per pixel" for record in records))]
     for name, metric in METRICS.items():
@@ -234,18 +232,14 @@ def _departures(records):
     yield "that makes it smallest, and the mean that the reference's noise alone would give."
 
 
-def _witnesses():
+def _witnesses() -> None:
     """Run the cases of docs/witnesses.md, and write their results."""
-    plugins.register()
-    direct.register()
-    for part in ("closed_forms", "figures", "whole_scenes"):
-        replace("witnesses.md", part.replace("_", " "), getattr(page, part)())
+    for part, lines in fact("witnesses").items():
+        replace("witnesses.md", part, lines)
 
 
-def _audits():
+def _audits() -> None:
     """Audit the shaders and some BSDFs."""
-    import audits  # next to this script
-
     plugins.register()
     found = audits.audits()
     replace("audit.md", "audits", audits.table(found))
@@ -255,10 +249,8 @@ def _audits():
     replace("audit.md", "threads", audits.threads(engines, found))
 
 
-def _shaders():
+def _shaders() -> None:
     """Compare the shaders of docs/shaders."""
-    import examples  # next to this script
-
     found = examples.comparisons()
     replace("shaders.md", "shaders", examples.table(found))
     replace("shaders.md", "lamp", examples.lamp())
@@ -267,10 +259,8 @@ def _shaders():
     _sheet("shaders.png", list(shown), [list(shown.values())])
 
 
-def _renderers():
+def _renderers() -> None:
     """Render scenes with four programs."""
-    import renderers  # next to this script
-
     found = renderers.rendered()
     replace("renderers.md", "renderers", renderers.table(found))
     programs = next(iter(found.values())).images
@@ -278,22 +268,20 @@ def _renderers():
     _sheet("renderers.png", list(found), rows)
 
 
-def _lessons():
+def _lessons() -> None:
     """Render the pixels of docs/lessons.md."""
-    import lessons  # next to this script
-
     for lesson in lessons.LESSONS:
         replace("lessons.md", lesson, lessons.table(lesson))
 
 
-def _notebook():
+def _notebook() -> None:
     """Execute the tutorial; keep the output of its cells, but not their times.
 
     Of a comparison only the picture is kept: hosts of code do not show frames.
     """
     path = DOCS / "tutorial.ipynb"
     notebook = nbformat.read(path, as_version=4)
-    NotebookClient(notebook, resources={"metadata": {"path": str(DOCS.parent)}}).execute()
+    NotebookClient(notebook, resources={"metadata": {"path": str(ROOT)}}).execute()
     for cell in notebook.cells:
         cell.metadata.pop("execution", None)
         for output in cell.get("outputs", ()):

@@ -2,13 +2,13 @@
 
 import runpy
 from collections.abc import Iterator
-from pathlib import Path
 from textwrap import wrap
 
 import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 
+from docs.figures.from_tests import ROOT, fact
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.comparison import Comparison
@@ -16,9 +16,8 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.reference.scene.source import Source
 from fotismos.reports.terminal.tables import markdown
-from tests.shared.wrong_shaders import WRONG
 
-SHADERS = Path(__file__).parent / "shaders"
+SHADERS = ROOT / "docs/shaders"
 NAMES = ("phong", "wrapped", "oren_nayar", "toon", "cook_torrance")
 SCENES = ("lambert-sphere", "fig-8-9", "plastic-spheres")
 PICTURED = SCENES[-1]
@@ -50,31 +49,31 @@ def lamp() -> Iterator[str]:
         alpha = bare[name]["bsdf"]["alpha"]
         metal = {"type": "roughconductor", "material": "none", "distribution": "ggx"}
         bare[name] = bare[name] | {"bsdf": metal | {"alpha": alpha}}
-    found = {}
+    measured = {}
     for function in (":center", ""):
         asked = Options(heuristic=f"{file}{function}", resolution=(192, 128), spp=SAMPLES)
         case = open_case(str(file), asked)
         sources = {"plastic": case.source, "metal": Source("metal", bare)}
         for kind, source in sources.items():
             metrics = compare(source, case.options).record.metrics
-            found[kind, function] = metrics["dE2000"].mean, metrics["rmse"].mean
-    plastic, metal = (
-        [found[kind, function] for function in (":center", "")] for kind in ("plastic", "metal")
+            measured[kind, function] = metrics["dE2000"].mean, metrics["rmse"].mean
+    matt, metallic = (
+        [measured[kind, function] for function in (":center", "")] for kind in ("plastic", "metal")
     )
     yield from wrap(
         "[representative_point.py](shaders/representative_point.py) uses `extent` for a lamp's"
         " highlight, after Karis (2013). On rough plastic under a spherical lamp, a scene that the"
-        f" file holds, the RMSE falls from {plastic[0][1]:.3f} to {plastic[1][1]:.3f}, and the mean"
-        f" ΔE2000 from {plastic[0][0]:.2f} to {plastic[1][0]:.2f}. On white metal the RMSE falls,"
-        f" too, from {metal[0][1]:.2f} to {metal[1][1]:.2f}, but around the highlight the lobe gets"
-        f" too dark: the mean ΔE2000 rises from {metal[0][0]:.2f} to {metal[1][0]:.2f}.",
+        f" file holds, the RMSE falls from {matt[0][1]:.3f} to {matt[1][1]:.3f}, and the mean"
+        f" ΔE2000 from {matt[0][0]:.2f} to {matt[1][0]:.2f}. On white metal the RMSE falls,"
+        f" too, from {metallic[0][1]:.2f} to {metallic[1][1]:.2f}, but around the highlight the"
+        f" lobe gets too dark: the mean ΔE2000 rises from {metallic[0][0]:.2f} to {metallic[1][0]:.2f}.",
         width=110,
     )
 
 
 def mistakes() -> Iterator[str]:
     """Yield the names of the mistakes that tests make on purpose."""
-    yield f"{'; '.join(wrong.name for wrong in WRONG)}."
+    yield f"{'; '.join(fact('mistakes'))}."
 
 
 def _compared(name: str, scene: str) -> Comparison:

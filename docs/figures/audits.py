@@ -1,19 +1,20 @@
 """The content of docs/audit.md: audits of shaders and of some Mitsuba BSDFs."""
 
 from collections.abc import Iterator
-from pathlib import Path
+from typing import Any
 
 import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 from scipy.interpolate import RegularGridInterpolator
 
+from docs.figures.from_tests import ROOT
 from fotismos.comparisons.audit.checks import Audit, Checked, audit
 from fotismos.comparisons.audit.furnace import single_scattering
 from fotismos.reports.terminal.tables import markdown
 from fotismos.reports.terminal.words import number, percent
 
-SHADERS = Path(__file__).parent / "shaders"
+SHADERS = ROOT / "docs/shaders"
 PICTURED = "phong"
 SHADED = ("cook_torrance", "oren_nayar", "toon", "wrapped")
 ENGINES = {
@@ -27,7 +28,7 @@ ENGINES = {
 
 GITHUB = "https://github.com/"
 ARGUED = ("white furnace", "energy", "reciprocity")
-BSDFS = (
+BSDFS: tuple[Any, ...] = (
     ("diffuse", {}),
     ("roughplastic", {"alpha": 0.1}),
     ("roughplastic", {"alpha": 0.5}),
@@ -90,7 +91,7 @@ def threads(found: dict[str, Audit], bsdfs: dict[str, Audit]) -> Iterator[str]:
     phong, gltf, layered = "three.js, MeshPhong", "glTF, Fresnel’s mix", "layered by albedo"
     plastic = (each for each in found[layered].curves if "glossy" in each.material)
     seen = [value for each in plastic for value in each.seen]
-    changed = found[layered].named("reciprocity").value
+    changed = found[layered].named("reciprocity").value or 0.0
     cases = (three_js(*each) for each in ((0.5, 0.5), (0.75, 0.5), (1, 0.5), (1, 1)))
     tables = zip(*cases, strict=True)
     single, before, after = (", ".join(f"{value:.2f}" for value in each) for each in tables)

@@ -2,27 +2,22 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
-from engines import three_js  # next to this script
 
-from fotismos.comparisons.case import Case, open_case
+from docs.engines import three_js
+from docs.figures.from_tests import fact
+from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.plain_scene import plain_scene
 from fotismos.reports.terminal.tables import markdown
-from tests.witnesses import povray, povray_scenes
 
 SCENES = ("fig-8-9", "fig-8-8c", "lambert-sphere", "plastic-spheres")
 SIDE, SAMPLES = 192, 256
-FINER = 4
-"""POV-Ray's rays along each side of a pixel."""
-
 KERNEL, POVRAY, THREE, MITSUBA = "kernel", "POV-Ray", "three.js", "Mitsuba"
 
 
@@ -61,7 +56,7 @@ def _rendered(name: str) -> Rendered:
     fine = case.changed(tessellation=three_js.TESSELLATION)
     images = {
         KERNEL: kernel.heuristic,
-        POVRAY: _povray(case),
+        POVRAY: np.array(fact("drawn", name, SIDE)),
         THREE: three_js.drawn(plain_scene(fine.source, fine.options)),
         MITSUBA: kernel.reference,
     }
@@ -77,11 +72,3 @@ def _rendered(name: str) -> Rendered:
         {each: mean(each, MITSUBA) for each in drawn},
         {each: mean(each, KERNEL) for each in drawn},
     )
-
-
-def _povray(case: Case) -> np.ndarray:
-    fine = case.changed(tessellation=48)
-    with TemporaryDirectory() as folder:
-        text = povray_scenes.translated(plain_scene(fine.source, fine.options))
-        picture = povray.drawn(text, FINER * SIDE, Path(folder))
-    return picture.reshape(SIDE, FINER, SIDE, FINER, 3).mean(axis=(1, 3))

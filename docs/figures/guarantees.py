@@ -11,8 +11,9 @@ import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
+from docs.figures.from_tests import ROOT
 
 AREAS = {
     "kernel": "Kernel and plugins",
@@ -70,7 +71,7 @@ def _of_file(path: Path) -> Iterator[Guarantee]:
             continue
         marks = {_name(mark): mark for mark in node.decorator_list}
         if "pytest.mark.guarantee" in marks:
-            mark = marks["pytest.mark.guarantee"]
+            mark: Any = marks["pytest.mark.guarantee"]
             area, text = (ast.literal_eval(argument) for argument in mark.args)
             if area not in AREAS:
                 raise ValueError(

@@ -5,11 +5,12 @@
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from statistics import median
+from typing import Any
 
 import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
+from docs.figures.from_tests import ROOT, fact
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.cost.cost_record import Cost, Point
@@ -20,9 +21,8 @@ from fotismos.comparisons.options import Options
 from fotismos.reports.terminal.cost_tables import busy
 from fotismos.reports.terminal.tables import markdown
 from fotismos.reports.terminal.words import number, parameter, seconds
-from tests.benchmarks import prediction
 
-LARGER = tuple(sorted((Path(__file__).parent / "scenes").glob("*.py")))
+LARGER = tuple(sorted((ROOT / "docs/scenes").glob("*.py")))
 SIZE = 512, 384
 TOLERANCES = (5.0, 2.0, 1.0)
 
@@ -74,10 +74,10 @@ def fronts(records: Sequence[Cost]) -> Iterator[str]:
 
 def predictions() -> Iterator[str]:
     """Yield how predictions compare with later measurements."""
-    found = prediction.run(rounds=7)
-    width, height = prediction.TARGET
+    found = fact("predictions", 7)
+    width, height = found["size"]
     yield f"At {width} by {height} pixels, from studies of 128 pixels."
-    yield " ".join(prediction.summary(found))
+    yield " ".join(found["summary"])
 
 
 def pictures(records: Sequence[Cost]) -> Iterator[str]:
@@ -156,7 +156,7 @@ def findings(records: Sequence[Cost]) -> Iterator[str]:
     yield f"- {_stand_ins(records)}"
 
 
-def _within(records, limit):
+def _within(records: Sequence[Any], limit: float) -> str:
     """Return how many scenes need only a kernel at a tolerance, and how much faster it is."""
     enough, saved = 0, []
     for record in records:
@@ -176,9 +176,9 @@ def _within(records, limit):
     )
 
 
-def _worth_most(records):
+def _worth_most(records: Sequence[Any]) -> str:
     """Return which effects are worth most, and in how many scenes."""
-    first = Counter()
+    first = Counter[str]()
     for record in records:
         sure = [one for one in record.attribution.effects if one.removes.low > 0]
         if sure:
@@ -189,7 +189,7 @@ def _worth_most(records):
     return f"The effect worth most, by the number of scenes: {ranked}."
 
 
-def _stand_ins(records):
+def _stand_ins(records: Sequence[Any]) -> str:
     """Return which stand-ins are on a front, and in how many scenes."""
     names = [method.name for method in STAND_INS]
     on_front = Counter(

@@ -12,11 +12,13 @@ from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from textwrap import fill
+from types import FrameType
 
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-ROOT = Path(__file__).resolve().parents[1]
+from docs.figures.from_tests import ROOT
+
 FLOORS = ("heuristic", "reference", "comparisons", "reports")
 SCENE = "fig-8-9"
 FILLS = ("#e8eef7", "#e9f4ea", "#fdf3e1", "#f6e9f2")
@@ -28,7 +30,7 @@ def watched() -> Iterator[list[str]]:
     """Collect the files of the functions called in the block, one entry per change of file."""
     files: list[str] = []
 
-    def note(frame, event, _):
+    def note(frame: FrameType, event: str, _: object) -> None:
         code = frame.f_code
         is_function = bool(code.co_flags & CO_OPTIMIZED)
         name = code.co_filename

@@ -12,8 +12,8 @@ import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is impor
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
-from model_figures import COLOURS, GROUND, STYLE
 
+from docs.figures.model_figures import COLOURS, GROUND, STYLE
 from fotismos.comparisons.cost import measure
 from fotismos.comparisons.cost.times import ratio
 from fotismos.comparisons.gallery import scenes

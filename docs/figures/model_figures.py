@@ -1,6 +1,7 @@
 """The figures of docs/models.md that the kernel computes: its lobes, and sheets of pictures."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import fotismos  # isort: skip  it finds LLVM before Dr.Jit is imported
 
@@ -31,7 +32,7 @@ OTHER = "#6b4ea0"
 HALO = [withStroke(linewidth=3, foreground=GROUND)]
 """It keeps lines from crossing letters."""
 
-Place = tuple[float, float]
+Place = Any
 
 VIEWS = np.arange(-90, 91, 1.5)
 """Degrees from the normal at which lobes are drawn."""
@@ -69,7 +70,7 @@ def lobes() -> Figure:
     return figure
 
 
-def seen(incidence: float, **material: float | str) -> NDArray[np.float64]:
+def seen(incidence: float, **material: Any) -> NDArray[np.float64]:
     """Return the kernel's value at each of :data:`VIEWS`.
 
     ``incidence`` is in degrees; the light has intensity 1.
@@ -155,6 +156,6 @@ def vector(axes: Axes, label: str, tip: Place, tail: Place = (0.0, 0.0), size: f
               ha="center", va="center", size=size, path_effects=HALO)  # fmt: skip
 
 
-def at(angle: float | NDArray[np.float64], radius: float | NDArray[np.float64] = 1.0):
+def at(angle: float | NDArray[np.float64], radius: float | NDArray[np.float64] = 1.0) -> Any:
     """Return x and y of an angle from the normal, in degrees to the right."""
     return radius * np.sin(np.radians(angle)), radius * np.cos(np.radians(angle))

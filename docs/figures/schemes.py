@@ -6,6 +6,7 @@ squares, as in chapter 8.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import fotismos  # isort: skip  it finds LLVM before Dr.Jit is imported
 
@@ -15,7 +16,9 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon
-from model_figures import (
+from numpy.typing import ArrayLike, NDArray
+
+from docs.figures.model_figures import (
     COLOURS,
     FAINT,
     GROUND,
@@ -29,8 +32,6 @@ from model_figures import (
     seen,
     vector,
 )
-from numpy.typing import ArrayLike, NDArray
-
 from fotismos.comparisons.departure.colour import to_srgb
 from fotismos.comparisons.gallery.builtin import THREE_LIGHTS, VIEWER_A, VIEWER_C, WHITE_LIGHT
 
@@ -216,7 +217,7 @@ def sun(theta: float) -> Callable[[Axes], None]:
     return panel
 
 
-def ball(**material: float) -> Callable[[Axes], None]:
+def ball(**material: Any) -> Callable[[Axes], None]:
     """Return a panel of a ball, as the kernel shades it."""
 
     def panel(axes: Axes) -> None:
@@ -320,7 +321,7 @@ def lost_highlight(axes: Axes) -> None:
     _mark(axes, "", (1.2, high), "s")
 
 
-SHEETS = {
+SHEETS: dict[str, dict[str, Callable[[Axes], None]]] = {
     "vectors": {
         "8.1 a  point source": point_source,
         "8.1 b  parallel beam": parallel_beam,
@@ -355,46 +356,56 @@ SHEETS = {
 # --- Parts -----------------------------------------------------------------------------------
 
 
-def _incidence(axes, angle):
+def _incidence(axes: Axes, angle: float) -> None:
     axes.text(0.05, -0.22, "$P$", size=14)
     arrow(axes, "N", 0)
     arrow(axes, "L", angle)
     _angle(axes, "α", angle, 0, 0.4)
 
 
-def _bulge(axes):
+def _bulge(axes: Axes) -> None:
     across = np.linspace(-1.35, 1.35, 40)
     axes.fill_between(across, -0.09 * across**2, -0.3, color=GREY)
 
 
-def _ground(axes):
+def _ground(axes: Axes) -> None:
     axes.fill_between((-1.35, 1.35), -0.08, 0, color=GREY)
 
 
-def _ray(axes, start, end):
+def _ray(axes: Axes, start: Any, end: Any) -> None:
     style = {"arrowstyle": "->", "color": LIGHT, "linewidth": 1, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", end, start, arrowprops=style)
 
 
-def _line(axes, *places):
+def _line(axes: Axes, *places: Any) -> None:
     axes.plot(*np.transpose(places), color=FAINT, linewidth=1, linestyle="--", zorder=1)
 
 
-def _mark(axes, label, place, shape="o", shift=(-0.15, 0.1)):
+def _mark(axes: Axes, label: str, place: Any, shape: str = "o", shift: Any = (-0.15, 0.1)) -> None:
     axes.plot(*place, shape, color=INK, markerfacecolor="white", markersize=7)
     _labelled(axes, label, np.add(place, shift))
 
 
-def _labelled(axes, label, place, size=14):
+def _labelled(axes: Axes, label: str, place: Any, size: float = 14) -> None:
     words = f"${label}$" if label else ""
     axes.text(*place, words, ha="center", va="center", size=size, path_effects=HALO)
 
 
-def _note(axes, words):
+def _note(axes: Axes, words: str) -> None:
     axes.text(1.42, -0.28, words, ha="right", size=11)
 
 
-def _angle(axes, label, low, high, radius, part=0.5, centre=(0, 0), size=14, beyond=0.13):
+def _angle(
+    axes: Axes,
+    label: str,
+    low: float,
+    high: float,
+    radius: float,
+    part: float = 0.5,
+    centre: ArrayLike = (0, 0),
+    size: float = 14,
+    beyond: float = 0.13,
+) -> None:
     """Draw an arc between two directions, and its letter at a part of it."""
     arc = Arc(centre, 2 * radius, 2 * radius, theta1=90 - high, theta2=90 - low, color=INK)
     axes.add_patch(arc)
@@ -402,11 +413,11 @@ def _angle(axes, label, low, high, radius, part=0.5, centre=(0, 0), size=14, bey
     _labelled(axes, label, (x, y), size)
 
 
-def _interpolated(axes) -> dict[str, tuple[NDArray, NDArray]]:
+def _interpolated(axes: Axes) -> dict[str, tuple[NDArray, NDArray]]:
     """Draw a triangle with a scan line; return A to E and P with their normals."""
     known = {name: (np.array(CORNERS[name]), np.array(at(TILTS[name]))) for name in CORNERS}
 
-    def between(one, other, part):
+    def between(one: str, other: str, part: float) -> tuple[NDArray, NDArray]:
         (p, n), (q, m) = known[one], known[other]
         return p + part * (q - p), _unit(n + part * (m - n))
 
@@ -420,7 +431,7 @@ def _interpolated(axes) -> dict[str, tuple[NDArray, NDArray]]:
     return known
 
 
-def _placed(axes, name, place, shape, fill):
+def _placed(axes: Axes, name: str, place: Any, shape: str, fill: str) -> None:
     x, y = _projected(place)
     axes.plot(x, y, shape, color=INK, markerfacecolor=fill, markersize=7)
     words = name + "(" + ", ".join(f"{part:g}" for part in place).replace("-", "−") + ")"
@@ -428,7 +439,7 @@ def _placed(axes, name, place, shape, fill):
     axes.text(*np.add((x, y), shift), words, ha="center", va="center", size=10)
 
 
-def _projected(places: ArrayLike) -> NDArray:
+def _projected(places: Any) -> NDArray:
     """Return places (..., 3) in the plane of a picture, seen from the front, left and above."""
     azimuth, height = np.radians((-130, 27))
     right = -np.sin(azimuth), np.cos(azimuth), 0
@@ -437,5 +448,5 @@ def _projected(places: ArrayLike) -> NDArray:
     return np.asarray(places, float) @ np.transpose([right, up])
 
 
-def _unit(vector):
+def _unit(vector: Any) -> Any:
     return vector / np.linalg.norm(vector)

@@ -14,6 +14,8 @@ import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is impor
 import msgspec
 import numpy as np
 
+from docs.figures import findings as findings_page
+from docs.figures.from_tests import ROOT, fact
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost.cost import cost
@@ -24,10 +26,7 @@ from fotismos.comparisons.study import dataset, design
 from fotismos.reports.charts import vega
 from fotismos.reports.charts.cost_charts import titled
 from fotismos.reports.terminal.tables import markdown
-from tests.benchmarks import kernel
-from tests.shared.verification import verify
 
-ROOT = Path(__file__).resolve().parents[1]
 DOCS = ROOT / "docs"
 COST_SCENE = "cornell-box"
 ROUNDS = 30
@@ -64,8 +63,6 @@ def fits() -> Iterator[str]:
 
 def findings() -> None:
     """Study Phong against roughplastic, and write its dataset, its figures and their page."""
-    import findings  # next to this script
-
     file = ROOT / "studies/phong-roughplastic.toml"
     with TemporaryDirectory() as folder:
         _run("fotismos.reports", "study", str(file), "-o", folder)
@@ -74,7 +71,7 @@ def findings() -> None:
         atomic.write(file.with_suffix(".parquet"), dataset.file_of(table))
         for figure in (made / "figures").glob("*.svg"):
             atomic.write(DOCS / "findings" / figure.name, figure.read_bytes())
-    atomic.write(DOCS / "findings.md", findings.page(design.read(file), table))
+    atomic.write(DOCS / "findings.md", findings_page.page(design.read(file), table))
 
 
 def attribution() -> Iterator[str]:
@@ -99,16 +96,13 @@ def attribution() -> Iterator[str]:
 
 def gains() -> Iterator[str]:
     """Verify plans, and yield the table of their savings."""
-    rows = []
-    for scene in VERIFIED:
-        case = open_case(scene, Options())
-        rows.append((scene, f"{verify(case.source, case.options).gain:.3g}"))
+    rows = [(scene, f"{gain:.3g}") for scene, gain in fact("gains", *VERIFIED).items()]
     yield from markdown([("Scene", "times sooner"), *rows], right=1)
 
 
 def speed() -> Iterator[str]:
     """Yield the table of the kernel's speed, and a sentence on many lights."""
-    data = kernel.run(ROUNDS)
+    data = fact("speed", ROUNDS)
     times, ratios = data["times"], data["ratios"]
     copy = min(times[name] for name in times if name.startswith("memory copy"))
     yield from markdown(
