@@ -66,7 +66,8 @@ def lamp() -> Iterator[str]:
         f" file holds, the RMSE falls from {matt[0][1]:.3f} to {matt[1][1]:.3f}, and the mean"
         f" ΔE2000 from {matt[0][0]:.2f} to {matt[1][0]:.2f}. On white metal the RMSE falls,"
         f" too, from {metallic[0][1]:.2f} to {metallic[1][1]:.2f}, but around the highlight the"
-        f" lobe gets too dark: the mean ΔE2000 rises from {metallic[0][0]:.2f} to {metallic[1][0]:.2f}.",
+        f" lobe gets too dark: the mean ΔE2000 rises from {metallic[0][0]:.2f} to"
+        f" {metallic[1][0]:.2f}.",
         width=110,
     )
 
