@@ -98,7 +98,7 @@ def compare(
     printed: list[str] = []
     with collect_messages(printed):
         comparison, ready = _measured(source, options, progress, command, alone)
-    comparison = comparison.warned(*count_messages([*source.messages, *printed]))
+    comparison = comparison.warned(count_messages([*source.messages, *printed]))
     for step in then:
         comparison = step(comparison, ready, progress)
     return _computed_twice(comparison)
@@ -140,7 +140,7 @@ def _computed_twice(comparison: Comparison) -> Comparison:
         for name, most in largest.items()
         if most > DEVIATION_ALLOWED
     )
-    return replace(comparison, record=record).warned(*warnings)
+    return replace(comparison, record=record).warned(warnings)
 
 
 def _measured(

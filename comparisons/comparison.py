@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from importlib import metadata
 from pathlib import Path
@@ -374,7 +375,7 @@ class Comparison:
     live: LivePoints | Missing = NOT_LIVE
     causes: Causes | None = None
 
-    def warned(self, *warnings: str) -> Comparison:
+    def warned(self, warnings: Iterable[str]) -> Comparison:
         """Return the comparison with more warnings."""
         record = structs.replace(self.record, warnings=(*self.record.warnings, *warnings))
         return replace(self, record=record)

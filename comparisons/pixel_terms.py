@@ -453,8 +453,10 @@ class _Points:
 
         def contribution(material: Material) -> LightContribution:
             material = replace(material, k_d=1, k_s=1)
-            at = (self.position, self.normal, self.view)
-            return next(kernel.contributions(*at, material, [light]))
+            one = kernel.contributions(
+                self.position, self.normal, self.view, material=material, lights=[light]
+            )
+            return next(one)
 
         def lobe(material: Material) -> Floats:
             cosine = contribution(material).cos_lobe

@@ -178,12 +178,13 @@ def curve(subject: Subject, material: str) -> MaterialCurves:
     alpha = subject.materials[material]
     lights = LIGHTS if alpha in (None, PICTURED) else ()
     angles = furnace.both_sides(ANGLES, subject.eta)
-    by = (subject.grid, subject.eta)
+    grid = subject.grid
+    eta = subject.eta
     return MaterialCurves(
         material=material,
         alpha=alpha,
-        seen=tuple(furnace.seen(response, angle, *by) for angle in angles),
-        returned=tuple(furnace.returned(response, angle, *by) for angle in angles),
+        seen=tuple(furnace.seen(response, angle, grid, eta) for angle in angles),
+        returned=tuple(furnace.returned(response, angle, grid, eta) for angle in angles),
         single_scattering=tuple(
             furnace.single_scattering(alpha, min(angle, 180 - angle)) for angle in angles if alpha
         ),
@@ -272,8 +273,8 @@ def sampling(subject: Subject) -> Checked:
 
 def values(subject: Subject) -> Checked:
     """Check that hard cases, and all values met so far, are finite and not negative."""
-    for case in subject.hard_cases():
-        subject.note(*case)
+    for description, cases, pairs in subject.hard_cases():
+        subject.note(description, cases, pairs)
     worst = subject.faults[0] if subject.faults else "none"
     expected = "0 cases of NaN, infinity or a negative value"
     return _checked("values", not subject.faults, len(subject.faults), expected, worst)

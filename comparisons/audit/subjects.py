@@ -399,7 +399,11 @@ class ScatteringSubject(Subject):
     def hard_cases(self) -> Iterator[CaseValues]:
         light, view = furnace.grazing()
         pairs = np.hstack([light, light]), np.hstack([view, -view])
-        yield "grazing, head on and from behind", furnace.of_bsdf(self.bsdf)(*pairs), pairs
+        yield (
+            "grazing, head on and from behind",
+            furnace.of_bsdf(self.bsdf)(pairs[0], pairs[1]),
+            pairs,
+        )
         yield "a direction of length 0", furnace.of_bsdf(self.bsdf)(np.zeros((3, 1)), UP), None
         light, view = pairs = furnace.random_and_mirrored()
         for alpha in (1e-4, 1.0) if "alpha" in self.keys else ():
@@ -423,7 +427,8 @@ class ScatteringSubject(Subject):
 
         It is None for a BSDF that scatters nothing.
         """
-        if not furnace.of_bsdf(self.bsdf)(*furnace.random_pairs(256, self.eta)).any():
+        light, view = furnace.random_pairs(256, self.eta)
+        if not furnace.of_bsdf(self.bsdf)(light, view).any():
             return None
         angles = furnace.both_sides(INCIDENT, self.eta)
         return min((self._p_value(angle), f"viewer at {angle:g}°") for angle in angles)

@@ -146,7 +146,7 @@ def require(name: str, target: Size, size: Size, is_measured: bool) -> None:
                 f"{target[0]}x{target[1]} is too large to measure: at most {most} pixels are"
                 " allowed. Omit `measure` to predict it."
             )
-        require_memory(name, *target)
+        require_memory(name, width=target[0], height=target[1])
 
 
 def attribution(found: Measurements, causes: Causes) -> CostAttribution:

@@ -123,7 +123,8 @@ def _flip(test: Array, reference: Array, viewing: Viewing, curves: Sequence[Curv
         near = np.clip(np.arange(rows.start - eye.reach, rows.stop + eye.reach), 0, height - 1)
         images = [_light(image[np.ix_(near, columns)], viewing) for image in (reference, test)]
         for curve in curves:
-            error = _error(*(eye.seen(curve(image), len(near)) for image in images))
+            truth, shown = (eye.seen(curve(image), len(near)) for image in images)
+            error = _error(truth, shown)
             np.maximum(result[rows], error.reshape(-1, width), out=result[rows])
     return result
 
@@ -167,9 +168,15 @@ class _Eye:
         spread = 0.5 * _FEATURE * pixels
         x = np.arange(-reach, reach + 1.0)
         smooth = np.where(np.abs(x) <= ceil(3.0 * spread), np.exp(-((x / spread) ** 2) / 2.0), 0.0)
-        derivatives = x * smooth, ((x / spread) ** 2 - 1.0) * smooth
-        blurs = tuple(_blurs(parts, x / pixels) for parts in _SENSITIVITY)
-        return cls(reach, blurs, *map(_band, (smooth / smooth.sum(), *map(_balanced, derivatives))))
+        edge = _balanced(x * smooth)
+        point = _balanced(((x / spread) ** 2 - 1.0) * smooth)
+        return cls(
+            reach=reach,
+            blurs=tuple(_blurs(parts, x / pixels) for parts in _SENSITIVITY),
+            smooth=_band(smooth / smooth.sum()),
+            edge=_band(edge),
+            point=_band(point),
+        )
 
     def seen(self, rgb: Array3f, height: int) -> Seen:
         """Return the blurred colours, the slope and the curvature of lightness, without margins.

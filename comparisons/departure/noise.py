@@ -214,8 +214,9 @@ def _draws(mean: Array, noise: Array, grouped: Grouped) -> Array:
     true = 1.0 - ratio(spread, grouped.by_block(off**2) / pixels)[blocks]
     most = ratio(np.sqrt(spread)[blocks], np.abs(off))
     true = np.clip(np.maximum(true, 1.0 - most), 0.0, 1.0)
-    sizes = np.mean(noise_middle**2, axis=0), middle**2
-    level = np.clip(1.0 - ratio(*(size.sum(axis=1) for size in sizes)), 0.0, 1.0)
+    noise_size = np.mean(noise_middle**2, axis=0).sum(axis=1)
+    size = (middle**2).sum(axis=1)
+    level = np.clip(1.0 - ratio(noise_size, size), 0.0, 1.0)
     level = level[blocks, None]
     kept = level * middle[blocks] + true * off
     draws: Array = kept + np.sqrt(level) * noise_middle[:, blocks] + np.sqrt(true) * noise_off

@@ -262,8 +262,17 @@ def _best(
     )
     after = fitted.whole(x).reshape(rendered.before.shape)
     by_metric, maps = departures(rendered, after)
-    common = rendered.reference.mean, counted, rendered.viewing, rendered.difference.noise
-    judged = (summarise(LEADING, image, *common) for image in (rendered.before, after))
+    judged = (
+        summarise(
+            LEADING,
+            image,
+            reference=rendered.reference.mean,
+            mask=counted,
+            viewing=rendered.viewing,
+            noise=rendered.difference.noise,
+        )
+        for image in (rendered.before, after)
+    )
     record = FormFit(
         form=fitted.form,
         loss=least,

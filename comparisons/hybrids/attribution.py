@@ -104,7 +104,7 @@ def with_causes(
         clean = comparison.images.reference, comparison.images.reference_stderr
         causes = find(ready, ready.source, ready.options, progress, clean)
     except FotismosError as error:
-        return comparison.warned(f"The causes are unknown: {error}")
+        return comparison.warned([f"The causes are unknown: {error}"])
     record = structs.replace(named(comparison, causes.maps), why=causes.record)
     comparison = replace(comparison, record=record, causes=causes)
     return comparison.timed(CAUSES, perf_counter() - begin)

@@ -248,8 +248,10 @@ def _work(pipe: Any, prepare: Callable[[], object]) -> NoReturn:
             call = pipe.recv()
         except (EOFError, OSError):
             os._exit(0)  # the parent is gone
-        _send(pipe, *_answer(pipe, prepare, *call))
-        del call
+        function, arguments, with_progress = call
+        kind, content = _answer(pipe, prepare, function, arguments, with_progress)
+        _send(pipe, kind, content)
+        del call, function, arguments, content  # what a task had must not outlive it
 
 
 def _end_with_parent() -> None:

@@ -344,7 +344,7 @@ def twosided(context: Context, index: int) -> NearestPhong:
     inner = context.inner(index)
     if len(inner) == 1:
         return replace(inner[0], twosided=True)
-    front, back = alike(graph, *inner[:2])
+    front, back = alike(graph, inner[0], inner[1])
     sided = {
         name: values.sides(graph, getattr(front, name), getattr(back, name))
         for name in (*COEFFICIENTS, "n", "transmittance")
@@ -378,7 +378,7 @@ def blend(context: Context, index: int) -> NearestPhong:
     """
     graph = context.graph
     inner = context.inner(index)
-    first, second = alike(graph, *inner[:2])
+    first, second = alike(graph, inner[0], inner[1])
     weight = context.value(index, "weight", 0.5)
     mixed = {
         name: values.blend(graph, getattr(first, name), getattr(second, name), weight)

@@ -130,8 +130,9 @@ def _prepare_film(
 ) -> None:
     films = graph.children(sensor, FILM)
     if not films:
-        films = [("film", graph.add(FILM, properties("hdrfilm")))]
-        graph.attach(sensor, *films[0])
+        added = graph.add(FILM, properties("hdrfilm"))
+        graph.attach(sensor, "film", added)
+        films = [("film", added)]
     ((_, film),) = films
     if graph.plugin(film) != "hdrfilm":
         settings.override("film", graph.plugin(film), "hdrfilm")

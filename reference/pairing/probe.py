@@ -280,10 +280,10 @@ class AlbedoTable:
         places = dr.arange(mi.UInt32, NODES * SAMPLES)
         grid_mu = dr.gather(mi.Float, mi.Float(mu), places // SAMPLES)
         rows = lattice(SAMPLES)[:3]
-        points = [dr.gather(mi.Float, mi.Float(row), places % SAMPLES) for row in rows]
+        lobe, u, v = (dr.gather(mi.Float, mi.Float(row), places % SAMPLES) for row in rows)
         si = dr.zeros(mi.SurfaceInteraction3f, NODES * SAMPLES)
         si.wi = mi.Vector3f(dr.safe_sqrt(1 - dr.square(grid_mu)), 0, grid_mu)
-        _, weight = bsdf.sample(mi.BSDFContext(), si, points[0], mi.Point2f(*points[1:]))
+        _, weight = bsdf.sample(mi.BSDFContext(), si, lobe, mi.Point2f(u, v))
         # Thousands of equal terms lose four digits in single precision.
         means = [
             mi.Float(dr.block_sum(mi.Float64(channel), SAMPLES) / SAMPLES) for channel in weight

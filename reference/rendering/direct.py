@@ -91,7 +91,14 @@ def _define(_variant: str) -> None:
             if self.transports[0].max_depth == 1:
                 return colour, valid, []
             bsdf = si.bsdf(ray)
-            arguments = scene, si, bsdf, sampler, hit, self.transports
+            seen = {
+                "scene": scene,
+                "si": si,
+                "bsdf": bsdf,
+                "sampler": sampler,
+                "active": hit,
+                "transports": self.transports,
+            }
             extended = []
             for emitter in others:
                 if self.environment_albedo is not None and emitter.is_environment():
@@ -100,7 +107,7 @@ def _define(_variant: str) -> None:
                 else:
                     extended.append(emitter)
             colours = [colour] * len(self.transports)
-            colours = sums(colours, _of_all(delta, True, *arguments))
+            colours = sums(colours, _of_all(delta, True, **seen))
             deep = [transport for transport in self.transports if transport.max_depth != 2]
             if deep:  # first, so that paths have the same random numbers whatever lights there are
                 # Loaded late: most plans have direct light alone.
@@ -119,10 +126,10 @@ def _define(_variant: str) -> None:
                 )
                 added = dict(zip(deep, indirect, strict=True))
                 colours = sums(colours, [added.get(transport, 0) for transport in self.transports])
-            colours = sums(colours, _of_all(extended, False, *arguments))
+            colours = sums(colours, _of_all(extended, False, **seen))
             looks = any(transport.bsdf_samples for transport in self.transports)
             if extended and (looks or _has_delta(scene)):
-                colours = sums(colours, _from_bsdf(*arguments))
+                colours = sums(colours, _from_bsdf(**seen))
             return colours[0], valid, [channel for image in colours[1:] for channel in image]
 
         def aov_names(self) -> list[str]:

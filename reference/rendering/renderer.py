@@ -173,19 +173,19 @@ class Renderer:
 
     def _image(self, seed: int) -> Any:
         """Render; later passes replay the kernels of the first if Dr.Jit knows all their arrays."""
-        arguments = self.scene, self.integrator, self.pass_spp, seed
+        spp = self.pass_spp
         if self._replayed is not None:
             try:
                 if hasattr(self.integrator, "prepare"):  # what cannot be recorded
                     self.integrator.prepare(self.scene)
                 with _no_collection():
-                    return self._replayed(*arguments)
+                    return self._replayed(self.scene, self.integrator, spp, seed)
             except InputError:  # the scene cannot be prepared
                 raise
             except Exception:  # a plugin's message is better when it is traced
                 LOGGER.info("%s: passes are traced, not replayed", self.label, exc_info=True)
                 self._replayed = None
-        return _rendered(*arguments)
+        return _rendered(self.scene, self.integrator, spp, seed)
 
     def pass_times(self) -> Times:
         """Return the :class:`Times` of the passes so far."""

@@ -128,7 +128,7 @@ def _with_palette(index: Bytes, table: Bytes) -> Image.Image:
 def _table(colormap: str) -> Bytes:
     from matplotlib import colormaps
 
-    colours = colormaps[colormap].resampled(256)(np.arange(256))[:, :3]
+    colours: np.ndarray = colormaps[colormap].resampled(256)(np.arange(256))[:, :3]
     return np.round(255 * colours).astype(np.uint8)
 
 
