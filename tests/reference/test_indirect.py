@@ -12,8 +12,8 @@ ALBEDO = 0.6
 COUNT = 400_000
 
 ROUNDING = 3e-3
-"""Of the mean: a ray that leaves a sphere at a grazing angle starts a little off it, so the densities
-of its two samples do not quite agree."""
+"""Of the mean: a ray that leaves a sphere at a grazing angle starts a little off it, so the
+densities of its two samples do not quite agree."""
 
 
 def estimate(max_depth, rr_depth=1000, **transport):
