@@ -1,5 +1,6 @@
 """How charts look: one theme, in the text's colour on a page and in black on paper."""
 
+from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from fotismos.reference.planning.effects import EFFECTS
@@ -19,6 +20,15 @@ NO_EFFECT = "#dee2e6"
 
 FAINT = "#8a8a8a"
 """Colour of guide lines, visible on light and dark grounds."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A chart for the page: its title, a sentence, and its picture."""
+
+    title: str
+    note: str
+    svg: str
 
 
 def _theme(ink: str, **theme: Any) -> Spec:

@@ -9,13 +9,12 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from fotismos.heuristic.errors import OutputError
 from fotismos.reports.charts import theme
-from fotismos.reports.charts.theme import Spec
+from fotismos.reports.charts.theme import Figure, Spec
 
 if TYPE_CHECKING:
     import altair
@@ -25,15 +24,6 @@ IDLE = re.compile(
     r'| (?:opacity|stroke-width)="1"'
 )
 """Attributes that change nothing in a picture: a quarter of its bytes."""
-
-
-@dataclass(frozen=True)
-class Figure:
-    """A chart for the page: its title, a sentence, and its picture."""
-
-    title: str
-    note: str
-    svg: str
 
 
 def figure(title: str, spec: Mapping[str, Any], note: str = "") -> Figure:

@@ -8,7 +8,7 @@ from msgspec import field
 
 from fotismos.comparisons.comparison import ComparisonRecord
 from fotismos.reference.records import Record, plain
-from fotismos.reports.charts.vega import Figure
+from fotismos.reports.charts.theme import Figure
 from fotismos.reports.page.embedding import Embedded
 
 

@@ -56,7 +56,7 @@ def write(folder: Path, study: Study) -> None:
         results.write(folder / name, content)
 
 
-def figure(record: Cost) -> vega.Figure:
+def figure(record: Cost) -> theme.Figure:
     """Return the chart of a study: error against time."""
     note = "; ".join([FAMILIES, *cost_charts.reading(record)]) + "."
     return vega.figure("Error against time", cost_charts.error_over_time(record), note)
