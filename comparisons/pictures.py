@@ -11,7 +11,6 @@ values gives the fraction of a pixel.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import permutations
 from math import pi
@@ -24,14 +23,13 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons.case import PICTURES, picture_parts
-from fotismos.comparisons.comparison import Comparison, Images, PictureRecord
+from fotismos.comparisons.comparison import Images, PictureRecord
 from fotismos.comparisons.departure.colour import CHROMATICITIES, from_srgb, luminance, to_srgb
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import Prepared
 from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
 from fotismos.reference.pairing.prepare import film_size
 from fotismos.reference.rendering.gbuffer import gbuffer
-from fotismos.reference.rendering.renderer import LARGEST_VALUE, Progress, Renderer, Times
+from fotismos.reference.rendering.renderer import LARGEST_VALUE, Renderer, Times
 from fotismos.reference.scene.source import Source
 
 SAME_PRIMARIES = 2e-3
@@ -369,17 +367,6 @@ EVEN = 0.2
 
 BETTER = 0.5
 """Largest share of the difference that a credible other reading of the values leaves."""
-
-
-def with_picture(
-    comparison: Comparison, ready: Prepared, progress: Progress | None = None
-) -> Comparison:
-    """Return a comparison with the record of its pictures, which it warns of first."""
-    record = comparison.record
-    half: Any = ready.heuristic
-    picture = picture_record(half, ready.scene, options=ready.options, images=comparison.images)
-    warnings = (*picture.odd, *record.warnings)
-    return replace(comparison, record=structs.replace(record, picture=picture, warnings=warnings))
 
 
 def picture_record(

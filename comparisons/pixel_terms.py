@@ -5,7 +5,6 @@ Those of the grid are at the centres of pixels, one in the middle of each cell.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from time import perf_counter
 from typing import Any
 
 import drjit as dr
@@ -13,10 +12,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import Prepared
 from fotismos.heuristic import kernel, materials, terms, vectors
 from fotismos.heuristic.convention import Floats, Scene
 from fotismos.heuristic.errors import InputError
@@ -26,7 +23,7 @@ from fotismos.heuristic.lights import lamps
 from fotismos.heuristic.materials import COEFFICIENTS, FORMS, Material
 from fotismos.reference.records import Missing
 from fotismos.reference.rendering.gbuffer import centre_rays, image_size, pixel_rays
-from fotismos.reference.rendering.renderer import Progress, Renderer, pass_seed, variant
+from fotismos.reference.rendering.renderer import Renderer, pass_seed, variant
 
 SIDE = 64
 """Points along the longer side of the grid, at most."""
@@ -221,23 +218,6 @@ def _colour(values: object) -> Colour:
 
 
 # --- Reading the kernel ------------------------------------------------------------------------
-
-
-def with_terms(
-    comparison: Comparison, ready: Prepared, progress: Progress | None = None
-) -> Comparison:
-    """Return a comparison with its terms at pixels and as images, and the points to shade again."""
-    begin = perf_counter()
-    half = ready.heuristic
-    options = ready.options
-    images = comparison.images
-    made = replace(
-        comparison,
-        terms=trace(half, options),
-        live=live(half, options),
-        images=replace(images, terms=layers(half, options, images.heuristic)),
-    )
-    return made.timed("terms", perf_counter() - begin)
 
 
 def trace(half: Renderer, options: Options) -> TermGrid | Missing:

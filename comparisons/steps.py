@@ -1,34 +1,72 @@
-"""What is added to a comparison once it is measured: step by step, each in a module of its own.
+"""What is added to a comparison once it is measured, step by step.
 
 A step takes the comparison and what it was rendered with, and returns the comparison with one part
-more (:data:`fotismos.comparisons.compare.Step`).
+more (:data:`fotismos.comparisons.compare.Step`). The modules behind the steps are loaded late: each
+serves some comparisons, and none is part of all.
 """
 
+from dataclasses import replace
+from time import perf_counter
+from typing import Any
+
+from msgspec import structs
+
 from fotismos.comparisons.compare import Step
+from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import Prepared
 from fotismos.heuristic import heuristics
+from fotismos.reference.rendering.renderer import Progress
 
 
 def steps(options: Options, why: bool) -> list[Step]:
     """Return the steps for options; ``why`` traces the terms of 8.10, and finds causes."""
+    if options.image:  # no effect can be added to a picture
+        return [with_picture, with_terms] if why else [with_picture]
     added: list[Step] = []
-    is_picture = bool(options.image)
-    if is_picture:
-        from fotismos.comparisons import pictures  # loaded late: few comparisons have any
-
-        added.append(pictures.with_picture)
-    elif not heuristics.named(options.heuristic).is_own:
-        from fotismos.comparisons.audit import diagnosis  # loaded late: only for users' shaders
-
-        added.append(diagnosis.with_mistakes)
+    if not heuristics.named(options.heuristic).is_own:
+        added.append(with_mistakes)
     if why:
-        from fotismos.comparisons import (
-            pixel_terms,  # loaded late: not every comparison traces terms
-        )
+        from fotismos.comparisons.hybrids.attribution import with_causes  # see above
 
-        added.append(pixel_terms.with_terms)
-    if why and not is_picture:  # no effect can be added to a picture
-        from fotismos.comparisons.hybrids import attribution  # loaded late: not always
-
-        added.append(attribution.with_causes)
+        added += [with_terms, with_causes]
     return added
+
+
+def with_picture(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
+    """Return a comparison with the record of its pictures, which it warns of first."""
+    from fotismos.comparisons import pictures  # see above
+
+    record = comparison.record
+    half: Any = ready.heuristic
+    picture = pictures.picture_record(
+        half, ready.scene, options=ready.options, images=comparison.images
+    )
+    warnings = (*picture.odd, *record.warnings)
+    return replace(comparison, record=structs.replace(record, picture=picture, warnings=warnings))
+
+
+def with_mistakes(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
+    """Return a comparison with the mistakes that its heuristic seems to make."""
+    from fotismos.comparisons.audit import diagnosis  # see above
+
+    mistakes = diagnosis.describe(ready.options.heuristic)
+    return replace(comparison, record=structs.replace(comparison.record, mistakes=mistakes))
+
+
+def with_terms(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
+    """Return a comparison with its terms at pixels and as images, and the points to shade again."""
+    from fotismos.comparisons import pixel_terms  # see above
+
+    begin = perf_counter()
+    half = ready.heuristic
+    options = ready.options
+    images = comparison.images
+    layers = pixel_terms.layers(half, options, images.heuristic)
+    comparison = replace(
+        comparison,
+        terms=pixel_terms.trace(half, options),
+        live=pixel_terms.live(half, options),
+        images=replace(images, terms=layers),
+    )
+    return comparison.timed("terms", perf_counter() - begin)

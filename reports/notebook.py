@@ -168,7 +168,7 @@ def fit(
 ) -> FitRecord:
     """Return the best heuristic parameters, and the error that remains.
 
-    ``loss`` is ``perceptual``, the mean ΔE2000, or ``mse``, the squared difference of linear
+    ``loss`` is ``perceptual``, the mean ΔE2000, or ``linear``, the squared difference of linear
     colours. Other arguments and errors are those of :func:`compare`.
     """
     case = open_case(scene, Options.of(options), name)

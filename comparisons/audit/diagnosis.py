@@ -13,20 +13,16 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from msgspec import structs
 from scipy.optimize import minimize_scalar
 
 from fotismos.comparisons.audit.subjects import shaded
-from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.pictures import MISREADINGS, factor_of_pi
-from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.textbook import clamped, dot, halfway, lobe, mirrored, unit
 from fotismos.heuristic import heuristics
 from fotismos.heuristic.heuristics import Heuristic
 from fotismos.heuristic.lights import INVERSE_SQUARE, PointLight
 from fotismos.heuristic.user_shaders import DEFAULT_VARIANT
-from fotismos.reference.rendering.renderer import Progress
 
 Array = np.ndarray
 
@@ -83,14 +79,6 @@ Mistake = tuple[str, Callable[..., dict[str, Any]]]
 
 TermFit = tuple[Array, float]
 """Coefficients (3, 4) of the terms by channel, and the remaining relative RMS difference."""
-
-
-def with_mistakes(
-    comparison: Comparison, ready: Prepared, progress: Progress | None = None
-) -> Comparison:
-    """Return a comparison with the mistakes that its heuristic seems to make."""
-    mistakes = describe(ready.options.heuristic)
-    return replace(comparison, record=structs.replace(comparison.record, mistakes=mistakes))
 
 
 def describe(name: str) -> tuple[str, ...]:
