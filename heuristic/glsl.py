@@ -169,6 +169,7 @@ class Shader:
                 f"{self.file}: a shader in GLSL needs RGB colours, which {mi.variant()} does not"
                 " have. Give `variant=llvm_ad_rgb`, or `heuristic_variant=llvm_ad_rgb`."
             )
+        # The fields that the code may read, evaluated together.
         lights = point.lights if "lights" in self.words else ()
         fields = self.fields(max(len(lights), 1))
         values = {name: _value(point, lights, name) for name in fields}
@@ -179,6 +180,7 @@ class Shader:
         for name, value in vars(point.parameters).items():
             if name in compute:  # compilers drop unused names
                 compute[name] = float(np.ravel(value)[0])
+        # Chunk by chunk, within the limits of buffers and work groups.
         colours = np.empty((count, 3), np.float32)
         step = max(min(POINTS, FLOATS // max(len(rows), 1)), 1)
         for start in range(0, count, step):
@@ -283,6 +285,7 @@ def _rows(value: Any, size: int) -> list[np.ndarray]:
 def _run(compute: Any, rows: list[np.ndarray], count: int) -> np.ndarray:
     """Return the colours (points, 3) of a chunk of points."""
     context = opengl()
+    # Floats (rows, count) in, colours (count, 3) out; each float has 4 bytes.
     values = context.buffer(reserve=max(4 * count * len(rows), 4))
     colours = context.buffer(reserve=12 * count)
     for number, row in enumerate(rows):  # saves one copy
@@ -290,6 +293,7 @@ def _run(compute: Any, rows: list[np.ndarray], count: int) -> np.ndarray:
     for number, buffer in enumerate((values, colours)):
         buffer.bind_to_storage_buffer(number)
     compute["fotismos_count"] = count
+    # Rounded up: `main` ignores the places beyond the last point.
     compute.run(group_x=-(-count // GROUP))
     context.memory_barrier()
     image = np.frombuffer(colours.read(), np.float32).reshape(count, 3)

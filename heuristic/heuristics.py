@@ -175,10 +175,12 @@ class Point:
         return kernel.shade(*self.arguments._replace(**instead))
 
     def _light(self, light: Any) -> LightAtPoint:
+        # A heuristic that needs `visible` asks for each shadow itself.
         visible = None if "visible" in self.needs else self.arguments.visible
         toward, diffuse, specular, reach = light.illuminate(self.arguments.position, visible)
         none = type(self.arguments.position)(0)
         extent = light.extent or Extent(none.x, none, none)
+        # `reach` ends at the body of a lamp, the distance at its centre.
         distance = reach + getattr(light, "shell", 0)
         return LightAtPoint(
             toward=toward,

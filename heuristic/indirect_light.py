@@ -99,6 +99,7 @@ def _arriving(scene: Any, si: Any, normal: Any) -> Any:
     sampler = mi.load_dict({"type": "independent"})
     sampler.seed(0, RAYS)
     active = si.is_valid()
+    # Each ray of a point has its own stratum.
     cell = dr.arange(mi.UInt32, RAYS) % STRATA**2
     corner = mi.Point2f(mi.Float(cell % STRATA), mi.Float(cell // STRATA))
     toward = mi.warp.square_to_cosine_hemisphere((corner + sampler.next_2d()) / STRATA)
@@ -132,6 +133,7 @@ because all visible surfaces have the same inclination."""
 def upward(scene: Any) -> Doubles:
     """Return the axis of the world, or its opposite, nearest to the camera's up vector."""
     matrix = np.array(scene.sensors()[0].world_transform().matrix, float)
+    # The camera's up vector: its second axis, in the world.
     column = matrix.reshape(4, 4, -1)[:3, 1, 0]
     axis = int(np.argmax(np.abs(column)))
     return np.asarray(np.sign(column[axis]) * np.eye(3)[axis])
@@ -147,6 +149,7 @@ def fit(normal: Doubles, arriving: Doubles, k_d: Doubles, up: Doubles) -> tuple[
     total = k_d.sum(axis=0)
     mean = weighted_mean(arriving, k_d)
     share = np.divide(k_d, total, out=np.zeros_like(k_d), where=total > 0)
+    # Weighted mean and variance of the cosine, and the slope of the regression, (K,) each.
     middle = (share * cosine).sum(axis=0)
     spread = (share * (cosine - middle) ** 2).sum(axis=0) + EVENNESS
     slope = (share * (cosine - middle) * (arriving - mean)).sum(axis=0) / spread

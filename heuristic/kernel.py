@@ -81,6 +81,7 @@ def shade(
         if name in INTENSITIES
     }
     materials.require_common_wavelengths(values | intensities)
+    # Factors for the kernel: numbers stay numbers, tuples become arrays.
     vector_type = type(position)
     arrays = [materials.as_array(value, vector_type) for value in values.values()]
     k_i, k_a, k_d, k_s, ambient = arrays
@@ -88,10 +89,12 @@ def shade(
     arrays = [type(value) for value in arrays if dr.is_array_v(value)]
     float_type = dr.value_t(vector_type)
     total = (dr.expr_t(float_type, *arrays) if arrays else float_type)(0)
+    # Terms without a light.
     if not materials.is_zero(material.k_i):
         total = total + terms.emission(k_i)
     if not (materials.is_zero(material.k_a) or materials.is_zero(values["ambient"])):
         total = total + terms.ambient(ambient, k_a)
+    # Terms of the lights, with the coefficients outside the sums.
     if lights:
         if material.normalised:
             k_s = k_s * terms.normalisation(material.form, material.n)
@@ -173,6 +176,7 @@ def contributions(
     has_specular = not (materials.is_zero(material.k_s) or numerics.is_number(material.n, inf))
     if not (has_diffuse or has_specular):
         return
+    # The lobe normalises by itself, in double precision where the exponent needs it.
     lobe = vectors.lobe(material, normal, view) if has_specular else None
     normal = vectors.normalise(normal)
     for light in lights:
@@ -241,6 +245,7 @@ def _checked_lights(lights: object) -> Sequence[Light]:
 
 def _check_sizes(values: dict[str, Any], lights: Sequence[Light]) -> None:
     """Reject Dr.Jit arrays of different numbers of points; one point fits any number."""
+    # Widths are not known while a loop or call is recorded.
     if dr.flag(dr.JitFlag.SymbolicScope):
         return
     for number, light in enumerate(lights):
@@ -255,6 +260,7 @@ def _check_sizes(values: dict[str, Any], lights: Sequence[Light]) -> None:
 
 
 def _array(name: str, value: Any) -> Any:
+    # Three components of any width: depth 2 for arrays of the JIT, 1 for scalar ones.
     is_vector = dr.depth_v(value) == 1 + dr.is_jit_v(value) and dr.size_v(value) == 3
     if not is_vector or dr.is_mask_v(value) or dr.is_complex_v(value):
         raise InputError(f"{name} is {type_of(value)}: {HOW}.")

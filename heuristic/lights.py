@@ -108,6 +108,7 @@ class Light:
         vector_type = type(position)
         toward, distance = vectors.light_vector(vector_type(self.position), position)
         cone = self.cone(toward)
+        # With the cone first: the attenuation keeps the whole product in the type's range.
         colours = [
             materials.as_array(intensity, vector_type) * cone for intensity in self.intensities
         ]
@@ -157,6 +158,7 @@ class Light:
         values = {
             name: moved(value) for name, value in self.given().items() if name not in compiled
         }
+        # Vectors and colours get the kernel's own types, so that all blocks have the same.
         for name in {"position", "direction"} & values.keys():
             values[name] = vector_type(values[name])
         for name in values.keys() & INTENSITIES:
@@ -247,6 +249,7 @@ class SpotLight(Light):
         cone = terms.spot_cone(cos_axis, numerics.cosine_of_degrees(self.cutoff))
         if is_number(self.exponent, 0):
             return cone
+        # A moderate power needs only the cosine, without its complement.
         cosine = cos_axis.value if numerics.is_moderate(self.exponent) else cos_axis
         return cone * terms.spot_falloff(cosine, self.exponent)
 

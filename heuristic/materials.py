@@ -98,6 +98,7 @@ def as_array(value: Any, vector_type: type) -> Colour:
     """
     if not isinstance(value, tuple):
         return value
+    # The first axis holds components, the second points.
     size = len(value) if len(value) <= 4 else -1
     shape = (size, -1) if dr.is_jit_v(vector_type) else (size,)
     return dr.replace_shape_t(vector_type, shape)(value)

@@ -115,6 +115,7 @@ def unit_cross(a: Vector, b: Vector) -> Direction:
     a = _scaled(a)
     b = _scaled(b)
     product = cross(a, b)
+    # Both sides of `|a x b| > limit |a| |b|` are squared, which spares the roots.
     limit = dr.square(PARALLEL_STEPS * dr.epsilon(a))
     is_turned = dr.squared_norm(product) > limit * dr.squared_norm(a) * dr.squared_norm(b)
     return vectors.normalise(dr.select(is_turned, product, type(a)(0)))
@@ -239,6 +240,7 @@ def corner_angles(p0: Position, p1: Position, p2: Position) -> tuple[Number, Num
     first, second = shorter_edges(edges)
     double_area = dr.norm(cross(first, second))
     a, b, c = edges
+    # The edge that arrives at a corner is reversed, hence the minus sign.
     return tuple(
         dr.atan2(double_area, -dr.dot(before, after)) for before, after in ((c, a), (a, b), (b, c))
     )

@@ -94,14 +94,17 @@ def log2_of(value: Any, complement: Number) -> Number:
     0``. Otherwise ``log1p`` after Kahan: ``log(w) x / (w - 1)`` with ``w`` the rounded ``1 + x``.
     """
     if _is_single(value):
+        # `e` and `2^-e` by integer arithmetic on the bits of the float.
         bits = dr.reinterpret_array(dr.int32_array_t(type(value)), dr.detach(value))
         exponent = (bits - _BITS_OF_ROOT_HALF) >> 23
         to_mantissa = dr.reinterpret_array(type(value), (127 - exponent) << 23)
         rest = dr.select(exponent == 0, -complement, dr.fma(value, to_mantissa, -1))
         return dr.fma(rest, _polynomial(rest, _LOG2), type(value)(exponent))
+    # Any other type: Kahan's `log1p`.
     rounded = 1 - complement
     is_far = complement > 0.5
     is_same = rounded == 1
+    # Where `w` is 1 the divisor is 1 too, only to avoid 0 / 0.
     quotient = dr.select(is_far | is_same, 1, complement / dr.select(is_same, 1, 1 - rounded))
     logarithm = dr.log2(dr.select(is_far, value, rounded)) * quotient
     return dr.select(is_same, -complement / _LN_2, logarithm)
@@ -116,8 +119,10 @@ def exp2(x: Number) -> Number:
     if not _is_single(x):
         return dr.exp2(x)
     x = at_least(x, -127)
+    # Derivatives come from the polynomial, so the bits are taken without any.
     shifted = dr.detach(x) + _ROUNDER
     bits = dr.reinterpret_array(dr.int32_array_t(type(x)), shifted)
+    # `2^i` from its exponent's bits; for `i = -127` they are all 0, and so is the float.
     scale = dr.reinterpret_array(type(x), (bits + 127) << 23)
     return _polynomial(x - (shifted - _ROUNDER), _EXP2) * scale
 
@@ -139,6 +144,7 @@ def scaled(vector: Vector) -> tuple[Vector, Number, Number]:
     ends; for the zero vector it is 0.
     """
     square = dr.squared_norm(vector)
+    # The factor is piecewise constant, so it has no derivative.
     inverse = _inverse_root_power(dr.detach(square))
     vector = vector * inverse
     return vector, inverse, dr.squared_norm(vector)
@@ -242,6 +248,7 @@ def inverse_of_power(power_of_two: Number) -> Number:
     """Return the inverse of a power of two, without a division."""
     if not _is_single(power_of_two):
         return 1 / power_of_two
+    # The biased exponents of `2^e` and `2^-e` add up to 254, in the bits 0x7F000000.
     bits = dr.reinterpret_array(dr.uint32_array_t(type(power_of_two)), power_of_two)
     return dr.reinterpret_array(type(power_of_two), 0x7F000000 - bits)
 
@@ -258,6 +265,7 @@ def _inverse_root_power(square: Number) -> Number:
     if not dr.is_jit_v(square):
         usable = 0 < square < inf
         return 2.0 ** (-round(log2(square) / 2)) if usable else 2.0 ** (-513 if square else 511)
+    # The constants of the fast inverse square root; the mask keeps the exponent alone.
     if _is_single(square):
         integer = dr.uint32_array_t(type(square))
         magic = 0x5F3759DF

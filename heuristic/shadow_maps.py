@@ -67,14 +67,17 @@ class DepthImage:
 def light_map(scene: Any, light: Any, resolution: int) -> DepthImage:
     """Trace the depth image of one of the kernel's lamps."""
     low, high = box(scene)
+    # Half the diagonal of the box, above 0 even for an empty one.
     radius = 0.5 * float(np.linalg.norm(high - low)) + float(np.finfo(np.float32).tiny)
     if not isinstance(light, DirectionalLight):
+        # In all directions from the lamp, beginning outside its own body.
         centre = mi.Point3f(light.position)
         start = dr.maximum(LEAST * radius, light.shell)
         toward = dr.normalize(_cube_direction(resolution))
         depths = _traced(scene, centre + toward * start, toward) + start
         dr.eval(depths, centre)
         return DepthImage(resolution, depths, centre)
+    # Parallel rays from a square in front of the scene, as wide as the scene.
     centre = mi.Point3f(((low + high) / 2).tolist())
     size = mi.Float(radius)
     dr.make_opaque(centre, size)
@@ -129,6 +132,7 @@ def _cube_direction(size: int) -> Any:
 def _cube_texel(position: Any, size: int) -> Any:
     """Return the number of the texel that a direction of any length hits."""
     length = abs(position)
+    # The side is that of the largest component; the other two are places on it.
     is_x = (length.x >= length.y) & (length.x >= length.z)
     is_y = ~is_x & (length.y >= length.z)
     major = dr.select(is_x, position.x, dr.select(is_y, position.y, position.z))
@@ -158,6 +162,7 @@ def refuse(scene: Any) -> str:
 
 def shade(point: Point) -> Array:
     """Return the chapters' model, with shadows from the lamps' depth images."""
+    # Emission and ambient light have no shadows.
     colour = point.textbook(lights=[])
     bare = replace(point.arguments.material, k_i=0, k_a=0)
     for light, image in zip(point.arguments.lights, point.prepared, strict=True):

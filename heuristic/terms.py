@@ -154,6 +154,7 @@ def attenuation_root(
     last = float_type(k2)
     is_far = last * distance >= numerics.at_least(first * inverse, float_type(k1))
     is_far &= is_away & (last > 0)
+    # The outer coefficients swap places in the reciprocal form, so one evaluation serves both.
     variable = dr.select(is_far, inverse, distance)
     first, last = dr.select(is_far, last, first), dr.select(is_far, first, last)
     root = _inverse_root(first + variable * (k1 + variable * last), at_zero)

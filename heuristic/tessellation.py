@@ -137,6 +137,7 @@ def _tessellated(shape: Shape, kind: Any, columns: int, rows: int) -> Mesh:
     row = index // (columns + 1)
     uv = mi.Point2f(mi.Float(column) / columns, mi.Float(row) / rows)
     points, surface_normals = _surface(shape, kind, _closed(kind, uv))
+    # The corners of each cell, anticlockwise in (u, v), and two triangles of them.
     cell = dr.arange(mi.UInt32, columns * rows)
     first = cell + cell // columns
     second = first + 1
@@ -148,6 +149,7 @@ def _tessellated(shape: Shape, kind: Any, columns: int, rows: int) -> Mesh:
     flat = _flat_normals(points, corners)
     has_area = dr.squared_norm(flat) > 0  # at a pole, and in the middle of a disk, half have none
     alignment = dr.dot(flat, dr.gather(mi.Vector3f, surface_normals, corners.x))
+    # The parametrisation may be left-handed: then every triangle turns over.
     if dr.sum(alignment)[0] < 0:
         corners = corners.xzy
     corners = dr.gather(mi.Vector3u, corners, dr.compress(has_area))

@@ -143,6 +143,7 @@ def of_function(function: Any, name: str, label: str = "") -> Heuristic:
     def shade(point: Point) -> Any:
         return function(point, **{name: getattr(point.parameters, name) for name in names})
 
+    # On trial everything may be read; what is read becomes the needs.
     everything = Heuristic(
         name=name, shade=shade, label=label, needs=frozenset(INPUTS), parameters=parameters
     )
@@ -299,6 +300,7 @@ def trial_points(heuristic: Heuristic) -> Point:
     def colour(high: float) -> Any:
         return mi.Spectrum(*(numbers(0, high) for _ in range(dr.size_v(mi.Spectrum))))
 
+    # Unit vectors (256, 3), each view on the side of its normal.
     normal, view = random.normal(size=(2, POINTS, 3))
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     view /= np.linalg.norm(view, axis=1, keepdims=True)

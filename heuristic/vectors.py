@@ -32,6 +32,7 @@ def light_vector(light_position: Position, position: Position) -> tuple[Directio
     """
     half, inverse, square = numerics.scaled(_half_offset(light_position, position))
     inverse_length = numerics.inverse_length(square)
+    # `sqrt(s) = s / sqrt(s)`, then doubled, and freed of the scale.
     distance = square * inverse_length * 2 * numerics.inverse_of_power(inverse)
     return half * inverse_length, numerics.at_most(distance, numerics.largest(distance))
 
@@ -49,6 +50,7 @@ def wide_light_vector(light_position: Position, position: Position) -> tuple[Vec
     root = numerics.inverse_length(square)
     if type(half) is dr.float64_array_t(type(half)):
         return scaled, root
+    # Subtracted again in double precision: the first difference was rounded.
     half = _half_offset(numerics.wide(light_position), numerics.wide(position))
     return half, numerics.refined_inverse(
         dr.squared_norm(half), numerics.wide(root) * numerics.wide(inverse)

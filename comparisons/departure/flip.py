@@ -123,7 +123,8 @@ def _flip(test: Array, reference: Array, viewing: Viewing, curves: Sequence[Curv
         near = np.clip(np.arange(rows.start - eye.reach, rows.stop + eye.reach), 0, height - 1)
         images = [_light(image[np.ix_(near, columns)], viewing) for image in (reference, test)]
         for curve in curves:
-            truth, shown = (eye.seen(curve(image), len(near)) for image in images)
+            truth = eye.seen(curve(images[0]), len(near))
+            shown = eye.seen(curve(images[1]), len(near))
             error = _error(truth, shown)
             np.maximum(result[rows], error.reshape(-1, width), out=result[rows])
     return result

@@ -103,6 +103,7 @@ class SceneMaterials:
                     " heuristic renders the heuristic half of a pair,"
                     " which fotismos.reference.pair makes."
                 )
+            # A pointer is a number in Dr.Jit's registry; the table maps it to a place in `bsdfs`.
             places[int(dr.reinterpret_array(mi.UInt32, mi.BSDFPtr(bsdf))[0])] = number
         self.table = mi.UInt32([places.get(i, 0) for i in range(max(places, default=0) + 1)])
 
@@ -133,6 +134,7 @@ class SceneMaterials:
 
     def _read(self, bsdf: Any, present: Sequence[str], si: Interaction, active: Mask) -> Any:
         material = bsdf.material(si, active, True, self.form, self.physical)
+        # `dr.switch` needs the same types, in the same order, from every reader.
         values = {name: mi.Spectrum(getattr(material, name)) for name in present}
         if self.physical:
             values["base_color"] = mi.Spectrum(material.base_color)

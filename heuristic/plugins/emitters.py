@@ -83,6 +83,7 @@ def define() -> dict[str, Any]:
         def __init__(self, props: Properties) -> None:
             super().__init__(props)
             self.model = PLUGINS[props.plugin_name()]
+            # Only those that are given: otherwise both terms share one intensity in the kernel.
             self.intensities = {
                 name: emitted(props, name, 1.0)
                 for name in INTENSITIES
@@ -95,9 +96,11 @@ def define() -> dict[str, Any]:
                     self._keep(props, name, kind, default)
             if "attenuation" in self.names:
                 self.clamped = props.get("clamped", False)
+                # Without any in the scene, the kernel holds no attenuation until a coefficient is edited.
                 self.unattenuated = all(props.get(k, d) == d for k, d in coefficients.items())
                 for name, default in coefficients.items():
                     self._keep(props, name, mi.Float, default)
+            # Without a shell it stays a plain 0, which adds no instruction.
             self.shell = 0
             if "shell" in self.names and props.get("shell", 0.0) > 0:
                 self._keep(props, "shell", mi.Float, 0.0)
@@ -125,6 +128,7 @@ def define() -> dict[str, Any]:
 
         def light(self, it: Interaction, active: Mask = True) -> Light:
             """Return the kernel's form of this light, at the wavelengths of an interaction."""
+            # A light has no surface, so its spectra need only the wavelengths.
             si = dr.zeros(mi.SurfaceInteraction3f)
             si.wavelengths = it.wavelengths
             return self.model(
@@ -143,10 +147,12 @@ def define() -> dict[str, Any]:
         def sample_direction(self, it: Interaction, sample: Any, active: Mask = True) -> Sample:
             toward, intensity, _, distance = self.light(it, active).illuminate(mi.Vector3f(it.p))
             ds = dr.zeros(mi.DirectionSample3f)
+            # Parallel light has no position: its point lies beyond any scene.
             ds.d, ds.dist = toward, FAR if isinstance(distance, float) else distance
             ds.p = it.p + toward * ds.dist
             ds.n = -toward
             ds.time = it.time
+            # The only possible direction: a delta sample is not weighted against others.
             ds.pdf = 1.0
             ds.delta = True
             ds.emitter = mi.EmitterPtr(self)

@@ -85,6 +85,7 @@ def define() -> dict[str, Any]:
         ) -> tuple[Colour, Mask, list[Any]]:
             materials = self.known(scene).materials  # a symbolic loop could not make them
             if any(bsdf.is_clear for bsdf in materials.bsdfs):
+                # A heuristic that cannot be recorded, such as one in GLSL, needs an evaluated loop.
                 recorded = self.model.traced and dr.flag(dr.JitFlag.SymbolicLoops)
                 with dr.scoped_set_flag(dr.JitFlag.SymbolicLoops, recorded):
                     colour, hit = _through_layers(
@@ -92,6 +93,7 @@ def define() -> dict[str, Any]:
                     )
             else:
                 colour, hit, _ = self.layer(scene, ray, active)
+            # The mask marks pixels with a value: all of them where the environment shows.
             sees_all = scene.environment() is not None and not self.hide_emitters
             return colour, active if sees_all else hit, []
 
@@ -123,6 +125,7 @@ def define() -> dict[str, Any]:
             normal = materials.normal(si, active)
             twosided = materials.twosided(si, active)
             if twosided is not False:
+                # `wi` points to the viewer: with a negative z the back is seen.
                 normal = dr.select(twosided & (si.wi.z < 0), -normal, normal)
             return normal, twosided | (si.wi.z > 0)
 
@@ -135,6 +138,7 @@ def define() -> dict[str, Any]:
             ambient = self.ambient_at(si, active)
             visible = self.visibility(scene, si, active)
             colour = mi.Spectrum(0)
+            # One evaluation for each form of the lobe; the masks do not overlap.
             for material, is_here in self.known(scene).materials.at(si, active):
                 value = model(si.p, normal, view, material, lights, ambient, visible)
                 colour += dr.select(is_here, value, 0)
@@ -169,12 +173,14 @@ def define() -> dict[str, Any]:
             # Its parts identify a scene: holding the scene would be a cycle, never freed.
             parts = [*scene.shapes(), *scene.emitters(), *scene.sensors()]
             is_same = self.parts is not None and len(parts) == len(self.parts)
+            # Prepared again for another scene, and for other values of prepared parameters.
             if not (is_same and all(map(is_, parts, self.parts)) and self.values == self.numbers):
                 self.materials = SceneMaterials(
                     scene, self.prune, form=self.model.form, physical=not self.model.is_own
                 )
                 begin = perf_counter()
                 self.prepared = self.model.prepared(scene, self.numbers)
+                # Kernels run asynchronously: without this the time would miss them.
                 dr.sync_thread()
                 self.preparation = perf_counter() - begin if self.model.prepare else 0.0
                 self.parts = parts
@@ -223,6 +229,7 @@ def define() -> dict[str, Any]:
         def parameters_changed(self, keys: Sequence[str] = ()) -> None:
             """Make edited numbers opaque, so new values compile nothing."""
             dr.make_opaque(self.parameters)
+            # `prepare` takes plain numbers, and `known` compares them.
             prepared = [parameter.name for parameter in self.model.parameters if parameter.prepared]
             self.numbers = {name: float(self.parameters[name][0]) for name in prepared}
 
@@ -261,6 +268,7 @@ def _through_layers(integrator: Any, scene: Scene, ray: Any, active: Mask) -> tu
         colour += throughput * mi.Spectrum(value)
         throughput *= mi.Spectrum(integrator.known(scene).materials.transmittance(si, hit))
         hit_any |= hit
+        # On from the far side of the surface, in the same direction.
         ray = si.spawn_ray(ray.d)
         active = hit & (dr.max(throughput) > 0)
         layer += 1

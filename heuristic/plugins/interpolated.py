@@ -69,6 +69,7 @@ def shading_points(mesh: Mesh, interpolation: Interpolation) -> Interaction:
     si.uv = si.uv if uv is None else uv
     si.sh_frame.n = si.n
     si.shape = mi.ShapePtr(mesh)
+    # An empty interaction is infinitely far away, and would not count as valid.
     si.t = mi.Float(0)
     return si
 
@@ -171,6 +172,7 @@ def derived(base: type) -> type:
             value = stored_shade(
                 si, self.interpolation, twosided=_is_twosided(scene), active=active
             )
+            # `llvm_ad_mono` has one channel, which was stored three times.
             return value if mi.is_rgb else mi.Spectrum(value.x)
 
     return InterpolatingIntegrator

@@ -125,6 +125,7 @@ def define() -> dict[str, Any]:
             wi, wo = self._facing(si.wi, wo)
             above = active & (wi.z > 0) & (wo.z > 0)
             value = mi.Spectrum(0)
+            # Components are numbered as in `m_components`: 0 the lobe, 1 diffuse, 2 null.
             if "k_d" in self.present and ctx.is_enabled(mi.BSDFFlags.DiffuseReflection, 1):
                 k_d = self.k_d.eval(si, above)
                 value += terms.diffuse(convention.RADIANCE_PER_IRRADIANCE, k_d, wo.z)
@@ -140,6 +141,7 @@ def define() -> dict[str, Any]:
         def pdf(self, ctx: Any, si: Interaction, wo: Direction, active: Mask = True) -> Number:
             wi, wo = self._facing(si.wi, wo)
             above = active & (wi.z > 0) & (wo.z > 0)
+            # The mixture that `sample` draws from: null or not, then the lobe or the diffuse part.
             probability = self._specular_probability(ctx, si, above)
             reflected = 1 - self._through_probability(ctx, si, above)
             diffuse = mi.warp.square_to_cosine_hemisphere_pdf(wo)
@@ -156,6 +158,7 @@ def define() -> dict[str, Any]:
             # The rest of the number is uniform again, and chooses between the other two.
             sample1 = dr.select(passes, 0, (sample1 - probability) / (1 - probability))
             reflected, weight = self._reflected(ctx, si, sample1, sample2, active & ~passes)
+            # Straight through: the density of a delta component is its chance.
             straight = dr.zeros(mi.BSDFSample3f)
             straight.wo = -si.wi
             straight.eta = 1.0
@@ -188,6 +191,7 @@ def define() -> dict[str, Any]:
             """Draw ``wo`` from the diffuse part and the lobe."""
             (wi,) = self._facing(si.wi)
             active = active & (wi.z > 0)
+            # The first number chooses the part, the second the direction.
             probability = self._specular_probability(ctx, si, active)
             is_specular = sample1 < probability
             wo = dr.select(
@@ -197,6 +201,7 @@ def define() -> dict[str, Any]:
                 else self._sample_lobe(wi, sample2, self.exponent(si, active)),
                 mi.warp.square_to_cosine_hemisphere(sample2),
             )
+            # From the front, where it was drawn, back to the viewer's side.
             if self.twosided:
                 wo = dr.mulsign(wo, si.wi.z)
             bs = dr.zeros(mi.BSDFSample3f)
@@ -208,7 +213,9 @@ def define() -> dict[str, Any]:
                 mi.UInt32(+self.specular),
                 mi.UInt32(+mi.BSDFFlags.DiffuseReflection),
             )
+            # Value and density of both parts, whichever of them drew the direction.
             value, bs.pdf = self.eval_pdf(ctx, si, wo=wo, active=active)
+            # A mirror has no density over solid angle: its chance takes the place.
             if self.is_mirror:
                 mirrored = terms.mirror(1, self.k_s.eval(si, active))
                 value = dr.select(is_specular, mirrored, value)
@@ -245,6 +252,7 @@ def define() -> dict[str, Any]:
                     _require_exponent(n)
                 self.is_mirror = inf in exponents
                 self.n_is_moderate = self.is_mirror or all(map(numerics.is_moderate, exponents))
+            # A mirror has no lobe, so the kernel gets no `k_s` of it.
             self.kernel_terms = [k for k in COEFFICIENTS if k != "k_s" or not self.is_mirror]
             self.present = {k for k in self.kernel_terms if may_be_nonzero(getattr(self, k))}
             # The lobe or mirror, the diffuse part and the null component, in this order.
@@ -294,6 +302,7 @@ def define() -> dict[str, Any]:
             k_s = dr.mean(self.k_s.eval(si, active))
             if self.is_mirror or self.normalised:
                 return k_d, k_s
+            # `k_s` of a plain lobe is its albedo times the normalisation.
             return k_d, k_s * (1 / terms.normalisation(self.form, self.exponent(si, active)))
 
         def _sample_lobe(self, wi: Direction, sample2: Any, n: Number) -> Direction:
@@ -304,6 +313,7 @@ def define() -> dict[str, Any]:
             - c^2`` would vanish for large ``n``: with ``c = 2^-x`` the sine comes from ``1 -
             2^(-2x)`` (:func:`fotismos.heuristic.numerics.one_less_exp2`).
             """
+            # `u = c^(n + 1)` and `c = 2^-x` give `x = -log2(u) / (n + 1)`.
             halvings = -dr.log2(numerics.at_least(sample2.y, SMALLEST_SAMPLE)) / (n + 1)
             sine = dr.sqrt(numerics.one_less_exp2(2 * halvings))
             cosine = numerics.exp2(-halvings)

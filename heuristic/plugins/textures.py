@@ -141,6 +141,7 @@ def define() -> dict[str, Any]:
             else:
                 normal = self._displaced(si, active)
             if self.flip:
+                # A half turn about the surface's normal, which keeps the slope.
                 mirrored = mi.Vector3f(-normal.x, -normal.y, normal.z)
                 normal = dr.select(dr.dot(normal, si.wi) * si.wi.z > 0, normal, mirrored)
             return mi.Color3f(normal)
@@ -159,10 +160,12 @@ def define() -> dict[str, Any]:
             slope = self.scale * self.maps["heights"].eval_1_grad(si, active)
             n = mi.Vector3f(si.sh_frame.n)
             across = [
+                # The rise replaces what the tangent has along the shading normal.
                 dp + n * (rise - dr.dot(n, dp))
                 for dp, rise in ((si.dp_du, slope.x), (si.dp_dv, slope.y))
             ]
             normal = dr.normalize(dr.cross(*across))
+            # Onto the side of the geometric normal: a parametrisation may be left-handed.
             normal = dr.mulsign(normal, dr.dot(si.n, normal))
             return si.to_local(normal)
 

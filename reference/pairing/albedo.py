@@ -111,6 +111,7 @@ def of_roughplastic(plastic: RoughPlastic) -> Albedo:
         return Albedo(np.array(smooth), specular_of(plastic))
     transmittance, returned = coat(*plastic.interface)
     theta, weight = nodes(max(alpha, LEAST_SPREAD))
+    # The plugin interpolates its 64 values linearly, too.
     cosine = np.cos(theta)
     leaving = np.interp(cosine, np.linspace(0, 1, ROWS), transmittance)
     through = transmittance[-1] * (weight @ (leaving * cosine)) / np.pi / eta**2
@@ -128,6 +129,7 @@ def specular_of(plastic: RoughPlastic) -> np.ndarray:
     slope = np.tan(theta / 2)
     if distribution == "beckmann":
         density = np.exp(-((slope / alpha) ** 2))
+        # Smith's masking for Beckmann by the plugin's rational fit in 1 / (alpha tan).
         height = np.minimum(1 / (alpha * np.tan(theta)), 1.6)
         height = np.where(theta < np.pi / 2, height, 0)
         masking = (3.535 * height + 2.181 * height**2) / (1 + 2.276 * height + 2.577 * height**2)
@@ -170,6 +172,7 @@ def ior_of_lobe(plastic: RoughPlastic, albedo: float) -> float:
         return LITERAL_IOR
     low = log(SMALLEST_IOR - 1)
     high = log(largest - 1)
+    # The albedo grows with the index; for one out of reach an end is nearest.
     if distance(high) <= 0:
         return largest
     if distance(low) >= 0:
@@ -187,6 +190,7 @@ def nearest_ior(plastic: RoughPlastic, albedo: Albedo) -> float:
 
     def distance(log_ior: float) -> float:
         reached = of_roughplastic(replace(plastic, int_ior=exp(log_ior)))
+        # The base may be darker than white, so a diffuse excess is no distance.
         diffuse = np.minimum(albedo.diffuse, reached.diffuse)
         squares = (diffuse - albedo.diffuse) ** 2 + (reached.specular - albedo.specular) ** 2
         return float(np.sum(squares))
@@ -199,6 +203,7 @@ def nearest_ior(plastic: RoughPlastic, albedo: Albedo) -> float:
     smallest = log(log(SMALLEST_IOR) * STEP)
     low = high = log(log(plastic.int_ior) / STEP)
     is_rising = slope(high) > 0
+    # Towards smaller indices until the slope changes its sign.
     while is_rising and low > smallest:
         low, high = max(low - 1, smallest), low
         is_rising = slope(low) >= 0
@@ -214,6 +219,7 @@ def nearest_ior(plastic: RoughPlastic, albedo: Albedo) -> float:
 def nodes(alpha: float) -> tuple[np.ndarray, np.ndarray]:
     """Return polar angles and weights of the quadrature; the weights include ``sin(theta)``."""
     points, weights = _legendre(NODES)
+    # There `alpha tan(s)` is 1, and theta a right angle.
     end = np.arctan(1 / alpha)
     s = end * (points + 1) / 2
     theta = 2 * np.arctan(alpha * np.tan(s))
@@ -253,9 +259,11 @@ def _sums(distribution: str, alpha: float, eta: float, size: int, is_refracted: 
         slope = facet.x / facet.z
         dr.eval(slope)
         slope = dr.gather(mi.Float, slope, dr.arange(mi.UInt32, dr.width(weight)) // (size // 2))
+        # Beckmann's slope along y is that of roughness 1, scaled.
         facet = dr.normalize(mi.Vector3f(slope, width * normal, 1))
     else:
         facets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, width)
+        # For GGX the first number makes the slope along y.
         facet, _ = facets.sample(incident, mi.Point2f(second, first))
     cosine = dr.dot(incident, facet)
     reflected, inside, _, inverse = mi.fresnel(cosine, dr.opaque(mi.Float, eta))
@@ -265,6 +273,7 @@ def _sums(distribution: str, alpha: float, eta: float, size: int, is_refracted: 
     else:
         leaving = mi.reflect(incident, facet)
         share = reflected
+    # A facet may send light to the wrong side, where it is lost.
     leaves = (leaving.z < 0) if is_refracted else (leaving.z > 0)
     value = dr.select(leaves & (share > 0), share * facets.smith_g1(leaving, facet), 0)
     return np.array(dr.block_sum(value * weight, size * size // 2), float)
@@ -280,6 +289,7 @@ def _rule(variant: str, size: int) -> tuple[np.ndarray, ...]:
     from scipy.special import erfinv  # loaded late: see ior_of_lobe
 
     points, weights = _legendre(size)
+    # Cosine, first axis and upper half of the second, flattened.
     row, i, j = np.indices((ROWS, size, size // 2)).reshape(3, -1)
     j += size // 2
     node = np.asarray(points, np.float32) * np.float32(0.5) + np.float32(0.5)
@@ -288,6 +298,7 @@ def _rule(variant: str, size: int) -> tuple[np.ndarray, ...]:
         mi.Float(node[i]),
         mi.Float(node[j]),
         mi.Float(erfinv(points)[j]),
+        # Over 4 for the unit square, times 2 for the half left out.
         mi.Float(weights[i] * weights[j] / 2),
     )
     dr.eval(rule)
@@ -310,6 +321,7 @@ def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic,
         rho, misses = up_to_1("diffuse reflectance", phong.k_d)
         return RoughPlastic(rho, alpha_of(phong.n, "blinn"), LITERAL_IOR), misses
 
+    # The lobe: width, tint, and the index that gives its strongest channel.
     diffuse = np.array(phong.k_d)
     specular = specular_albedo(phong)
     strength = max(phong.k_s)
@@ -322,6 +334,7 @@ def to_roughplastic(phong: Phong, convention: Convention) -> tuple[RoughPlastic,
         specular_reflectance=tint,
     )
     white = replace(white, int_ior=ior_of_lobe(white, max(specular)))
+    # The base: if the coat lets too little light through, both parts give way.
     if any(diffuse > of_roughplastic(white).diffuse):
         white = replace(white, int_ior=nearest_ior(white, Albedo(diffuse, specular)))
     passed = of_roughplastic(white).diffuse

@@ -175,6 +175,7 @@ def to_heuristic(context: Context, replaced: Replacements) -> None:
             replaced.bsdf(label, plugin, "phong", parameters)
         for lost, rule in material.lost:
             replaced.lose(label, plugin, lost, rule)
+    # Only now, because labels and plugins in the records are those of the scene.
     for index, material in context.done.items():
         graph.replace(index, material.properties())
 
@@ -194,6 +195,7 @@ def to_physical(graph: Graph, convention: Convention, replaced: Replacements) ->
         replaced.bsdf(label, "phong", plugin, recorded, note)
         props = properties(plugin, **parameters)
         is_twosided = before.get("twosided", False)
+        # A wrapper takes over the node, to which shapes already refer.
         graph.replace(index, mi.Properties("twosided") if is_twosided else props)
         if is_twosided:
             graph.attach(index, "bsdf", graph.add(BSDF, props))

@@ -158,6 +158,7 @@ def _ambient_ratio(graph: Graph) -> tuple[np.ndarray, bool]:
     # Without a diffuse part the reflectance is k_a itself.
     has_part = np.logical_or(k_d.any(axis=1, keepdims=True), k_s.any(axis=1, keepdims=True))
     k_d = np.where(has_part, k_d, k_a)
+    # Least squares without a constant: `sum k_a k_d / sum k_d^2`.
     weight = np.sum(k_d**2, axis=0)
     ratio = np.where(weight > 0, np.sum(k_a * k_d, axis=0) / np.where(weight > 0, weight, 1), 1.0)
     fits = np.abs(k_a - ratio * k_d) <= 1e-6 * np.maximum(k_a, 1e-6)

@@ -108,6 +108,7 @@ def pair(source: Source, options: PairOptions | None = None) -> Pair:
 
 
 def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
+    # The geometry alone, for lights that must be measured.
     bare = graph.copy()
     for shape in bare.nodes(SHAPE):
         for kind in (BSDF, MEDIUM):
@@ -115,6 +116,7 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
                 bare.detach(shape, key)
     geometry = cache(bare.instantiate)
 
+    # The heuristic half.
     model = named(options.heuristic)
     half = graph.copy()
     replaced = Replacements()
@@ -153,6 +155,7 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
             half, geometry(), resolution=options.tessellation, interpolation=options.interpolation
         )
 
+    # The physical half.
     physical = graph.copy()
     emitters.add_glowing_shapes(physical, replaced)
     bsdfs.to_physical(physical, options.convention, replaced)

@@ -90,6 +90,7 @@ def _area(light: LightNode) -> None:
         cone = {}
     if flatness < 1:  # its light leaves through the shape
         cone["shell"] = radius
+    # A sphere has the area 4 pi r^2, a disk pi r^2; a rectangle has its two half edges.
     match graph.plugin(shape):
         case "sphere" | "disk" as kind:
             cone["radius"] = np.sqrt(area / np.pi) / (2 if kind == "sphere" else 1)
@@ -110,6 +111,7 @@ ROOM = 1.02
 
 
 def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float], float]:
+    # Mitsuba's sampling is even in area, so means over the grid are means over the surface.
     cells = (np.arange(64) + 0.5) / 64
     x, y = np.reshape(np.meshgrid(cells, cells), (2, -1))
     sample = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))
@@ -181,6 +183,7 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
         # Mitsuba rejects a beam as wide as the cone; just below it the cone is even.
         return _least(lambda beam_width: distance(edge, beam_width), 0.0, edge * (1 - 1e-4))
 
+    # A search in a search: each edge is judged with its best beam.
     edge = _least(lambda edge: distance(edge, best_beam(edge)), 1e-3 * cutoff, cutoff)
     return edge, best_beam(edge)
 
@@ -188,6 +191,7 @@ def cone_for(cutoff: float, exponent: float) -> tuple[float, float]:
 def _least(function: Callable[[float], float], low: float, high: float) -> float:
     from scipy.optimize import minimize_scalar  # loaded late: a tenth of a command's start
 
+    # The bounded search only approaches the ends, which may be best.
     inner = minimize_scalar(function, bounds=(low, high), method="bounded").x
     return float(min((low, high, inner), key=function))
 
@@ -262,6 +266,7 @@ def spot_to_physical(light: LightNode) -> None:
         power_flux(cutoff, exponent) / linear_flux(edge, beam_width),
     )
     fitted = f"linear from {beam_width:.4g} to {edge:.4g} deg, fitted to m = {exponent:g}"
+    # Origin, target, and the axis of the world most unlike the beam as up.
     ends = (position, position + axis, np.eye(3)[np.argmin(np.abs(axis))])
     props = properties(
         "spot",

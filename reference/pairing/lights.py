@@ -218,9 +218,11 @@ def level(
     k1 = light.number("k1", 0.0)
     k2 = light.number("k2", 0.0)
     clamped = light.value("clamped", False)
+    # Equal flux, at any distance.
     if (k0, k1, k2) == INVERSE_SQUARE and not clamped:
         return IRRADIANCE_PER_INTENSITY * flux_ratio, ""
 
+    # Otherwise equal mean irradiance over what the camera sees.
     def chapters(distance: Any, travel: Any) -> Any:
         factor = 1 / np.maximum(k0 + k1 * distance + k2 * distance**2, np.finfo(float).tiny)
         return (np.minimum(factor, 1) if clamped else factor) * cone(travel)

@@ -63,6 +63,7 @@ def unknown(context: Context, index: int) -> NearestPhong:
         return NearestPhong(k_a=0.5, k_d=0.5, lost=lost, physical=context.physical(0.5))
     graph = context.graph
     level = values.plain(probed.specular)
+    # Fresnel's `F = ((ior - 1) / (ior + 1))^2`, solved for the index; 0.04 for a spectrum.
     root = sqrt(min(float(np.mean(level)) if level is not None else 0.04, 0.99))
     ior = min((1 + root) / (1 - root), LARGEST_IOR)
     width = min(max(probed.alpha, SMALLEST_ALPHA), 1.0)
@@ -131,6 +132,7 @@ def roughplastic(context: Context, index: int) -> NearestPhong:
     if values.plain(base) is not None and values.plain(coat) is not None:
         material = albedo.to_phong(_roughplastic(graph, index), context.convention)
         return NearestPhong(k_a=material.k_d, **asdict(material), physical=physical)
+    # A texture: albedos at reflectances of 1 and 0.5 determine all others.
     white = _roughplastic(graph, index, base=(1.0,) * 3, coat=(1.0,) * 3)
     unit = albedo.to_phong(white, context.convention)
     k_s = values.product(graph, coat, unit.k_s[0])

@@ -134,6 +134,7 @@ def _prepare_film(
         graph.attach(sensor, "film", added)
         films = [("film", added)]
     ((_, film),) = films
+    # Of another film only size and filter stay.
     if graph.plugin(film) != "hdrfilm":
         settings.override("film", graph.plugin(film), "hdrfilm")
         before = graph.props(film)
@@ -165,6 +166,7 @@ def _resize(props: Any, resolution: tuple[int, int]) -> None:
         if f"crop_{side}" in props:
             begin = props.get(f"crop_offset_{name}", 0)
             end = begin + props[f"crop_{side}"]
+            # Rounding both ends, not the length, keeps neighbouring crops in touch.
             first = min(round(begin * new / before), new - 1)
             props[f"crop_offset_{name}"] = first
             props[f"crop_{side}"] = max(round(end * new / before) - first, 1)
@@ -189,6 +191,7 @@ def _take_integrator(graph: Graph, settings: Settings) -> None:
     for key, outer in graph.children(0, INTEGRATOR):
         graph.detach(0, key)
         index = outer
+        # Integrators such as `aov` wrap others: the innermost makes the light.
         while nested := graph.children(index, INTEGRATOR):
             settings.override("integrator", graph.plugin(index), "the integrator inside it")
             index = nested[0][1]

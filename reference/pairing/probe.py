@@ -71,6 +71,7 @@ def probe(bsdf: mi.BSDF) -> Albedos | None:
     by_part = zip(*(colours for colours, _ in parts), strict=True)
     columns = [np.stack(column, 1) for column in by_part]
     if drawn is not None:
+        # Rays draw their four wavelengths far apart: here they are put in order.
         columns = [np.interp(WAVELENGTHS, drawn.T.ravel(), column.ravel()) for column in columns]
     reflected, diffuse, passed, scattered = map(np.ravel, columns)
     alpha = float(np.mean([width for _, width in parts]))
@@ -146,6 +147,7 @@ def _wavelengths() -> np.ndarray | tuple[None]:
 
 def _of_rays() -> np.ndarray:
     """Return wavelengths as a ray has them, (n, 4): tints of `principled` depend on all four."""
+    # Mitsuba spaces the four evenly: a quarter of the range of random numbers apart.
     places = (np.arange(WAVELENGTHS.size) + 0.5) / WAVELENGTHS.size
     wavelengths, _ = mi.sample_rgb_spectrum(mi.Spectrum(mi.Float(places)))
     return np.array(wavelengths[0]).reshape(4, -1).T
@@ -160,6 +162,7 @@ def _at(si: Any, wavelengths: np.ndarray | None) -> Any:
 
 
 def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple[tuple[Any, ...], float]:
+    # Light along the normal of a plane, at places all over its textures.
     points = [mi.Float(row) for row in lattice(SAMPLES)]
     lobe, x, y, u, v = points
     si = _at(dr.zeros(mi.SurfaceInteraction3f, SAMPLES), wavelengths)
@@ -172,10 +175,12 @@ def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple[tuple[Any, ..
     context = mi.BSDFContext(mi.TransportMode.Importance)
     bs, weight = bsdf.sample(context, si, lobe, mi.Point2f(x, y), True)
     weight = dr.select(dr.isfinite(weight) & (bs.pdf > 0), weight, 0)
+    # Light goes up, passes straight or refracted, or is scattered through.
     up = bs.wo.z > 0
     straight = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Null) | ~mi.has_flag(
         bs.sampled_type, mi.BSDFFlags.Diffuse
     )
+    # The BRDF on a cone beside the lobe; `eval` contains the cosine.
     around = mi.Float(2 * np.pi * (np.arange(SAMPLES) + 0.5) / SAMPLES)
     sin_phi, cos_phi = dr.sincos(around)
     beside = mi.Vector3f(sin(OFF_LOBE) * cos_phi, sin(OFF_LOBE) * sin_phi, cos(OFF_LOBE))
@@ -204,6 +209,7 @@ def _width(bs: Any, weight: Any, up: Any, diffuse: Any) -> Any:
     share = np.where(delta, 0, np.mean(diffuse) * cosine / (np.pi * np.maximum(density, 1e-30)))
     weights = np.maximum(weights - share, 0)
     slope = np.where(delta, 0, (1 - cosine) / (1 + cosine))  # tan^2 of half the angle
+    # The slope below which half of the lobe's light lies.
     order = np.argsort(slope)
     reached = np.cumsum(weights[order])
     median = slope[order][np.searchsorted(reached, reached[-1] / 2)] if reached[-1] > 0 else 0.0
@@ -279,8 +285,10 @@ class AlbedoTable:
         # Spread out in the kernel: millions of numbers need not be sent.
         places = dr.arange(mi.UInt32, NODES * SAMPLES)
         grid_mu = dr.gather(mi.Float, mi.Float(mu), places // SAMPLES)
-        rows = lattice(SAMPLES)[:3]
-        lobe, u, v = (dr.gather(mi.Float, mi.Float(row), places % SAMPLES) for row in rows)
+        rows = lattice(SAMPLES)
+        lobe = dr.gather(mi.Float, mi.Float(rows[0]), places % SAMPLES)
+        u = dr.gather(mi.Float, mi.Float(rows[1]), places % SAMPLES)
+        v = dr.gather(mi.Float, mi.Float(rows[2]), places % SAMPLES)
         si = dr.zeros(mi.SurfaceInteraction3f, NODES * SAMPLES)
         si.wi = mi.Vector3f(dr.safe_sqrt(1 - dr.square(grid_mu)), 0, grid_mu)
         _, weight = bsdf.sample(mi.BSDFContext(), si, lobe, mi.Point2f(u, v))
@@ -292,6 +300,7 @@ class AlbedoTable:
         dr.eval(self.table)
 
     def at(self, mu: Number) -> Colour:
+        # The inverse of the nodes' even spacing in `sqrt(mu)` from 1e-3 to 1.
         """Interpolate linearly at cosines ``mu``; behind a one-sided surface, 0."""
         mu = abs(mu) if self.has_back else mu
         node = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)

@@ -284,6 +284,7 @@ def _put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
             graph.detach(shape, key)
             if facts.pair.hide_emitters:
                 graph.remove(shape)
+    # The lights that only the heuristic half has are those in place of shapes.
     before = dict(facts.pair.physical.children(0, EMITTER))
     emitters = facts.pair.heuristic.children(0, EMITTER)
     _put_lights(graph, facts, [key for key, _ in emitters if key not in before])

@@ -101,6 +101,7 @@ def _disk(shape: mi.Shape) -> Geometry:
     along_u, along_v, axis = matrix[:3, :3].T
     across = np.cross(along_u, along_v)
     length = np.linalg.norm(axis)
+    # Either way round: the transform may mirror.
     if not abs(axis @ across) > ALIKE * length * np.linalg.norm(across):
         return UNKNOWN
     return Geometry(Form.FLAT, plane=(matrix[:3, 3], axis / length))
@@ -124,6 +125,7 @@ def _mesh(mesh: mi.Mesh, is_rectangle: bool) -> Geometry:
     length = np.linalg.norm(across, axis=1)
     has_area = length > 0
     normals = across / np.where(has_area, length, 1)[:, None]
+    # Interpolated normals must be those of the faces, or nothing is certain.
     if smooth:
         vertex_normals = meshes.rows(mesh, meshes.NORMALS).astype(float)[faces]
         if not _are_alike(vertex_normals, normals[:, None])[has_area].all():
@@ -241,6 +243,7 @@ def _is_sampled_as_hit(graph: Graph, index: int | None, shape: mi.Shape) -> bool
         return shape.is_mesh() or shape.shape_type() in round_or_flat
     props = graph.props(index) if index is not None else {}
     matrix = np.array(props.get("to_world", mi.ScalarTransform4f()).matrix, float)[:3, :3]
+    # Round: axes of equal length, perpendicular to each other.
     squares = matrix.T @ matrix
     if "p0" not in props and "p1" not in props:
         squares[2, 2] = squares[0, 0]  # it may be long
@@ -267,6 +270,7 @@ def _sides(graph: Graph, bsdf: int | None) -> tuple[bool, bool, bool]:
         values.may_be_nonzero(props.get(name, usual))
         for name, usual in (reflectances or {}).items()
     )
+    # A plugin that is not known, or transmits, may do anything.
     if reflectances is None or passes:
         return False, True, True
     reflects |= not reflectances
@@ -298,6 +302,7 @@ class CameraFacts:
             return cls(plugin, is_still=is_still)
         film = sensor.film()
         border = 0.0
+        # Rays of a sampled border begin outside the film, in shares of its shorter side.
         if film.sample_border():
             border = film.rfilter().border_size() / min(film.crop_size())
         ends = (-border, 1 + border)
@@ -305,6 +310,7 @@ class CameraFacts:
         across = np.concatenate([steps, np.ones(EDGE), 1 - steps, np.zeros(EDGE)])
         lens = np.stack([across, np.roll(across, EDGE)])  # around the square's edge
         places = np.array([(x, y) for x in ends for y in ends]).T
+        # Each of the film's four corners with all points of the lens.
         on_film = mi.Point2f(np.repeat(places, 4 * EDGE, axis=1))
         on_lens = mi.Point2f(np.tile(lens, 4))
         ray, _ = sensor.sample_ray(0.0, 0.5, on_film, on_lens)

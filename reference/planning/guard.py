@@ -56,6 +56,7 @@ class Tally:
     def of(cls, pieces: Sequence[np.ndarray]) -> "Tally":
         """Sum up rays: (2, N) radiances by the plan and by everything, in pieces."""
         planned, whole = np.concatenate(pieces, axis=1)
+        # Rays that do not fill a batch are left out.
         count = len(planned) // BATCHES * BATCHES
         batches = (planned - whole)[:count].reshape(BATCHES, -1).mean(axis=1)
         return cls(batches, float(max(planned.mean(), whole.mean())), len(planned))
@@ -108,6 +109,7 @@ def examine_plan(
         return Guard()
     begin = perf_counter()
     integrators = [physical_integrator(p, scene, hide_emitters) for p in (plan, whole)]
+    # A seed for each use, so that no two pieces share random numbers.
     seeds = (pass_seed(seed, number, Stream.PROBE) for number in range(2**31))
     sizes = _looks(int(min(max(FEWEST, SHARE * samples), MOST)))
     pieces = []
@@ -118,6 +120,7 @@ def examine_plan(
         rays = size
         if tally.agrees(LOOKING):
             break
+        # A departure must be found again by new rays alone.
         if tally.departs(LOOKING / len(sizes)):
             fresh = [
                 radiances(scene, integrators, count=PIECE, seeds=seeds)

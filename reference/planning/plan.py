@@ -244,6 +244,7 @@ def _reference(facts: Facts) -> Plan:
         rr_depth=pair.rr_depth or direct.RR_DEPTH,
         rules=tuple(rule.check(facts) for rule in RULES),
     )
+    # Without this rule nothing is known to replace Mitsuba's own integrator.
     if not LIGHT_BY_LIGHT.check(facts).applies:
         return stock
     kinds = [lights.of(light.kind) for light in facts.lights]
@@ -254,6 +255,7 @@ def _reference(facts: Facts) -> Plan:
         # Behind hidden lamps only the stock integrator is right.
         return stock if facts.sees_through_lamps else replace(stock, integrator="path")
     tabulated = TABULATED_ENVIRONMENT.check(facts).applies
+    # Random numbers besides the place on the film: wavelength, lens, or an extent.
     is_random = (
         mi.is_spectral
         or facts.camera.plugin not in ("perspective", "orthographic")

@@ -231,9 +231,11 @@ class Boxes:
         self.low = np.array([shape.low for shape in self.shapes]).reshape(-1, 3)
         self.high = np.array([shape.high for shape in self.shapes]).reshape(-1, 3)
         facing = [shape.facing for shape in self.shapes]
+        # Receivers in rows, (N, 1, 3); boxes (N, 3) in columns.
         direction = np.array([d for d, _ in facing]).reshape(-1, 1, 3)
         offset = np.array([o for _, o in facing]).reshape(-1, 1)
         margin = ROUNDING * np.maximum((self.high - self.low).max(axis=1, initial=0), 1e-30)
+        # The corner of each box that lies farthest in the receiver's direction.
         reach = np.maximum(self.low * direction, self.high * direction).sum(axis=2)
         self.is_before = reach - offset > margin
         np.fill_diagonal(self.is_before, False)
@@ -243,6 +245,7 @@ class Boxes:
 
         The ways of parallel light lie in a box around the receiver and its box moved far away.
         """
+        # For each receiver a box around all ways of light to it.
         low = self.low
         high = self.high
         shining = np.array([shape.name == light.shape for shape in self.shapes], bool)
@@ -260,9 +263,11 @@ class Boxes:
         else:  # an environment shines from everywhere that the receiver faces
             low = np.full_like(low, -np.inf)
             high = np.full_like(high, np.inf)
+        # Boxes touch if they overlap along every axis.
         hides = self.is_before & np.all(
             (low[:, None] <= self.high) & (self.low <= high[:, None]), axis=2
         )
+        # Whether a lamp hides itself is asked elsewhere; what reflects nothing needs no light.
         hides &= ~shining & np.array([[shape.reflects] for shape in self.shapes], bool)
         if not hides.any():
             return None

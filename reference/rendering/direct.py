@@ -69,6 +69,7 @@ def _define(_variant: str) -> None:
         def sample(
             self, scene: Scene, sampler: Any, ray: Any, medium: Any = None, active: Mask = True
         ) -> tuple[Colour, Mask, list[Any]]:
+            # Lights at points and in directions are exact, the others are sampled.
             delta: list[Any] = []
             lamps = []
             others: list[Any] = []
@@ -77,6 +78,7 @@ def _define(_variant: str) -> None:
                 (delta if is_delta else others).append(emitter)
                 if mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface):
                     lamps.append(emitter)
+            # The surface that the camera sees, and the light that comes from it directly.
             if self.hide_emitters and lamps:
                 si = _beyond_lamps(scene, mi.Ray3f(ray), mi.Bool(active))
             else:
@@ -86,6 +88,7 @@ def _define(_variant: str) -> None:
                 is_shown = active & (si.is_valid() | (not self.hide_emitters))
                 colour = dr.select(is_shown, si.emitter(scene).eval(si, is_shown), 0)
             hit = active & si.is_valid()
+            # The mask of valid samples becomes alpha: a visible environment fills the picture.
             environment = scene.environment() is not None and not self.hide_emitters
             valid = active if environment else hit
             if self.transports[0].max_depth == 1:
@@ -99,6 +102,7 @@ def _define(_variant: str) -> None:
                 "active": hit,
                 "transports": self.transports,
             }
+            # The environment from a table, if there is one; the other lights are sampled.
             extended = []
             for emitter in others:
                 if self.environment_albedo is not None and emitter.is_environment():
@@ -106,6 +110,7 @@ def _define(_variant: str) -> None:
                     colour += dr.select(hit, albedo * emitter.eval(si, hit), 0)
                 else:
                     extended.append(emitter)
+            # Each image begins with what the camera sees, and the exact lights.
             colours = [colour] * len(self.transports)
             colours = sums(colours, _of_all(delta, True, **seen))
             deep = [transport for transport in self.transports if transport.max_depth != 2]
@@ -126,6 +131,7 @@ def _define(_variant: str) -> None:
                 )
                 added = dict(zip(deep, indirect, strict=True))
                 colours = sums(colours, [added.get(transport, 0) for transport in self.transports])
+            # Lights with an extent: a sample of each, and one of the BSDF for all together.
             colours = sums(colours, _of_all(extended, False, **seen))
             looks = any(transport.bsdf_samples for transport in self.transports)
             if extended and (looks or _has_delta(scene)):
@@ -194,11 +200,13 @@ def _of_all(
 
     def of_light(sample_direction: Any, sampler: Any) -> Any:
         sample = mi.Point2f(0.5) if is_delta else sampler.next_2d(active)
+        # A point of the light; the density is over solid angle, 0 where no light arrives.
         point, direction, density, weight = sample_direction(si, sample, active)
         facing = active & (density > 0)
         reached = visibility(scene, si, point, facing, transports)
         wo = si.to_local(direction)
         context = mi.BSDFContext()
+        # Images that differ in shadows need the BSDF at hidden points too.
         is_mixed = len({transport.shadows for transport in transports}) > 1
         evaluated = facing if is_mixed else reached[0]
         if is_weighted:
@@ -262,6 +270,8 @@ def _from_bsdf(
     context = mi.BSDFContext()
     bs, weight = bsdf.sample(context, si, sampler.next_1d(active), sampler.next_2d(active), active)
     active = active & (bs.pdf > 0)
+    # What lies in that direction, and how likely a sample of that light is to take it.
+    # Every light is sampled, so no chance of picking it enters.
     hit = scene.ray_intersect(si.spawn_ray(si.to_world(bs.wo)), active)
     emitter = hit.emitter(scene, active)
     ds = mi.DirectionSample3f(scene, hit, si)
@@ -270,6 +280,7 @@ def _from_bsdf(
     is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
     if not any(transport.bsdf_samples for transport in transports):
         active &= is_delta
+    # The other half of the balance heuristic; a delta direction has no rival.
     share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
     value = weight * emitter.eval(hit, active) * share
     return found_by_bsdf(active, is_delta, value=value, transports=transports)

@@ -51,6 +51,7 @@ class GBuffer:
         """
         offset = np.asarray(light_position) - self.position[self.hit]
         distance = np.linalg.norm(offset, axis=1)
+        # On the light itself there is no direction: an infinite distance makes the cosine 0.
         distance = np.where(distance > 0, distance, np.inf)
         cosine = np.sum(self.normal[self.hit] * offset, axis=1) / distance
         travel = -offset / distance[:, None]
@@ -91,10 +92,12 @@ def gbuffer(scene: Scene, size: tuple[int, int] = (GRID, GRID)) -> GBuffer:
     width, height = size
     si = scene.ray_intersect(centre_rays(scene, size))
     hit = si.is_valid()
+    # `wi` points to the viewer: with a negative z the back is seen.
     normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
     points = np.array(dr.select(hit, mi.Vector3f(si.p), 0)).T.reshape(height, width, 3)
     normals = np.array(dr.select(hit, normal, 0)).T.reshape(height, width, 3)
     seen = np.array(hit).reshape(height, width)
+    # An instance stands for all shapes of its group.
     shape = dr.select(si.instance != None, si.instance, si.shape)  # noqa: E711  of pointers
     shapes = _object_ids(shape, seen)
     return GBuffer(
@@ -110,6 +113,7 @@ def _named_apart(materials: ObjectIds, shapes: ObjectIds) -> ObjectIds:
     seen = materials.places >= 0
     unseen = len(shapes.names)
     times = Counter(materials.names)
+    # The first shape that shows each material, or `unseen`.
     first = np.full(len(materials.names), unseen)
     np.minimum.at(first, materials.places[seen], shapes.places[seen])
 
@@ -126,6 +130,7 @@ def _object_ids(pointers: Any, seen: np.ndarray) -> ObjectIds:
     numbers = np.array(dr.reinterpret_array(mi.UInt32, pointers)).reshape(seen.shape)
     ids, first, places = np.unique(numbers, return_index=True, return_inverse=True)
     named = zip(ids, first, strict=True)
+    # Number 0 is the null pointer, which has no id.
     names = tuple((pointers[int(at)].id() or UNNAMED) if number else "" for number, at in named)
     return ObjectIds(np.where(seen, places.reshape(seen.shape), -1), names)
 

@@ -34,6 +34,7 @@ def indirect_light(
     context = mi.BSDFContext()
     limit = mi.UInt32(max_depth if max_depth >= 0 else 0xFFFFFFFF)
     light = [mi.Spectrum(0) for _ in transports]
+    # The first direction, from the surface that the camera sees, and how it was drawn.
     bs, throughput = bsdf.sample(
         context, si, sampler.next_1d(active), sampler.next_2d(active), active
     )
@@ -58,17 +59,21 @@ def indirect_light(
             light, found_by_bsdf(is_indirect, previous_delta, value=value, transports=transports)
         )
 
+        # Paths end where nothing is hit, and at the largest depth.
         active &= si.is_valid() & (depth < limit)
         vertex = si.bsdf(ray)
         direct = active & mi.has_flag(vertex.flags(), mi.BSDFFlags.Smooth)
+        # A sample of one light, picked at random, against one of the BSDF (balance heuristic).
         ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), False, direct)
         direct &= ds.pdf > 0
         value, bsdf_pdf = vertex.eval_pdf(context, si, wo=si.to_local(ds.d), active=direct)
         reached = visibility(scene, si, ds.p, direct, transports)
+        # No ray hits a point or a direction, so such a sample counts in full.
         share = dr.select(ds.delta, 1, ds.pdf / (ds.pdf + bsdf_pdf))
         value = throughput * value * weight
         light = sums(light, _weighted(reached, value, share, transports))
 
+        # The next direction; its weight is the BSDF times the cosine over the density.
         bs, weight = vertex.sample(
             context, si, sampler.next_1d(active), sampler.next_2d(active), active
         )
@@ -79,6 +84,7 @@ def indirect_light(
         ray = si.spawn_ray(si.to_world(bs.wo))
         depth += 1
         largest = dr.max(throughput)
+        # Russian roulette: paths that go on also carry the light of those that end.
         survival = dr.select(depth > rr_depth, dr.minimum(largest, SURVIVAL), 1)
         active &= (largest > 0) & (sampler.next_1d(active) < survival)
         throughput *= dr.rcp(dr.maximum(survival, 1e-6))

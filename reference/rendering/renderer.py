@@ -122,6 +122,7 @@ class Renderer:
                 f" once are too many: at most {LARGEST_PASS} samples per pass are allowed."
                 " Give a smaller `spp` or `resolution`."
             )
+        # The pass, timed with its evaluation.
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             _reset(self.scene)
             dr.kernel_history_clear()
@@ -141,10 +142,13 @@ class Renderer:
             self.times.append(perf_counter() - begin)
             self.processor_times.append(process_time() - used)
             kernels = dr.kernel_history([dr.KernelType.JIT])
+        # Dr.Jit counts milliseconds.
         self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
+        # A variant of one channel.
         if image.shape[2] == 1:
             image = dr.repeat(image, 3, axis=2)
         layer = f"{self.label}, pass with seed {seed}"
+        # Written so that a NaN fails it too.
         if not dr.all(dr.abs(image.array) <= LARGEST_VALUE):
             pixels = np.array(image)
             require_finite(pixels, layer)
@@ -230,6 +234,7 @@ def syntax(f: FunctionType | None = None, **options: Any) -> Callable[..., Any]:
     key = f.__code__.co_filename, f.__code__
     if key not in _transformed:
         _transformed[key] = _transform(f).__code__
+    # Only the code is shared: globals and defaults are those of the module just loaded.
     copy = FunctionType(_transformed[key], f.__globals__)
     copy.__defaults__ = f.__defaults__
     return copy
@@ -371,6 +376,7 @@ def available_memory() -> int | None:
         lines = [line.split() for file in files for line in file.read_text("utf-8").splitlines()]
         sizes = {fields[0]: 1024 * int(fields[1]) for fields in lines if fields[-1] == "kB"}
         limits = {"VmData:": resource.RLIMIT_DATA, "VmSize:": resource.RLIMIT_AS}
+        # What each limit of the process still allows.
         left = [
             resource.getrlimit(limit)[0] - sizes[name]
             for name, limit in limits.items()

@@ -78,6 +78,7 @@ def _define(_variant: str) -> None:
         def seed(self, seed: Any, wavefront_size: int = 0xFFFFFFFF) -> None:
             super().seed(seed, wavefront_size)
             index = dr.arange(mi.UInt32, self.wavefront_size())
+            # The samples of a pixel follow each other in the wavefront, and share one hash.
             pixel = index // self.sample_count()
             self.index = index - pixel * self.sample_count()
             self.pixel, _ = mi.sample_tea_32(mi.UInt32(seed), pixel)
@@ -94,6 +95,7 @@ def _define(_variant: str) -> None:
         def next_2d(self, active: Any = True) -> Any:
             columns, rows = cells(self.sample_count())
             stratum, permutation, turn = self._stratum(active)
+            # Each sample has a cell; its column is split by rows, and its row by columns.
             row = stratum // columns
             column = stratum - row * columns
             along = turned(row, rows, permutation * _ALONG, turn * _ALONG, active)
@@ -144,4 +146,5 @@ def turned(index: Array, count: int, permutation: Array, turn: Array, active: Ma
         return mi.UInt32(0)
     # The high word of the product is uniform in 0 … count - 1, without a division.
     cell = mi.permute_kensler(index, count, permutation, active) + dr.mul_hi(turn, count)
+    # Both terms are below count, so subtracting it once is enough.
     return dr.select(cell >= count, cell - count, cell)

@@ -108,6 +108,7 @@ class Accumulator:
     def _add(self, value: Array, sums: dict[str, Array]) -> None:
         count = self.count
         step = value - sums["mean"]
+        # Opaque counts, so that all passes share one kernel.
         share = step / dr.opaque(mi.Float64, count)
         if "cubes" in sums:
             # The update of a third central moment by one value (Pébay 2008, equation 2.8) takes the
@@ -116,6 +117,7 @@ class Accumulator:
             sums["cubes"] += share * (share * step * cubic - 3 * sums["squares"])
         sums["mean"] += share
         if "squares" in sums:
+            # Welford's update takes the step from the old mean and from the new one.
             sums["squares"] += step * (value - sums["mean"])
         if "signed" in sums:
             sums["signed"] += value * dr.opaque(mi.Float64, 1 if count % 2 else -1)
@@ -157,6 +159,7 @@ class DifferenceSums(Accumulator):
     def __init__(self, counted: np.ndarray) -> None:
         super().__init__((*NOISE, "cubes"))
         self._sample = sample(counted)
+        # Places of the sampled channels in the flat image, (P, 3).
         flat = 3 * self._sample[0][:, None] + np.arange(3)
         self._index = mi.UInt32(flat.ravel().astype(np.uint32))
         self._groups = np.zeros((GROUPS, flat.size))
@@ -174,6 +177,7 @@ class DifferenceSums(Accumulator):
         # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, and of the mean 1/n² of it.
         third *= 1.0 / (n * (n - 1) * (n - 2)) if n >= 4 else 0.0
         sizes = np.bincount(np.arange(self.count) % GROUPS, minlength=GROUPS)
+        # With few passes the last groups are empty.
         sizes = sizes[sizes > 0]
         means = self._groups[: len(sizes)] / sizes[:, None]
         places, blocks, total = self._sample

@@ -135,6 +135,7 @@ def _is_transform(value: Any) -> bool:
 
 def _is_invertible(matrix: np.ndarray) -> bool:
     even = matrix
+    # Columns, then rows, get length 1, so that an uneven scale alone is no fault.
     for axis in (1, 0):
         lengths = np.linalg.norm(even, axis=axis, keepdims=True)
         if not lengths.all():
@@ -181,6 +182,7 @@ def damage(graph: Graph, index: int) -> str:
         return ""
     state = path.stat()
     number = graph.props(index).get("shape_index", 0)
+    # A file that is written again has another stamp, and is examined again.
     stamp = state.st_mtime_ns, state.st_size, mi.variant()
     fault = _wrong_mesh(plugin, str(path), number=number, stamp=stamp)
     return f"{path}: {fault} Write the file again." if fault else ""
