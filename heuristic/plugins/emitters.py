@@ -96,7 +96,7 @@ def define() -> dict[str, Any]:
                     self._keep(props, name, kind, default)
             if "attenuation" in self.names:
                 self.clamped = props.get("clamped", False)
-                # Without any in the scene, the kernel holds no attenuation until a coefficient is edited.
+                # Without attenuation in the scene, the kernel holds none until an edit.
                 self.unattenuated = all(props.get(k, d) == d for k, d in coefficients.items())
                 for name, default in coefficients.items():
                     self._keep(props, name, mi.Float, default)

@@ -219,7 +219,7 @@ def nearest_ior(plastic: RoughPlastic, albedo: Albedo) -> float:
 def nodes(alpha: float) -> tuple[np.ndarray, np.ndarray]:
     """Return polar angles and weights of the quadrature; the weights include ``sin(theta)``."""
     points, weights = _legendre(NODES)
-    # There `alpha tan(s)` is 1, and theta a right angle.
+    # At the end `alpha tan(s)` is 1, and theta a right angle.
     end = np.arctan(1 / alpha)
     s = end * (points + 1) / 2
     theta = 2 * np.arctan(alpha * np.tan(s))

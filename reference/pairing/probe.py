@@ -300,9 +300,9 @@ class AlbedoTable:
         dr.eval(self.table)
 
     def at(self, mu: Number) -> Colour:
-        # The inverse of the nodes' even spacing in `sqrt(mu)` from 1e-3 to 1.
         """Interpolate linearly at cosines ``mu``; behind a one-sided surface, 0."""
         mu = abs(mu) if self.has_back else mu
+        # The inverse of the nodes' even spacing in `sqrt(mu)` from 1e-3 to 1.
         node = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)
         node = dr.clip(node, 0, NODES - 1)
         below = dr.minimum(mi.UInt32(node), NODES - 2)

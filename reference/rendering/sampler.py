@@ -78,7 +78,7 @@ def _define(_variant: str) -> None:
         def seed(self, seed: Any, wavefront_size: int = 0xFFFFFFFF) -> None:
             super().seed(seed, wavefront_size)
             index = dr.arange(mi.UInt32, self.wavefront_size())
-            # The samples of a pixel follow each other in the wavefront, and share one hash.
+            # The samples of a pixel follow each other in the wavefront.
             pixel = index // self.sample_count()
             self.index = index - pixel * self.sample_count()
             self.pixel, _ = mi.sample_tea_32(mi.UInt32(seed), pixel)
