@@ -93,7 +93,7 @@ def require_common_wavelengths(values: Mapping[str, Any]) -> None:
 def as_array(value: Any, vector_type: type) -> Colour:
     """Convert a checked value into a factor for the kernel.
 
-    Numbers and Dr.Jit arrays stay unchanged; a tuple of three or fewer becomes a fixed array of
+    Numbers and Dr.Jit arrays stay unchanged; a tuple of four or fewer becomes a fixed array of
     the backend and precision of ``vector_type``, a longer one a dynamic array.
     """
     if not isinstance(value, tuple):

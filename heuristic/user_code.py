@@ -28,9 +28,8 @@ def contained(path: Path) -> Iterator[set[Path]]:
 
     Its changes to the process are undone: folder, umask, environment, arguments, path, NumPy's
     handling of errors, and imported modules, since other code may mean another file by the same
-    name. Yields a set that holds, after
-    the block, the files of those modules. A process that the code forks ends here instead of
-    continuing alongside its parent.
+    name. Yields a set that holds, after the block, the files of those modules. A process that the
+    code forks ends here instead of continuing alongside its parent.
     """
     pid = os.getpid()
     folder = os.getcwd()

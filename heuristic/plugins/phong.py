@@ -19,7 +19,7 @@ Parameter           Type (default)    Meaning
                                       read only by the integrator ``heuristic``
 ==================  ================  =============================================================
 
-All but ``twosided`` are exposed to ``mitsuba.traverse``. Python::
+Coefficients, ``n`` and ``transmittance`` are exposed to ``mitsuba.traverse``. Python::
 
     {'type': 'phong', 'k_d': {'type': 'rgb', 'value': [0.5, 0.4, 0.3]}, 'k_s': 0.7, 'n': 9}
 

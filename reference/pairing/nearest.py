@@ -355,8 +355,21 @@ def twosided(context: Context, index: int) -> NearestPhong:
         name: values.sides(graph, value, back.physical[name])
         for name, value in front.physical.items()
     }
+    # A phong has one form of the lobe and one tilt of the normal for both sides.
+    lobes = [side for side in (front, back) if not values.is_zero(side.k_s)]
     lost = front.lost + back.lost
-    return replace(front, **sided, twosided=True, lost=lost, physical=physical)
+    if len({side.form for side in lobes}) > 1:
+        lost += (("another form of the lobe behind", f"{front.form} on both sides"),)
+    if back.tilt is not None and back.tilt is not front.tilt:
+        lost += (("the normals of the back", "those of the front"),)
+    return replace(
+        front,
+        **sided,
+        form=lobes[0].form if lobes else front.form,
+        twosided=True,
+        lost=lost,
+        physical=physical,
+    )
 
 
 def mask(context: Context, index: int) -> NearestPhong:

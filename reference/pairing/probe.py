@@ -306,6 +306,6 @@ class AlbedoTable:
         node = (dr.safe_sqrt(mu) - 1e-3) / (1 - 1e-3) * (NODES - 1)
         node = dr.clip(node, 0, NODES - 1)
         below = dr.minimum(mi.UInt32(node), NODES - 2)
-        low = dr.gather(mi.Color3f, self.table, below + 0)
+        low = dr.gather(mi.Color3f, self.table, below)
         high = dr.gather(mi.Color3f, self.table, below + 1)
         return dr.select(mu > 0, dr.lerp(low, high, node - mi.Float(below)), 0)

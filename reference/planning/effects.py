@@ -257,12 +257,12 @@ def _put_lights(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
 
 
 def _attenuated(facts: Facts) -> tuple[bool, str]:
-    """Distance attenuation: any point or spot whose ``f_att`` is not 1."""
+    """Distance attenuation: any point or spot whose ``f_att`` depends on the distance."""
     graph = facts.pair.heuristic
     for index in graph.nodes(EMITTER):
         props = graph.props(index)
-        is_one = (props.get("k1", 0.0), props.get("k2", 0.0)) == (0.0, 0.0)
-        if lights.of(graph.plugin(index)).has("attenuation") and not is_one:
+        is_even = (props.get("k1", 0.0), props.get("k2", 0.0)) == (0.0, 0.0)
+        if lights.of(graph.plugin(index)).has("attenuation") and not is_even:
             return True, f"{graph.label(index)} falls off with distance"
     return False, "no light of the heuristic half falls off with distance"
 

@@ -41,7 +41,7 @@ DECIDING = 1e-4
 
 BATCHES = 32
 PIECE = 2**18
-"""Rays followed at once."""
+"""Rays followed at once by a decision; a look may follow twice as many."""
 
 
 @dataclass(frozen=True)

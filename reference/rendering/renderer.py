@@ -134,9 +134,9 @@ class Renderer:
                 dr.sync_thread()
             except RuntimeError as error:
                 chain = list(_chain(error))
-                for integrator in chain:
-                    if isinstance(integrator, FotismosError):
-                        raise integrator from None
+                for cause in chain:
+                    if isinstance(cause, FotismosError):
+                        raise cause from None
                 reason = str(chain[-1]).strip()
                 raise InputError(f"{self.label}: Mitsuba cannot render it: {reason}") from error
             self.times.append(perf_counter() - begin)

@@ -291,3 +291,19 @@ def test_ambient_light_is_the_mean_of_the_map_over_the_sphere(rgb):
     bitmap = mi.Bitmap(radiance.astype(np.float32))
     graph, emitter = lone({"type": "envmap", "bitmap": bitmap, "scale": 1.0})
     np.testing.assert_allclose(mean_radiance(graph, emitter), [1, 2, 3], rtol=2e-3)
+
+
+def test_two_sides_share_one_form_of_the_lobe_and_one_normal_map():
+    chalk = {"type": "diffuse"}
+    phong, blinn = (
+        {"type": "phong", "k_s": 0.4, "n": 9, "form": form} for form in ("phong", "blinn")
+    )
+    rough = {"type": "bumpmap", "nested": chalk, "texture": raw(waves()[0][..., None])}
+    for front, back, form, losses in (
+        (chalk, blinn, "blinn", 0),
+        (blinn, chalk, "blinn", 0),
+        (phong, blinn, "phong", 1),
+        (chalk, rough, "phong", 1),
+    ):
+        found = material({"type": "twosided", "front": front, "back": back})
+        assert (found.form, len(found.lost)) == (form, losses), (front, back)
