@@ -331,7 +331,7 @@ def _measure(estimates: Estimates, ready: Prepared) -> tuple[dict[str, Any], Ima
         if metric.drawn:
             maps[name] = distances
     ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(test, reference, counted)
-    significant = marks.find(
+    found = marks.find(
         estimates.difference, test, counted, leading_distance(options.viewing, metrics), exact=exact
     )
     error = maps[LEADING.name]
@@ -346,7 +346,7 @@ def _measure(estimates: Estimates, ready: Prepared) -> tuple[dict[str, Any], Ima
         position=surface.position,
         normal=surface.normal,
         maps=maps,
-        significant=significant,
+        significant=found.image,
         counted=counted,
         objects=seen,
         materials=made_of,
@@ -357,9 +357,10 @@ def _measure(estimates: Estimates, ready: Prepared) -> tuple[dict[str, Any], Ima
         "metrics": summaries,
         "log2_luminance": ratio,
         "significant": Significant(
-            fraction=statistics.share(significant[counted] == marks.MARKED),
-            undetermined=statistics.share(significant[counted] == marks.UNDETERMINED),
+            fraction=statistics.share(found.image[counted] == marks.MARKED),
+            undetermined=statistics.share(found.image[counted] == marks.UNDETERMINED),
             level=marks.LEVEL,
+            certain=found.is_certain,
         ),
     }
     return numbers, images

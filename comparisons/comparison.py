@@ -86,6 +86,13 @@ class Significant(Record):
             " chance of any.",
         ),
     ]
+    certain: Annotated[
+        bool,
+        Meta(
+            description="Whether the images differ for sure, in a block of pixels or as a whole;"
+            " without it, noise may explain every difference."
+        ),
+    ] = True
 
 
 NO_TERMS = Missing("Terms are traced with the causes, which were not asked for.")

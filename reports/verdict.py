@@ -78,7 +78,8 @@ def share(record: ComparisonRecord, threshold: float = TOLERANCE) -> VisibleShar
 
 def decision(record: ComparisonRecord, threshold: float = TOLERANCE) -> Verdict:
     """Return whether a scene passes at a tolerance, fails, or is undecided."""
-    return decide(record.metrics[LEADING.name].visible, threshold)
+    visible = record.metrics[LEADING.name].visible
+    return decide(visible, threshold, is_certain=record.significant.certain)
 
 
 def missing(record: ComparisonRecord) -> dict[str, float]:
@@ -121,6 +122,11 @@ def sentence(
             return "Exact, as far as can be seen." if lead.high <= EXACT else "Nothing to do."
         case "undecided":
             more = "repeats of the picture" if record.picture else "samples (--spp, --noise)"
+            if found.low > LIMIT:
+                return (
+                    f"Noise may explain it: {percent(found.value)} of the pixels differ, but no"
+                    f" difference is certain anywhere. More {more} decide."
+                )
             return (
                 f"Too close to call: {percent(found.low)} to {percent(found.high)} of the pixels"
                 f" differ, and {percent(LIMIT)} may. More {more} decide."

@@ -24,6 +24,10 @@ Assoc. 73, 1978). The term counts only on the side where light can be missing.
 **Few passes.** The variance of a pixel is pooled with nearby ones, as far as these are alike
 (Smyth, Stat. Appl. Genet. Mol. Biol. 3, 2004), and is never less than its own.
 
+**Certain somewhere.** A block that differs shows, with a chance of `BLOCK_LEVEL` of any false
+alarm, that the images do. Where no block is large enough, the mean of the whole image may be: it is
+tested likewise, with the spread of its groups of passes, and the two tests share the level.
+
 **Undetermined.** An unmarked pixel is undetermined if its 95 % interval reaches a difference of
 `VISIBLE` in the metric; with fewer than `FEWEST` passes, every pixel is. No rule can detect light
 that no path in the image has sampled.
@@ -67,6 +71,14 @@ _NORMAL = 1e6
 Distance = Callable[[Array, Array], Array]
 
 
+@dataclass(frozen=True)
+class Marks:
+    """Marks (H, W) of pixels, and whether the images certainly differ somewhere."""
+
+    image: NDArray[np.float32]
+    is_certain: bool
+
+
 def find(
     difference: DifferenceEstimate,
     test: ArrayLike,
@@ -75,8 +87,10 @@ def find(
     *,
     exact: bool = False,
     level: float = LEVEL,
-) -> NDArray[np.float32]:
+) -> Marks:
     """Return marks (H, W): 1 where a difference is shown, 0.5 if undetermined, 0 elsewhere.
+
+    With them, whether a difference is certain anywhere.
 
     ``difference`` is the test image (H, W, 3) less the reference, pass by pass. Pixels that are not
     ``counted`` (H, W) are 0. ``distance(test, reference) -> (N,)`` takes linear colours (N, 3), and
@@ -97,14 +111,16 @@ def find(
         beyond[rows] &= np.any(np.abs(mean) > rounding, axis=-1)
     if exact:
         marks[beyond] = MARKED
-        return marks
+        return Marks(image=marks, is_certain=bool(beyond.any()))
     if difference.passes < FEWEST:
         marks[counted] = UNDETERMINED
-        return marks
+        return Marks(image=marks, is_certain=False)
     around = _Around.of(difference, counted)
     share = BLOCK_LEVEL / LEVEL * level
     rate = level - share
-    differing = around.differing(share, _inflation(difference))
+    # Half of the blocks' share each, for the blocks and for the image as a whole.
+    differing = around.differing(share / 2, _inflation(difference))
+    is_certain = bool(differing.any()) or _whole_differs(difference, around, level=share / 2)
     inside = spread_out(differing, counted.shape) & counted
     chances = np.ones(counted.shape)
     for rows in bands(len(counted)):
@@ -114,7 +130,7 @@ def find(
     for rows in bands(len(counted)):
         pixels = _Pixels.of(difference, around, rows, rest)
         marks[rows][rest[rows]] = UNDETERMINED * pixels.are_open(test[rows][rest[rows]], distance)
-    return marks
+    return Marks(image=marks, is_certain=is_certain and bool(beyond.any()))
 
 
 def _discoveries(chances: Array, rate: float) -> float:
@@ -209,6 +225,24 @@ class _Around:
         chances = _chances(self.difference, self.variance * inflation, sizes=sizes, freedom=freedom)
         tested = self.pixels[..., 0] > 0
         return tested & (chances <= level / max(int(np.count_nonzero(tested)), 1))
+
+
+def _whole_differs(difference: DifferenceEstimate, around: _Around, level: float) -> bool:
+    """Return whether the mean of all counted pixels differs, by the spread of groups of passes.
+
+    The groups are of the sampled blocks; neighbours may share noise, which their spread includes.
+    """
+    grouped = difference.grouped
+    count = len(grouped.sizes)
+    if count < FEWEST:
+        return False
+    means = grouped.means.mean(axis=1)
+    mean = np.average(means, axis=0, weights=grouped.sizes)
+    squares = (grouped.sizes[:, None] * (means - mean) ** 2).sum(axis=0)
+    variance = squares / ((count - 1) * grouped.sizes.sum())
+    sizes = around.largest_sizes[:, 0, 0] / len(grouped.places)
+    freedom = np.full((1, 3), count - 1.0)
+    return bool(_chances(mean[None], variance[None], sizes[:, None], freedom)[0] <= level)
 
 
 def _sums(difference: DifferenceEstimate, counted: NDArray[np.bool_], rows: slice) -> list[Array]:

@@ -74,7 +74,12 @@ def gates(
             scene=record.scene,
             bound=bound,
             found=verdict.share(record, threshold),
-            state=decide(record.metrics[LEADING.name].visible, threshold, bound),
+            state=decide(
+                record.metrics[LEADING.name].visible,
+                threshold,
+                bound,
+                is_certain=record.significant.certain,
+            ),
         )
         for record in records
     ]

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from msgspec import structs
 
 from fotismos.comparisons.departure.colour import BT709, rgb_to_xyz
-from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, decide
+from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
 from fotismos.comparisons.departure.metrics import (
     LEADING,
     LOG2_EPSILON,
@@ -163,7 +163,7 @@ def _scene(view: SceneView, taken: set[str]) -> PageScene:
             for effect, part in verdict.missing(record).items()
         ),
         shares=tuple(round(share.value, 5) for share in visible),
-        verdicts="".join(decide(visible, threshold)[0] for threshold in THRESHOLDS),
+        verdicts="".join(verdict.decision(record, threshold)[0] for threshold in THRESHOLDS),
         cause=verdict.cause(record),
         advice=_runs(lambda t: verdict.sentence(record, cost, t)),
     )

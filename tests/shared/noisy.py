@@ -58,7 +58,7 @@ def found(differences, test, counted=None, **options):
     """Return the marks of a test image, from passes of its difference from a reference."""
     counted = np.ones(test.shape[:2], bool) if counted is None else counted
     distance = leading_distance(DEFAULT_VIEWING)
-    return marks.find(estimate(differences, counted), test, counted, distance, **options)
+    return marks.find(estimate(differences, counted), test, counted, distance, **options).image
 
 
 def truth(size=SIZE, contrast=0.7):

@@ -69,7 +69,7 @@ def verify(source, options=None):
     ]
     ratio = noise[1] / noise[0]
     gain = seconds[0] / (seconds[1] * ratio**2)
-    return Verification(int((marked == marks.MARKED).sum()), float(ratio), float(gain))
+    return Verification(int((marked.image == marks.MARKED).sum()), float(ratio), float(gain))
 
 
 def kernel_difference(source, options):
