@@ -123,6 +123,11 @@ class TimeSpent(Record):
     ratio_high: Positive | None = None
     no_ratio: str = ""
 
+    @property
+    def total_s(self) -> float:
+        """The time of the comparison: passes and all stages."""
+        return self.heuristic.total_s + self.reference.total_s + sum(self.stages.values())
+
 
 class NoiseTarget(Record):
     """Where a run with a noise target ended.

@@ -79,6 +79,15 @@ BIAS = 0.005
 """Half an interval of what an effect removes, at least, as a share of the departure: some noise is
 not taken away (:meth:`ErrorMeter.without_noise`)."""
 
+MORE = 4
+PATIENCE = 2.0
+"""Factor of more samples for causes that do not add up, and the longest time that all of it takes,
+over the comparison's own."""
+
+CLOSED = 0.025
+"""Largest closure, as a share of the departure, that needs no more samples; its interval may have
+four times the width."""
+
 LEAST = 1.0
 """ΔE2000: an effect that removes less cannot be seen, and does not dominate."""
 
@@ -102,7 +111,8 @@ def with_causes(
     begin = perf_counter()
     try:
         clean = comparison.images.reference, comparison.images.reference_stderr
-        causes = find(ready, ready.source, ready.options, progress, clean)
+        limit_s = PATIENCE * comparison.record.time.total_s
+        causes = find(ready, ready.source, ready.options, progress, clean, limit_s=limit_s)
     except FotismosError as error:
         return comparison.warned([f"The causes are unknown: {error}"])
     record = structs.replace(named(comparison, causes.maps), why=causes.record)
@@ -117,12 +127,16 @@ def find(
     progress: Progress | None = None,
     clean: tuple[Floats, Floats] | None = None,
     most: int | None = None,
+    limit_s: float = 0.0,
 ) -> "Causes":
     """Attribute the departure of a prepared scene, on a film of at most ``most`` pixels' width.
 
     If ``most`` is omitted, it is :data:`WIDTH` or :data:`NARROW`. ``clean`` are the reference (H,
     W, 3) on the scene's own film and its standard error, if known: they make previews less noisy.
+    While the effects do not add up to the departure, the samples are multiplied by :data:`MORE`, as
+    long as this takes less than ``limit_s`` seconds in all.
     """
+    begin = perf_counter()
     width, height = image_size(ready.scene)
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
     most = most or (NARROW if is_large else WIDTH)
@@ -132,29 +146,48 @@ def find(
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
     surface = gbuffer(ready.scene, size)
     require_surface(surface.hit, source.name)
+    leading: Any = ready.metrics()[LEADING.name]
+    pairs = Pairs(source, options, ready)
+    scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
     reference = Renderer(
         ready.scene, ready.reference.integrator, pass_spp=spp, label="reference image", size=size
     )
-    # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
-    loop = passes(
-        [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
-        progress=progress, stage="reference",
-    )  # fmt: skip
-    groups = np.stack([np.array(rendered.images[0]) for rendered in loop])
-    leading: Any = ready.metrics()[LEADING.name]
-    meter = ErrorMeter(groups, surface.hit, options.viewing, leading)
-    pairs = Pairs(source, options, ready)
-    scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
-    images = HybridImages(
-        pairs, scenes, replicates=REPLICATES, replicate_spp=spp, seed=options.seed, size=size
-    )
-    if progress:
-        progress(CAUSES, 0, 1)
-    found = attribute(images, meter, shapes=surface.shape, seed=options.seed, clean=clean)
+    while True:
+        started = perf_counter()
+        # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
+        loop = passes(
+            [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
+            progress=progress, stage="reference",
+        )  # fmt: skip
+        groups = np.stack([np.array(rendered.images[0]) for rendered in loop])
+        meter = ErrorMeter(groups, surface.hit, options.viewing, leading)
+        images = HybridImages(
+            pairs,
+            scenes,
+            replicates=REPLICATES,
+            replicate_spp=reference.pass_spp,
+            seed=options.seed,
+            size=size,
+        )
+        if progress:
+            progress(CAUSES, 0, 1)
+        found = attribute(images, meter, shapes=surface.shape, seed=options.seed, clean=clean)
+        end = perf_counter()
+        is_late = end - begin + MORE * (end - started) > limit_s
+        if is_closed(found.record) or is_late:
+            break
+        reference = reference.sampled(MORE * reference.pass_spp)
     resize(ready.scene, (width, height))
     if progress:
         progress(CAUSES, 1, 1)
     return found
+
+
+def is_closed(record: Attribution) -> bool:
+    """Return whether the effects add up to the departure, as nearly as :data:`CLOSED` asks."""
+    width = record.closure.high - record.closure.low
+    is_near = abs(record.closure.value) <= CLOSED * record.departure
+    return is_near and width <= 4 * CLOSED * record.departure
 
 
 class ErrorMeter:

@@ -260,6 +260,11 @@ def jackknifed(values: ArrayLike, bias: float = 0.0) -> Interval:
     """Return the first of values (1 + n), with an interval from the others.
 
     The first is of all repeats, each other one leaves out one of them. ``bias`` is what all share.
+    A statistic that is not linear has a bias of its own, which shrinks with the repeats: by
+    Quenouille's estimate ``(n - 1) (mean of the others - first)``, which widens the interval.
     """
     value, *others = np.asarray(values, float)
-    return student(float(value), float(jackknife_error(others)), count=len(others), bias=bias)
+    count = len(others)
+    own = (count - 1) * (float(np.mean(others)) - float(value))
+    error = float(jackknife_error(others))
+    return student(float(value), error, count=count, bias=hypot(bias, own))
