@@ -21,9 +21,12 @@ spaces are curved.
 **Heavy noise.** All of this supposes that noise in means of n passes falls as ``1 / √n``. Rare
 bright samples fall more slowly, and the passes show it: means of half of the passes are compared
 with those of the other half, single groups with single groups (:class:`Halves`). Where the latter
-are less than `ORDINARY` times as far apart as the former, for 2 or more, noise is heavy, and each
-interval is widened by what halves differ in, twice: once for the samples that are in the mean, and
-once for light that no sample has found.
+are less than `ORDINARY` times as far apart as the former, noise is heavy. Then the interval of a
+mean holds all that noise as large as the distance ``h`` of the halves can do to each pixel's
+distance ``v``, from ``√(v² − h²)`` to ``√(v² + h²)``. Beyond that, it holds the light that a pixel
+without a rare sample lacks: the mean of the groups less their median, over all pixels. It begins at
+0 where halves are as far apart as the images. Shares are widened by the pixels whose halves differ
+visibly.
 
 The added noise is a contrast of the groups of passes (:func:`contrasts`). The intervals are
 Student's, by the jackknife over the groups. With too few groups, or for a metric of neighbourhoods,
@@ -181,11 +184,11 @@ def debiased(
     if metric.linear:
         value, low, high = np.sqrt([value, low, high])
     shares = _shares(metric.visible, distances, grouped, raw)
-    apart = Halves.of(distances_between(metric, shown, viewing), grouped)
+    between = distances_between(metric, shown, viewing)
+    apart = Halves.of(between, grouped.means, grouped.sizes)
     if apart.are_heavy and not metric.linear:
-        half = 2.0 * float(apart.halves.mean())
-        low = max(min(low, value - half), 0.0)
-        high = max(high, value + half)
+        low = max(min(low, measured - apart.below), 0.0)
+        high = max(high, measured + apart.above)
         shares[1] -= shares_above(apart.halves, metric.visible)
         shares[2] += shares_above(apart.halves, metric.visible)
     return _fields(metric, float(value), low=float(low), high=float(high), shares=shares)
@@ -210,35 +213,56 @@ class Halves:
     """How far means of passes are from means of as many others, at P pixels.
 
     ``groups`` (P,) are of single groups, ``halves`` (P,) of halves of the groups; both are means
-    over `SPLITS` random splits.
+    over `SPLITS` random splits. ``measured`` (P,) are the distances of the mean of all, and
+    ``unseen`` is how far the mean moves by the light that most pixels lack.
     """
 
     groups: Array
     halves: Array
+    measured: Array
+    unseen: float
     count: int
 
     @classmethod
-    def of(cls, between: Between, grouped: Grouped) -> Halves:
-        """Split the groups of passes at random, always alike."""
-        count = len(grouped.sizes)
+    def of(cls, between: Between, means: Array, sizes: Array) -> Halves:
+        """Split means (K, P, 3) of groups of passes at random, always alike."""
+        count = len(sizes)
         rng = np.random.default_rng(0)
         apart: dict[int, list[Array]] = {1: [], count // 2: []}
         for _ in range(SPLITS):
             order = rng.permutation(count)
             for size, found in apart.items():
-                first = grouped.means[order[:size]].mean(axis=0)
-                second = grouped.means[order[size : 2 * size]].mean(axis=0)
+                first = means[order[:size]].mean(axis=0)
+                second = means[order[size : 2 * size]].mean(axis=0)
                 found.append(between(first, second))
+        mean = np.average(means, axis=0, weights=sizes)
+        lacking = (np.median(means, axis=0) - mean).mean(axis=0)
         return cls(
             groups=np.mean(apart[1], axis=0),
             halves=np.mean(apart[count // 2], axis=0),
+            measured=between(mean, np.zeros_like(mean)),
+            unseen=float(between(mean, mean + lacking).mean()),
             count=count,
         )
 
     @property
+    def below(self) -> float:
+        """By how much the mean distance may be too large."""
+        if self.measured.mean() <= self.halves.mean():
+            return float(self.measured.mean())
+        squares = np.maximum(self.measured**2 - self.halves**2, 0.0)
+        return float((self.measured - np.sqrt(squares)).mean()) + self.unseen
+
+    @property
+    def above(self) -> float:
+        """By how much the mean distance may be too small."""
+        larger = np.hypot(self.measured, self.halves)
+        return float((larger - self.measured).mean()) + self.unseen
+
+    @property
     def are_heavy(self) -> bool:
         """Whether noise falls more slowly than ``1 / √n``; with few groups it cannot be seen."""
-        if self.count < 2 * FEWEST:
+        if self.count <= FEWEST:
             return False
         usual = np.sqrt(self.count // 2)
         return bool(self.groups.mean() < ORDINARY / 2 * usual * self.halves.mean())
