@@ -7,10 +7,12 @@ The position is found by edges: a shift looks like wrong shading. Geometric edge
 or the hit changes, are in any picture of the same scene, however it is shaded. The heuristic half
 mostly shares its edges too: it shows where light ends. The picture's edges are correlated with both
 at all shifts up to :data:`REACH`, and the better agreement counts; a parabola through the highest
-values gives the fraction of a pixel.
+values gives the fraction of a pixel. A shift counts only if it improves the agreement by more than
+a shift of the reference itself, which is in its place: noise and shading explain that much.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from itertools import permutations
 from math import pi
@@ -244,9 +246,22 @@ along each side of a pixel."""
 LEAST = 0.08
 """Correlation below which edges are uninformative."""
 
-Place = tuple[tuple[float, float] | None, float]
-"""By how many pixels (x, y) a picture's content is too far right and too low, if its edges show it,
-and the correlation of the edges there."""
+DOUBTFUL = 2.0
+"""A shift improves the agreement by more than this times what noise does."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a picture's content is.
+
+    ``shift`` is by how many pixels (x, y) it is too far right and too low, None if its edges do not
+    show it; ``correlation`` is that of the edges there, and ``gain`` by how much it is larger than
+    without the shift.
+    """
+
+    shift: tuple[float, float] | None
+    correlation: float
+    gain: float
 
 
 def geometry_edges(scene: mi.Scene, width: int, height: int) -> np.ndarray:
@@ -269,7 +284,7 @@ def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Place:
     ``expected`` are maps (H, W) of edges that it may contain; the best agreement counts.
     """
     seen = picture_edges(image)
-    return max((_shift(edges, seen) for edges in expected), key=lambda shift: shift[1])
+    return max((_shift(edges, seen) for edges in expected), key=lambda place: place.correlation)
 
 
 def _edges(layers: np.ndarray) -> np.ndarray:
@@ -285,11 +300,12 @@ def _shift(edges: np.ndarray, seen: np.ndarray) -> Place:
     table = np.array([[_correlation(seen, edges, down=y, right=x) for x in shifts] for y in shifts])
     y, x = map(int, np.unravel_index(np.argmax(table), table.shape))
     highest = float(table[y, x])
+    gain = highest - float(table[reach, reach])
     if highest < LEAST:
-        return None, highest
+        return Place(shift=None, correlation=highest, gain=gain)
     down = y - reach + _vertex(table[:, x], y)
     right = x - reach + _vertex(table[y], x)
-    return (float(right), float(down)), highest
+    return Place(shift=(float(right), float(down)), correlation=highest, gain=gain)
 
 
 def _correlation(seen: np.ndarray, edges: np.ndarray, down: int, right: int) -> float:
@@ -379,15 +395,18 @@ def picture_record(
     height, width = images.counted.shape
     expected = [geometry_edges(scene, width, height)]
     expected += [picture_edges(image) for image in (template, images.reference)]
-    shift, edges = measure(np.mean(half.images, axis=0), expected)
+    place = measure(np.mean(half.images, axis=0), expected)
+    # The reference is in its place: what a shift gains there, noise and shading make.
+    by_noise = measure(images.reference, expected[:2])
+    is_doubtful = place.gain > 0 and place.gain <= DOUBTFUL * by_noise.gain
     files = options.image
     ratio = ratios(shown, reference)
     record = PictureRecord(
         files=files,
         transfer=options.transfer,
         repeats=len(files),
-        shift=shift,
-        edges=edges,
+        shift=None if is_doubtful else place.shift,
+        edges=place.correlation,
         ratio=ratio,
     )
     odd = describe(record, images.heuristic, images.reference, images.counted)

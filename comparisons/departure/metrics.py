@@ -290,7 +290,8 @@ METRICS.own(
         label="HDR-FLIP",
         unit="from 0 to 1, the distance of green and blue",
         definition="The largest LDR-FLIP over exposures from one for the reference's brightest "
-        "light to one for its median (Andersson et al. 2021, ACES).",
+        "light to one for its median (Andersson et al. 2021, ACES). Unlike its authors', they are "
+        "at most 8 stops apart, and black pixels do not count for the median.",
         caution="Nobody sees all these exposures at once: the worst one counts at each pixel.",
         map_range=(0.0, 1.0),
         rounding=1e-4,

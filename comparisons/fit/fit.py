@@ -9,7 +9,7 @@ declares.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import log
 from time import perf_counter
 from typing import Any
@@ -19,16 +19,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fotismos.comparisons.comparison import versions
+from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import share_above
-from fotismos.comparisons.departure.metrics import LEADING, drawn
-from fotismos.comparisons.departure.statistics import noise_floor, summarise
+from fotismos.comparisons.departure.metrics import LEADING, drawn, leading_distance
+from fotismos.comparisons.departure.statistics import Summary, noise_floor, summarise
 from fotismos.comparisons.fit import model
 from fotismos.comparisons.fit.fit_record import (
+    EXACT,
+    INVISIBLE,
     FitDeparture,
     FitRecord,
     FittedMaterial,
     FormFit,
+    Judgement,
     parameter_record,
     physical_materials,
 )
@@ -47,9 +51,15 @@ from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named
 from fotismos.heuristic.materials import FORMS
-from fotismos.reference.records import Pixels
+from fotismos.reference.records import Interval, Pixels
 from fotismos.reference.rendering.renderer import Progress, pass_seed, passes, variant
-from fotismos.reference.rendering.sums import Accumulator, Estimate, add_difference
+from fotismos.reference.rendering.sums import (
+    Accumulator,
+    DifferenceEstimate,
+    DifferenceSums,
+    Estimate,
+    add_difference,
+)
 from fotismos.reference.scene.graph import Graph, properties
 from fotismos.reference.scene.source import Source
 
@@ -88,9 +98,20 @@ class RenderedHalves:
     seeds: tuple[int, ...]
     before: Floats
     reference: Estimate
-    difference: Estimate
+    difference: DifferenceEstimate
     counted: NDArray[np.bool_]
     viewing: Viewing
+
+    def difference_of(self, image: Floats) -> DifferenceEstimate:
+        """Return the difference of another image (H, W, 3), with no noise of its own, as passes."""
+        moved = image - self.before
+        grouped = self.difference.grouped
+        means = grouped.means + moved.reshape(-1, 3)[grouped.places]
+        return replace(
+            self.difference,
+            mean=self.difference.mean + moved,
+            grouped=replace(grouped, means=means),
+        )
 
 
 def fit(
@@ -208,13 +229,14 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
             f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"
             f" `heuristic_variant={VARIANT}`."
         )
-    sums = [Accumulator() for _ in range(3)]
+    difference_sums = DifferenceSums(ready.counted)
+    sums = [Accumulator(), Accumulator(), difference_sums]
     halves = (ready.heuristic, ready.reference)
     for rendered in passes(halves, options.seed, ready.passes, progress=progress):
         add_difference(sums, rendered.images)
     before = sums[0].estimate()
     reference = sums[1].estimate()
-    difference = sums[2].estimate()
+    difference = difference_sums.estimate()
     seeds = tuple(pass_seed(options.seed, number) for number in range(ready.passes))
     counted = ready.counted
     viewing = options.viewing
@@ -262,27 +284,42 @@ def _best(
     )
     after = fitted.whole(x).reshape(rendered.before.shape)
     by_metric, maps = departures(rendered, after)
-    judged = (
-        summarise(
-            LEADING,
-            image,
-            reference=rendered.reference.mean,
-            mask=counted,
-            viewing=rendered.viewing,
-            noise=rendered.difference.noise,
-        )
-        for image in (rendered.before, after)
-    )
+    judged = [_judged(rendered, image) for image in (rendered.before, after)]
+    left = judged[1]
+    is_certain = marks.find(
+        rendered.difference_of(after), after, counted, leading_distance(rendered.viewing)
+    ).is_certain
+    judgement: Judgement = "undecided"
+    if is_certain:
+        judgement = "wrong"
+    elif left.low <= EXACT and left.high <= INVISIBLE:
+        judgement = "right within noise"
     record = FormFit(
         form=fitted.form,
         loss=least,
         parameter_error=objective.value_of(rendered.before[counted]) - least,
         departure=by_metric,
-        differ=tuple(share_above(summary.visible) for summary, _ in judged),
+        differ=tuple(share_above(summary.visible) for summary in judged),
+        left=Interval(value=left.debiased, low=left.low, high=left.high),
+        judgement=judgement,
         materials=materials,
         converged=converged,
     )
     return record, after, maps
+
+
+def _judged(rendered: RenderedHalves, image: Floats) -> Summary:
+    """Return the summary of an image (H, W, 3) with the paired or the fitted parameters."""
+    summary, _ = summarise(
+        LEADING,
+        image,
+        reference=rendered.reference.mean,
+        mask=rendered.counted,
+        viewing=rendered.viewing,
+        noise=rendered.difference.noise,
+        grouped=rendered.difference_of(image).grouped,
+    )
+    return summary
 
 
 def form_starts(objective: Objective) -> list[Floats]:

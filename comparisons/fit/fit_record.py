@@ -17,6 +17,7 @@ from fotismos.reference.records import (
     VERSION,
     Amount,
     Count,
+    Interval,
     Pixels,
     Record,
     Resolution,
@@ -67,6 +68,14 @@ class FittedMaterial(Record):
     parameters: tuple[FittedParameter, ...]
 
 
+Judgement = Literal["right within noise", "wrong", "undecided"]
+
+EXACT = 0.01
+INVISIBLE = 1.0
+"""ΔE2000: a model is right within noise if what is left begins below the first, and ends below the
+second."""
+
+
 class FormFit(Record):
     """The best fit of one form of the lobe, or of the parameters of a heuristic."""
 
@@ -79,6 +88,16 @@ class FormFit(Record):
     differ: Annotated[
         tuple[VisibleShare, ...],
         Meta(description="Pixels above ΔE2000 2, with the paired and the fitted parameters."),
+    ]
+    left: Annotated[
+        Interval, Meta(description="Mean ΔE2000 that is left beyond noise, with its interval.")
+    ]
+    judgement: Annotated[
+        Judgement,
+        Meta(
+            description="`wrong` if a difference is certain somewhere, `right within noise` if none"
+            " is and less than one ΔE2000 may be left, `undecided` if neither can be said."
+        ),
     ]
     materials: Annotated[
         tuple[FittedMaterial, ...], Meta(description="Or the heuristic, with its own parameters.")

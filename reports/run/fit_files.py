@@ -12,7 +12,7 @@ from fotismos.reference.records import to_json
 from fotismos.reports.files import images, results
 from fotismos.reports.page.templating import rendered
 from fotismos.reports.terminal import tables
-from fotismos.reports.terminal.words import percent
+from fotismos.reports.terminal.words import difference, percent
 from fotismos.reports.verdict import EXACT
 
 Cells = Sequence[str]
@@ -67,8 +67,17 @@ def judgement(record: FitRecord) -> str:
     before, after = record.nearest.differ
     paired = f"{percent(before.value)} ({decide([before])})"
     fitted = f"{percent(after.value)} ({decide([after])})"
+    best = record.nearest
+    left = f"{difference(best.left.low)} to {difference(best.left.high)}"
+    model = {
+        "wrong": f"The model is wrong: mean {LEADING.label} {left} is left beyond noise.",
+        "right within noise": f"The model is right within noise: mean {LEADING.label} {left} is"
+        " left.",
+        "undecided": f"Noise hides whether the model is right: mean {LEADING.label} {left} is left."
+        " More samples decide.",
+    }
     return (
-        f"At most 5 % of the pixels may differ by more than {LEADING.label}"
+        f"{model[best.judgement]} At most 5 % of the pixels may differ by more than {LEADING.label}"
         f" {TOLERANCE:g}: paired {paired}, fitted {fitted}."
     )
 

@@ -118,11 +118,11 @@ def test_repeats_tell_the_pictures_noise(rgb, tmp_path):
 def test_shifts_are_measured_to_a_fraction_of_a_pixel(cornell):
     reference, kernel, expected, _ = cornell
     for x, y in ((-3, 0), (-1, 1), (0, -2), (1, 1), (2, -2)):
-        shift, _ = pictures.measure(np.roll(reference, (y, x), (0, 1)), expected)
+        shift = pictures.measure(np.roll(reference, (y, x), (0, 1)), expected).shift
         assert shift == pytest.approx((x, y), abs=0.35)
     for part in (0.25, 0.5, 0.75):
         moved = (1 - part) * kernel + part * np.roll(kernel, 1, 1)
-        shift, _ = pictures.measure(moved, expected)
+        shift = pictures.measure(moved, expected).shift
         assert shift == pytest.approx((part, 0), abs=0.2)
 
 
@@ -144,7 +144,8 @@ def test_a_right_picture_that_is_shifted_is_said_to_be_shifted_by_that_alone(rgb
 def odd(picture, cornell):
     """Return what is said of a picture of two repeats."""
     reference, _, expected, counted = cornell
-    shift, edges = pictures.measure(picture, expected)
+    place = pictures.measure(picture, expected)
+    shift, edges = place.shift, place.correlation
     record = PictureRecord(
         files=("x", "y"), transfer=None, repeats=2, shift=shift, edges=edges,
         ratio=pictures.ratios(picture[counted], reference[counted]),

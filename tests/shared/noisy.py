@@ -81,6 +81,27 @@ def skewed(kind, passes, samples, rng, size=SIZE):
     return 0.9 * rng.normal(1.0, 0.5 / np.sqrt(samples), shape) + 0.1 * rare
 
 
+def kinds(passes, rng, size=SIZE):
+    """Yield names and deviations (passes, H, W, C) of mean 0 and size 1 or so, eight kinds.
+
+    Only the first and the last two fall as ``1 / √n``.
+    """
+    shape = (passes, size, size, 1)
+    rare = np.exp(2 * rng.normal(size=shape) - 2) - 1
+    y, x = np.mgrid[:size, :size] - size / 2
+    inside = (x**2 + y**2 < (size / 8) ** 2)[..., None]
+    heavy = np.abs(rng.standard_t(2.2, size=shape))
+    blotches = rng.normal(size=(passes, size // 4, size // 4, 1))
+    yield "normal", rng.normal(size=shape)
+    yield "lognormal", rare / 7.3
+    yield "fireflies", (300.0 * (rng.random(shape) < 1e-3) - 0.3) / 9.5
+    yield "poisson", (rng.poisson(0.05, shape) / 0.05 - 1) / 4.4
+    yield "a disc", np.where(inside, rare / 1.8, 0.02 * rng.normal(size=shape))
+    yield "heavy tails", (heavy - heavy.mean()) / 3
+    yield "coloured", rng.normal(size=(*shape[:3], 3))
+    yield "blotches", blotches.repeat(4, axis=1).repeat(4, axis=2)
+
+
 @dataclass(frozen=True)
 class Pool:
     """Passes (N, H, W, 3) of a reference, a few of the heuristic's of the same camera rays.
