@@ -17,16 +17,21 @@ about 0, and the tails of ``Σ d / √Σ d²`` are no heavier than a normal vari
 is distributed (Efron, J. Am. Stat. Assoc. 64, 1969): a firefly raises both sums. It also means
 that a change of fewer than about 30 pixels in a block counts as fireflies.
 
-r is 1 for independent pixels; a reconstruction filter, which correlates neighbours, raises it. With
-f degrees of freedom of r, t has ``1 / (1/f + r/N)``. Noise that is correlated over more than a tile
-is underestimated.
+r is 1 for independent pixels; a reconstruction filter, which correlates neighbours, raises it.
+Noise that is correlated over a part of a tile is correlated with a part of the next one: r falls
+short by a share that is half as large in tiles of twice the side. If r is likely larger there
+(:data:`LIKELY`), ``2 r(2 tiles) - r(tile)`` counts; if it is surely larger (:data:`SURE`), noise
+is taken to reach along the whole picture, as in stripes. A pattern that tiles repeat shows in the
+sums over the same pixel of all tiles, and multiplies r. Longer patterns are not noticed. With f
+degrees of freedom of r, t has ``1 / (1/f + r/N)``.
 
 Half of the significance is for the means of the picture, half for the blocks, each half corrected
 for its number of tests (Šidák). If no pixel varies at all, any change beyond rounding is a drift.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil, floor, log10
 from typing import Annotated, Literal
 
@@ -54,6 +59,11 @@ TILES = 8
 """Side in pixels of the blocks that are tested; tiles of whole blocks along the longer side of the
 picture, at most."""
 
+LIKELY = 0.97
+SURE = 0.995
+"""Chances with which independent tiles have a smaller variance of their sums: beyond the first,
+noise is taken to reach a little further than a tile, beyond the second much further."""
+
 POWER = 0.95
 QUANTILE = 1.645
 """The chance with which the smallest visible change is caught, and its quantile."""
@@ -77,23 +87,22 @@ class Repeats:
         mean = np.zeros(())
         squares = np.zeros(())
         known = set()
-        sums: list[Array] = []
+        sums: dict[str, list[Array]] = {name: [] for name in SUMS}
+        count = 0
         for count, image in enumerate(images, start=1):
             values = np.asarray(image, np.float64)
-            if sums:
+            if count > 1:
                 require_one_size((mean, values))
             step = values - mean
             mean = mean + step / count
             squares = squares + step * (values - mean)
-            sums.append(_tiles(values))
+            for name, of_repeats in sums.items():
+                of_repeats.append(SUMS[name](values))
             known.add(hash(values.tobytes()))
-        if 1 < len(known) < len(sums):
+        if 1 < len(known) < count:
             raise InputError("some repeats are equal: give each its own seed.")
-        freedom = max(len(sums) - 1, 1)
-        variance = squares / freedom
-        alone = _tiles(variance)
-        r = ratio(np.var(sums, axis=0) * len(sums) / freedom, alone)
-        return cls(len(sums), mean, variance, ratio(_total(r), _total(alone > 0)))
+        variance = squares / max(count - 1, 1)
+        return cls(count, mean, variance, _correlation(sums, variance, count))
 
 
 @dataclass(frozen=True)
@@ -179,9 +188,57 @@ def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
     return over(max(d.shape[:2])), over(SIDE)
 
 
-def _tiles(image: Array) -> Array:
+def _correlation(sums: Mapping[str, Sequence[Array]], variance: Array, count: int) -> Array:
+    """Return r (...) from each repeat's sums over tiles, and the pixels' variance (H, W, 3, ...).
+
+    ``sums`` are over tiles, over tiles of twice the side, and over the same pixel of all tiles.
+    """
+    from scipy.special import chdtri  # loaded late: half a second
+
+    found = {}
+    chance = {}
+    for name, of_repeats in sums.items():
+        alone = SUMS[name](variance)
+        r = ratio(np.var(of_repeats, axis=0) * count / max(count - 1, 1), alone)
+        # The channels' noise may be one.
+        tested = _total(alone > 0)
+        freedom = np.maximum(tested / 3.0 * (count - 1), 1.0)
+        found[name] = ratio(_total(r), tested)
+        chance[name] = freedom
+    correlation = found["tiles"]
+    twice = found["twice"]
+    freedom = chance["twice"]
+    grown = twice / np.maximum(correlation, 1e-30)
+    # Noise that reaches beyond a tile: as in an endless picture, or else as along a stripe of it.
+    beyond = np.where(grown > chdtri(freedom, 1.0 - LIKELY) / freedom, 2.0 * twice - correlation, 0)
+    stripes = max(variance.shape[:2]) / _side(variance, 2)
+    is_sure = grown > chdtri(freedom, 1.0 - SURE) / freedom
+    correlation = np.maximum(correlation, np.where(is_sure, stripes * twice, beyond))
+    # A pattern that every tile repeats: its sum grows with the number of tiles.
+    freedom = chance["folded"]
+    repeats = found["folded"] > chdtri(freedom, 1.0 - SURE) / freedom
+    return np.where(repeats, correlation * found["folded"], correlation)
+
+
+def _folded(image: Array) -> Array:
+    """Return sums (side, side, ...) over the same pixel of all whole tiles."""
+    side = min(_side(image), *image.shape[:2])
+    height = image.shape[0] // side
+    width = image.shape[1] // side
+    whole = image[: height * side, : width * side]
+    tiles = whole.reshape(height, side, width, side, *image.shape[2:])
+    folded: Array = tiles.sum(axis=(0, 2))
+    return folded
+
+
+def _side(image: Array, scale: int = 1) -> int:
+    """Return the side of tiles in pixels; ``scale`` is a factor on it."""
+    return scale * SIDE * ceil(int(max(image.shape[:2])) / TILES / SIDE)
+
+
+def _tiles(image: Array, scale: int = 1) -> Array:
     """Return sums over whole tiles (rows, columns, ...); of a smaller picture, over itself."""
-    side = SIDE * ceil(max(image.shape[:2]) / TILES / SIDE)
+    side = _side(image, scale)
     height = max(image.shape[0] // side * side, side)
     width = max(image.shape[1] // side * side, side)
     return block_sums(image[:height, :width], side)
@@ -190,6 +247,14 @@ def _tiles(image: Array) -> Array:
 def _total(values: np.ndarray) -> Array:
     total: NDArray[np.float64] = values.sum(axis=(0, 1, 2))
     return total
+
+
+SUMS: dict[str, Callable[[Array], Array]] = {
+    "tiles": _tiles,
+    "twice": partial(_tiles, scale=2),
+    "folded": _folded,
+}
+"""The sums of a picture in which its noise is examined."""
 
 
 # --- Baselines -----------------------------------------------------------------------------------

@@ -7,8 +7,9 @@ import jsonschema
 import numpy as np
 import pytest
 from PIL import Image
-from scipy import stats
+from scipy import ndimage, stats
 
+from fotismos.comparisons.check.pictures import Repeats, check_pictures
 from tests.benchmarks import gates
 from tests.shared.outputs import write
 from tests.shared.schemas import schema
@@ -111,3 +112,38 @@ def test_alarms_and_power_are_as_stated(noise, level, rounds, counts, monkeypatc
         assert alarms[0, 0] * 100 * rounds <= stats.binom.ppf(0.999, 100 * rounds, level)
         assert power[:, 0].min() > 0.9
         assert "Gaussian" not in noise or np.abs(power[:, 1] - 0.95).max() < 0.03
+
+
+def correlated(kind, rng, size=96):
+    """Noise (size, size, 3) that pixels share in one of several ways."""
+    free = rng.normal(size=(size, size, 3))
+    match kind:
+        case "a tile":
+            return np.tile(rng.normal(size=(16, 16, 3)), (size // 16, size // 16, 1))
+        case "columns":
+            return 0.7 * (free + rng.normal(size=(1, size, 3)))
+        case "a blur":
+            return 30 * ndimage.gaussian_filter(free, (10, 10, 0), mode="wrap")
+    return free
+
+
+@pytest.mark.guarantee("checks", "Noise that pixels share raises no more alarms than other noise.")
+@pytest.mark.parametrize("kind", ["independent", "a tile", "columns", "a blur"])
+def test_noise_that_pixels_share_is_no_drift(kind):
+    """At a significance of 1 %, four alarms of 60 come once in 500 suites."""
+    alarms = 0
+    for run in range(60):
+        rng = np.random.default_rng(run)
+        counts = [(4, 4), (8, 8), (2, 4), (4, 2)][run % 4]
+        sides = [
+            Repeats.of(0.4 + 0.05 * correlated(kind, rng) for _ in range(count)) for count in counts
+        ]
+        alarms += bool(check_pictures(*sides, 0.01).moved)
+    assert alarms < 4
+
+
+def test_a_change_is_still_caught_beside_noise_that_pixels_share():
+    rng = np.random.default_rng(1)
+    before = Repeats.of(0.4 + 0.02 * correlated("independent", rng) for _ in range(4))
+    after = Repeats.of(0.404 + 0.02 * correlated("independent", rng) for _ in range(4))
+    assert check_pictures(before, after, 0.01).moved
