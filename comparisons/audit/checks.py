@@ -196,6 +196,7 @@ def lobe(subject: Subject, material: str, degrees: float) -> tuple[float, ...]:
     """Return ``pi f`` at :data:`VIEWS`."""
     light = furnace.direction(np.deg2rad(-degrees), 0.0)
     view = furnace.direction(np.deg2rad(furnace.both_sides(VIEWS, subject.eta)), 0.0)
+    # The response includes the light's cosine; of its channels, the largest counts.
     return tuple((subject.response(material, light, view) / light[2]).max(axis=0).tolist())
 
 
@@ -232,6 +233,7 @@ def reciprocity(subject: Subject) -> Checked:
 
 def horizon(subject: Subject) -> Checked:
     """Check that no value jumps as a light along x sets."""
+    # Viewers on one side of the light's plane stand for those on the other.
     polar, azimuth = np.meshgrid(np.linspace(0, 80, 33), np.linspace(0, 180, 61))
     view = furnace.direction(np.deg2rad(polar.ravel()), np.deg2rad(azimuth.ravel()))
     above = np.tile([[1.0], [0.0], [GRAZING]], view.shape[1])
@@ -251,6 +253,7 @@ def light_from_below(subject: Subject) -> Checked:
     if subject.eta:
         return _checked("light from below", None, None, "0", "it transmits light")
     degrees = np.linspace(91, 180, 90), np.arange(0, 181, 20.0), np.array([0.0, 30, 60, 80])
+    # Every combination of light, azimuth and viewer, (3, N).
     angles = np.deg2rad(np.stack(np.meshgrid(*degrees)).reshape(3, -1))
     polar, azimuth, viewer = angles
     light = furnace.direction(polar, azimuth)
@@ -331,6 +334,7 @@ def disagreement(centre: float, shade: Any) -> float:
     number = mi.Float(centre)
     dr.enable_grad(number)
     value = shade(number)
+    # A value that does not depend on the number has no derivative to forward: it stays 0.
     automatic = np.zeros(dr.width(value))
     if dr.grad_enabled(value):
         dr.set_grad(number, 1.0)
@@ -339,6 +343,7 @@ def disagreement(centre: float, shade: Any) -> float:
     wide = _central(shade, centre, STEP * centre)
     narrow = _central(shade, centre, (STEP / 2) * centre)
     finite = np.broadcast_to((4 * narrow - wide) / 3, len(automatic))
+    # Relative to the larger of the two, a difference is at most 2.
     size = np.maximum(np.abs(automatic), np.abs(finite))
     if not np.isfinite(size).all():
         return OPPOSITE

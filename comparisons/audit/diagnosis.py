@@ -96,6 +96,7 @@ def describe(name: str) -> tuple[str, ...]:
 def _describe(heuristic: Heuristic) -> Iterator[str]:
     model = sample(halfway if heuristic.form == "blinn" else mirrored)
     seen = evaluate(heuristic, model)
+    # Some values are exactly 1, and none is above: they are cut, and tell only a lower bound.
     is_cut = seen.max() == 1 and 3 < np.count_nonzero(seen == 1) < seen.size / 2
     counts = seen < 1 if is_cut else np.ones_like(seen, bool)
     explanation = _explain(model, seen, counts)
@@ -111,6 +112,7 @@ def _describe(heuristic: Heuristic) -> Iterator[str]:
 
 def _explain(model: Model, seen: Array, counts: Array) -> tuple[str, TermFit] | None:
     """Return the mistake that explains the values seen, and its fit; no words if there is none."""
+    # No mistake, wrong encodings, then changed models: the first that fits is the answer.
     right = model.terms()
     candidates = [("", right, seen)]
     candidates += [(f"its {symptom}", right, undo(seen)) for symptom, undo in ENCODINGS.items()]
@@ -121,8 +123,10 @@ def _explain(model: Model, seen: Array, counts: Array) -> tuple[str, TermFit] | 
         fit = _fit(terms, values, counts)
         if fit[1] < ALIKE:
             return description, fit
+    # With a number to choose, more fits by chance: these come last.
     scaled = [_best(mistake, model, seen, counts) for mistake in SCALED]
     alike = [pair for pair in scaled if pair[1][1] < ALIKE]
+    # Among several the one whose coefficients need the fewest sentences is the likeliest.
     return min(alike, key=lambda pair: len(list(_factors(pair[1], 0))), default=None)
 
 
@@ -133,6 +137,7 @@ def _best(mistake: Mistake, model: Model, seen: Array, counts: Array) -> tuple[s
     def fit(log: float) -> TermFit:
         return _fit(model.terms(**change(model, np.exp(log))), seen, counts)
 
+    # The remainder may have several minima: a grid finds the valley, a search its bottom.
     grid, step = np.linspace(-LARGEST_LOG, LARGEST_LOG, 32, retstep=True)
     start = grid[np.argmin([fit(log)[1] for log in grid])]
     bounds = start - step, start + step
@@ -145,6 +150,7 @@ def _fit(terms: Array, values: Array, counts: Array) -> TermFit:
 
     Rows are weighted by the inverse of their size, or highlights alone would decide.
     """
+    # A negative value has no inverse under some encodings.
     if not np.isfinite(values).all():
         return np.zeros((3, 4)), np.inf
     weights = counts / (np.abs(values) + np.median(np.abs(values)) + 1e-9)
@@ -154,6 +160,7 @@ def _fit(terms: Array, values: Array, counts: Array) -> TermFit:
         weight = weights[:, channel]
         matrix = (terms[:, :, channel] * weight).T
         target = values[:, channel] * weight
+        # Columns of equal size, so that the cut at `rcond` does not depend on how bright a term is.
         size = np.sqrt((matrix**2).mean(axis=0)) + 1e-12
         solved = np.linalg.lstsq(matrix / size, target, rcond=1e-9)[0] / size
         coefficients.append(solved)
@@ -169,11 +176,13 @@ def _factors(fit: TermFit, lights: int) -> Iterator[str]:
         shown = ", ".join(f"{value:.3g}" for value in coefficients[:, 2])
         yield f"Its red, green and blue diffuse light is {shown} times the textbook's."
         return
+    # Terms with the same factor share a sentence.
     odd: dict[float, list[str]] = {}
     for name, value in zip(TERMS, means, strict=True):
         if abs(value) > 0.01 and abs(value - 1) > 0.02:
             odd.setdefault(float(f"{value:.3g}"), []).append(name)
     for value, names in sorted(odd.items()):
+        # Inside the loop over lights, emission and ambient light count once for each light.
         for_each = value == lights and names[0] in TERMS[:2]
         mistake = "is it added once for each light" if for_each else factor_of_pi(value)
         whose = "All its" if len(names) == len(TERMS) else f"Its {' and '.join(names)}"
@@ -194,7 +203,9 @@ def sample(along: Callable[[Array, Array, Array], Array]) -> Model:
     position = random.uniform(-1, 1, (POINTS, 3))
     normal = unit(random.normal(size=(POINTS, 3)))
     view = unit(random.normal(size=(POINTS, 3)))
+    # Viewers are on the shaded side; lights may be behind it, where lost signs show.
     view *= np.sign(dot(normal, view))
+    # From each point to each light, (L, P, 3).
     away = np.array(LAMPS)[:, None] - position
     distance = np.sqrt(dot(away, away))
     return Model(
@@ -215,6 +226,7 @@ def sample(along: Callable[[Array, Array, Array], Array]) -> Model:
 
 def evaluate(heuristic: Heuristic, model: Model) -> Array:
     """Return a heuristic's values (P, 3) at a model's points."""
+    # One diffuse colour under three names: a shader may read any of them.
     names = {"k_i": "k_i", "k_a": "k_d", "k_d": "k_d", "k_s": "k_s", "base_color": "k_d"}
     colours = {name: getattr(model, field).T for name, field in names.items()}
     lights = [
@@ -249,6 +261,7 @@ def _without_gate(cosine: Array, n: Array, incidence: Array) -> Array:
 
 
 def _mirrored_behind(normal: Array, toward: Array, view: Array) -> Array:
+    # 8.7 with `|N.L|` in place of `N.L`.
     return 2 * np.abs(dot(normal, toward)) * dot(normal, view) - dot(toward, view)
 
 
@@ -279,6 +292,7 @@ MISTAKES: tuple[Mistake, ...] = (
      lambda m: {"lobe": lambda *words: lobe(*words) * clamped(words[-1])}),
     ("only the first light is used",
      lambda m: {"toward": m.toward[:1], "intensity": m.intensity[:1]}),
+    # Constant factors are left out: the fitted coefficient takes them up.
     ("the lobe is normalised by n + 2, which the paired k_s already includes",
      lambda m: {"k_s": m.k_s * (m.n + 2)}),
     ("the lobe is normalised by n + 8, which the paired k_s already includes",

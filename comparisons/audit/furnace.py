@@ -47,6 +47,7 @@ def evaluate(bsdf: Any, light: Floats, view: Floats) -> Any:
     si.wi = wi
     if mi.is_spectral:
         si.wavelengths = 550.0
+    # Mitsuba's `eval` includes the cosine of `wo`, here the light's.
     return dr.pi * mi.Spectrum(bsdf.eval(mi.BSDFContext(), si, toward))
 
 
@@ -64,13 +65,16 @@ def sphere(azimuths: int, heights: int, edge: float = 1.0) -> tuple[Floats, Floa
     Legendre, and about an azimuth of 180 degrees, ``phi = pi (1 + u^3)``: opposite to the fixed
     direction, grazing lobes are narrow. Values may jump at a cosine below 1, the ``edge``.
     """
+    # A segment of `t` to each side of the edge: no rule of Gauss straddles a jump.
     ends = np.unique([0, np.sqrt(1 - edge), 1])[:, None]
     nodes, weights = np.polynomial.legendre.leggauss(heights)
+    # Half of each, as the nodes lie between -1 and 1.
     lengths = np.diff(ends, axis=0) / 2
     u = (2 * np.arange(azimuths) + 1) / azimuths - 1
     grids = np.meshgrid(ends[:-1] + lengths * (1 + nodes), u)
     t, u = np.reshape(grids, (2, -1))
     above = direction(np.arccos(1 - t * t), np.pi * (1 + u**3))
+    # `sin(theta) d theta = 2 t dt`, and `d phi = 3 pi u^2 du` with `du = 2 / azimuths`.
     solid_angle = np.tile((lengths * weights).ravel(), azimuths) * t * 12 * np.pi * u**2 / azimuths
     return np.stack([above, above * [[1], [1], [-1]]]), solid_angle
 
@@ -93,6 +97,7 @@ def _about(degrees: float, grid: tuple[int, int], eta: float | None) -> tuple[Fl
     fixed = direction(np.deg2rad(degrees), 0.0)
     z = fixed[2, 0]
     edge = 1.0 if eta is None else float(z / eta if z > 0 else -z * eta)
+    # An edge of 1 or more is none; a cut elsewhere keeps the number of nodes.
     return fixed, *sphere(*grid, edge if edge < 1 or eta is None else 0.5)
 
 
@@ -101,6 +106,7 @@ def seen(
 ) -> float:
     """Return what a viewer at an angle sees in the furnace: the channel that is farthest from 1."""
     view, lights, solid_angle = _about(degrees, grid, eta)
+    # Relative to the furnace on the viewer's side, so that 1 is white from either side.
     values: Any = sum(
         response(light, view) @ (solid_angle * radiance(eta, light) / radiance(eta, view) / np.pi)
         for light in lights
@@ -113,6 +119,7 @@ def returned(
 ) -> float:
     """Return the share of the light from an angle that leaves, of the brightest channel."""
     light, views, solid_angle = _about(degrees, grid, eta)
+    # What leaves takes the viewer's cosine; the light's is divided out of the response.
     values: Any = sum(
         response(light, view) @ (np.abs(view[2] / light[2]) * solid_angle / np.pi)
         for view in (views if eta else views[:1])
@@ -127,9 +134,12 @@ def single_scattering(alpha: float, degrees: float) -> float:
 
     def response(light: Floats, view: Floats) -> Floats:
         half = light + view
+        # The square of the half vector's cosine.
         top = half[2] ** 2 / (half**2).sum(axis=0)
+        # Smith's root for the viewer, then for the light; each goes with the other's cosine.
         paths = (np.sqrt(square + (1 - square) * direction[2] ** 2) for direction in (view, light))
         masked = light[2] * next(paths) + view[2] * next(paths)
+        # `pi D G / (4 cos_l cos_v) cos_l`, in which `G / (4 cos_l cos_v) = 1 / (2 masked)`.
         density: Floats = (light[2] * square / (1 - top + square * top) ** 2 / (2 * masked))[None]
         return density
 

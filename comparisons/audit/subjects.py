@@ -164,14 +164,17 @@ class ShadingSubject(Subject):
 
     def hard_cases(self) -> Iterator[CaseValues]:
         light, view = pairs = furnace.random_and_mirrored()
+        # Extreme materials, in ordinary directions.
         for description, change in EXTREMES:
             yield description, self._array(MIDDLE | change, _sun(light), view), pairs
+        # Ordinary materials, with normals and directions that are not.
         for length in LENGTHS:
             values = self._array(MIDDLE, _sun(light), view, length * UP)
             yield f"a normal of length {length:g}", values, pairs
         low = furnace.grazing()
         values = self._array(MIDDLE, _sun(low[0]), low[1])
         yield "grazing, head on and from behind", values, low
+        # Lights that are very near, very far, dark, or missing.
         lights: dict[str, Any] = {
             f"a light at a distance of {far:g}": PointLight(mi.Point3f(0, 0, far), mi.Spectrum(1.0))
             for far in DISTANCES
@@ -193,11 +196,13 @@ class ShadingSubject(Subject):
             change = {name: number}
             material = MIDDLE if is_parameter else MIDDLE | change
             values = change if is_parameter else None
+            # The mean of the channels: one value per point.
             return dr.mean(self._colour(material, _sun(light), view, UP, values))
 
         for name, value in MIDDLE.items():
             if value:
                 yield name, value, partial(shade, name, False)
+        # A preparation gets plain numbers, through which no derivative passes.
         for parameter in self.heuristic.parameters:
             if not parameter.prepared and (
                 centre := _within(parameter, self.values[parameter.name])
@@ -275,6 +280,7 @@ def _within(parameter: heuristics.Parameter, value: float) -> float | None:
     low = max(parameter.low, -1e6)
     high = min(parameter.high, 1e6)
     inner = min(max(value, low + 0.1 * (high - low)), high - 0.1 * (high - low))
+    # A tenth to each side is ample: a difference steps by a fiftieth.
     centre = value if low < 0.9 * value and 1.1 * value < high else inner
     return centre or None
 
@@ -347,6 +353,7 @@ def _index(bsdf: Any) -> float:
     found, _ = bsdf.sample(
         mi.BSDFContext(), si, mi.Float(lobe), mi.Point2f(mi.Float(x), mi.Float(y))
     )
+    # Only a sample that passes to the other side tells the index.
     return dr.max(dr.select(found.wo.z < 0, found.eta, 0))[0] or 1.0
 
 
@@ -361,6 +368,7 @@ class ScatteringSubject(Subject):
         super().__init__()
         self.plugin = plugin = registered(word)
         self.parameters = dict(parameters)
+        # Values whose lobes quadrature or χ² could not resolve are refused.
         for name, (least, most) in RESOLVED.items():
             value = self.parameters.get(name)
             if isinstance(value, float) and not least <= value <= most:
@@ -381,10 +389,12 @@ class ScatteringSubject(Subject):
                     f"BSDF {plugin!r}: an index of refraction of {eta:.3g} makes a lobe too narrow"
                     f" for the audit: give one above {1 / (1 - LEAST_BEND):.2f}."
                 )
+        # One BSDF, or one for each roughness if that is left open.
         self.bsdfs = {plugin: self.bsdf}
         self.materials: dict[str, float | None] = {plugin: None}
         self.keys = {key.partition(".")[0] for key, _ in mi.traverse(self.bsdf)}
         if self.keys.intersection(ROUGH) and not self.parameters.keys() & set(ROUGH):
+            # Where it is called `roughness`, it is the root of alpha.
             by_root = "roughness" in self.keys
             of = {f"{plugin}, alpha {alpha:g}": alpha for alpha in ALPHAS}
             self.materials = {**of}
@@ -398,6 +408,7 @@ class ScatteringSubject(Subject):
 
     def hard_cases(self) -> Iterator[CaseValues]:
         light, view = furnace.grazing()
+        # Each pair again, with the viewer on the other side.
         pairs = np.hstack([light, light]), np.hstack([view, -view])
         yield (
             "grazing, head on and from behind",
@@ -453,6 +464,7 @@ class ScatteringSubject(Subject):
             sample_count=200_000, ires=32, res=100,
         )  # fmt: skip
         test.run(quiet=True)
+        # The test also fails for a negative density, or for samples where it is 0.
         p = 0.0 if test.fail else float(np.array(test.p_value).ravel()[0])
         return p if np.isfinite(p) else 0.0
 
@@ -472,6 +484,7 @@ class ScatteringSubject(Subject):
     def _changed(
         self, key: str, kind: type, light: np.ndarray, view: np.ndarray, number: Any
     ) -> Any:
+        # Made for each derivative: the one under audit keeps its values.
         bsdf = self._made()
         parameters = mi.traverse(bsdf)
         parameters[key] = kind(number)

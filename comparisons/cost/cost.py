@@ -97,6 +97,7 @@ def cost(
         resolution=found.size,
         rounds=effort.rounds,
         threads=dr.thread_count(),
+        # Every line holds the same number of processors, the median of all.
         processor_share=min(next(iter(found.lines.values())).processors / dr.thread_count(), 1.0),
         reference=found.converged,
         methods=found.methods,
@@ -155,6 +156,7 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
     ``causes`` may be of another size.
     """
     samples = SPP * found.size[0] * found.size[1]
+    # The steps lead from the kernel as requested to the full plan.
     first = found.steps[0].before
     last = found.steps[-1].after
 

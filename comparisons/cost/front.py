@@ -106,10 +106,13 @@ def reach(points: Sequence[Point], tolerance: float) -> Reach | None:
         of_method = [point for point in points if point.method == name]
         if len(of_method) < 2:
             continue
+        # Points of a method come in order of their counts.
         fewer, more = of_method[-2:]
         step = more.spp - fewer.spp
         square = more.tolerance.value**2
+        # `noise^2 / more.spp` is the squares' difference times `fewer.spp / step`.
         left = max(square - (fewer.tolerance.value**2 - square) * fewer.spp / step, 0.0)
+        # `left` is still a square here: noise may take the rest of the tolerance's.
         room = tolerance**2 - left
         spp = None
         if room > 0:

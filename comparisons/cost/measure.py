@@ -159,12 +159,14 @@ def measure_ladder(
         options = options.changed(resolution=reduced(source, shaped, WIDTH))
     if options.spp is not None:
         effort = replace(effort, largest=options.spp)
+    # The scene, its converged reference, and the ladder.
     ready = guarded(source, options.changed(spp=None, allow_empty=False))
     reference = converged(ready, options.seed, progress)
     judge = judge_by(reference, ready.counted, options.viewing)
     ladder = Ladder(source, options, ready=ready, is_short=effort.is_short)
     size = image_size(ready.scene)
     gc.collect()  # release scenes that pairing left behind
+    # Steps also need methods that are not on the ladder: they are timed, not judged.
     steps = tuple(ladder.steps())
     wanted = {method.name: method for step in steps for method in (step.before, step.after)}
     wanted |= {method.name: method for method in ladder.methods}
@@ -174,6 +176,7 @@ def measure_ladder(
         counts, pixels=size[0] * size[1], progress=progress,
     )  # fmt: skip
     judged = {(method.name, spp) for method in ladder.methods for spp in counts[method.name]}
+    # Compiling is over: only images that are timed need the machine alone.
     with alone or nullcontext():
         errors, images = rendered(
             renderers, judge, judged, effort.rounds, options.seed, progress, "timing"
@@ -254,6 +257,7 @@ def tried(
         progress("compiling", number, len(firsts))
         by_spp = {first.pass_spp: first}
         last = first
+        # More samples, until one image takes long enough to time.
         while True:
             warm(last)
             seconds = last.times[-1]
@@ -266,6 +270,7 @@ def tried(
                 more *= 4
             last = first.sampled(more * last.pass_spp)
             by_spp[last.pass_spp] = last
+        # The line through the largest needs a smallest, and one between them that shows a bend.
         fewer = {max(1, last.pass_spp // 4), max(1, last.pass_spp // 16)}
         for spp in {*counts[name], *fewer} - by_spp.keys():
             by_spp[spp] = first.sampled(spp)
@@ -307,6 +312,7 @@ def rendered(
 
 def _mean_errors(errors: ArrayLike) -> tuple[MeanError, MeanError]:
     values = np.asarray(errors)
+    # Rows are rounds; columns are the mean error and the tolerance.
     means = values.mean(axis=0)
     halves = SURE * values.std(axis=0, ddof=1) / sqrt(len(values))
     lows = means - halves
@@ -322,6 +328,7 @@ def timed(
     """Return the time of each method from the last rounds of its renderers."""
     seconds: dict[str, dict[int, tuple[Any, Any]]] = {}
     for (name, spp), renderer in renderers.items():
+        # The first images, which warmed up, are not among the last rounds.
         both_times = renderer.times[-rounds:], renderer.processor_times[-rounds:]
         seconds.setdefault(name, {})[spp * pixels] = both_times
     return times.lines(seconds, seed)
@@ -334,6 +341,7 @@ def timed_method(
     line = found[method.name]
     return TimedMethod(
         **structs.asdict(method),
+        # A difference from the shortest image's time, whose unseen share it inherits.
         overhead_s=times.interval(line.overhead, times.UNSEEN * line.shortest),
         per_sample_s=times.interval(line.per_sample, times.UNSEEN * float(line.per_sample[0])),
         ratio=times.ratio(line, found[textbook]),
@@ -360,6 +368,7 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
     errors, _ = rendered(
         renderers, judge, renderers, MEASURED_ROUNDS, options.seed, progress, "measuring"
     )
+    # The scene is shared: it gets back the size of the study.
     resize(scene, found.size)
     points = []
     for (name, spp), renderer in renderers.items():
@@ -369,6 +378,7 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
             Point(
                 method=name,
                 spp=spp,
+                # Other programs only add time: the shortest round is the time.
                 seconds=Interval(value=min(took), low=min(took), high=max(took)),
                 error=error,
                 tolerance=tolerance,

@@ -155,6 +155,7 @@ class Ladder:
     def __init__(
         self, source: Source, options: Options, ready: Prepared, is_short: bool = False
     ) -> None:
+        # Flat and Gouraud shading need vertices: all kernels get a mesh, the default one.
         if options.polygon_shading is not Interpolation.PHONG and options.tessellation is None:
             options = options.changed(tessellation=RESOLUTION)
         self.ready = ready
@@ -167,6 +168,7 @@ class Ladder:
         shadows = {OCCLUSION} if plan.calls_for(OCCLUSION) else set()
         self._effects = frozenset(effect.label for effect in differences | shadows)
         sampled = {effect for effect in EFFECTS if effect.sampled}
+        # Light from a table needs no random numbers.
         if plan.tabulated_environment:
             sampled.remove(ENVIRONMENT)
         self._is_random = any(plan.calls_for(effect) or effect in differences for effect in sampled)
@@ -179,6 +181,7 @@ class Ladder:
             else:
                 merged.setdefault(self._form(method), []).append(method)
         self._known = {form: self._merged(form, alike) for form, alike in merged.items()}
+        # A scene is made when a method first needs it, and others share it.
         self._kernel_scene = cache(self._make_kernel_scene)
         self._plan_scene = cache(self.scenes.of)
 
@@ -190,6 +193,7 @@ class Ladder:
     def _form(self, method: Method) -> Method:
         """Return only what a method renders, without what the scene does not have."""
         if method.is_kernel:
+            # Where the plan needs no shadow rays, they change nothing; the scene's own are kept.
             shadows = method.shadows and OCCLUSION.label in self._effects
             return Method(
                 name="",
@@ -198,6 +202,7 @@ class Ladder:
                 shadows=shadows or self.scenes.facts.has_shadows,
                 heuristic=method.heuristic,
             )
+        # Paths of depth 2 are direct light, under another name.
         without = {*method.without, *([INTERREFLECTION.label] if method.max_depth == 2 else [])}
         is_limited = (
             INTERREFLECTION.label in self._effects - without
@@ -283,6 +288,7 @@ class Ladder:
         effects = [effect.label for effect in self.pairs.effects(self.scenes.differences)]
         kernel = self._form(KERNELS[2])
         kernel = structs.replace(kernel, interpolation=self.options.polygon_shading)
+        # What the kernel can have, one effect after another.
         changes: dict[str, dict[str, Any]] = {
             POLYGONS.label: {"interpolation": Interpolation.PHONG},
             OCCLUSION.label: {"shadows": True},
@@ -294,8 +300,10 @@ class Ladder:
                 before = self._named(kernel)
                 kernel = structs.replace(kernel, **change)
                 yield Step(effect=label, weight=1.0, before=before, after=self._named(kernel))
+        # What an effect adds depends on what is there already: both orders count half.
         others = [effect for effect in effects if effect not in changes]
         for order in (others, others[::-1]):
+            # Each plan leaves out one effect fewer; the last leaves out none.
             plans = [
                 self._named(self._form(structs.replace(FULL_PLAN, without=tuple(order[number:]))))
                 for number in range(len(order) + 1)
@@ -334,6 +342,7 @@ class Ladder:
             for interpolation in (Interpolation.FLAT, Interpolation.GOURAUD):
                 try:
                     require_colours()
+                    # On other shapes, a time would compare meshes rather than shading.
                     if self._shapes(interpolation) != smooth:
                         refused[interpolation.value] = (
                             "it needs a mesh, and the others have the scene's own shapes: give"

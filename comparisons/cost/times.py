@@ -59,10 +59,12 @@ Rounds = tuple[Sequence[float], Sequence[float]]
 
 def lines(measured: Mapping[str, Mapping[int, Rounds]], seed: int = 0) -> dict[str, Line]:
     """Return the line of each method, of ``{method: {samples over all pixels: rounds}}``."""
+    # All images have the same rounds, so that one set of draws serves all.
     (rounds,) = {
         len(wall) for times_by_count in measured.values() for wall, _ in times_by_count.values()
     }
     drawn = np.random.default_rng(seed).integers(rounds, size=(DRAWS, rounds))
+    # The first row is every round once: the value itself.
     drawn = np.vstack([np.arange(rounds), drawn])
     best: dict[str, tuple[Floats, Floats]] = {}
     slopes: list[Draws] = []
@@ -75,6 +77,7 @@ def lines(measured: Mapping[str, Mapping[int, Rounds]], seed: int = 0) -> dict[s
         best[name] = counts, wall
         span = counts[-1] - counts[0]
         for found, times in ((slopes, wall), (work, processor)):
+            # Above 0, because other times are divided by it.
             least = LEAST_SLOPE * times[-1] / counts[-1]
             found.append(np.maximum((times[-1] - times[0]) / span, least))
     processors = np.median(np.array(work) / np.array(slopes), axis=0)
@@ -86,6 +89,7 @@ def lines(measured: Mapping[str, Mapping[int, Rounds]], seed: int = 0) -> dict[s
 
 def _line(counts: Floats, wall: Floats, per_sample: Draws, processors: float) -> Line:
     overhead = np.maximum(wall[0] - per_sample * counts[0], 0.0)
+    # The count nearest to a fourth of the largest, against the chord between the ends.
     between = int(np.argmin(np.abs(counts - counts[-1] / 4)))
     chord = np.interp(counts[between], counts[[0, -1]], wall[[0, -1], 0])
     bend = float(wall[between, 0] / chord - 1)
@@ -105,6 +109,7 @@ def interval(values: ArrayLike, unseen: float) -> Interval:
     value = float(values[0])
     below = max(value - low, 0.0)
     above = max(high - value, 0.0)
+    # What draws show and what they cannot show are independent: squares add up.
     return Interval(
         value=value,
         low=value - float(np.hypot(below, unseen)),

@@ -136,6 +136,7 @@ def fit(
         raise InputError(f"forms {forms}: give one or more of {', '.join(FORMS)}.")
     options = _completed(options or Options())
     heuristic = named(options.heuristic)
+    # Both halves are rendered once; every form is fitted to the same images.
     rendered = render(guarded(source.edited(filter_by_box), options), options, progress)
     rendering = perf_counter() - begin
     if heuristic is PHONG:
@@ -213,6 +214,7 @@ def filter_by_box(graph: Graph) -> None:
     for film in graph.nodes(mi.ObjectType.Film):
         for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
             graph.detach(film, key)
+    # A sensor without a film would get Mitsuba's own, with another filter.
     for sensor in graph.nodes(mi.ObjectType.Sensor):
         if not graph.children(sensor, mi.ObjectType.Film):
             film = graph.add(mi.ObjectType.Film, properties("hdrfilm"))
@@ -263,7 +265,9 @@ def _best(
         fitted, rendered.reference.mean[counted], loss=loss, viewing=rendered.viewing
     )
     x, least, converged = search(objective, starts(objective))
+    # What the image tells of each parameter, given its noise.
     pixels = np.array([fitted.reached[parameter.owner] for parameter in fitted.parameters])
+    # The halves share their camera rays: noise that cancels in the difference moves no fit.
     error = rendered.difference.standard_error[counted]
     certainties, covariance = identify(objective, x, pixels=pixels, standard_error=error)
     physical = physical_materials(rendered.ready.pair.physical)
@@ -282,6 +286,7 @@ def _best(
         )
         for owner, name in enumerate(fitted.names)
     )
+    # The image with the best parameters, judged by every metric.
     after = fitted.whole(x).reshape(rendered.before.shape)
     by_metric, maps = departures(rendered, after)
     judged = [_judged(rendered, image) for image in (rendered.before, after)]
@@ -335,6 +340,7 @@ def form_starts(objective: Objective) -> list[Floats]:
     starts: list[Floats] = [paired]
     for n in STARTS:
         x = np.where(at_n, log(n * 4 if phong.form == "blinn" else n), paired)
+        # At a given `n` the image is linear in its coefficients: a row (3 N,) for each.
         columns = phong.columns(x)[linear].reshape(linear.sum(), -1)
         target = (objective.reference - phong.surface.fixed[phong.counted]).ravel()
         x[linear] = bounded_minimum(
@@ -352,6 +358,7 @@ def own_starts(objective: Objective) -> list[Floats]:
     low, high = model.bounds(parameters)
     low = np.maximum(low, default - reach)
     high = np.minimum(high, default + reach)
+    # A search expects the paired start first.
     return [default, *np.random.default_rng(0).uniform(low, high, (OWN_STARTS, len(default)))]
 
 

@@ -164,10 +164,12 @@ def parameter_record(
     certainty = certainties[index]
     value = float(x[index])
     spread = COVERAGE * sqrt(covariance[index, index])
+    # Paired, fitted, and both ends of the interval.
     raw: tuple[float, ...] = (parameter.paired, value, value - spread, value + spread)
     limits: tuple[float, ...] = (parameter.low, parameter.high)
     phong = model if isinstance(model, PhongModel) else None
     if phong and parameter.name == "n":
+        # The vector holds `ln n`.
         raw = tuple(map(exp, raw))
         limits = tuple(map(exp, limits))
     elif (
@@ -175,6 +177,7 @@ def parameter_record(
         and parameter.name == "k_s"
         and not phong.surface.materials[parameter.owner].normalised
     ):
+        # The vector holds the lobe's albedo; `k_s` also depends on `n`, and on its error.
         at_n = phong.place_of_exponent(parameter.owner)
         step = 1e-5
         per_albedo = normalisation(phong.form, exp(x[at_n] + 0))
@@ -182,12 +185,14 @@ def parameter_record(
         above = normalisation(phong.form, exp(x[at_n] + step))
         slopes = np.zeros(len(x))
         slopes[[index, at_n]] = per_albedo, value * (above - below) / (2 * step)
+        # To first order, with the covariance of the two.
         variance = float(slopes @ covariance @ slopes)
         spread = COVERAGE * sqrt(max(variance, 0))
         at_pairing = normalisation(phong.form, exp(phong.parameters[at_n].paired))
         k_s = value * per_albedo
         limits = (0.0, per_albedo)
         raw = parameter.paired * at_pairing, k_s, k_s - spread, k_s + spread
+        # Without a lobe `k_s` is 0 for any `n`.
         if not certainty.reason and certainties[at_n].reason and value > AT_BOUND:
             reason = "follows from its albedo and n, which is not identifiable"
             certainty = Certainty(reason, (), certainty.at_bound)

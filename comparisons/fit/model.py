@@ -133,6 +133,7 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
             label="heuristic samples",
             is_traced=True,  # else it would see nothing
         )
+        # The passes: each gives the fixed light as its image, and its samples.
         fixed: Any = 0.0
         passes = []
         samples_per_pixel = 0
@@ -143,15 +144,18 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
             count = len(arrays["material"])
             for key, values in arrays.items():  # an orthographic camera has one view for all
                 arrays[key] = np.broadcast_to(values, (*values.shape[:-1], count))
+            # The samples of a pixel follow each other.
             spp = count // image[..., 0].size
             passes.append(arrays | {"pixel": np.arange(count) // spp})
             samples_per_pixel += spp
+        # The copies suffice: the last pass need not stay in Dr.Jit's memory.
         eye.seen = None
         whole = {
             key: np.concatenate([samples[key] for samples in passes], axis=-1) for key in passes[0]
         }
         facing = whole.pop("facing")
         material = whole.pop("material")
+        # Samples by material; a side that is not shaded is black for any parameters.
         samples = []
         for owner, bsdf in enumerate(bsdfs):
             without = set(COEFFICIENTS) - set(_textured(bsdf))
@@ -215,6 +219,7 @@ def _eye(shading: Any) -> Any:
                 "normal": mi.Vector3f(normal),
                 "view": mi.Vector3f(-ray.d),
                 "facing": hit & is_shaded,
+                # A single material's number is a literal: widened to one for each sample.
                 "material": number + dr.zeros(mi.UInt32, dr.width(si.p)),
             }
             for name in {name for bsdf in materials.bsdfs for name in _textured(bsdf)}:
@@ -285,6 +290,7 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
             form=material.form,
             normalised=material.normalised,
         )
+        # As in the vector: the lobe by its albedo, not by `k_s`.
         paired = {"k_a": material.k_a, "k_d": material.k_d, "k_s": tuple(specular_albedo(phong))}
         if isinstance(surface.ambient, int):  # no ambient light
             del paired["k_a"]
@@ -308,6 +314,7 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
                     )
                 )
             else:
+                # A number for each channel: its tint is 0 in the two others.
                 fitted += [
                     FitParameter(
                         name=name,
@@ -320,6 +327,7 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
                     )
                     for value, tint, channel in zip(colour, np.eye(3), "RGB", strict=True)
                 ]
+        # The exponent of this form whose lobe is as wide as the scene's.
         n = exponent_of(alpha_of(material.n, material.form), form)
         fitted.append(
             FitParameter(
@@ -358,12 +366,14 @@ class PhongModel:
             [parameter.name in COEFFICIENTS for parameter in self.parameters], bool
         )
         self._vector = vector or mi.Vector3f
+        # Bases are the same for all `x`; of the lobes, the last of each material is kept.
         self._basis, self._points = cache(self._rendered_basis), cache(self._point)
         self._lobe = lru_cache(maxsize=len(surface.names))(self._rendered_lobe)
         self._columns = lru_cache(maxsize=1)(self._derivatives)
 
     def whole(self, x: Floats) -> NDArray[np.float64]:
         """Return the image of all pixels for a vector of parameters."""
+        # A sum over the coefficients; the rows by `n` are derivatives alone.
         columns = self._columns(tuple(x))[self.linear]
         return self.surface.fixed + np.tensordot(x[self.linear], columns, 1)
 
@@ -398,6 +408,7 @@ class PhongModel:
             if name in ("k_a", "k_d"):
                 result[index] = self._basis(owner, name) * parameter.tint
                 continue
+            # A lobe of albedo 1: by `k_s` its basis, by `ln n` the slope times the albedo.
             basis, slope = self._lobe(owner, float(np.exp(x[self.place_of_exponent(owner)])))
             result[index] = basis * parameter.tint if name == "k_s" else slope * albedo[owner]
         return result
@@ -412,6 +423,7 @@ class PhongModel:
 
     def _rendered_lobe(self, owner: int, n: float) -> Any:
         """Return the specular basis of a material, and its derivative by ``ln n``."""
+        # Opaque, so that another `n` compiles no kernel.
         exponent = dr.opaque(dr.value_t(self._vector), n)
         dr.enable_grad(exponent)
         lobe = {"n": exponent, "form": self.form, "normalised": True}
@@ -422,6 +434,7 @@ class PhongModel:
         basis = dr.detach(value)
         slope = dr.grad(value)
         dr.eval(basis, slope)
+        # `d / d ln n = n d / dn`.
         return self.surface.pixels(owner, basis), n * self.surface.pixels(owner, slope)
 
     def _shaded(self, owner: int, name: str, lights: Any, ambient: Any = 0, **lobe: Any) -> Any:
@@ -430,6 +443,7 @@ class PhongModel:
             return None
         position, normal, view, textures, visible = self._points(owner)
         material = Material(**{name: textures.get(name, 1.0)}, **lobe)
+        # Masks are in the order of the lights, in which the kernel must ask for them.
         masks = iter(visible)
         test = (lambda toward, distance: next(masks)) if visible else None
         return shade(position, normal, view, material, list(lights), ambient, test)
@@ -477,6 +491,7 @@ class OwnModel:
         self._renderer = renderer
         self._seeds = seeds
         self._counted = counted
+        # Room for an image, all its derivatives, and the image of a trial step.
         self._kept = lru_cache(maxsize=2 + len(self.parameters))(self._rendered)
 
     def whole(self, x: Floats) -> Floats:
@@ -502,6 +517,7 @@ class OwnModel:
             values = {
                 parameter.name: mi.Float(v) for parameter, v in zip(self.parameters, x, strict=True)
             }
+            # Opaque, so that other values compile no kernel.
             dr.make_opaque(values)
             integrator.parameters = values
             if by is not None:

@@ -85,6 +85,7 @@ def _perceptual_derivative(rgb: Floats, viewing: Viewing) -> Floats:
     """Return central differences; all six images are converted at once."""
     step = STEP * np.abs(rgb) + SMALLEST_STEP
     shifts = np.concatenate([sign * np.eye(3) for sign in (1, -1)])
+    # Shifts (6, 1, 3) of pixels (N, 3): three up, then three down.
     values = cam16ucs_unclipped(rgb + shifts[:, None, :] * step, viewing)
     return np.moveaxis((values[:3] - values[3:]) / (2 * step.T[..., None]), 0, -1)
 
@@ -162,6 +163,7 @@ class Objective:
         """Return gradient (P,) and second derivative (P, P) of the loss by the parameters."""
         slopes, curvature, jacobian = self.changes(x)
         gradient = np.einsum("nkp,nk->p", jacobian, slopes)
+        # `J^T C J` over all coordinates of all pixels, with `J` as (N K, P).
         flat = jacobian.reshape(-1, len(x))
         second = flat.T @ (curvature @ jacobian).reshape(-1, len(x))
         return gradient / len(slopes), second / len(slopes)
@@ -188,13 +190,16 @@ def descend(objective: Objective, x: Floats) -> tuple[Floats, float, bool]:
     damping = 1e-3
     gradient, second = objective.quadratic(x)
     for _ in range(1, LARGEST_COUNT):
+        # In proportion to the diagonal, so that a parameter's unit does not matter.
         damped = second + damping * np.diag(np.diag(second))
         step = bounded_minimum(damped, gradient, low=low - x, high=high - x)
+        # The loss that the damped quadratic promises to remove.
         expected = -(gradient @ step + step @ damped @ step / 2)
         if expected <= max(TOLERANCE * loss, SMALLEST_GAIN) or damping > LARGEST_DAMPING:
             return x, loss, True
         trial = np.clip(x + step, low, high)
         gained = loss - objective.value(trial)
+        # Less damping after a step near its promise, more after a poor one.
         if gained > 0:
             x = trial
             loss = loss - gained
@@ -210,6 +215,7 @@ def bounded_minimum(second: Floats, gradient: Floats, low: Floats, high: Floats)
 
     Directions without curvature get as much of it as rounding would leave, and stay in place.
     """
+    # With `H = V D V^T` and `R = D^(1/2) V^T`, minimise `|R x + D^(-1/2) V^T g|`.
     values, vectors = np.linalg.eigh(second)
     roots = np.sqrt(np.maximum(values, max(1e-13 * values[-1], 1e-300)))
     solved = lsq_linear(
@@ -245,6 +251,7 @@ def identify(
     near = AT_BOUND * (high - low)
     threshold = objective.loss.threshold
     at_bound = (x - low < near) | (high - x < near)
+    # A norm over all pixels, divided by this, is a root mean square over those it reaches.
     root = np.sqrt(np.maximum(pixels, 1))
     _, curvature, jacobian = objective.changes(x)
     flat = jacobian.reshape(-1, len(x))
@@ -252,16 +259,20 @@ def identify(
     free = shows >= threshold
     inverse = _inverse_normal(flat[:, free])
     alone = shows.copy()
+    # What remains of a change after the best answer of all others that show.
     alone[free] = 1 / np.sqrt(np.diag(inverse)) / root[free]
     determined = free & (alone >= threshold)
     covariance = np.zeros((len(x),) * 2)
     if (inside := determined & ~at_bound).any():
         second = objective.quadratic(x)[1][np.ix_(inside, inside)]
         slopes = objective.loss.derivative(objective.reference, objective.viewing)
+        # What one standard error of each reference channel changes in the slopes, (N, K, 3).
         noise = curvature @ (slopes * standard_error[:, None, :])
         spread = np.einsum("nkp,nkc->pnc", jacobian[..., inside], noise) / len(noise)
         moved = np.linalg.pinv(second, hermitian=True) @ spread.reshape(len(spread), -1)
+        # Pixels and channels count as independent: their squares add up.
         covariance[np.ix_(inside, inside)] = moved @ moved.T
+    # Half an interval above one natural change tells nothing of the value.
     lost = determined & (COVERAGE * np.sqrt(np.diag(covariance)) > 1)
     certainties = []
     for number in range(len(x)):
@@ -272,6 +283,7 @@ def identify(
         elif not determined[number]:
             reason = "others make up for it"
             index = int(free[:number].sum())
+            # How far each other parameter moves to undo a unit of this one.
             shares = np.abs(inverse[index] / inverse[index, index])
             others = zip(np.flatnonzero(free).tolist(), shares, strict=True)
             partners = tuple(i for i, share in others if i != number and share > PARTNER)

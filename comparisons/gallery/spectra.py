@@ -43,6 +43,7 @@ def metameric_pair() -> dict[str, Any]:
     plain = 0.45 - 0.12 * np.cos(2 * np.pi * (WAVELENGTHS - 380) / 340)
     wave = np.cos(2 * np.pi * (WAVELENGTHS - 560) / 150)
     black = wave - weights @ np.linalg.lstsq(weights, wave, rcond=None)[0]
+    # How much of it keeps each reflectance in 0.05 to 0.95: the least value serves all.
     room = np.where(black > 0, (0.95 - plain), (plain - 0.05)) / np.maximum(np.abs(black), 1e-9)
     surfaces = {"plain": _spectrum(plain), "metamer": _spectrum(plain + room.min() * black)}
     return _row(surfaces, _spectrum(_at_luminance(_incandescent(), 70.0)))

@@ -49,11 +49,13 @@ def code_of(error: BaseException | None) -> int:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
+    # From here on another signal ends the process at once.
     for handled in SIGNALS:
         if signal.getsignal(handled) is _interrupt:
             signal.signal(handled, lambda number, _: os._exit(128 + number))
     if not _is_delicate(frame):
         raise Interrupted(number)
+    # An alarm tries again, in whatever code runs by then.
     signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(number, frame))
     signal.setitimer(signal.ITIMER_REAL, PAUSE_S)
 

@@ -130,6 +130,7 @@ class Pool:
 
     def _fill(self, waiting: Iterator[Task]) -> None:
         for task in islice(waiting, self._count - len(self._busy)):
+            # An idle process may have died since its last task.
             self._idle = [worker for worker in self._idle if worker.process.is_alive()]
             worker = self._idle.pop() if self._idle else Worker(self._prepare)
             self._busy.append(worker)
@@ -142,6 +143,7 @@ class Pool:
         ready = connection.wait([worker.pipe for worker in self._busy], pause)
         over = []
         for worker in self._busy:
+            # Messages first: a process may have ended just after its answer.
             if worker.pipe in ready:
                 worker.receive(self._limit_s)
             elif not worker.process.is_alive():
@@ -237,11 +239,13 @@ class Worker:
 
 def _work(pipe: Any, prepare: Callable[[], object]) -> NoReturn:
     """Do the tasks that come through the pipe, until it is closed."""
+    # A group of its own, so that what a task starts ends with it.
     os.setpgid(0, 0)
     os.register_at_fork(after_in_child=pipe.close)  # only this process answers
     os.dup2(2, 1)  # standard output is for the parent's results
     threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent gets it too, and ends this process
+    # The mask comes from the parent, which held signals back at the start.
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     while True:
         try:
@@ -322,6 +326,7 @@ class Turn:
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Wait until no other process works, and let none begin within this context."""
+        # Two that kept their shared locks would wait for each other forever.
         fcntl.flock(self._file, fcntl.LOCK_UN)
         with self._at_gate():
             fcntl.flock(self._file, fcntl.LOCK_EX)

@@ -233,6 +233,7 @@ def _part(raw: dict[str, Any], where: str, folder: Path) -> StudyPart:
         )
     if in_file := heuristics.in_file(name):
         file, function = in_file
+        # GLSL files have no function, and so no colon.
         options = options.changed(heuristic=f"{folder / file}:{function}".rstrip(":"))
     part = StudyPart(
         name=atomic.file_name(table.name or Path(scene).stem, "a part"),
@@ -321,6 +322,7 @@ def _check_size(part: StudyPart, where: str) -> None:
     """Reject a design with no points, too many points, or no range to draw from."""
     size = part.count
     if part.design == "grid":
+        # In floats: a product of integers could overflow into the allowed range.
         size = int(np.prod([len(level.values) for level in part.levels.values()], dtype=float))
     if not 1 <= size <= LARGEST:
         raise InputError(
@@ -329,6 +331,7 @@ def _check_size(part: StudyPart, where: str) -> None:
         )
     if part.design == "grid":
         return
+    # Sobol's points are balanced at powers of 2 alone.
     if size & (size - 1):
         lower = 1 << (size.bit_length() - 1)
         raise InputError(

@@ -96,6 +96,7 @@ def _points(part: StudyPart) -> Iterator[StudyPoint]:
         _check(part, points)
     except InputError as error:
         raise InputError(f"part {part.name!r}: {error}") from error
+    # All points edit the same source: the first gives its digest.
     scene_digest = "" if part.scene in SCENES else digest(source_of(part, points[0]))
     code = named(part.options.heuristic).digest()
     content = [scene_digest, code, versions()]
@@ -200,6 +201,7 @@ def _rendered(point: StudyPoint) -> Row:
     its ``identity`` stays.
     """
     part = point.part
+    # The pair, with the point's values in the scene.
     tuned, in_scene = split(point.values)
     source = source_of(part, point.values, point.identity)
     if part.scene not in SCENES:
@@ -208,10 +210,12 @@ def _rendered(point: StudyPoint) -> Row:
     spp = max(1, (part.options.spp or 0) // PASSES)
     scene = ready.scene
     heuristic = ready.heuristic.sampled(spp)
+    # The heuristic's own parameters are the integrator's.
     parameters = mi.traverse(heuristic.integrator)
     for name, value in tuned.items():
         parameters[name] = value
     parameters.update()
+    # The heuristic half, then one image per step; the last is the reference.
     renderers = [heuristic]
     plans = _plans(ready.plan)
     for stage in plans.values():
@@ -225,6 +229,7 @@ def _rendered(point: StudyPoint) -> Row:
         difference.add(rendered.images[0] - rendered.images[-1])
     images = [total.estimate().mean for total in sums]
     result = measure(images[0], images[-1], ready.counted, difference.estimate().noise)
+    # Steps that change nothing have no image, and keep 0.
     sizes = dict.fromkeys(STEPS, 0.0)
     for name, (before, after) in zip(plans, pairwise(images), strict=True):
         change = (after - before).mean(axis=2)[ready.counted]
@@ -275,6 +280,7 @@ def set_values(graph: Graph, values: dict[str, float]) -> None:
     """
     in_use = [graph.props(index) for index in graph.nodes_in_use()]
     for path, value in values.items():
+        # An id may contain dots itself.
         identifier, _, key = path.rpartition(".")
         props = [props for props in in_use if props.id() == identifier and key in props]
         if not props:

@@ -257,9 +257,11 @@ def reference_radiance(
     """Return the radiance of Mitsuba's BSDF, as :func:`heuristic_radiance` does."""
     diffuse = {"reflectance": plastic.diffuse_reflectance[0]}
     bsdfs = [{"type": "diffuse", **diffuse}] * 2
+    # Equal indices have no interface, and no specular part.
     if plastic.int_ior != plastic.ext_ior:
         values = {name: getattr(plastic, name) for name in ("alpha", "int_ior", "ext_ior")}
         values |= {"type": "roughplastic", "diffuse_reflectance": diffuse["reflectance"]}
+        # The specular part is the whole less the BSDF without it.
         bsdfs = [values | {"specular_reflectance": k} for k in (plastic.specular_reflectance[0], 0)]
     responses = [furnace.of_bsdf(mi.load_dict(bsdf))(light, view)[0] for bsdf in bsdfs]
     total, diffuse = responses
@@ -276,6 +278,7 @@ def hemisphere() -> tuple[np.ndarray, np.ndarray]:
     x, w = np.polynomial.legendre.leggauss(HEIGHTS)
     y, v = np.polynomial.legendre.leggauss(AZIMUTHS)
     theta, phi = np.meshgrid((x + 1) * 45, (y + 1) * 90)
+    # `cos(theta) sin(theta)` is `sin(2 theta) / 2`, with `theta = (x + 1) 45`.
     weight = np.outer(v, w * np.sin(np.deg2rad(x * 90 + 90)))
     return direction(theta.ravel(), phi.ravel()), weight.ravel() / weight.sum()
 
@@ -308,6 +311,7 @@ def lobe(point: Point, convention: Convention) -> tuple[dict[str, float], np.nda
     """
     phong, plastic, _ = material(tuple(point.items()), convention)
     angle = point["light_angle"]
+    # All directions in one call: images, albedos, the plane of incidence, the mirror's.
     plane = direction(np.arange(0, 90, PEAK_STEP), 0.0)
     mirror = direction(angle, 0.0)
     parts = (views(), hemisphere()[0], plane, mirror)
@@ -326,6 +330,7 @@ def lobe(point: Point, convention: Convention) -> tuple[dict[str, float], np.nda
         result[f"albedo_{half}"] = albedo(everywhere, angle)
         result[f"specular_albedo_{half}"] = albedo(specular, angle)
         result[f"specular_{half}"] = float(mirrored[0])
+        # A plateau of a degree or more is no peak.
         highest = in_plane > in_plane.max() * (1 - 1e-6)
         if np.count_nonzero(highest) * PEAK_STEP < 1:  # n = 0 has no peak, k_s = 0 no lobe
             result[f"peak_{half}"] = float(np.argmax(in_plane)) * PEAK_STEP
