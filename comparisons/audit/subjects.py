@@ -281,7 +281,8 @@ def _within(parameter: heuristics.Parameter, value: float) -> float | None:
     high = min(parameter.high, 1e6)
     inner = min(max(value, low + 0.1 * (high - low)), high - 0.1 * (high - low))
     # A tenth to each side is ample: a difference steps by a fiftieth.
-    centre = value if low < 0.9 * value and 1.1 * value < high else inner
+    room = 0.1 * abs(value)
+    centre = value if low < value - room and value + room < high else inner
     return centre or None
 
 

@@ -201,7 +201,7 @@ def measure_ladder(
         converged=Converged(
             integrator=ready.plan.integrator,
             max_depth=ready.plan.max_depth,
-            spp=REFERENCE_SPP * reference.passes,
+            spp=_reference_spp(size) * reference.passes,
             passes=reference.passes,
             noise_floor=judge(reference.mean + reference.noise)[0],
         ),
@@ -223,13 +223,17 @@ def measure_ladder(
     )
 
 
+def _reference_spp(size: Size) -> int:
+    """Return the samples per pixel of a pass of the reference, which large images reduce."""
+    return min(REFERENCE_SPP, LARGEST_PASS // (size[0] * size[1]))
+
+
 def converged(
     ready: Prepared, seed: int, progress: Progress | None, size: Size | None = None
 ) -> Estimate:
     """Render the reference, with seeds that no method has."""
     integrator = ready.reference.integrator
-    width, height = size or image_size(ready.scene)
-    spp = min(REFERENCE_SPP, LARGEST_PASS // (width * height))
+    spp = _reference_spp(size or image_size(ready.scene))
     renderer = Renderer(ready.scene, integrator, pass_spp=spp, label="reference image", size=size)
     total = Accumulator()
     count = max(REFERENCE_PASSES, ready.plan.passes)

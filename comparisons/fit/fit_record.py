@@ -190,7 +190,7 @@ def parameter_record(
         spread = COVERAGE * sqrt(max(variance, 0))
         at_pairing = normalisation(phong.form, exp(phong.parameters[at_n].paired))
         k_s = value * per_albedo
-        limits = (0.0, per_albedo)
+        limits = (0.0, per_albedo * parameter.high)
         raw = parameter.paired * at_pairing, k_s, k_s - spread, k_s + spread
         # Without a lobe `k_s` is 0 for any `n`.
         if not certainty.reason and certainties[at_n].reason and value > AT_BOUND:

@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 from fotismos.heuristic.convention import Colour, Doubles, Floats, Mask, Scene
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Heuristic
-from fotismos.heuristic.kernel import shade
+from fotismos.heuristic.kernel import BLOCK, shade
 from fotismos.heuristic.materials import Material
 from fotismos.heuristic.plugins.coefficients import SceneMaterials
 from fotismos.reference.pairing.factors import Phong, alpha_of, exponent_of, specular_albedo
@@ -443,10 +443,15 @@ class PhongModel:
             return None
         position, normal, view, textures, visible = self._points(owner)
         material = Material(**{name: textures.get(name, 1.0)}, **lobe)
-        # Masks are in the order of the lights, in which the kernel must ask for them.
+        # Masks are in the order of the lights. The kernel asks for them in this order as long as
+        # the lights fit into one block: more would be grouped by their kind.
         masks = iter(visible)
         test = (lambda toward, distance: next(masks)) if visible else None
-        return shade(position, normal, view, material, list(lights), ambient, test)
+        total: Any = 0
+        for begin in range(0, max(len(lights), 1), BLOCK):
+            block = list(lights[begin : begin + BLOCK])
+            total = total + shade(position, normal, view, material, block, ambient, test)
+        return total
 
     def _point(self, owner: int) -> Any:
         """Return the kernel's arrays of a material: place, textures, and masks of the lights."""

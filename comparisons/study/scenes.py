@@ -332,7 +332,8 @@ def lobe(point: Point, convention: Convention) -> tuple[dict[str, float], np.nda
         result[f"specular_{half}"] = float(mirrored[0])
         # A plateau of a degree or more is no peak.
         highest = in_plane > in_plane.max() * (1 - 1e-6)
-        if np.count_nonzero(highest) * PEAK_STEP < 1:  # n = 0 has no peak, k_s = 0 no lobe
+        # n = 0 has no peak, and k_s = 0 no lobe.
+        if in_plane.max() > 0 and np.count_nonzero(highest) * PEAK_STEP < 1:
             result[f"peak_{half}"] = float(np.argmax(in_plane)) * PEAK_STEP
     test, truth = images
     return result, test, truth
