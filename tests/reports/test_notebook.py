@@ -27,7 +27,7 @@ from tests.shared.programs import ROOT
 CELL = """
 from fotismos import compare
 import mitsuba as mi
-shown = compare(mi.cornell_box(), name="box <b>", spp=4, resolution=(16, 16))
+shown = compare(mi.cornell_box(), name="box <b>", spp=16, resolution=(16, 16))
 print(shown.comparison.record.resolution)
 shown
 """
