@@ -151,6 +151,7 @@ def find(
     if progress:
         progress(CAUSES, 0, 1)
     found = attribute(images, meter, shapes=surface.shape, seed=options.seed, clean=clean)
+    # The scene is the comparison's: it gets its size back.
     resize(ready.scene, (width, height))
     if progress:
         progress(CAUSES, 1, 1)
@@ -239,6 +240,7 @@ def attribute(
     sets = [nothing, *(frozenset({effect}) for effect in effects)]
     sets += [everything - left_out for left_out in sets]
 
+    # A dry run of the sums notes the subsets that they ask for.
     def note(simulated: frozenset[Effect]) -> float:
         sets.append(simulated)
         return 0.0
@@ -256,6 +258,7 @@ def attribute(
     gains, sampling_errors, drawn = shares(
         effects, error, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS
     )
+    # A gain is a change of the error: an effect that removes some has a negative one.
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
     departure = error(nothing)
     left = error(everything)
@@ -283,6 +286,7 @@ def attribute(
 
     previews = images.previews(errors, clean)
     kernel = images.pixels(images.plain_kernel).mean(axis=0)
+    # The kernel and its plugin compute the same: what differs is rounding.
     plugin = images.pixels(images.plugin(nothing)).mean(axis=0)
     rounding = meter.metric(plugin, kernel, meter.viewing)[meter.counted]
     return Causes(
@@ -356,6 +360,7 @@ def shares(
     ``orders`` are drawn, an even number of at least 4.
     """
     players = tuple(players)
+    # All orders, or pairs of random ones.
     is_exact = len(players) <= exact_players
     rng = np.random.default_rng(seed)
     walks: list[Sequence[int]] = [*permutations(range(len(players)))] if is_exact else []
@@ -376,6 +381,7 @@ def shares(
         return found, (0.0,) * len(players), 0
     errors = []
     for gain in gains.values():
+        # An order and its reverse depend on each other: together they are one draw.
         pairs = np.array([np.mean(change) for change in gain]).reshape(-1, 2).mean(axis=1)
         errors.append(float(pairs.std(ddof=1) / np.sqrt(len(pairs))))
     return found, tuple(errors), orders
