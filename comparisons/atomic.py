@@ -75,6 +75,8 @@ def file_name(name: object, what: str) -> str:
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a file to write to, and replace ``path`` with it if the block succeeds."""
+    # In the same folder, so that replacing is one rename. Names are cut by bytes, and what is
+    # left of a split character is dropped.
     end = f".{os.getpid()}{PARTIAL}"
     name = os.fsencode(path.name)[: LONGEST - 1 - len(end)].decode(errors="ignore")
     partial = path.with_name(f".{name}{end}")
@@ -148,6 +150,7 @@ class Entry:
         """
         try:
             text = content(self.path)
+            # Checksums have one length, so the head of an empty body is as long as any.
             body = text[len(self._head(b"")) : -1]
             result = json.loads(body) if text == self._head(body) + body + b"}" else None
         except (OSError, ValueError, RecursionError):

@@ -18,8 +18,8 @@ RGB = "llvm_ad_rgb"
 SPECTRAL = "llvm_ad_spectral"
 
 SUFFIXES = (".xml", ".py")
-PICTURES = (".exr", ".png")
 """Suffixes of scene files: Mitsuba's, and Python's."""
+PICTURES = (".exr", ".png")
 
 Scene = str | Path | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
 
@@ -99,6 +99,7 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
 def file_of(scene: str | Path) -> Path | None:
     """Return the path of a scene file, None for a built-in scene."""
     path = Path(scene)
+    # A folder may have the name of a built-in scene; only a scene's suffix always means a file.
     if not str(scene) or (path.suffix not in SUFFIXES and (path.is_dir() or not path.exists())):
         return None
     if not path.is_file():
@@ -131,6 +132,7 @@ def name_of(scene: str | Path) -> str:
 
 def _complete(source: Source, options: Options, word: str) -> Case:
     """Choose a scene's variant, and complete the options from it."""
+    # A scene can be read in a variant only, and tells which it wants once it is read.
     set_variant(options.variant or RGB)
     variant = options.variant or (SPECTRAL if wants_spectra(source.parse()) else RGB)
     set_variant(variant)
@@ -140,6 +142,7 @@ def _complete(source: Source, options: Options, word: str) -> Case:
 
 def picture_parts(word: str) -> tuple[Path, str]:
     """Return the file and the layer that a word names."""
+    # A path may hold colons: one separates a layer only after a picture's suffix.
     file, _, layer = word.rpartition(":")
     if file.lower().endswith(PICTURES):
         return Path(file), layer

@@ -101,6 +101,7 @@ def compare(
     comparison = comparison.warned(count_messages([*source.messages, *printed]))
     for step in then:
         comparison = step(comparison, ready, progress)
+    # Last, since colour-science is loaded in the meantime.
     return _computed_twice(comparison)
 
 
@@ -244,6 +245,7 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
     for rendered in loop:
         add_difference(sums, rendered.images)
         done = rendered.number + 1
+        # Else the images of this pass stay alongside the next ones.
         del rendered
         if options.noise is not None and is_checked(done, ready.passes):
             reached = noise_percentile(sums, counted, distance)
@@ -310,6 +312,7 @@ def _measure(estimates: Estimates, ready: Prepared) -> tuple[dict[str, Any], Ima
     """
     surface = ready.traced()
     options = ready.options
+    # A picture has noise of its own, whatever the plan is.
     exact = ready.plan.exact and not options.image
     test = estimates.heuristic
     reference = estimates.reference

@@ -92,6 +92,7 @@ POINTS = 2001
 def by_kernel(setting: Setting) -> NDArray[np.float32]:
     """Evaluate the kernel at a setting, in single precision: an array (N,)."""
     s = setting.rounded()
+    # Everything becomes (N, 3), then (3, N); of a number's three equal rows, one is read.
     vectors = (np.reshape(v, (-1, 3)) for v in (s.position, s.normal, s.view, s.light))
     numbers = (np.reshape(v, (-1, 1)) for v in (s.n, s.intensity))
     columns = [np.ascontiguousarray(v.T) for v in np.broadcast_arrays(*vectors, *numbers)]
@@ -133,6 +134,7 @@ def _about_mirror(angle: Floats) -> Floats:
 
 def _highlight(n: float, **changes: Any) -> Setting:
     """Return a setting across a highlight, from its middle to a thousandth of its peak."""
+    # `cos^n` is nearly `exp(−n angle² / 2)`.
     view = _about_mirror(np.linspace(0, np.sqrt(2 * np.log(1e3) / n), POINTS))
     return replace(Setting(normal=NORMAL, light=LIGHT, view=view, k_s=1.0, n=n), **changes)
 
@@ -171,6 +173,7 @@ _ON_CONE = Setting(k_d=1.0, cutoff=135.0, direction=(-3.0, 0.0, 4.0), light=-_RA
 """Integers at exactly 135 degrees from an axis: as far against it as across it."""
 
 
+# Rounded first: exact values are of the numbers that single precision holds.
 CASES = tuple(replace(case, setting=case.setting.rounded()) for case in (
     HardCase(name="exponent 0 at the lobe's end", group="Exponents", bound=2e-4,
           setting=Setting(k_s=1.0, n=0.0, view=(1.0, 0.0, 0.0)),

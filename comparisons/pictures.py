@@ -122,6 +122,7 @@ def read(word: str, transfer: str | None = None) -> np.ndarray:
         fault = "it is not a regular file" if path.exists() else "there is no such file"
         raise InputError(f"{path}: {fault}. Give a {' or '.join(PICTURES)} picture.")
     image = _exr(path, layer) if path.suffix.lower() == ".exr" else _png(path, transfer)
+    # A NaN would pass the later tests: it is neither above nor below.
     wrong = ~np.isfinite(image).all(axis=-1)
     if wrong.any():
         raise NonFiniteError(f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture.")
@@ -268,6 +269,7 @@ def geometry_edges(scene: mi.Scene, width: int, height: int) -> np.ndarray:
     """Return how much the geometry changes at each pixel, (H, W)."""
     surface = gbuffer(scene, (FINER * width, FINER * height))
     layers = np.concatenate([surface.normal, surface.hit[..., None]], axis=-1)
+    # Means over the rays of a pixel, (H, W, 4).
     return _edges(layers.reshape(height, FINER, width, FINER, 4).mean(axis=(1, 3)))
 
 
@@ -393,6 +395,7 @@ def picture_record(
     reference = images.reference[images.counted]
     template = np.array(half.half.sampled(TEMPLATE_SPP).render(0), float)
     height, width = images.counted.shape
+    # Edges that it may contain: of the geometry, of the textbook half, of the reference.
     expected = [geometry_edges(scene, width, height)]
     expected += [picture_edges(image) for image in (template, images.reference)]
     place = measure(np.mean(half.images, axis=0), expected)
@@ -469,6 +472,7 @@ def _white(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> I
     shown = _blocks(picture, counted)
     expected = _blocks(reference, counted)
     logs = np.log(shown / expected)
+    # Without the level of each block, the balance of its channels is left.
     logs -= logs.mean(axis=1, keepdims=True)
     tint = np.median(logs, axis=0)
     spread = np.median(np.abs(logs - tint), axis=0).max()
@@ -483,6 +487,7 @@ def _blocks(image: np.ndarray, counted: np.ndarray) -> np.ndarray:
     width = counted.shape[1] // BLOCK * BLOCK
     weighted = np.where(counted[..., None], image, 0)[:height, :width].astype(float)
     sums = weighted.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3).sum(axis=(1, 3))
+    # Both images count the same pixels and only ratios are used, so sums serve as means.
     sums = sums.reshape(-1, 3)
     means: np.ndarray = np.maximum(sums, 1e-3 * max(sums.mean(), 1e-9))
     return means

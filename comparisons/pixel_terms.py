@@ -169,6 +169,7 @@ class TermGrid:
 
     def light_image(self, light: GridLight) -> NDArray[np.float64]:
         """Return one light's terms, (H, W, 3); 0 where no shaded surface is seen."""
+        # The background's index, −1, is that of the black material at the end.
         k_d = np.array([material.k_d for material in self.materials] + [(0.0, 0.0, 0.0)])
         k_s = np.array([material.k_s for material in self.materials] + [(0.0, 0.0, 0.0)])
         diffuse = k_d[self.material] * np.maximum(light.cos_incidence, 0)[..., None]
@@ -277,6 +278,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | Missing:
     size = shrunk(image_size(scene), LIVE_SIDE)
     ray = centre_rays(scene, size)
     ahead = sensor.world_transform() @ mi.Vector3f(0, 0, 1)
+    # Directions that end on a plane are linear over the film: three corners give all others.
     film = (ray.o, ray.d / dr.dot(ray.d, ahead))
     corners = [0, size[0] - 1, -size[0]]
     points = _Points(scene, half.integrator, ray)
@@ -284,6 +286,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | Missing:
         return Missing("No pixel’s centre sees a shaded surface.")
     materials, places = points.materials()
     vectors = dict[str, Floats]()
+    # Many materials may be one with a texture: diffuse colours get planes of their own.
     if len(materials) > MATERIALS:
         vectors["k_d"] = points.select(lambda material: points.colours(material.k_d))
         has_ambient = points.colours(points.ambient).any()  # else k_a, too, does not matter
@@ -339,6 +342,7 @@ def _traced(scene: Scene, integrator: Any) -> TermGrid | Missing:
     )
     if len(lights) <= LIGHTS:
         return grid
+    # The strongest over the whole grid, in the scene's order; the others become one sum.
     images = [grid.light_image(light) for light in lights]
     order = np.argsort([-image.sum() for image in images], kind="stable")
     strongest = sorted(order[:LIGHTS])
@@ -397,6 +401,7 @@ class _Points:
 
     def materials(self, ones: Sequence[str] = ()) -> tuple[tuple[TermMaterial, ...], Whole]:
         """Return the different materials, with 1 for some of `ROW`, and each point's index."""
+        # A row of numbers for each point (`ROW`): points with equal rows share a material.
         number = self.floats(self.known.index(self.si, self.si.is_valid()))
         rows = np.column_stack((number, self.select(self._row), self.colours(self.ambient)))
         for name in ones:
@@ -432,6 +437,7 @@ class _Points:
         light = emitter.light(self.si, self.si.is_valid())
 
         def contribution(material: Material) -> LightContribution:
+            # The kernel leaves out what has a coefficient of 0, and its cosine with it.
             material = replace(material, k_d=1, k_s=1)
             one = kernel.contributions(
                 self.position, self.normal, self.view, material=material, lights=[light]
@@ -505,6 +511,7 @@ def layers(half: Renderer, options: Options, whole: Floats) -> dict[str, Floats]
         finally:
             integrator.shares = None
             integrator.hide_emitters = hidden
+    # Shares of the image; the last term is what the others leave, so that the sum is exact.
     together = sum(images.values())
     rest = whole
     for name in names[:-1]:

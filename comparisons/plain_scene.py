@@ -90,6 +90,7 @@ def _layers(scene: Scene) -> dict[str, np.ndarray]:
     """Trace the rays through the pixel centres."""
     seen = gbuffer(scene, image_size(scene))
     ids = [shape.id() for shape in scene.shapes()]
+    # The background's place, −1, is that of the 0 at the end.
     numbers = [ids.index(name) + 1 if name in ids else 0 for name in seen.shape.names]
     shape = np.array([*numbers, 0], np.float32)[seen.shape.places]
     return {"P": seen.position, "N": seen.normal, "shape": shape}
@@ -125,6 +126,7 @@ def camera(scene: mi.Scene) -> dict[str, Any]:
         [0.0, 0.0, -(far + near) / depth, -2 * far * near / depth],
         [0.0, 0.0, -1.0, 0.0],
     ]
+    # Half a turn about y leads from Mitsuba's axes to OpenGL's.
     view = np.diag([-1.0, 1.0, -1.0, 1.0]) @ np.linalg.inv(to_world)
     return {
         "width": width,
@@ -165,6 +167,7 @@ def material_of(bsdf: mi.BSDF, number: int, scene: mi.Scene) -> dict[str, Any]:
     material = bsdf.material(point, True, False, None, True)
     textures = {name: getattr(bsdf, name) for name in (*COEFFICIENTS, "n", "base_color")}
     colours = {name: textures[name].eval(point) for name in (*COEFFICIENTS, "base_color")}
+    # The `k_s` of a mirror is no lobe's: it shows none of these lights (8.7).
     if bsdf.is_mirror:
         colours["k_s"] = 0
     return {

@@ -57,10 +57,12 @@ def schedule(
     """
     largest = max(1, WAVEFRONT // pixels)
     if noise is not None:
+        # At most half the limit, so that two passes fit into it.
         per_pass = min(max(1, plan.spp // plan.passes), largest)
         per_pass = max(1, min(per_pass, (spp or LIMIT_SPP) // 2))
         return per_pass, max(2, (spp or LIMIT_SPP) // per_pass // 2 * 2)
     spp = spp or plan.spp
+    # With few samples there are fewer passes, of at least 4 samples if possible.
     passes = max(2, min(plan.passes, spp // 4 // 2 * 2))
     per_pass = max(1, spp // passes)
     if per_pass > largest:
@@ -250,6 +252,7 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
     if found.state == "disagreed":
         ready = prepare(source, options.changed(everything=True))
         ready = replace(ready, plan=ready.plan.unpruned("guard", found.words))
+    # The options are those given, even if everything had to be simulated.
     ready = replace(ready, options=options, guard=found)
     if not options.allow_empty:
         require_surface(ready.counted, source.name)

@@ -91,12 +91,14 @@ def shade(setting: Setting, dtype: Any) -> Floats:
         reflection = mirrored(normal, toward, view)[..., 0]
         power = clamped(reflection) ** dtype(s.n)
         distance = distance[..., 0]
+        # The light that arrives: 6.1, for a spot also its cone (6.2, 6.3) and fall-off (6.4).
         k0, k1, k2 = map(dtype, s.attenuation)
         arriving = dtype(s.intensity) / (k0 + k1 * distance + k2 * distance**2)
         if s.direction is not None:
             cos_axis = -dot(toward, unit(np.asarray(s.direction).astype(dtype)))[..., 0]
             inside = cos_axis >= np.cos(np.deg2rad(dtype(s.cutoff)))
             arriving = np.where(inside, arriving * np.maximum(cos_axis, 0) ** dtype(s.m), 0)
+        # 8.10; at the horizon and below it there is neither term.
         value = arriving * (dtype(s.k_d) * cosine + dtype(s.k_s) * power)
         return np.atleast_1d(np.where(cosine <= 0, 0, value))
 
@@ -110,8 +112,10 @@ def shade_exactly(setting: Setting) -> Floats:
     value = shade(setting, EXACT)
     with np.errstate(all="ignore"):
         normal, view, toward = map(unit, _vectors(setting, EXACT))
+        # Only without a diffuse term is the whole value the lobe's.
         if setting.k_d == 0:
             value = np.where(mirrored(normal, toward, view)[..., 0] > 0, value, 0)
+    # A vector of length 0 became NaN when `unit` divided it by that length.
     exists = ~np.isnan(dot(toward, toward) + dot(normal, normal) + dot(view, view))[..., 0]
     return np.where(exists, value, 0)
 

@@ -157,6 +157,7 @@ def measure_scene(
 
     ``spp`` of the options counts all passes, and is the plan's if omitted.
     """
+    options.require_model("a check of a scene")
     ready = guarded(source, options)
     spp = options.spp or ready.reference.pass_spp * ready.passes
     pass_spp = max(1, spp // count)
@@ -169,7 +170,9 @@ def measure_scene(
     heuristic, reference = images.mean(axis=0)
     caution = ready.require_light(heuristic, reference)
     pictures = {"heuristic": heuristic, "reference": reference}
-    return MeasuredScene(measurement=numbers, pictures=pictures, spp=spp, caution=caution)
+    return MeasuredScene(
+        measurement=numbers, pictures=pictures, spp=pass_spp * count, caution=caution
+    )
 
 
 def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
@@ -203,7 +206,10 @@ def _metrics(images: Array, counted: Array, viewing: Viewing) -> dict[str, Metri
     total = images.sum(axis=0)
     values = departure(total / count)
     errors = jackknife_error([departure((total - image) / (count - 1)) for image in images])
+    # With signs that sum to 0, the light of the passes cancels, and the noise does not.
     signs = np.where(np.arange(count) % 2, -1.0, 1.0)
+    signs -= signs.mean()
+    signs *= np.sqrt(count / (signs**2).sum())
     noise = np.einsum("i,ijkl->jkl", signs, images[:, 0] - images[:, 1]) / count
     reference = images[:, 1].mean(axis=0)
     floors = {
@@ -222,6 +228,7 @@ def _half(images: Array) -> Half:
     def estimate(values: Array) -> tuple[Floats, Floats]:
         return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(len(values))
 
+    # Means of each pass first: passes are independent, neighbouring pixels are not.
     whole = estimate(images.mean(axis=(1, 2)))
     blocks = estimate(block_means(images))
     rows = zip(*(part.tolist() for part in blocks), strict=True)
@@ -331,6 +338,7 @@ def _require_sane(baseline: Baseline) -> None:
     for half in (baseline.heuristic, baseline.reference):
         if half.means().ndim != 3:  # raises ValueError for rows that differ in length
             raise ValueError("there are no blocks.")
+    # The last test is written so that a NaN fails it, too.
     quantities = baseline.measured().quantities()
     numbers = [(quantity.value, quantity.error) for quantity in quantities]
     floors = [metric.noise_floor or 0.0 for metric in baseline.metrics.values()]

@@ -81,7 +81,9 @@ class Move(Record):
     def size(self) -> float:
         """How much it moved: metrics, which differ in unit, by their share, colours in light."""
         change = abs(self.after - self.before)
-        return change if self.half or self.block else change / max(self.before, self.after, 1e-9)
+        if self.half or self.block:
+            return change
+        return change / max(abs(self.before), abs(self.after), 1e-9)
 
     @property
     def change(self) -> str:
@@ -131,6 +133,7 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
     rounding = np.array([known.get(old.name, LINEAR_ROUNDING) for old, _ in pairs])
     rounding = np.maximum(rounding, RELATIVE_ROUNDING * np.abs(x).max(axis=1))
     spread = total > (1e-6 * rounding) ** 2  # sums of equal numbers differ in their last bits
+    # Deviations of single passes, as SciPy takes them; where there are none, t is not used.
     deviations = np.where(spread[:, None], errors, 1.0) * np.sqrt(count)
     t, p = ttest_ind_from_stats(
         x[:, 1], deviations[:, 1], count, x[:, 0], deviations[:, 0], count, equal_var=False
@@ -155,6 +158,7 @@ def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
 
 def sidak(p: ArrayLike, tests: int) -> NDArray[np.float64]:
     """Return the chance of a p-value as small as `p` among this many independent tests."""
+    # `1 − (1 − p)^n`, in a form that keeps its digits for small p.
     with np.errstate(divide="ignore"):  # p = 1
         chances: NDArray[np.float64] = -np.expm1(tests * np.log1p(-np.asarray(p, float)))
         return chances

@@ -93,12 +93,14 @@ class Repeats:
             values = np.asarray(image, np.float64)
             if count > 1:
                 require_one_size((mean, values))
+            # Welford's update takes the step from the old mean and from the new one.
             step = values - mean
             mean = mean + step / count
             squares = squares + step * (values - mean)
             for name, of_repeats in sums.items():
                 of_repeats.append(SUMS[name](values))
             known.add(hash(values.tobytes()))
+        # Two of one seed would hide noise; all may be equal, where a picture has none.
         if 1 < len(known) < count:
             raise InputError("some repeats are equal: give each its own seed.")
         variance = squares / max(count - 1, 1)
@@ -163,6 +165,7 @@ def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
     """
     m = before.count
     n = after.count
+    # Weights by degrees of freedom: a single repeat has none.
     first = (m - 1) / (m + n - 2)
     second = (n - 1) / (m + n - 2)
     d = after.mean - before.mean
@@ -174,6 +177,7 @@ def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
     def over(side: int) -> Means:
         pixels = block_sums(np.ones_like(d[:, :, :1]), side)
         total = block_sums(d, side)
+        # Q; it counts only if some pixel varies, else a change would hide in its own spread.
         spread = np.maximum(block_sums(d * d, side) - total**2 / pixels, 0.0)
         square = r * np.maximum(block_sums(noise, side), spread * noise.any(axis=(0, 1, 2)))
         old = block_sums(before.mean, side) / pixels
@@ -238,6 +242,7 @@ def _side(image: Array, scale: int = 1) -> int:
 
 def _tiles(image: Array, scale: int = 1) -> Array:
     """Return sums over whole tiles (rows, columns, ...); of a smaller picture, over itself."""
+    # Tiles are whole blocks; a rest at the right and at the bottom is left out.
     side = _side(image, scale)
     height = max(image.shape[0] // side * side, side)
     width = max(image.shape[1] // side * side, side)
@@ -346,6 +351,7 @@ class PictureCheck:
         ):
             size = np.maximum((weights * base).sum(axis=(0, 1)), 1e-30)
             value = (weights * (new - old)).sum(axis=(0, 1)) / size
+            # If the baseline, changed alike, agrees everywhere, the change explains all.
             shifted = replace(self.before, mean=self.before.mean + value * image)
             if not any(mean.moved(self.level).any() for mean in means(shifted, self.after)):
                 shown = map(_interval, start + value, 2.0 / np.sqrt(size))

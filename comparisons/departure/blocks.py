@@ -30,6 +30,7 @@ def neighbourhood(values: Array, first: int = 0) -> Array:
     """Return sums of each block (h, w, ...) and its eight neighbours; `first` is the row axis."""
     around = [(0, 0)] * values.ndim
     around[first] = around[first + 1] = (1, 1)
+    # A frame of zeros: blocks at the edge have fewer neighbours in their sum.
     padded = np.pad(values, around)
     windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3), (first, first + 1))
     return np.asarray(windows.sum(axis=(-2, -1)))
@@ -56,6 +57,7 @@ def shrunk(sides: Sequence[int], longest: int) -> tuple[int, int]:
 def averaged(image: NDArray[np.floating], shape: Sequence[int]) -> Array:
     """Average an image (H, W, 3) down to ``shape``, whose first sides are height and width."""
     height, width = shape[:2]
+    # Pillow resizes single channels of floats, but no images of three.
     planes = [Image.fromarray(image[..., channel].astype(np.float32)) for channel in range(3)]
     small = [plane.resize((width, height), Image.Resampling.BOX) for plane in planes]
     return np.stack([np.asarray(plane, float) for plane in small], axis=-1)

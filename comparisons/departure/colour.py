@@ -121,6 +121,7 @@ def to_srgb(linear: ArrayLike) -> Array:
 
 def from_srgb(encoded: ArrayLike) -> Array:
     """Return linear values: ``v / 12.92`` up to 0.04045, else ((v + 0.055) / 1.055)^2.4."""
+    # Both branches are evaluated everywhere: a power of a negative value would be NaN.
     encoded = np.asarray(encoded)
     low = encoded <= 0.04045
     return np.where(low, encoded / 12.92, ((np.maximum(encoded, 0.04045) + 0.055) / 1.055) ** 2.4)
@@ -138,6 +139,7 @@ def rgb_to_xyz(primaries: tuple[tuple[float, float], ...]) -> Array:
     xyz = np.array([[x / y, 1.0, (1.0 - x - y) / y] for x, y in primaries])
     colours = xyz[:-1].T
     white = xyz[-1]
+    # Columns are the primaries, scaled so that RGB (1, 1, 1) is white.
     return colours * np.linalg.solve(colours, white)
 
 
@@ -153,13 +155,17 @@ def _to_cam16ucs(viewing: Viewing, largest: float = 1.0) -> Formula:
     shown = _displayed(viewing, largest)
     white = 100.0 * rgb_to_xyz(BT709).sum(axis=1)
     adapting = 0.2 * viewing.ambient_illuminance / np.pi  # cd/m²
+    # The degree of adaptation D, and the gain that it gives to each cone response.
     degree = min(max(_F * (1.0 - exp((-adapting - 42.0) / 92.0) / 3.6), 0.0), 1.0)
     sharp = _M16 @ white
     gain = degree * white[1] / sharp + 1.0 - degree
+    # F_L, the adaptation to the level of luminance.
     k = 1.0 / (5.0 * adapting + 1.0)
     level = 0.2 * k**4 * 5.0 * adapting + 0.1 * (1.0 - k**4) ** 2 * (5.0 * adapting) ** (1 / 3)
+    # N_bb, which is also N_cb, from the background's share of white.
     n = viewing.background / white[1]
     induction = 0.725 * n**-0.2
+    # A_w without N_bb, which cancels in A / A_w.
     power = (gain * sharp * level / 100.0) ** 0.42
     achromatic = np.array([2.0, 1.0, 0.05]) @ (400.0 * power / (power + 27.13))
     # Viewing conditions are inputs of the kernel, so one kernel serves them all.
@@ -186,12 +192,15 @@ def _cam16ucs(
     light = 2.0 * red + green + 0.05 * blue
     j = _signed_power(light * dimming, exponent)
     size = dr.sqrt(a * a + b * b)
+    # Grey has no hue, and 0 / 0 would be NaN; its chroma of 0 hides the one chosen.
     has_hue = size > 0.0
     cosine = dr.select(has_hue, a / size, 1.0)
     sine = dr.select(has_hue, b / size, 0.0)
+    # `(cos(h + 2) + 3.8) / 4`, by the sum of angles: the angle itself is not needed.
     eccentricity = (cos(2.0) * cosine - sin(2.0) * sine + 3.8) / 4.0
     t = chromatic * eccentricity * size / (red + green + 1.05 * blue + 0.305)
     colourfulness = _signed_power(t, 0.9) * _signed_power(j, 0.5) * level
+    # CAM16-UCS: J and M compressed, with M along the hue.
     shown = dr.log(1.0 + 0.0228 * colourfulness) / 0.0228
     return Array3f64(170.0 * j / (1.0 + 0.7 * j), shown * cosine, shown * sine)
 
@@ -203,6 +212,7 @@ def _signed_power(base: Float64, exponent: float | Float64) -> Float64:
 def delta_e_00(first: Array3f64, second: Array3f64) -> Float64:
     """Return ΔE00 between CIE L*a*b* colours, with k_L = k_C = k_H = 1."""
     chroma = [dr.sqrt(a * a + b * b) for _, a, b in (first, second)]
+    # 1 + G, by which a is stretched near the neutral axis.
     stretch = 1.5 - 0.5 * _saturation((chroma[0] + chroma[1]) / 2.0)
     (l1, a1, b1) = first
     (l2, a2, b2) = second
@@ -210,6 +220,7 @@ def delta_e_00(first: Array3f64, second: Array3f64) -> Float64:
     c2 = dr.sqrt(dr.square(a2 * stretch) + b2 * b2)
     h1 = _hue(a1 * stretch, b1)
     h2 = _hue(a2 * stretch, b2)
+    # The hue of a grey is 0 here: if one colour is grey, `total` is the hue of the other.
     has_hues = c1 * c2 != 0.0
     turn = h2 - h1
     total = h1 + h2
@@ -219,6 +230,7 @@ def delta_e_00(first: Array3f64, second: Array3f64) -> Float64:
     turn = dr.select(has_hues, turn, 0.0)
     middle = total + dr.select(wide, dr.select(total < 360.0, 360.0, -360.0), 0.0)
     hue = dr.select(has_hues, middle / 2.0, total)
+    # Differences over their weights S_L, S_C and S_H, and the rotation R_T in the blue.
     lightness = (l1 + l2) / 2.0
     mean = (c1 + c2) / 2.0
     t = (
@@ -331,6 +343,7 @@ def itp(viewing: Viewing) -> Formula:
     """720 · (I, T, P) of linear RGB, whose Euclidean distance is ΔE_ITP."""
     matrix = np.linalg.inv(rgb_to_xyz(BT2020)) @ rgb_to_xyz(BT709)
     level = opaque(viewing.exposure * viewing.white_luminance)
+    # BT.2124 halves the second coordinate: T = C_T / 2.
     scale = Array3f64(720.0, 360.0, 720.0)
 
     def convert(rgb: Array3f64) -> Array3f64:

@@ -92,6 +92,7 @@ def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
     """
     start, stop = exposures(_exposed(reference, viewing))
     factors = 2.0 ** np.linspace(start, stop, max(2, ceil(stop - start)))
+    # Factors are inputs of the kernel, so that all exposures share one.
     curves = [partial(_toned, factor=dr.opaque(Float32, factor)) for factor in factors.tolist()]
     return _flip(test, reference, viewing=viewing, curves=curves)
 
@@ -118,6 +119,7 @@ def _flip(test: Array, reference: Array, viewing: Viewing, curves: Sequence[Curv
     eye = _Eye.at(float(viewing.pixels_per_degree))
     result: Plane = np.zeros(test.shape[:2], np.float32)
     height, width = result.shape
+    # A margin as wide as the filters: beyond the edge the last pixel repeats.
     columns = np.clip(np.arange(-eye.reach, width + eye.reach), 0, width - 1)
     for rows in bands(height):
         near = np.clip(np.arange(rows.start - eye.reach, rows.stop + eye.reach), 0, height - 1)
@@ -165,10 +167,13 @@ class _Eye:
     @lru_cache(maxsize=2)
     def at(cls, pixels: float) -> "_Eye":
         widest = max(width for parts in _SENSITIVITY for _, width in parts)
+        # Three standard deviations of the widest Gaussian, `√(width / 2) / π` degrees each.
         reach = ceil(3.0 * sqrt(widest / 2.0) / pi * pixels)
         spread = 0.5 * _FEATURE * pixels
         x = np.arange(-reach, reach + 1.0)
+        # The detectors end sooner, at three of their own; all filters have one length.
         smooth = np.where(np.abs(x) <= ceil(3.0 * spread), np.exp(-((x / spread) ** 2) / 2.0), 0.0)
+        # First and second derivative; sign and scale do not matter.
         edge = _balanced(x * smooth)
         point = _balanced(((x / spread) ** 2 - 1.0) * smooth)
         return cls(
@@ -191,6 +196,7 @@ class _Eye:
             np.sum([share * _across(_down(plane, band), band) for share, band in parts], axis=0)
             for plane, parts in zip(planes, self.blurs, strict=True)
         ]
+        # Detectors along one axis, smooth along the other: two for edges and two for points.
         light = planes[0]
         smooth = _down(planes[0], self.smooth)
         slope = dr.hypot(
@@ -208,6 +214,7 @@ class _Eye:
 
 def _blurs(parts: tuple[tuple[float, float], ...], degrees: Array) -> Blurs:
     """Return the shares and the bands of a channel's Gaussians, sampled at some degrees."""
+    # `weight √(π / width) exp(−π² r² / width)`; in two dimensions its sum is its share.
     curves = [np.exp(-(pi**2) * degrees**2 / width) for _, width in parts]
     shares = [
         weight * sqrt(pi / width) * curve.sum() ** 2
@@ -228,6 +235,7 @@ def _balanced(weights: Array) -> Array:
 
 def _band(weights: Array) -> Plane:
     """Return the matrix (_TILE, _TILE + 2 reach) that filters columns."""
+    # Row i has the weights from column i on: windows of the padded strip, the last one first.
     strip = np.pad(weights, _TILE - 1).astype(np.float32)
     windows = np.lib.stride_tricks.sliding_window_view(strip, _TILE + len(weights) - 1)
     return np.ascontiguousarray(windows[::-1])
@@ -262,6 +270,7 @@ def _error(truth: Seen, shown: Seen) -> Plane:
     second, other_edge, other_point = shown
     slope = dr.abs(edge - other_edge)
     curvature = dr.abs(point - other_point)
+    # `√(max / √2)`: the difference of two slopes is at most √2.
     feature = sqrt(sqrt(0.5)) * dr.sqrt(dr.maximum(slope, curvature))
     colour = _redistributed(_apart(first, second))
     # Equal colours are 0 apart, whatever the power.

@@ -115,6 +115,7 @@ def find(
     if difference.passes < FEWEST:
         marks[counted] = UNDETERMINED
         return Marks(image=marks, is_certain=False)
+    # Blocks first, then the pixels of those that differ.
     around = _Around.of(difference, counted)
     share = BLOCK_LEVEL / LEVEL * level
     rate = level - share
@@ -135,6 +136,7 @@ def find(
 
 def _discoveries(chances: Array, rate: float) -> float:
     """Return the largest chance that counts as a discovery (Benjamini and Hochberg); −1 if none."""
+    # The largest `p(i) <= rate i / n`; all smaller chances are discoveries with it.
     ordered = np.sort(chances)
     passed = ordered <= rate * np.arange(1, len(ordered) + 1) / max(len(ordered), 1)
     return float(ordered[passed][-1]) if passed.any() else -1.0
@@ -151,6 +153,7 @@ def _chances(
     """
     from scipy.special import ndtri, stdtr
 
+    # Where the test image is brighter, light may be missing from the reference, else from it.
     size = np.where(difference > 0.0, *sizes)
     supposed = variance + size * np.abs(difference)
     deviations = np.zeros(supposed.shape)
@@ -158,6 +161,7 @@ def _chances(
     # Student's tails are slow to compute, and never lighter than the normal distribution's.
     near = deviations.max(axis=-1) >= -ndtri(most / 6.0)
     found = np.ones(near.shape)
+    # Six times one tail: two signs of three channels (Bonferroni).
     found[near] = 6.0 * stdtr(freedom[near], -deviations[near]).min(axis=-1)
     return np.where(found <= most, found, 1.0)
 
@@ -183,22 +187,26 @@ class _Around:
     def of(cls, difference: DifferenceEstimate, counted: NDArray[np.bool_]) -> "_Around":
         parts = [_sums(difference, counted, rows) for rows in bands(len(counted))]
         pixels, mean, variance, squares, *skewed = map(np.concatenate, zip(*parts, strict=True))
+        # (2, h, w, 3): contributions to the reference make cumulants below 0, which come first.
         third = np.array(skewed[:2])
         moved = np.array(skewed[2:])
         # If noise is large on both sides, the cubes of one would hide those of the other.
         one_sided = ratio(neighbourhood(third, 1), neighbourhood(moved, 1))
         largest = one_sided.max(axis=(1, 2))[:, None, None]
         around = neighbourhood(variance)
+        # Near noise the sign of its skewness tells the side; without any, nothing is excluded.
         both = ratio(neighbourhood(third[0] - third[1]), around)
         sizes = np.where(around > 0.0, np.maximum([both, -both], 0.0), largest)
         # Variances differ among blocks: a block counts as much as its eight neighbours.
         near = [neighbourhood(sums) + 8.0 * sums for sums in (pixels, variance, squares)]
         pooled = ratio(near[1], near[0])
+        # Mean square over squared mean, less 1: the relative variance of the pixels' variances.
         scatter = ratio(ratio(near[2], near[0]), pooled**2) - 1.0
         freedom = difference.passes - 1
         return cls(
             pixels=pixels,
             difference=ratio(mean, pixels),
+            # Of a block's mean, as if its pixels were independent: `_inflation` corrects it.
             variance=ratio(variance, pixels**2),
             sizes=sizes,
             largest_sizes=largest,
@@ -219,10 +227,12 @@ class _Around:
 
         The image's largest contributions count: rare ones may only have been seen elsewhere.
         """
+        # One contribution moves the mean of a block by its size over the number of pixels.
         sizes = ratio(self.largest_sizes, self.pixels) * inflation
         # A quarter, since neighbours and their squares are not quite independent.
         freedom = np.maximum(neighbourhood(self.pixels) * self.own_freedom / 4.0, 1.0)
         chances = _chances(self.difference, self.variance * inflation, sizes=sizes, freedom=freedom)
+        # Bonferroni, over the blocks that hold counted pixels.
         tested = self.pixels[..., 0] > 0
         return tested & (chances <= level / max(int(np.count_nonzero(tested)), 1))
 
@@ -286,10 +296,12 @@ class _Pixels:
         mask = mask[rows]
         mean = difference.mean[rows][mask]
         variance = _variance(difference, rows)[mask]
+        # Bands hold whole blocks, so they begin where a block does.
         blocks = slice(rows.start // BLOCK, -(-rows.stop // BLOCK))
         by_block = (around.pooled_freedom, around.quantile, around.pooled_variance, *around.sizes)
         by_pixel = [spread_out(values[blocks], mask.shape)[mask] for values in by_block]
         prior, quantile, pooled, *sizes = by_pixel
+        # Smyth: the pooled variance weighs as much as its degrees of freedom.
         freedom = prior + around.own_freedom
         moderated = (prior * pooled + around.own_freedom * variance) / freedom
         return cls(mean, np.maximum(variance, moderated), np.array(sizes), freedom, quantile)
@@ -307,9 +319,11 @@ class _Pixels:
         noise: no light has arrived that could vary.
         """
         t = self.quantile
+        # The larger root of `u² = t² (V + c u)`, for light missing from either image.
         half = t * t * self.sizes / 2.0
         below, above = half + np.sqrt(half**2 + t * t * self.variance)
         are_visible: NDArray[np.bool_] = (below + above == 0.0).all(axis=-1)
+        # The true reference at both ends: larger by `below` where it lacks light.
         for end in (below, -above):
             rest = ~are_visible
             reached = shown[rest] - self.difference[rest] + end[rest]
@@ -323,6 +337,7 @@ def _prior_freedom(scatter: Array, freedom: int) -> Array:
     If true variances follow a scaled inverse χ² with ``d0`` degrees of freedom, variances measured
     with ``d`` have a relative variance of ``2 (d + d0 − 2) / (d (d0 − 4))``, solved for ``d0``.
     """
+    # No more scatter than that of χ² itself: all pixels have one variance, known by pooling.
     more = scatter * freedom - 2.0
     prior = ratio(2.0 * freedom - 4.0 + 4.0 * scatter * freedom, more)
     return np.where(more > 0.0, np.minimum(prior, _NORMAL), _NORMAL)
@@ -337,6 +352,7 @@ def _inflation(difference: DifferenceEstimate) -> float:
     variance = difference.standard_error.reshape(-1, 3)[grouped.places].astype(np.float64) ** 2
     independent = grouped.by_block(variance)
     sums = np.stack([grouped.by_block(mean) for mean in grouped.means])
+    # The variance of the weighted mean of K groups: `Σ w (m − mean)² / ((K − 1) Σ w)`.
     weights = grouped.sizes[:, None, None]
     spread = (weights * (sums - np.average(sums, axis=0, weights=grouped.sizes)) ** 2).sum(axis=0)
     spread /= max(len(weights) - 1, 1) * weights.sum()

@@ -145,6 +145,7 @@ class Metric:
         if not values.size:
             return 0.0
         if self.linear:
+            # Each distance is a root mean square of channels: squares average over all values.
             return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
         return float(values.mean(dtype=np.float64))
 

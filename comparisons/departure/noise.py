@@ -114,11 +114,13 @@ def roughly(metric: Metric, values: Floats, noise: Floats) -> dict[str, Any]:
     shares = [
         shares_above(distances, metric.visible)
         for distances in (
+            # The value, then both ends: the truth is at most `noise` away from what is measured.
             np.sqrt(np.maximum(values**2 - noise**2, 0.0)),
             values - noise,
             values + noise,
         )
     ]
+    # Noise added once more is taken to add its square: what remains is `√(mean² − floor²)`.
     clean = max(float(without_noise(mean, np.hypot(mean, floor))), 0.0)
     half = MARGIN * floor
     return _fields(
@@ -146,6 +148,7 @@ def _fields(metric: Metric, value: float, low: float, high: float, shares: Array
 
 def shares_above(distances: Floats, thresholds: Sequence[float]) -> Array:
     """Return the share of distances (N,) above each threshold, (T,), which rise; 0 of none."""
+    # Counts by the number of thresholds strictly below, summed from the top.
     counts = np.bincount(np.searchsorted(thresholds, distances), minlength=len(thresholds) + 1)
     return counts[:0:-1].cumsum()[::-1] / max(len(distances), 1)
 
@@ -165,6 +168,7 @@ def debiased(
     coordinates = metric.coordinates(shown, viewing)
 
     def distances(differences: Array) -> Array:
+        # All noise of the difference goes to the reference: the test image stays as shown.
         references = metric.coordinates(shown - differences, viewing)
         return metric.difference(references, np.broadcast_to(coordinates, references.shape))
 
@@ -173,6 +177,7 @@ def debiased(
         _Extrapolated.of(metric, distances, grouped, [k for k in range(count) if k != out]).clean
         for out in range(count)
     ]
+    # Noise of the passes, and blocks that are not sampled: independent, so squares add up.
     error = float(np.hypot(jackknife_error(left_out), sampling_error(whole.added, grouped)))
     # The bias comes from the sample, the value that it is subtracted from is over all pixels.
     measured = _mean(metric, raw)
@@ -181,6 +186,7 @@ def debiased(
     half = student(0.0, error, count).high
     half += whole.gap / 2.0 + np.sqrt(middle**2 + CURVATURE * whole.noise**2) - middle
     value, low, high = np.maximum(measured - added + half * np.array([0, -1, 1]), 0.0)
+    # Up to here a linear metric is a mean square.
     if metric.linear:
         value, low, high = np.sqrt([value, low, high])
     shares = _shares(metric.visible, distances, grouped, raw)
@@ -278,11 +284,13 @@ def _shares(
     noise = np.tensordot(contrasts(grouped.sizes), grouped.means, 1)
     plain, *drawn = distances(np.concatenate([mean[None], _draws(mean, noise, grouped)]))
     steps = np.arange(len(thresholds))
+    # (P, T): whether a pixel is above a threshold, and the share of draws in which it is.
     before = np.searchsorted(thresholds, plain)[:, None] > steps
     chance = np.mean(
         [np.searchsorted(thresholds, values)[:, None] > steps for values in drawn], axis=0
     )
     added = before.mean(axis=0) - chance.mean(axis=0)
+    # The last factor makes `p (1 − p)` of few draws unbiased.
     undecided = (chance * (1.0 - chance)).mean(axis=0) * len(drawn) / (len(drawn) - 1)
     # The noise's part comes from the sample, the value that it is subtracted from is of all pixels.
     value = shares_above(raw, thresholds) - added
@@ -308,12 +316,15 @@ def _draws(mean: Array, noise: Array, grouped: Grouped) -> Array:
         middle = grouped.by_block(image) / pixels
         return middle, image - middle[blocks]
 
+    # Means of blocks (B, 3) and what pixels add to them (P, 3); of noise with a J in front.
     middle, off = split(mean)
     noise_middle, noise_off = map(np.array, zip(*map(split, noise), strict=True))
     spread = grouped.by_block(np.mean(noise_off**2, axis=0)) / pixels
+    # How much of a pixel's offset is kept: noise takes at most one deviation from it.
     true = 1.0 - ratio(spread, grouped.by_block(off**2) / pixels)[blocks]
     most = ratio(np.sqrt(spread)[blocks], np.abs(off))
     true = np.clip(np.maximum(true, 1.0 - most), 0.0, 1.0)
+    # How much of a block's mean is kept, the same for its three channels.
     noise_size = np.mean(noise_middle**2, axis=0).sum(axis=1)
     size = (middle**2).sum(axis=1)
     level = np.clip(1.0 - ratio(noise_size, size), 0.0, 1.0)
@@ -361,6 +372,7 @@ class _Extrapolated:
         else:
             pair = plain**2, np.mean(np.square(noisy), axis=0)
             squares = np.array([grouped.by_block(values) for values in pair])
+            # Sums over blocks by both rules; that of a mean square is its root times the pixels.
             lower = without_noise(before, after)
             upper = np.minimum(without_noise(*np.sqrt(squares * pixels)), before)
             added = before - (lower + upper) / 2.0
@@ -373,6 +385,7 @@ class _Extrapolated:
 def sampling_error(added: Array, grouped: Grouped) -> Array:
     """Return the standard error of what noise adds to sums of blocks (B, ...), due to sampling."""
     pixels = grouped.by_block(np.ones(len(grouped.places)))
+    # A ratio estimate: each block's scatter about its share by pixels.
     left = added - np.multiply.outer(pixels, added.sum(axis=0) / pixels.sum())
     share = 1.0 - grouped.sampled / grouped.total
     spread = np.sqrt((left**2).sum(axis=0) / max(len(left) - 1, 1))
@@ -387,6 +400,8 @@ def contrasts(sizes: Array) -> Array:
     over the number of passes.
     """
     count = len(sizes)
+    # In units of each group's own deviation the weights of the mean are as `√sizes`: QR keeps
+    # their direction as the first column, and makes the others orthogonal to it.
     waves = np.cos(np.pi * np.outer(np.arange(count) + 0.5, np.arange(count)) / count)
     waves[:, 0] = np.sqrt(sizes)
     basis, _ = np.linalg.qr(waves)

@@ -105,12 +105,14 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
 
 def _best_box(worth: NDArray[np.float64]) -> tuple[slice, slice, float]:
     """Return the box of cells with the greatest sum, the first of equal ones, and the sum."""
+    # Sums of all rows above each edge: a strip is the difference of two.
     below = np.vstack([np.zeros(worth.shape[1]), worth.cumsum(axis=0)])
     top, bottom = np.triu_indices(len(below), 1)
     strips = below[bottom] - below[top]  # a row for each pair: the sums of its columns
     running = np.full(len(strips), -np.inf)
     start = np.zeros(len(strips), int)
     best = (-np.inf, 0, 0, 0)
+    # For each strip the best sum that ends at this column; after a loss it begins here.
     for column, strip in enumerate(strips.T):
         fresh = running <= 0.0
         running = np.where(fresh, strip, running + strip)
@@ -144,6 +146,8 @@ def find_objects(
     ranked = sorted(present, key=lambda index: -sums[index])
     if len(ranked) > MOST_OBJECTS:
         ranked = ranked[: MOST_OBJECTS - 1]
+    # The row of each owner; the last entry is what a place of −1 indexes.
+    # Owners without a row of their own share the one after the ranked ones.
     rows = np.full(len(owners.names) + 1, len(ranked))
     rows[ranked] = np.arange(len(ranked))
     rows[-1] = -1

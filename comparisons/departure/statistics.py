@@ -110,9 +110,11 @@ def summarise(
     after = numbers
     if factor != 1.0:
         after = _numbers(metric, exposed)
+        # A factor of a sample, or of least squares, may be worse over all pixels.
         if after["mean"] > numbers["mean"]:
             factor = 1.0
             after = numbers
+    # Without noise: as it is if there is none, by extrapolation, or by the triangle inequality.
     clean = None
     if not noise_alone.any():
         clean = exactly(metric, values)
@@ -186,6 +188,7 @@ def _blocks(metric: Metric, image: Array) -> Iterator[slice]:
 
 
 def _rows(image: Array) -> Iterator[slice]:
+    # In a list of pixels (N, 3) each one is a row.
     step = max(1, _BLOCK_PIXELS * len(image) // max(image.size // 3, 1))
     return (slice(start, start + step) for start in range(0, len(image), step))
 
@@ -234,6 +237,7 @@ def best_exposure(
     def mean_at(stops: float) -> float:
         return metric.mean(distances(2.0**stops * shown))
 
+    # The bracket: all whole stops at once, (13, n, 3), on fewer pixels.
     whole_stops = np.arange(-EXPOSURE_STOPS, EXPOSURE_STOPS + 1.0)
     bracketing = 2.0 ** whole_stops[:, None, None] * shown[:_BRACKET_PIXELS]
     some = np.broadcast_to(truth[:_BRACKET_PIXELS], bracketing.shape)

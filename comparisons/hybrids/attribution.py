@@ -158,35 +158,38 @@ def find(
         ready.scene, ready.reference.integrator, pass_spp=spp, label="reference image", size=size
     )
     took = 0.0
-    while True:
-        started = perf_counter()
-        # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
-        loop = passes(
-            [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
-            progress=progress, stage="reference",
-        )  # fmt: skip
-        groups = np.stack([np.array(rendered.images[0]) for rendered in loop])
-        meter = ErrorMeter(groups, surface.hit, options.viewing, leading)
-        images = HybridImages(
-            pairs,
-            scenes,
-            replicates=REPLICATES,
-            replicate_spp=reference.pass_spp,
-            seed=options.seed,
-            size=size,
-        )
-        if progress:
-            progress(CAUSES, 0, 1)
-        found = attribute(images, meter, shapes=surface.shape, seed=options.seed, clean=clean)
-        before = took
-        took = perf_counter() - started
-        # The first samples also compile: more of them take less than their number says.
-        growth = took / before if before else 2.0
-        is_late = perf_counter() - begin + growth * took > limit_s
-        if is_closed(found.record) or is_late:
-            break
-        reference = reference.sampled(MORE * reference.pass_spp)
-    resize(ready.scene, (width, height))
+    try:
+        while True:
+            started = perf_counter()
+            # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
+            loop = passes(
+                [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
+                progress=progress, stage="reference",
+            )  # fmt: skip
+            groups = np.stack([np.array(rendered.images[0]) for rendered in loop])
+            meter = ErrorMeter(groups, surface.hit, options.viewing, leading)
+            images = HybridImages(
+                pairs,
+                scenes,
+                replicates=REPLICATES,
+                replicate_spp=reference.pass_spp,
+                seed=options.seed,
+                size=size,
+            )
+            if progress:
+                progress(CAUSES, 0, 1)
+            found = attribute(images, meter, shapes=surface.shape, seed=options.seed, clean=clean)
+            before = took
+            took = perf_counter() - started
+            # The first samples also compile: more of them take less than their number says.
+            growth = took / before if before else 2.0
+            is_late = perf_counter() - begin + growth * took > limit_s
+            if is_closed(found.record) or is_late:
+                break
+            reference = reference.sampled(MORE * reference.pass_spp)
+    finally:
+        # The scene is the comparison's: it gets its size back.
+        resize(ready.scene, (width, height))
     if progress:
         progress(CAUSES, 1, 1)
     return found
@@ -291,6 +294,7 @@ def attribute(
     sets = [nothing, *(frozenset({effect}) for effect in effects)]
     sets += [everything - left_out for left_out in sets]
 
+    # A dry run of the sums notes the subsets that they ask for.
     def note(simulated: frozenset[Effect]) -> float:
         sets.append(simulated)
         return 0.0
@@ -308,6 +312,7 @@ def attribute(
     gains, sampling_errors, drawn = shares(
         effects, error, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS
     )
+    # A gain is a change of the error: an effect that removes some has a negative one.
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
     departure = error(nothing)
     left = error(everything)
@@ -339,6 +344,7 @@ def attribute(
 
     previews = images.previews(errors, clean)
     kernel = images.pixels(images.plain_kernel).mean(axis=0)
+    # The kernel and its plugin compute the same: what differs is rounding.
     plugin = images.pixels(images.plugin(nothing)).mean(axis=0)
     rounding = meter.metric(plugin, kernel, meter.viewing)[meter.counted]
     return Causes(
@@ -412,6 +418,7 @@ def shares(
     ``orders`` are drawn, an even number of at least 4.
     """
     players = tuple(players)
+    # All orders, or pairs of random ones.
     is_exact = len(players) <= exact_players
     rng = np.random.default_rng(seed)
     walks: list[Sequence[int]] = [*permutations(range(len(players)))] if is_exact else []
@@ -432,6 +439,7 @@ def shares(
         return found, (0.0,) * len(players), 0
     errors = []
     for gain in gains.values():
+        # An order and its reverse depend on each other: together they are one draw.
         pairs = np.array([np.mean(change) for change in gain]).reshape(-1, 2).mean(axis=1)
         errors.append(float(pairs.std(ddof=1) / np.sqrt(len(pairs))))
     return found, tuple(errors), orders

@@ -156,6 +156,7 @@ class HybridScenes:
         All sets have the same scene; one integrator, which can leave out effects, renders them.
         """
         scene = self.of(sets[0])
+        # Every image has what the halves treat alike: only their differences are left out.
         alike = set(EFFECTS) - set(self.differences)
         plans = [self.plan.directly().simulating(alike | set(simulated)) for simulated in sets]
         integrator = physical_integrator(plans[0], scene, self.pair.hide_emitters)
@@ -173,6 +174,7 @@ class HybridScenes:
         if not left_out:
             return None
         graph = self.pair.heuristic.copy()
+        # A background that is not simulated stays; all other lights go.
         for key, index in graph.children(0, EMITTER):
             seen = not lights.is_heuristic(graph.plugin(index)) and ENVIRONMENT in left_out
             if not seen or self.pair.hide_emitters:
@@ -238,6 +240,7 @@ class HybridImages:
         groups: dict[tuple[str, frozenset[Effect]], list[frozenset[Effect]]] = {}
         for simulated in dict.fromkeys(frozenset(simulated) - OF_KERNEL for simulated in sets):
             groups.setdefault(self._group(simulated), []).append(simulated)
+        # Sorted by variant: a change of it takes as long as a small image.
         for (name, _), group in sorted(groups.items(), key=lambda found: found[0][0]):
             # In one order of transports: scenes that differ only in data share a kernel.
             group.sort(
@@ -319,6 +322,7 @@ class HybridImages:
             self._scenes[mi.variant()] = HybridScenes(pair, self._ready.plan, physical)
         scenes = self._scenes[mi.variant()]
         found = self._passes(scenes.transport(sets, self._pass_spp), len(sets))
+        # A group has one scene, so all its sets have the same effects of emission.
         key = mi.variant(), frozenset(IN_EMISSION) & sets[0]
         if key not in self._emission:
             renderer = scenes.emission(sets[0], self._pass_spp)
@@ -338,9 +342,12 @@ class HybridImages:
         width, height = self.size
         whole = image_size(renderer.scene)
         renderer.size = self.finer * width, self.finer * height
-        loop = passes([renderer], self._seed, self.replicates, stream=Stream.REPLICATES)
-        made = np.stack([np.array(rendered.images[0]) for rendered in loop])
-        resize(renderer.scene, whole)
+        try:
+            loop = passes([renderer], self._seed, self.replicates, stream=Stream.REPLICATES)
+            # (R, f H, f W, 3 count): the channels of an image are neighbours.
+            made = np.stack([np.array(rendered.images[0]) for rendered in loop])
+        finally:
+            resize(renderer.scene, whole)
         # An image in grey has one channel.
         return [
             np.broadcast_to(image, (*image.shape[:3], 3)) for image in np.split(made, count, axis=3)
@@ -373,6 +380,7 @@ class HybridImages:
         count, height, width, _ = full.shape
         if clean is None or self.finer == 1 or len(clean[0]) < height:
             return [simulated.mean(axis=0) for simulated in images]
+        # The clean reference at this size: the mean of n pixels has their error over √n.
         picture = averaged(clean[0], (height, width))
         error = averaged(clean[1], (height, width))
         error *= np.sqrt(height * width / clean[1][..., 0].size)
@@ -389,6 +397,7 @@ class HybridImages:
             )
             return deviations
 
+        # F − C, and the deviations of F alone and of both.
         beyond = full.mean(axis=0) - picture
         other = full - full.mean(axis=0)
         known = deviation(other)
