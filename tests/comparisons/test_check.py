@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fotismos.comparisons.check.measurement import baseline_of, measure_scene, read_baseline
-from fotismos.comparisons.check.moved import differences, moved
+from fotismos.comparisons.check.measurement import (
+    baseline_of,
+    measure_scene,
+    measurement,
+    read_baseline,
+)
+from fotismos.comparisons.check.moved import Move, differences, moved
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.errors import InputError
@@ -40,6 +46,39 @@ def box(bounces=0):
 def measured(make, seed=0, resolution=(64, 64), spp=None):
     options = Options(seed=seed, resolution=resolution, spp=spp)
     return measure_scene(Source("scene", make), options).measurement
+
+
+# --- What is measured ------------------------------------------------------------------------
+
+
+def test_the_samples_of_a_measurement_are_those_that_it_rendered(rgb):
+    options = Options(resolution=(16, 16), spp=20)
+    assert measure_scene(Source("scene", spheres), options, count=16).spp == 16
+
+
+def test_a_picture_is_not_checked_like_a_model(rgb):
+    with pytest.raises(InputError, match="is a picture"):
+        measure_scene(Source("scene", spheres), Options(image=("half.exr",)))
+
+
+@pytest.mark.parametrize("count", [4, 5, 7])
+def test_the_noise_floor_has_no_light_in_it_for_any_number_of_passes(count):
+    images = np.empty((count, 2, 8, 8, 3))
+    images[:, 0] = 0.2
+    images[:, 1] = 0.6
+    numbers = measurement(images, np.ones((8, 8), bool), DEFAULT_VIEWING)
+    assert numbers.metrics["dE2000"].value > 10
+    assert numbers.metrics["dE2000"].noise_floor == pytest.approx(0, abs=1e-4)
+
+
+def test_a_signed_metric_moves_by_its_share_below_zero_too():
+    def size(before, after):
+        return Move(
+            quantity="log2_luminance", half=None, block=None, before=before, after=after,
+            error=0.1, standard_errors=1.0, p=0.5, p_corrected=0.5,
+        ).size  # fmt: skip
+
+    assert size(-0.5, -0.6) == pytest.approx(size(0.5, 0.6)) == pytest.approx(1 / 6)
 
 
 # --- Power -----------------------------------------------------------------------------------
