@@ -8,7 +8,8 @@ or the hit changes, are in any picture of the same scene, however it is shaded. 
 mostly shares its edges too: it shows where light ends. The picture's edges are correlated with both
 at all shifts up to :data:`REACH`, and the better agreement counts; a parabola through the highest
 values gives the fraction of a pixel. A shift counts only if it improves the agreement by more than
-a shift of the reference itself, which is in its place: noise and shading explain that much.
+a shift of the reference itself, which is in its place: noise and shading explain that much. Each
+half of the repeats must show it, too.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -249,6 +250,8 @@ LEAST = 0.08
 
 DOUBTFUL = 2.0
 """A shift improves the agreement by more than this times what noise does."""
+AGREEMENT = 1.0
+"""Pixels by which the shifts of halves of the repeats may differ from that of all."""
 
 
 @dataclass(frozen=True)
@@ -401,7 +404,8 @@ def picture_record(
     place = measure(np.mean(half.images, axis=0), expected)
     # The reference is in its place: what a shift gains there, noise and shading make.
     by_noise = measure(images.reference, expected[:2])
-    is_doubtful = place.gain > 0 and place.gain <= DOUBTFUL * by_noise.gain
+    is_gain_of_noise = place.gain > 0 and place.gain <= DOUBTFUL * by_noise.gain
+    is_doubtful = is_gain_of_noise or not _halves_agree(half.images, expected, place)
     files = options.image
     ratio = ratios(shown, reference)
     record = PictureRecord(
@@ -414,6 +418,22 @@ def picture_record(
     )
     odd = describe(record, images.heuristic, images.reference, images.counted)
     return structs.replace(record, odd=tuple(odd))
+
+
+def _halves_agree(
+    repeats: Sequence[np.ndarray], expected: Sequence[np.ndarray], place: Place
+) -> bool:
+    """Return whether each half of the repeats (H, W, 3) shows the shift; True for one picture.
+
+    Shifts that noise makes differ from half to half.
+    """
+    if place.shift is None or len(repeats) == 1:
+        return True
+    for first in range(2):
+        shift = measure(np.mean(repeats[first::2], axis=0), expected).shift
+        if shift is None or np.abs(np.subtract(shift, place.shift)).max() > AGREEMENT:
+            return False
+    return True
 
 
 def ratios(picture: np.ndarray, reference: np.ndarray) -> tuple[float, float, float]:

@@ -126,6 +126,16 @@ def test_shifts_are_measured_to_a_fraction_of_a_pixel(cornell):
         assert shift == pytest.approx((part, 0), abs=0.2)
 
 
+def test_a_shift_that_only_half_of_the_repeats_show_is_none(cornell):
+    reference, _, expected, _ = cornell
+    moved = np.roll(reference, 3, 1)
+    place = pictures.measure(moved, expected)
+    assert place.shift == pytest.approx((3, 0), abs=0.35)
+    assert pictures._halves_agree([moved] * 4, expected, place)
+    assert pictures._halves_agree([moved], expected, place)
+    assert not pictures._halves_agree([moved, reference] * 2, expected, place)
+
+
 @pytest.mark.parametrize("scene", ["plastic-spheres", "narrow-band-lamp", "fig-8-9"])
 def test_a_right_picture_that_is_shifted_is_said_to_be_shifted_by_that_alone(rgb, tmp_path, scene):
     case = open_case(scene, Options(resolution=(SIDE, SIDE), spp=256))
