@@ -29,6 +29,7 @@ def main() -> None:
 def _open_standard_streams() -> None:
     """Open closed standard streams to the null device, lest other files get their numbers."""
     for number in range(3):
+        # A file that is opened now gets the first free number, which is the closed stream's.
         try:
             os.fstat(number)
         except OSError:

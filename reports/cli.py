@@ -78,6 +78,7 @@ class Group(jobs.Helped, click.Group):
 
     def get_command(self, context: click.Context, name: str) -> click.Command | None:
         """Return a command by its name."""
+        # Only a name in COMMANDS may reach the import: other words come from the user.
         if name not in self.list_commands(context) or name in self.commands:
             return self.commands.get(name)
         return cast(
@@ -141,6 +142,7 @@ def main() -> None:
             "fotismos: interrupted; finished scenes are kept, and the same command resumes.",
             err=True,
         )
+        # click turns an interruption into Abort, whose cause knows the signal.
         sys.exit(interruption.code_of(error.__cause__ or error))
     except click.ClickException as error:
         error.show()
@@ -154,6 +156,7 @@ def main() -> None:
     except OSError as error:  # standard output on a full disk, above all
         where = error.filename or "output"
         echo(f"fotismos: error: {where}: {error.strerror}.", err=True)
+        # Python flushes standard output at exit, which would fail again.
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         sys.exit(2)
     else:

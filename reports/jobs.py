@@ -140,6 +140,7 @@ class Within(click.FloatRange):
         self, value: Any, parameter: click.Parameter | None, context: click.Context | None
     ) -> float:
         number = super().convert(value, parameter, context)
+        # Comparisons with NaN are false, so click's range lets it pass.
         if math.isnan(number):
             self.fail(
                 f"{value!r} is not in the range {self._describe_range()}.", parameter, context
@@ -151,6 +152,7 @@ def with_options(*options: Decorator) -> Decorator:
     """Return a decorator that adds options to a command."""
 
     def add(command: Any) -> Any:
+        # Reversed, as decorators apply: help lists the options in the given order.
         for option in reversed(options):
             command = option(command)
         return command
@@ -189,6 +191,7 @@ def option(name: str, command_default: str = "") -> Decorator:
 
 def _kind(name: str, kind: Any) -> dict[str, Any]:
     """Return what click needs to know of an option's type."""
+    # The second type of a union is None, which stands for an omitted option.
     match kind.types[0] if isinstance(kind, inspect.UnionType) else kind:
         case inspect.LiteralType(values):
             return {"type": click.Choice(sorted(values))}
@@ -305,6 +308,7 @@ def pool(
     """
     if scheduler is None:
         workers = min(workers or cores(), max(1, tasks))
+        # Dr.Jit takes all cores by default: processes that run together share them.
         threads = max(1, cores() // workers) if workers > 1 else None
         return Pool(workers, Ready(level(), threads), timeout)
     if workers and workers > 1:
@@ -345,6 +349,7 @@ class Ready:
         """Get this process ready."""
         if self.program is not None:
             os.environ[program.VARIABLE] = self.program
+        # Scenes and results are named relative to the user's folder.
         if self.folder is not None:
             try:
                 os.chdir(self.folder)

@@ -58,6 +58,7 @@ DENSITY = 130
 """Dots per inch of the picture for notebooks that cannot show the frame."""
 
 
+# Reentrant, since a function that makes a scene may itself compare others.
 _running = RLock()
 
 Arguments = ParamSpec("Arguments")
@@ -92,6 +93,8 @@ class Shown:
 
     def _repr_html_(self) -> str:
         """Show the page in a frame, which isolates its styles and scripts."""
+        # In a frame with `srcdoc` the page's address begins with about:, by which its first script
+        # knows where it is.
         return (
             f'<iframe sandbox="allow-scripts" style="width: 100%; height: {HEIGHT}px; border: 0"'
             f' title="Comparison" srcdoc="{escape(self.page)}"></iframe>'
@@ -201,6 +204,7 @@ def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: A
     """
     if (heuristic is None) == (bsdf is None):
         raise InputError("audit needs one of heuristic and bsdf.")
+    # In this order: plugins are registered for the current variant.
     set_variant(RGB)
     register()
     kind: Kind = "bsdf" if heuristic is None else "heuristic"

@@ -131,6 +131,7 @@ def sentence(
                 f"Too close to call: {percent(found.low)} to {percent(found.high)} of the pixels"
                 f" differ, and {percent(LIMIT)} may. More {more} decide."
             )
+    # If 5 % may differ, the 95th percentile decides.
     if lead.after_exposure.p95 + NOISE * lead.noise_floor <= threshold:
         factor = lead.after_exposure.exposure
         change = "Brightening" if factor > 1 else "Darkening"
@@ -181,10 +182,12 @@ def _is_judged(cost: Cost, name: str) -> bool:
 
 def search(record: ComparisonRecord, threshold: float, spp: int | None = None) -> str:
     """Return the command that finds the cheapest method for a scene at a tolerance."""
+    # The record's command has the options that the user chose, after the scene.
     arguments = shlex.split(record.command)
     scene, *rest = arguments[arguments.index("compare") + 1 :]
     known = SCENES.get(scene)
     default = ("phong", "matched", (known and known.interpolation) or "phong")
+    # Each word with the one after it; the blank is the partner of the last.
     kept = [
         word
         for option, value in pairwise([*rest, ""])
@@ -246,6 +249,7 @@ def most_missing(records: Sequence[ComparisonRecord], threshold: float = TOLERAN
         if decision(record, threshold) == "fail":
             wrong = share(record, threshold).value
             parts = missing(record)
+            # There microfacets are not at fault: `cause` names the material instead.
             if _impossible_albedo(record):
                 parts.pop(MICROFACETS.label, None)
             pixels.update({effect: wrong * part for effect, part in parts.items()})

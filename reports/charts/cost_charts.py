@@ -95,6 +95,7 @@ def _rows(record: Cost) -> list[dict[str, Any]]:
             "family": methods[point.method].family,
             "sampled": methods[point.method].monte_carlo,
             "time": 1e3 * point.seconds.value,
+            # An interval may reach 0, which a logarithmic axis cannot show. Times are in ms.
             "fastest": 1e3 * max(point.seconds.low, point.seconds.value / 10),
             "slowest": 1e3 * point.seconds.high,
             "error": point.error.value,
@@ -159,6 +160,7 @@ def _names_beside(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
     low, high = errors
     last = {row["method"]: row for row in sorted(rows, key=lambda row: row["time"])}
     ordered = sorted(last.values(), key=lambda row: -row["error"])
+    # Pixels from the top, in which `spread` works; `beside` is the way back to an error.
     heights = [HEIGHT * log10(high / max(row["error"], low)) / log10(high / low) for row in ordered]
     named = [
         {**row, "beside": high * (low / high) ** (y / HEIGHT)}
@@ -182,6 +184,7 @@ def spread(places: Sequence[float], gap: float, length: float) -> list[float]:
     mean of their places; blocks stay within ``[0, length]`` if they fit.
     """
     least = gap * np.arange(len(places))  # the room that the places before take
+    # Without that room, places that are far enough apart are places that do not descend.
     moved = isotonic_regression(np.asarray(places) - least).x
     apart: list[float] = (np.clip(moved, 0, max(length - least[-1], 0)) + least).tolist()
     return apart

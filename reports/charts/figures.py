@@ -61,6 +61,7 @@ def strip(comparison: Comparison) -> Figure:
     tall = side * height / width
     with rc_context({"font.size": FONT_SIZE, "axes.titlesize": FONT_SIZE}):
         figure = Figure(figsize=(TEXT_WIDTH, tall + HEADING + GAP))
+        # Matplotlib takes places as parts of the figure's sides.
         inches = (1 / TEXT_WIDTH, 1 / (tall + HEADING + GAP))
 
         def place(left: float, width: float) -> Axes:

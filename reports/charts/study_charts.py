@@ -96,6 +96,7 @@ def _map(
         colour = alt.Color("value:N", title=column, scale=scale)
     else:
         scale = alt.Scale(scheme="magma" if column.startswith("dE") else "viridis")
+        # A title as a list has a line for each word, which keeps the legend narrow.
         colour = alt.Color("value:Q", title=_label(column).split(" "), scale=scale)
     x = _axis(alt.X, table, names[0])
     y = _axis(alt.Y, table, names[1])
@@ -146,6 +147,7 @@ def _lines(
         chart = chart.encode(strokeDash=dash)
     layers = [chart]
     if figure.rule is not None:
+        # One row of its own, or Vega-Lite would draw the rule once for each point.
         rule = alt.Chart(alt.Data(values=[{}])).mark_rule(strokeDash=[3, 3], color=FAINT)
         layers.append(rule.encode(y=alt.datum(figure.rule)))
     return alt.layer(*layers, data=alt.Data(values=values)).properties(width=460, height=300)

@@ -43,6 +43,7 @@ def _svg(spec: str) -> str:
     try:
         return vl_convert.vegalite_to_svg(spec)
     except BaseException as error:
+        # A panic of Rust is no Exception, and its type cannot be imported.
         if type(error).__name__ != "PanicException":
             raise
         raise OutputError(
@@ -63,6 +64,7 @@ def _drawn(spec: str) -> str:
 
     It has unique ids, since several share one page; its figure describes it.
     """
+    # Only within tags: the text of a chart may look like an attribute.
     svg = re.sub(r"<[^>]*>", lambda tag: IDLE.sub("", tag[0]), _svg(spec))
     prefix = "v" + hashlib.sha256(svg.encode()).hexdigest()[:8]
     owned = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", svg)

@@ -92,6 +92,7 @@ def read_text(path: Path, of_pictures: bool = False) -> str:
         text = content(path, LARGEST).decode()
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}. {_HOW}") from error
+    # Both kinds are JSON in one folder; only that of pictures counts repeats.
     if ('"repeats":' in text) != of_pictures:
         hint = "not of pictures. Omit" if of_pictures else "of pictures. Give"
         raise InputError(f"{path}: this baseline is {hint} --picture {path.stem}=PATTERN.")
@@ -135,6 +136,7 @@ def put(path: Path, text: str, layers: Kept, subject: str) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.exists():
             require_regular(path)
+        # The text comes last: it names the pictures.
         if layers:
             require_own_pictures(path)
             images.write_exr(path.with_suffix(".exr"), layers, {"scene": subject})

@@ -154,6 +154,7 @@ def examine(
     )
     if folder is None:
         return made, None
+    # Checks usually pass, so a failure alone is compared in full.
     added = steps(case.options, why=False)
     comparison = compare(case.source, case.options, progress, case.command(), then=added)
     view = scene.write(folder.parent, folder.name, comparison)
@@ -179,6 +180,7 @@ def update(
         made = structs.replace(made, message=added)
     if is_added or not found.passed:
         kept = found.now.pictures if with_pictures or old.images else None
+        # If nothing moved, the old numbers stay, and only the pictures are new.
         new = old if found.passed else baseline_of(old.scene, old.options, found.now.measurement)
         baselines.write(file.path, new, kept)
     return made
@@ -195,6 +197,7 @@ def create(
     begin = perf_counter()
     case = made_small(case)
     measured = measure_scene(case.source, case.options, progress=progress)
+    # The number of samples becomes an option: every later check takes as many.
     options = baselines.options_for(case.changed(spp=measured.spp).options.stated(), path)
     status: Literal["updated", "created"] = "updated" if path.exists() else "created"
     new = baseline_of(scene, options, measured.measurement)
@@ -429,6 +432,7 @@ def update_one(
             )
         scene = baselines.scene_from(old.scene, path)
         options = dict(old.options) | options
+        # With equal options only what moved is written; with others the old numbers mean nothing.
         if Options.of(options) == Options.of(old.options):
             return update(file, file.open(), significance, with_pictures, progress), None
         with_pictures = with_pictures or bool(old.images)

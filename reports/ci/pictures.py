@@ -42,6 +42,7 @@ def write(path: Path, repeats: Repeats, transfer: Literal["linear", "srgb"] | No
     """Write a baseline, and its EXR with the mean and variance of each pixel."""
     if repeats.count < 2:
         raise InputError(f"{path}: one picture does not show its noise. Give two repeats or more.")
+    # Compared with itself: the difference of two such means has an error √2 times that of one.
     whole, _ = means(repeats, repeats)
     height, width = repeats.mean.shape[:2]
     baseline = PictureBaseline(
@@ -65,10 +66,12 @@ def record_of(path: Path) -> PictureBaseline:
 def read(path: Path) -> tuple[PictureBaseline, Repeats]:
     """Read a baseline, and the statistics of its repeats from the EXR beside it."""
     baseline = record_of(path)
+    # Only the name counts: a baseline must not lead to files elsewhere.
     images = path.parent / Path(baseline.images).name
     how = program.command("check", path, "--update", "--picture", f"{path.stem}=PATTERN")
     found = baselines.read_layers(images, LAYERS, longest=LONGEST, how=how)
     repeats = Repeats(baseline.repeats, **found, correlation=np.array(baseline.correlation))
+    # The two files may come from different runs, or one was edited.
     is_same = np.allclose(repeats.mean.mean(axis=(0, 1)), baseline.mean, rtol=1e-5, atol=1e-9)
     if not (is_same and (repeats.variance >= 0).all() and baseline.correlation < np.inf):
         raise InputError(f"{images}: this is not of {path.name}. Write both again: `{how}`.")

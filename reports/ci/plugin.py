@@ -85,6 +85,7 @@ def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
 def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str] | None:
     """Explain a departure for which an assertion failed."""
     for side in (left, right):
+        # On the type, since a mock has an attribute of any name.
         explain = getattr(type(side), "fotismos_explanation", None)
         if explain is not None:
             return [f"{left} {op} {right}", *explain(side)]

@@ -32,6 +32,7 @@ JUNIT_HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"fotism
 SHOWN = 12
 """Quantities of a scene that are listed; all are in the record."""
 
+# XML 1.0 forbids all other characters, even as references; a lone surrogate is no UTF-8 either.
 NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
@@ -200,6 +201,7 @@ def _document(command: str, cases: Sequence[Element]) -> bytes:
     kinds = [child.tag for case in cases for child in case]
     totals = {"name": f"fotismos {command}", "tests": str(len(cases)), "skipped": "0"}
     totals |= {f"{kind}s": str(kinds.count(kind)) for kind in ("failure", "error")}
+    # The name is the first attribute: by that `JUNIT_HEAD` recognises the file later.
     root = Element("testsuites", totals)
     SubElement(root, "testsuite", totals).extend(cases)
     indent(root)
@@ -246,6 +248,7 @@ def of_comparison(
         parts += [_marked_down([GATE_HEADINGS, *rows]), gate_outcome(gates)]
     parts += [escaped(f"{name}: {error}") for name, error in errors.items()]
     parts += [_where(page)] if page else []
+    # The next summary may be appended to the same file.
     return "\n\n".join(parts) + "\n\n"
 
 
@@ -270,6 +273,7 @@ def _marked_down(rows: Sequence[Sequence[str]], right: int = 1) -> str:
 
 
 def _where(page: str) -> str:
+    # A backtick in a path would end the code span.
     return f"Pictures, maps and numbers: {escaped(page) if '`' in page else f'`{visible(page)}`'}"
 
 

@@ -118,9 +118,11 @@ class Fotismos:
             checks.create(path, named, case)
             return True
         file = baselines.read(path)
+        # The baseline's own scene and options; those of the test replace some.
         if not _in_python(scene):
             scene = baselines.scene_from(file.baseline.scene, path)
         case = _open(scene, baselines.options_from(file.baseline.options, path) | given, name)
+        # Other options give other numbers: the baseline is written again, or the test fails.
         others = _other_options(file.baseline.options, baselines.options_for(given, path))
         if others:
             if not self.update:

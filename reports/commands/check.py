@@ -89,6 +89,7 @@ def check(
       fotismos check baselines --update --picture hall='render_*.exr'
       fotismos check baselines --picture hall='new_*.exr'
     """  # noqa: D301 click reads the \b as: keep these lines
+    # Only what the user gave: a default must not replace the baseline's option.
     changes = {
         name: value
         for name, value in rendering.items()

@@ -82,6 +82,8 @@ def gltf(scene: PlainScene) -> dict[str, Any]:
         {"name": "camera", "camera": 0, "matrix": _columns(np.linalg.inv(camera["view"]))},
         *(_light_node(light, number) for number, light in enumerate(scene.lights)),
     ]
+    # Elements of all arrays have 4 bytes, so each array begins where glTF allows it. The last of
+    # the starts is the whole length.
     starts = np.cumsum([0, *(array.nbytes for array in arrays)]).tolist()
     content = base64.b64encode(b"".join(array.tobytes() for array in arrays)).decode()
     lights = [_light(light) for light in scene.lights]
@@ -97,6 +99,7 @@ def gltf(scene: PlainScene) -> dict[str, Any]:
                 "type": "perspective",
                 "perspective": {
                     "aspectRatio": camera["width"] / camera["height"],
+                    # This element of the matrix is the cotangent of half the angle.
                     "yfov": 2 * atan(1 / camera["projection"][1][1]),
                     "znear": camera["near"],
                     "zfar": camera["far"],
@@ -148,6 +151,7 @@ def _accessor(number: int, array: np.ndarray) -> dict[str, Any]:
 
 
 def _material(material: dict[str, Any]) -> dict[str, Any]:
+    # glTF limits factors to 1.
     return {
         "name": material["name"],
         "doubleSided": material["twosided"],
@@ -164,6 +168,7 @@ def _material(material: dict[str, Any]) -> dict[str, Any]:
 
 def _light(light: dict[str, Any]) -> dict[str, Any]:
     intensity = light.get("diffuse_intensity", light["intensity"])
+    # glTF splits light into a colour up to 1 and an intensity; a dark light must not divide by 0.
     largest = max(*intensity, 1e-30)
     outer = min(radians(light.get("cutoff", 0.0)), pi / 2)
     spot = {"spot": {"innerConeAngle": 0.0, "outerConeAngle": outer}}

@@ -106,6 +106,7 @@ def thumbnails(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
     panels |= {name: tonemap(term, exposure) for name, term in shown.terms.items() if term.any()}
     size = shrunk(panels["reference"].size, THUMBNAIL)
     return {
+        # Pillow resizes a palette by the nearest pixel: colours first, so that they are averaged.
         name: webp(picture.convert("RGB").resize(size, Image.Resampling.BOX))
         for name, picture in panels.items()
     }
@@ -138,6 +139,7 @@ def _table(colormap: str) -> Bytes:
 def webp(picture: Image.Image, lossless: bool = False) -> bytes:
     """Return the WebP file of a picture."""
     buffer = BytesIO()
+    # Without loss, `quality` means the effort to pack.
     picture.convert("RGB").save(buffer, "WEBP", quality=QUALITY, method=4, lossless=lossless)
     return buffer.getvalue()
 
@@ -192,6 +194,7 @@ def channels(layers: Mapping[str, ArrayLike]) -> dict[str, np.ndarray]:
     result: dict[str, np.ndarray] = {}
     for name, values in layers.items():
         image = np.asarray(values)
+        # Above HALF_MAX a half becomes infinite.
         is_large = bool(image.size) and np.abs(image).max() > HALF_MAX
         is_full = is_large or name in FULL_PRECISION or name.startswith(FULL_PREFIXES)
         precision = np.float32 if is_full else np.float16

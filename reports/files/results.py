@@ -104,7 +104,9 @@ def hold(
     writes nothing leaves no trace. ``patience`` is in seconds.
     """
     folder = Path(folder)
+    # A soft lock is a mere file, which a killed process leaves behind.
     lock = FileLock(folder / LOCK, patience, fallback_to_soft=False, preserve_lock_file=True)
+    # The innermost folder first: in this order they can be removed again.
     missing = [path for path in (folder, *folder.parents) if not os.path.lexists(path)]
     with atomic.explained(folder / LOCK):
         while not _acquires(lock, folder):
@@ -125,6 +127,7 @@ def hold(
                 (folder / MARK).unlink()
             if not is_own(folder):
                 (folder / LOCK).unlink()
+            # The first folder that is not empty ends the loop, and `suppress` the error.
             for path in missing if names else [folder, *missing[1:]]:
                 path.rmdir()  # fails if it is not empty
         lock.release()
@@ -223,6 +226,7 @@ def own(folder: Path, *names: str) -> Path:
         for name in there:
             if os.path.lexists(folder / name):
                 raise _not_ours(folder / name if names else folder)
+        # Braces begin a list of files; an empty mark means that every file is its own.
         atomic.write(folder / MARK, "{}" if names else "")
     return folder
 
@@ -349,8 +353,11 @@ def assigned(folder: Path, subjects: Iterable[tuple[str, Path | None]]) -> list[
 
 
 def _candidates(name: str) -> Iterator[str]:
+    # Some file systems store accents in one form, and do not tell upper from lower case.
     composed = unicodedata.normalize("NFC", name)
     plain = "".join(c if c.isalnum() or c in "-_." else "-" for c in composed)
+    # File systems count bytes, so a character at the end may be cut, and is dropped. A dot at the
+    # start would hide the folder.
     plain = plain.encode(errors="replace")[:LONGEST].decode(errors="ignore").strip(".") or "scene"
     if plain.casefold() not in RESERVED:
         yield plain

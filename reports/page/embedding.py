@@ -60,6 +60,7 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
     ``counted`` are the pixels in the statistics. Of the standard error, the largest channel stays.
     """
     height, width = np.shape(counted)
+    # Rounded up, so that the longer side has no more than LONGEST blocks.
     block = -(-max(height, width) // LONGEST)
     halves = [f"{half}.{c}" for half in ("heuristic", "reference") for c in "RGB"]
     planes = {name: encode(_means(channels[name], block)) for name in halves}
@@ -84,10 +85,13 @@ def packed(planes: Mapping[str, Codes], block: int = 1) -> Embedded:
     height, width = next(iter(planes.values())).shape
     before = np.zeros((height, width), np.uint16)
     parts = []
+    # Differences wrap modulo 2^16, as they do in the page's Uint16Array. Those of colours rely
+    # on the order of the planes: red, green, blue.
     for name, codes in planes.items():
         parts.append((codes - before if name.endswith((".G", ".B")) else codes).ravel())
         before = codes
     steps = np.diff(np.concatenate(parts), prepend=np.uint16(0)).view(np.int16)
+    # 0, -1, 1, -2 become 0, 1, 2, 3: the high bytes are mostly 0.
     signed = ((steps << 1) ^ (steps >> 15)).view(np.uint16)  # small steps of both signs are small
     halves = np.stack([signed & 0xFF, signed >> 8]).astype(np.uint8)
     data = base64.b64encode(zlib.compress(halves.tobytes())).decode("ascii")
@@ -96,6 +100,8 @@ def packed(planes: Mapping[str, Codes], block: int = 1) -> Embedded:
 
 def encode(values: ArrayLike, step: int = STEP) -> Codes:
     """Return half floats as integers, rounded to multiples of ``step``; no zero is negative."""
+    # Without its sign, a half float grows with its code, so a rounded code is a rounded value.
+    # The code after 0x7BFF is infinity, which rounding must not reach.
     codes = np.clip(values, -HALF_MAX, HALF_MAX).astype(np.float16).view(np.uint16)
     rounded = np.minimum((codes & 0x7FFF) + step // 2, 0x7BFF) & ~np.uint16(step - 1)
     return np.where(rounded > 0, rounded | (codes & 0x8000), 0).astype(np.uint16)

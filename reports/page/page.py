@@ -87,6 +87,7 @@ def render(
     scenes = [_scene(view, taken) for view in views]
     scenes.sort(key=lambda scene: -scene.shares[usual])
     failed = {_identifier(failure.scene, taken): failure for failure in failures}
+    # On the page of a check, what moved takes the place of the verdict.
     since = [*(view.before for view in views if view.before), *moved]
     headline = " ".join(
         [title, *(f"{check.name}: {check.headline}" for check in since[:FIRST_MOVED])]
@@ -163,6 +164,7 @@ def _scene(view: SceneView, taken: set[str]) -> PageScene:
             for effect, part in verdict.missing(record).items()
         ),
         shares=tuple(round(share.value, 5) for share in visible),
+        # A letter for each threshold: "p", "f" or "u".
         verdicts="".join(verdict.decision(record, threshold)[0] for threshold in THRESHOLDS),
         cause=verdict.cause(record),
         advice=_runs(lambda t: verdict.sentence(record, cost, t)),

@@ -46,6 +46,7 @@ def causes_view(comparison: Comparison) -> WhyView | None:
     )
     if len(previews) < 2:
         return WhyView(effects=found)
+    # The maps' pixels, repeated to the size of the previews.
     times = len(previews[0]) // len(counted)
     planes = {"flags": np.uint16(COUNTED) * counted.repeat(times, axis=0).repeat(times, axis=1)}
     for index, preview in enumerate(previews):
@@ -66,6 +67,7 @@ def terms_view(grid: TermGrid | Missing) -> TermsView:
     if isinstance(grid, Missing):
         return TermsView(missing=grid.reason)
     seen = grid.material >= 0
+    # Material -1, where no surface is seen, reads the False at the end.
     shiny = np.array([any(material.k_s) for material in grid.materials] + [False])[grid.material]
     cosines = {"cos_view": grid.cos_view}
     amounts = dict[str, np.ndarray]()
@@ -115,9 +117,11 @@ def live_view(points: LivePoints | Missing) -> LiveView:
     tops = {}
     rows = {}
     for name, plane in points.planes.items():
+        # The background must not raise the top, and packs well if it is even.
         plane = np.where(points.planes["material"], plane, 0.0)
         tops[name] = float(abs(plane).max()) or 1.0
         codes = np.rint(LIVE_CODE * (1 + plane / tops[name]) / 2).astype(np.uint16)
+        # Differences wrap modulo 2^16, and the page's sums wrap back.
         rows[name] = np.diff(codes, axis=0, prepend=np.uint16(0))
     return LiveView(
         grid=packed(rows),

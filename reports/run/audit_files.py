@@ -43,6 +43,7 @@ def furnace(record: Audit) -> Spec:
         for angle, *values in zip(
             record.angles, curve.seen, curve.single_scattering or curve.seen, strict=True
         ):
+            # Over alpha there is a line for each angle, over the angle only one.
             at, of = (curve.alpha, f"{angle:g}°") if varied else (angle, "")
             for rows, value in zip(lines, values, strict=True):
                 if not varied or angle in SHOWN:
@@ -69,6 +70,7 @@ def lobes(record: Audit) -> Spec:
             x = alt.X("x:Q", axis=shown).title(None).scale(domain=[-reach, reach], nice=False)
             y = alt.Y("y:Q", axis=shown).title(None).scale(domain=[low, reach], nice=False)
             chart = _chart(rows, circle, of="light at", x=x, y=y)
+            # Half as high if nothing points down, so that circles stay round.
             charts[curve.material] = chart.properties(height=WIDTH if low else WIDTH // 2)
     return _charts(charts)
 
@@ -87,6 +89,7 @@ def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerCha
         shown = legend if len(names) > 1 else None
         return channel("of:N", title=of, sort=names, legend=shown, scale=scale)
 
+    # Vega-Lite joins points by x; `order` lets a curve turn back.
     below = (
         alt.Chart(alt.Data(values=[row | {"order": order} for order, row in enumerate(faint)]))
         .mark_line(clip=True, strokeWidth=1)

@@ -81,6 +81,7 @@ class Batch:
 
     def record(self) -> RunRecord:
         """The record of the run, with its stages until now."""
+        # Stages are summed over processes, and may exceed the wall time.
         other = perf_counter() - START - sum(self.stages.values())
         return RunRecord(
             command=self.command,
@@ -100,6 +101,7 @@ class Batch:
             state = f"Interrupted: {done}; the same command resumes the run."
         elif self.done < len(self.places):
             state = f"In progress: {done}; reload to see more."
+        # Details first: the page links them.
         records = [view.record for view in self.ordered]
         details = page.details(self.hard_cases, run, records)
         results.write(self.folder / results.DETAILS, details)
@@ -139,6 +141,7 @@ def run(
     views of the compared scenes and the errors of the others. The gravest error is raised at last.
     """
     checked_threshold(job.within)
+    # Before anything is written, since a placeholder may be unknown.
     requests = dict(zip(scenes, _requests(job.request, scenes), strict=True))
     command = command_line()
     with results.hold(folder, command) as folder:
@@ -160,10 +163,12 @@ def run(
                 stages = ("rendering", "causes") if job.with_causes else ("rendering",)
                 _compare(pool, batch, calls, bar, hard_cases, stages)
         except KeyboardInterrupt:
+            # No process may write while the results are put together.
             pool.end()
             if batch.done:
                 _write(batch, is_interrupted=True)
             raise
+        # A single scene that failed leaves no page.
         if batch.views or len(places) > 1:
             _write(batch)
         if finish is not None:
@@ -253,6 +258,7 @@ def _write(batch: Batch, is_interrupted: bool = False) -> None:
     errors = []
     steps: list[Callable[[], object]] = [
         lambda: batch.write_page(is_interrupted, run),
+        # A new record, which has the time that the page just took.
         lambda: results.write(folder / results.RUN, to_json(batch.record())),
     ]
     if views:

@@ -30,6 +30,7 @@ def documents(study: Study) -> dict[str, bytes]:
         f"{name}.png": images.png(images.tonemap(image, exposure=record.viewing.exposure))
         for name, image in pictures.items()
     }
+    # The record stays last: `write` keeps this order.
     made["cost.svg"] = vega.paper(cost_charts.titled(record))
     made["cost.json"] = records.to_json(record).encode()
     return made

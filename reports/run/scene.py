@@ -55,6 +55,7 @@ def compare(
     """Compare a scene and write its files to ``folder/place``, unless it is finished there."""
     with Turn(folder, folder / results.TABLES) as turn:
         begin = perf_counter()
+        # A finished scene is recognised by its key.
         case = open_case(name, job.request)
         key = key_of(case, job)
         view = None if job.fresh else load(folder / target, key)
@@ -67,6 +68,7 @@ def compare(
             turn.give_way()
             progress(*state)
 
+        # Rendering, metrics and causes.
         begin = perf_counter()
         source = case.source
         options = case.options
@@ -79,6 +81,7 @@ def compare(
             then=steps(options, job.with_causes),
         )
         spent = _stages(comparison.record, perf_counter() - begin)
+        # The costs of methods, for a few scenes.
         study = None
         causes = comparison.causes
         if case.word in job.ladders and causes:
@@ -193,6 +196,7 @@ def write(
     target = folder / name
     record = comparison.record
     results.own(target)
+    # The view names the earlier files, and is about to go.
     earlier = _files(target)
     results.clear(target, (RECORD, VIEW))
     view = view_of(comparison)
@@ -214,9 +218,11 @@ def write(
     images.write_exr(target / PICTURE, _layers(comparison.images), _header(record))
     made[RECORD] = atomic.encoded(to_json(record))
     digests = {file: _digest(content) for file, content in made.items()}
+    # The library writes this file, so its bytes are only on the disk.
     digests[PICTURE] = results.digest_of(target / PICTURE)
     results.clear(target, earlier - digests.keys())
     finished = Finished(view=view, digests=digests)
+    # Written without a key, too: `_files` finds the names in it, but `load` never finds a result.
     atomic.Entry(target / VIEW, key or "none").save(plain(finished))
     results.write(target / RECORD, made[RECORD])
     return view

@@ -46,6 +46,7 @@ def schema(kind: type) -> dict[str, Any]:
 
 
 def _describe(definition: dict[str, Any]) -> None:
+    # A role of Sphinx, such as :class:`Name`, becomes the name alone.
     docstring = inspect.cleandoc(
         re.sub(r":\w+:`([^`]*)`", r"\1", definition.get("description", ""))
     )

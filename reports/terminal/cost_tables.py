@@ -39,6 +39,7 @@ def lines(record: Cost) -> Iterator[str]:
     )
     if record.guard and record.guard.state == "disagreed":
         yield "a probe disagreed with the plan, so everything is simulated: please report it"
+    # Methods with their times, and what is odd or absent among them.
     yield from _section("Time of each method: overhead + samples x time per sample", _times(record))
     for method in record.methods:
         if abs(method.bend) > BENT:
@@ -47,6 +48,7 @@ def lines(record: Cost) -> Iterator[str]:
     yield from _explained(method.name for method in record.methods if method.family == "physical")
     for name, reason in record.left_out.items():
         yield f"left out: {name}: {reason}"
+    # Errors, and what each effect contributes.
     yield from _section(f"Error and time of one image at {size}", _points(record.points))
     yield from filter(None, [unreached(record)])
     if record.attribution.effects:
@@ -56,6 +58,7 @@ def lines(record: Cost) -> Iterator[str]:
         yield "alone, last: added first, added last"
         yield together(record)
         yield closure(record)
+    # Another size, if one was requested.
     if record.at:
         title = f"Predicted at {sized(record.at)}, with the errors at {size}"
         yield from _section(title, _points(record.predicted))
@@ -222,6 +225,7 @@ def _attribution(record: Cost) -> Rows:
             f"{effect.removes.low:.3f} to {effect.removes.high:.3f}",
             f"{effect.alone:.3f}",
             f"{effect.last:.3f}",
+            # An interval with 0 in it leaves even the sign open.
             "no measurable time" if effect.adds_s.low <= 0 <= effect.adds_s.high else time,
             interval,
         )

@@ -37,6 +37,7 @@ def printed(rows: Iterable[Sequence[str]], right: int | None = None) -> Iterator
         is_left = right is None or column < right
         justify: Literal["left", "right"] = "left" if is_left else "right"
         table.add_column(heading, overflow="fold", justify=justify)
+    # As Text, since rich would read brackets in a string as markup.
     for row in others:
         table.add_row(*(Text(visible(cell)) for cell in row))
     console = Console(width=WIDTH, color_system=None)
@@ -83,6 +84,7 @@ def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
     for key, value in record.items():
         if isinstance(value, Mapping):
             yield from _flat(value, f"{prefix}{key}.")
+        # A list of shares becomes three columns for each threshold.
         elif key == "visible":
             for share in value:
                 name = f"visible.{share['threshold']:g}"
@@ -109,6 +111,8 @@ def _inert(cell: Any) -> Any:
 
 def escaped(text: str) -> str:
     """Return text in one line that Markdown shows unchanged; `markdown` escapes bars."""
+    # Line breaks go first, or `visible` would print them as escapes. The ampersand goes before
+    # "<", whose replacement has one.
     text = visible(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;")
     return re.sub(r"([\\`*_\[\]])", r"\\\1", text)
 
@@ -125,6 +129,7 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
     for record in records:
         if record.picture:
             yield from _picture(record, record.picture)
+    # A row for each scene, then what its columns mean.
     headings = "differ", f"mean {LEADING.label}", "noise", "shape", "time"
     rows: list[tuple[str, ...]] = [("scene", *headings)]
     for record in records:
@@ -143,6 +148,7 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
     yield "time: what a sample of the physical half takes, over one of the textbook's"
     reasons = {record.time.no_ratio for record in records if not record.picture} - {""}
     yield from (f"time ?: {reason}" for reason in sorted(reasons))
+    # What is special about single scenes.
     for record in records:
         if record.heuristic != PHONG.name and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"

@@ -21,6 +21,7 @@ LEVEL = "fotismos.verbosity"
 
 
 def _remember(context: click.Context, parameter: click.Parameter, is_set: bool) -> None:
+    # click calls this for an absent flag, too, which must not undo the other one.
     if is_set:
         context.meta[LEVEL] = -1 if parameter.name == "quiet" else 1
 
@@ -54,6 +55,7 @@ def visible(text: str) -> str:
     Control characters, which names from a scene may have, are shown as escapes. GitHub reads lines
     that begin with ``::``, Azure and TeamCity ``##name[``.
     """
+    # Zs are blanks: Python calls those beyond the space not printable, but they do no harm.
     shown = "".join(
         c if c.isprintable() or unicodedata.category(c) == "Zs" else ascii(c)[1:-1] for c in text
     )

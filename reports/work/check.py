@@ -32,6 +32,7 @@ def run(
     as_json: bool,
 ) -> int:
     """Check or update baselines, print what moved, and return the exit code."""
+    # Before anything is rendered: an output that cannot be used is refused at once.
     summary.require_free(junit, summary_file, [*scenes, *inputs])
     shown = ""
     if update:
@@ -58,6 +59,7 @@ def run(
             echo(f"fotismos: error: {outcome.message}", err=True)
     summary.write_junit(junit, lambda: summary.junit_of_checks(outcomes))
     summary.append(summary_file, lambda: summary.of_checks(outcomes, significance, shown))
+    # 2, could not be checked, outweighs 1, moved.
     code = max(outcome.exit_code for outcome in outcomes)
     if as_json:
         record = checks.Checks(passed=not code, significance=significance, checks=tuple(outcomes))

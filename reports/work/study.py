@@ -28,6 +28,7 @@ def run(pool: Pool, file: Path, output: Path, many: Callable[[int], Pool]) -> No
     chosen = design.read(file)
     with hold_results(output / "study", [(chosen.name, file)], command_line()) as (folder,):
         points = pool.do(Task(chosen.name, running.all_points, (chosen,)))
+        # Its work is done, and the renderers get the cores and the memory.
         pool.end()
         tasks = len(points) // running.WORTH_A_PROCESS + 1
         for part in (folder / FIGURES, folder / running.POINTS):
