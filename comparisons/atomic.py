@@ -48,7 +48,7 @@ def explained(path: Path) -> Iterator[None]:
 
 def refusal(path: Path, error: OSError) -> OutputError:
     """Return the error that says why a place cannot be written to."""
-    reason = os.strerror(error.errno) if error.errno else str(error)
+    reason = error.strerror or str(error)
     advice = ADVICE.get(error.errno or 0, "Move away whatever is in the way")
     return OutputError(
         f"{printable(path)}: {reason}. {advice}, or choose another `output`. Finished results"
@@ -159,16 +159,11 @@ class Entry:
 
     def save(self, content: Mapping[str, Any]) -> None:
         """Save a mapping, in place of the old one."""
-        try:
+        with explained(self.path):
             if self.path.exists():
                 require_regular(self.path)
             body = json.dumps(content, ensure_ascii=False).encode()
             write(self.path, self._head(body) + body + b"}")
-        except OSError as error:
-            raise InputError(
-                f"{self.path}: {error.strerror or error}. Results are kept there: make room,"
-                " or choose another `output` folder."
-            ) from error
 
     def _head(self, body: bytes) -> bytes:
         """Return the text before the content: the key, and the content's checksum."""

@@ -238,7 +238,10 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
     """
     options = ready.options
     distance = leading_distance(options.viewing, ready.metrics())
-    sums = Accumulator(MEAN), Accumulator(DEVIATION), DifferenceSums(counted)
+    heuristic = Accumulator(MEAN)
+    reference = Accumulator(DEVIATION)
+    difference = DifferenceSums(counted)
+    sums = (heuristic, reference, difference)
     done = 0
     reached = None
     loop = passes((ready.heuristic, ready.reference), options.seed, ready.passes, progress=progress)
@@ -262,13 +265,11 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
             limit_spp=ready.passes * ready.reference.pass_spp,
         )
     # From here on images have single precision, like the files.
-    difference = sums[2].estimate(np.float32)
-    error = sums[1].standard_error(np.float32)
     return Estimates(
-        heuristic=sums[0].mean(np.float32),
-        reference=sums[1].mean(np.float32),
-        standard_error=error,
-        difference=difference,
+        heuristic=heuristic.mean(np.float32),
+        reference=reference.mean(np.float32),
+        standard_error=reference.standard_error(np.float32),
+        difference=difference.estimate(np.float32),
         passes=done,
         stop=stop,
     )

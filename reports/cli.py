@@ -135,6 +135,7 @@ def cli() -> None:
 
 def main() -> None:
     """Run the command line, and exit with its code."""
+    standard_output = sys.stdout
     try:
         code = cli(prog_name=shlex.join(program()), complete_var=COMPLETION, standalone_mode=False)
     except (click.exceptions.Abort, KeyboardInterrupt) as error:
@@ -150,9 +151,11 @@ def main() -> None:
     except FotismosError as error:
         echo(f"fotismos: error: {error}", err=True)
         sys.exit(error.exit_code)
-    except BrokenPipeError:  # the reader of the output closed it
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(128 + signal.SIGPIPE)
+    except SystemExit:
+        # If the reader of the output closed it, click replaces standard output and exits with 1.
+        if sys.stdout is not standard_output:
+            sys.exit(128 + signal.SIGPIPE)
+        raise
     except OSError as error:  # standard output on a full disk, above all
         where = error.filename or "output"
         echo(f"fotismos: error: {where}: {error.strerror}.", err=True)

@@ -202,7 +202,7 @@ def search(record: ComparisonRecord, threshold: float, spp: int | None = None) -
 def about(record: ComparisonRecord, cost: Cost | None = None, threshold: float = TOLERANCE) -> str:
     """Return a scene's verdict, what is mostly missing, and what to do, in a few sentences."""
     parts = [headline([record], threshold)]
-    if decision(record, threshold) != "pass":
+    if not record.caution and decision(record, threshold) != "pass":
         parts += [cause(record), sentence(record, cost, threshold)]
     return " ".join(dict.fromkeys(filter(None, parts)))
 

@@ -91,8 +91,12 @@ def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements
             irradiance = light.scaled_intensity(IRRADIANCE_PER_INTENSITY)
             props = properties("directional", direction=travel, irradiance=irradiance)
             light.replace(props, IRRADIANCE_PER_INTENSITY)
-        else:
+        elif light.plugin == "heuristic_spot":
             _lamps().spot_to_physical(light)
+        else:
+            raise NotImplementedError(
+                f"{light.plugin} has no physical form. Add one to `emitters.to_physical`."
+            )
 
 
 def _lamps() -> ModuleType:

@@ -1,6 +1,6 @@
 """The kinds of lights, and a light of a graph that the rules of pairing read and replace."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -174,8 +174,23 @@ KINDS = (
     LightKind(plugins=("projector",)),
 )
 
-_by_plugin = {plugin: kind for kind in KINDS for plugin in kind.plugins}
-_by_plugin |= {kind.model.plugin: kind for kind in KINDS if kind.model is not None}
+
+def by_plugin(kinds: Sequence[LightKind]) -> dict[str, LightKind]:
+    """Return the kind of each plugin, of either half.
+
+    Raises ``ValueError`` if two kinds name the same plugin: one of them would never be used.
+    """
+    result: dict[str, LightKind] = {}
+    for kind in kinds:
+        heuristic = () if kind.model is None else (kind.model.plugin,)
+        for plugin in (*kind.plugins, *heuristic):
+            if plugin in result:
+                raise ValueError(f"Two kinds of light have the plugin {plugin}. Remove one.")
+            result[plugin] = kind
+    return result
+
+
+_by_plugin = by_plugin(KINDS)
 
 
 def of(plugin: str) -> LightKind:

@@ -141,9 +141,12 @@ def write_junit(path: Path | None, document: Callable[[], bytes]) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         atomic.put(path, document())
-    except OSError as error:
+    except (OSError, OutputError) as error:
+        # `atomic.put` turns the system's error into advice on the folder of results.
+        system = error.__cause__ or error
+        reason = getattr(system, "strerror", None) or system
         raise InputError(
-            f"--junit {path}: {error.strerror or error}. Name a file that can be written to."
+            f"--junit {path}: {reason}. Name a file that can be written to."
         ) from error
 
 

@@ -28,9 +28,8 @@ def run(
         return 0
     from fotismos.reports.ci import summary  # loaded late: most comparisons need no CI
 
-    named = [job.request.heuristic, *job.request.image]
-    files = [word.partition(":")[0] for word in named]
-    summary.require_free(junit, summary_file, [*scenes, *files])
+    shader = job.request.heuristic.partition(":")[0]  # FILE:NAME, or a name alone
+    summary.require_free(junit, summary_file, [*scenes, shader, *job.request.image])
     code = 0
 
     def finish(

@@ -2,6 +2,7 @@
 
 import mitsuba as mi
 import numpy as np
+import pytest
 
 from fotismos.heuristic.lights import PLUGINS
 from fotismos.reference import Source
@@ -45,3 +46,16 @@ def test_every_light_of_the_heuristic_has_a_physical_form(rgb):
         (record,) = replaced.emitters
         assert record.given == plugin
         assert record.derived in kind.plugins
+
+
+def test_two_kinds_of_light_with_one_plugin_are_refused():
+    twin = lights.LightKind(plugins=("area",))
+    with pytest.raises(ValueError, match="plugin area"):
+        lights.by_plugin([*lights.KINDS, twin])
+
+
+def test_a_heuristic_light_without_a_physical_form_is_refused(monkeypatch, rgb):
+    """It was once paired as a spot."""
+    monkeypatch.setattr(emitters, "is_heuristic", lambda plugin: True)
+    with pytest.raises(NotImplementedError, match="point has no physical form"):
+        emitters.to_physical(graph_of("point"), None, Replacements())

@@ -17,6 +17,7 @@ from fotismos.comparisons.check.moved import Check, Move, differences, moved
 from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.heuristic.errors import InputError
 from fotismos.reports.ci import checks, summary
 from tests.shared import records
 from tests.shared.programs import command_line
@@ -382,3 +383,8 @@ def test_hostile_names_are_printed_as_text(run, tmp_path, monkeypatch):
     csv = (tmp_path / "out/tables/carriers.csv").read_text()
     assert "=1+1" in csv
     assert ",=1+1" not in csv
+
+
+def test_a_junit_path_that_cannot_be_written_is_named_by_its_option(tmp_path):
+    with pytest.raises(InputError, match=r"--junit .*: Is a directory\. Name a file"):
+        summary.write_junit(tmp_path, lambda: b"<testsuites/>")

@@ -6,6 +6,7 @@ import os
 import re
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 from io import StringIO
@@ -309,3 +310,12 @@ def test_help_of_costs_and_fits_states_their_own_defaults(run):
     assert f"[default: {fitting.SPP}]" in texts["fit"]
     for option in ("--spp", "--seed", "--pixels-per-degree"):
         assert option not in texts["export"]
+
+
+def test_a_closed_pipe_ends_as_a_shell_expects():
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-P", "-m", "fotismos.reports", "--version"]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, cwd=ROOT, check=False)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, b"")

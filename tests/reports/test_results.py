@@ -445,5 +445,5 @@ def test_an_entry_is_its_content_under_its_key_or_nothing(tmp_path):
     entry.path.unlink()
     os.mkfifo(entry.path)
     assert entry.load() is None
-    with pytest.raises(InputError, match=r"not a regular file.* `output`"):
+    with pytest.raises(OutputError, match=r"not a regular file.* `output`"):
         entry.save({})

@@ -202,3 +202,8 @@ def test_a_material_that_reflects_more_than_it_receives_is_the_cause(rgb, tmp_pa
     said = f"{verdict.about(record)} {verdict.most_missing([record])}"
     assert "A material reflects 2.50 times the light that it receives" in said
     assert "microfacets" not in said
+
+
+def test_a_warning_stands_once_in_what_is_said_about_a_scene():
+    text = verdict.about(records.record(caution="It is black."))
+    assert text.count("It is black.") == 1
