@@ -8,7 +8,7 @@ import numpy as np
 
 from fotismos.comparisons.comparison import Comparison, ComparisonRecord, Images
 from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.departure.metrics import RATIO, THRESHOLDS, drawn
+from fotismos.comparisons.departure.metrics import METRICS, RATIO, THRESHOLDS, drawn
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.departure.statistics import Summary
 from fotismos.reference.records import plain
@@ -92,6 +92,8 @@ def data():
     """Return the content of the made-up record."""
     means = {"dE2000": 4.327, "dE_ITP": 12.91, "dE_CAM16UCS": 3.638}
     unseen = {"rmse": 0.04871, "ldr_flip": 0.1234, "hdr_flip": 0.2345}
+    # Metrics that are declared later get a made-up mean, too.
+    unseen |= dict.fromkeys(METRICS.keys() - means.keys() - unseen.keys(), 0.1)
     metrics = {name: metric(mean) for name, mean in means.items()}
     metrics |= {name: metric(mean, ()) for name, mean in unseen.items()}
     return json.loads(CONTENT) | {"viewing": plain(Viewing(exposure=0.5)), "metrics": metrics}
