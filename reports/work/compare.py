@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from fotismos.comparisons.case import picture_parts
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.errors import FotismosError
 from fotismos.reports.jobs import Job, open_page
@@ -29,7 +30,8 @@ def run(
     from fotismos.reports.ci import summary  # loaded late: most comparisons need no CI
 
     shader = job.request.heuristic.partition(":")[0]  # FILE:NAME, or a name alone
-    summary.require_free(junit, summary_file, [*scenes, shader, *job.request.image])
+    pictures = [picture_parts(word)[0] for word in job.request.image]
+    summary.require_free(junit, summary_file, [*scenes, shader, *pictures])
     code = 0
 
     def finish(

@@ -19,6 +19,7 @@ from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.ci import checks, summary
+from fotismos.reports.work import compare as work
 from tests.shared import records
 from tests.shared.programs import command_line
 from tests.shared.schemas import schema
@@ -388,3 +389,12 @@ def test_hostile_names_are_printed_as_text(run, tmp_path, monkeypatch):
 def test_a_junit_path_that_cannot_be_written_is_named_by_its_option(tmp_path):
     with pytest.raises(InputError, match=r"--junit .*: Is a directory\. Name a file"):
         summary.write_junit(tmp_path, lambda: b"<testsuites/>")
+
+
+@pytest.mark.parametrize("layer", ["", ":view"])
+def test_files_for_ci_never_replace_a_picture_whatever_its_name_and_layer(tmp_path, layer):
+    picture = tmp_path / "a:b.exr"
+    picture.touch()
+    job = SimpleNamespace(request=SimpleNamespace(heuristic="phong", image=[f"{picture}{layer}"]))
+    with pytest.raises(InputError, match="is an input of the same command"):
+        work.run(None, [], tmp_path, job, 5.0, picture, None, is_opened=False)
