@@ -20,8 +20,8 @@ spaces are curved.
 
 **Heavy noise.** All of this supposes that noise in means of n passes falls as ``1 / √n``. Rare
 bright samples fall more slowly, and the passes show it: means of half of the passes are compared
-with those of the other half, single groups with single groups (:class:`Halves`). Where the latter
-are less than `ORDINARY` times as far apart as the former, noise is heavy. Then the interval of a
+with those of the other half, single groups with single groups (:class:`Halves`). Where half as
+many samples are less than `HEAVY` times as far apart, noise is heavy. Then the interval of a
 mean holds all that noise as large as the distance ``h`` of the halves can do to each pixel's
 distance ``v``, from ``√(v² − h²)`` to ``√(v² + h²)``. Beyond that, it holds the light that a pixel
 without a rare sample lacks: the mean of the groups less their median, over all pixels. It begins at
@@ -73,21 +73,24 @@ CURVATURE = 0.06
 MARGIN = 1.25
 """Factor by which a noise floor, itself an estimate, may be too small."""
 
-ORDINARY = 1.75
-"""Ratio of distances between groups and between halves, at least, of noise that is not heavy: 2
-where it falls as ``1 / √n``, of 8 groups. In tests it is 1.9 or more for normal noise, and 1.7 or
-less for noise of rare samples."""
+USUAL = float(np.sqrt(2.0))
+HEAVY = float(np.sqrt(1.75))
+"""How much farther apart images of half as many samples are, if noise falls as ``1 / √n``, and
+where it counts as heavy. In tests it is 1.38 or more for normal noise, and 1.30 or less for noise
+of rare samples."""
 
 FEWEST = 3
 """Fewest groups of passes for a jackknife: without one of them, two remain to make noise from."""
 
 
-def without_noise(measured: ArrayLike, noisier: ArrayLike) -> Array:
+def without_noise(measured: ArrayLike, noisier: ArrayLike, growth: float = USUAL) -> Array:
     """Return distances without noise, from those measured and those with the noise added again.
 
-    ``√(2 f0² − f1²)``; the root of a negative number is negative.
+    ``f² = f0² − (f1² − f0²) / (g² − 1)``, where the noise of half as many samples is ``g`` times
+    as far. For ``g = √2`` it is ``2 f0² − f1²``. The root of a negative number is negative.
     """
-    squares = 2.0 * np.square(measured) - np.square(noisier)
+    before = np.square(measured)
+    squares = before - (np.square(noisier) - before) / (growth**2 - 1.0)
     return np.sign(squares) * np.sqrt(np.abs(squares))
 
 
@@ -266,12 +269,17 @@ class Halves:
         return float((larger - self.measured).mean()) + self.unseen
 
     @property
+    def growth(self) -> float:
+        """How much farther apart images of half as many samples are; with few groups the usual."""
+        doublings = np.log2(max(self.count // 2, 1))
+        if self.count <= FEWEST or not self.halves.any():
+            return USUAL
+        return float((self.groups.mean() / self.halves.mean()) ** (1.0 / doublings))
+
+    @property
     def are_heavy(self) -> bool:
         """Whether noise falls more slowly than ``1 / √n``; with few groups it cannot be seen."""
-        if self.count <= FEWEST:
-            return False
-        usual = np.sqrt(self.count // 2)
-        return bool(self.groups.mean() < ORDINARY / 2 * usual * self.halves.mean())
+        return self.growth < HEAVY
 
 
 def _shares(

@@ -39,6 +39,7 @@ from fotismos.comparisons.departure.blocks import ratio
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
 from fotismos.comparisons.departure.noise import (
+    USUAL,
     Halves,
     contrasts,
     distances_between,
@@ -49,8 +50,9 @@ from fotismos.comparisons.hybrids.hybrids import HybridImages, HybridScenes, Pai
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.heuristic.convention import Doubles, Floats
-from fotismos.heuristic.errors import FotismosError
+from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.planning.effects import Effect
+from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import (
     ObjectIds,
     gbuffer,
@@ -83,6 +85,9 @@ ORDERS = 8
 BIAS = 0.005
 """Half an interval of what an effect removes, at least, as a share of the departure: some noise is
 not taken away (:meth:`ErrorMeter.without_noise`)."""
+
+SLOWEST = float(np.sqrt(4 / 3))
+"""Growth of the noise with half of the samples, at least, by which it is extrapolated."""
 
 MORE = 4
 PATIENCE = 2.0
@@ -142,6 +147,11 @@ def find(
     long as this takes less than ``limit_s`` seconds in all.
     """
     begin = perf_counter()
+    if media := sorted(name for name, _ in ready.pair.media):
+        raise InputError(
+            f"{source.name} has participating media ({', '.join(media)}), which no image of some"
+            " effects can hold. Give `no_why` to do without causes."
+        )
     width, height = image_size(ready.scene)
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
     most = most or (NARROW if is_large else WIDTH)
@@ -222,21 +232,23 @@ class ErrorMeter:
         self._groups = np.asarray(groups)[:, counted].astype(float)
         _, self._blocks = np.unique(block_numbers(counted), return_inverse=True)
 
-    def without_noise(self, images: Floats) -> NDArray[np.float64]:
-        """Return the error (R + 1, N) of each counted pixel, without the noise of both images.
+    def without_noise(self, images: Floats, growth: float = USUAL) -> NDArray[np.float64]:
+        """Return the error (2, R + 1, N) of each counted pixel, without the noise of both images.
 
-        First for the mean of all replicates (R, H, W, 3), then leaving out each in turn.
+        By two rules, each first for the mean of all replicates (R, H, W, 3), then leaving out each
+        in turn.
 
         A distance is never negative, so noise raises it, and most where it is small. So the noise
-        of both images is added once more, and the increase of each block of pixels is taken away:
-        ``f² = 2 f0² − f1²`` (:mod:`fotismos.comparisons.departure.noise`). Within a block each
-        pixel keeps its share. The rule is exact where doubled variance raises a mean distance by
-        √2. The noise of few path-traced samples is skewed, and colour spaces compress it, so it
-        raises distances by less (1.37 in the Cornell box at 64 samples): up to a fifth of the
-        noise's part remains there, and two fifths where a departure is near the size of the noise.
+        of both images is added once more, and the increase of each block of pixels is taken away
+        (:func:`fotismos.comparisons.departure.noise.without_noise`). Within a block each pixel
+        keeps its share. The first rule supposes that noise alone would grow by √2. The noise of few
+        path-traced samples is skewed, and colour spaces compress it, so it grows by less (1.37 in
+        the Cornell box at 64 samples, 1.25 in a room with a mirror), and the rule leaves a part of
+        it. The second one supposes the ``growth`` that halves of the replicates show. It takes away
+        too much where the departure is far larger than the noise.
         """
         images = np.asarray(images)[:, self.counted].astype(float)
-        found = []
+        rules: tuple[list[Doubles], list[Doubles]] = ([], [])
         for chosen, references in self._references:
             noisier = self._noisier(images[chosen])
             differences = map(self.metric.difference, references, noisier)
@@ -244,8 +256,10 @@ class ErrorMeter:
             noisy = list(differences)
             before = np.bincount(self._blocks, plain).astype(float)
             after = np.bincount(self._blocks, np.mean(noisy, axis=0)).astype(float)
-            found.append(plain * ratio(without_noise(before, after), before)[self._blocks])
-        return np.stack(found)
+            for errors, assumed in zip(rules, (USUAL, growth), strict=True):
+                kept = ratio(without_noise(before, after, assumed), before)
+                errors.append(plain * kept[self._blocks])
+        return np.array(rules)
 
     def halves(self, images: Floats) -> Halves:
         """Return how far halves of the replicates (R, H, W, 3) of an image are from each other.
@@ -301,29 +315,35 @@ def attribute(
 
     shares(effects, note, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS)
     images.render(sets)
-    errors: dict[frozenset[Effect], Floats] = {}
+    noise = meter.halves(images.pixels(images.simulating(everything)))
+    growth = float(np.clip(noise.growth, SLOWEST, USUAL))
+    rules: dict[frozenset[Effect], Floats] = {}
+
+    def both(simulated: frozenset[Effect]) -> Floats:
+        """Errors (2, R + 1, N) in ΔE2000: by both rules of the meter, which see."""
+        if simulated not in rules:
+            found = images.pixels(images.simulating(simulated))
+            rules[simulated] = meter.without_noise(found, growth)
+        return rules[simulated]
 
     def error(simulated: frozenset[Effect]) -> Floats:
-        """Errors (R + 1, N) in ΔE2000: of all replicates, then leaving out each in turn."""
-        if simulated not in errors:
-            errors[simulated] = meter.without_noise(images.pixels(images.simulating(simulated)))
-        return errors[simulated]
+        """Errors (R + 1, N): the middle of both rules."""
+        return np.mean(both(simulated), axis=0)
 
     gains, sampling_errors, drawn = shares(
-        effects, error, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS
+        effects, both, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS
     )
     # A gain is a change of the error: an effect that removes some has a negative one.
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
     departure = error(nothing)
     left = error(everything)
-    noise = meter.halves(images.pixels(images.simulating(everything)))
     bias = BIAS * float(departure[0].mean())
     if noise.are_heavy:  # the closure shows how much of the noise was not taken away
-        bias = max(bias, abs(float(left[0].mean())))
+        bias = max(bias, min(abs(float(left[0].mean())), noise.below))
     contributions = tuple(
         Contribution(
             effect=effect.label,
-            removes=jackknifed(removed[effect.label].mean(axis=1), bias),
+            removes=by_both_rules(removed[effect.label].mean(axis=-1), bias),
             alone=float((error(nothing) - error(frozenset({effect})))[0].mean()),
             last=float((error(everything - {effect}) - error(everything))[0].mean()),
             sampling_error=sampling_error,
@@ -331,10 +351,15 @@ def attribute(
         for effect, sampling_error in zip(effects, sampling_errors, strict=True)
     )
     # What noise leaves in the closure is no fault: it may explain as much as halves differ in.
-    closure = jackknifed(left.mean(axis=1), max(bias, noise.below if noise.are_heavy else 0.0))
+    remaining = both(everything).mean(axis=-1)
+    if noise.are_heavy:
+        bias = max(bias, noise.below)
+    if noise.are_heavy and noise.measured.mean() <= noise.halves.mean():
+        bias = max(bias, float(np.abs(remaining).max()))
+    closure = by_both_rules(remaining, bias)
     hybrids = [
-        Hybrid(effects=labels(effects, simulated), error=float(found[0].mean()))
-        for simulated, found in errors.items()
+        Hybrid(effects=labels(effects, simulated), error=float(error(simulated)[0].mean()))
+        for simulated in rules
     ]
 
     def filled(values: Floats) -> NDArray[np.float64]:
@@ -342,7 +367,7 @@ def attribute(
         whole[meter.counted] = values
         return whole
 
-    previews = images.previews(errors, clean)
+    previews = images.previews(rules, clean)
     kernel = images.pixels(images.plain_kernel).mean(axis=0)
     # The kernel and its plugin compute the same: what differs is rounding.
     plugin = images.pixels(images.plugin(nothing)).mean(axis=0)
@@ -364,12 +389,21 @@ def attribute(
                 filled(departure[0]), removed, left=left[0], counted=meter.counted, shapes=shapes
             ),
         ),
-        maps={name: filled(change[0]) for name, change in removed.items()},
+        maps={name: filled(change[:, 0].mean(axis=0)) for name, change in removed.items()},
         departure=filled(departure[0]),
         left=filled(left[0]),
         counted=meter.counted,
         previews={hybrid.effects: image for hybrid, image in zip(hybrids, previews, strict=True)},
     )
+
+
+def by_both_rules(values: Floats, bias: float) -> Interval:
+    """Return the middle of what both rules find (2, R + 1), and an interval that holds both.
+
+    ``bias`` is half its width, at least.
+    """
+    gap = abs(float(values[0, 0] - values[1, 0]))
+    return jackknifed(values.mean(axis=0), max(bias, gap))
 
 
 def by_object(
@@ -391,7 +425,9 @@ def by_object(
             pixels=share.pixels,
             share=share.share,
             departure=share.mean_dE2000,
-            removes=tuple(jackknifed(change[:, row], BIAS * share.mean_dE2000) for change in gains),
+            removes=tuple(
+                by_both_rules(change[..., row], BIAS * share.mean_dE2000) for change in gains
+            ),
             left=float(remaining[row]),
         )
         for row, share in enumerate(found)

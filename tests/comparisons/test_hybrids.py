@@ -22,6 +22,7 @@ from fotismos.reference.planning.effects import EXTENDED, INTERREFLECTION, OCCLU
 from fotismos.reference.rendering.renderer import Stream, passes
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Source
+from tests.shared import noisy_scenes
 from tests.shared.misplanned import BLACK, DIFFUSE
 from tests.shared.misplanned import scene as described
 from tests.shared.noisy import require_equal, whole
@@ -76,6 +77,14 @@ def test_a_clamped_fall_off_is_a_cause(rgb):
     assert record.departure > 0.5
     assert [entry.effect for entry in record.effects] == ["distance attenuation"]
     assert abs(record.closure.value) < 0.01 * record.departure
+
+
+def test_in_fog_the_causes_are_said_to_be_unknown(rgb):
+    """No image of some effects holds a medium: its light would be missing from all of them."""
+    case = open_case(noisy_scenes.fog, Options(resolution=(8, 8), spp=16))
+    record = compare(case.source, case.options, then=steps(case.options, why=True)).record
+    assert record.why is None
+    assert any("participating media (interior)" in warning for warning in record.warnings)
 
 
 @pytest.mark.thorough
@@ -158,7 +167,7 @@ def test_intervals_of_attributions_hold_the_converged_value(rgb, capsys, monkeyp
         with capsys.disabled():
             print(f"\n{effect}: {exact.value:.3f}, held {held} of 40, median width {width:.3f}")
         assert held >= 35
-        assert width < max(0.2, exact.value / 2)
+        assert width < max(0.25, exact.value / 2)
 
 
 # -- Hybrids ---------------------------------------------------------------------------------------

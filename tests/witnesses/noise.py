@@ -1,0 +1,210 @@
+"""Whether intervals hold what many more samples show, in scenes that are hard to sample.
+
+Of each scene of :mod:`tests.shared.noisy_scenes`, comparisons with default options and different
+seeds give intervals: of the mean ΔE2000, of the share of visible pixels, of what effects remove,
+and of the closure, whose true value is 0. The true mean and share come from Mitsuba's own
+integrator, which shares no plan with the reference, and the true effects from hybrids, each with
+:data:`FINER` times the samples.
+
+``python -m tests.witnesses.noise FOLDER [SCENE …]`` measures scenes, and keeps what it measured in
+a folder, one JSON file per scene.
+"""
+
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from time import perf_counter
+from unittest import mock
+
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Mitsuba is imported
+
+import mitsuba as mi
+import numpy as np
+
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.comparison import Attribution
+from fotismos.comparisons.departure.criterion import share_above
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.hybrids import attribution
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.steps import steps
+from fotismos.reports.terminal import tables
+from tests.shared.noisy_scenes import SCENES
+
+SEEDS = 8
+FINER = 100
+"""Comparisons of a scene, and samples of the true values, over those of one comparison."""
+
+TRUE_SEED = 1000
+"""Of the true values: no comparison has it."""
+
+MOST = 8
+"""Effects up to which true values take all subsets, in place of drawn orders."""
+
+PASS = 1024
+"""Samples per pixel of one pass of Mitsuba's own integrator."""
+
+MEAN = "mean"
+SHARE = "share"
+CLOSURE = "closure"
+NUMBERS = (MEAN, SHARE, CLOSURE)
+"""What is measured beside the effects, which go by their labels."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The intervals of one number of a scene over seeds, and what is true.
+
+    ``intervals`` are ``[low, high]``, one for each seed.
+    """
+
+    number: str
+    truth: float
+    intervals: list[list[float]]
+
+    @property
+    def held(self) -> int:
+        """How many intervals hold the true value."""
+        return sum(low <= self.truth <= high for low, high in self.intervals)
+
+
+@dataclass(frozen=True)
+class SceneMeasured:
+    """All numbers of a scene; ``departure`` is its true mean ΔE2000."""
+
+    scene: str
+    departure: float
+    numbers: list[Measured]
+    seconds: float
+
+    def held(self, *numbers: str) -> tuple[int, int]:
+        """Return how many intervals of some numbers hold their truth, and how many there are."""
+        chosen = [measured for measured in self.numbers if measured.number in numbers]
+        held = sum(measured.held for measured in chosen)
+        return held, sum(len(measured.intervals) for measured in chosen)
+
+    @property
+    def effects(self) -> list[str]:
+        """The labels of its effects."""
+        return [one.number for one in self.numbers if one.number not in NUMBERS]
+
+
+def measured(make) -> SceneMeasured:
+    """Compare a scene with different seeds, and find its true values."""
+    begin = perf_counter()
+    intervals: dict[str, list[list[float]]] = {}
+    kernels = []
+    for seed in range(SEEDS):
+        case = open_case(make, Options(seed=seed))
+        comparison = compare(case.source, case.options, then=steps(case.options, why=True))
+        record = comparison.record
+        kernels.append(comparison.images.heuristic)
+        for number, low, high in _intervals(record):
+            intervals.setdefault(number, []).append([float(low), float(high)])
+    true = {CLOSURE: 0.0}
+    if record.why is not None:
+        true |= _true_effects(make)
+    picture = _own_picture(make, FINER * record.plan.spp)
+    counted = comparison.images.counted
+    kernel = np.mean(kernels, axis=0)
+    distances = LEADING(kernel, picture, record.viewing)[counted]
+    share = share_above(record.metrics[LEADING.name].visible)
+    true[MEAN] = float(distances.mean())
+    true[SHARE] = float(np.mean(distances > share.threshold))
+    return SceneMeasured(
+        scene=make.__name__.replace("_", " "),
+        departure=true[MEAN],
+        numbers=[
+            Measured(number, true.get(number, 0.0), found) for number, found in intervals.items()
+        ],
+        seconds=perf_counter() - begin,
+    )
+
+
+def _intervals(record) -> Iterator[tuple[str, float, float]]:
+    """Yield each number of a record with the ends of its interval."""
+    summary = record.metrics[LEADING.name]
+    share = share_above(summary.visible)
+    yield MEAN, summary.low, summary.high
+    yield SHARE, share.low, share.high
+    why = record.why
+    if why is None:  # in fog, where no image of some effects can be rendered
+        return
+    yield CLOSURE, why.closure.low, why.closure.high
+    for contribution in why.effects:
+        # Drawn orders have an error of their own, which a record states beside the interval.
+        drawn = 1.96 * contribution.sampling_error
+        removes = contribution.removes
+        yield contribution.effect, removes.low - drawn, removes.high + drawn
+
+
+def _true_effects(make) -> dict[str, float]:
+    """Return what each effect removes, by hybrids of many samples and all their subsets."""
+    case = open_case(make, Options(seed=TRUE_SEED))
+    ready = prepare(case.source, case.options)
+    more = {name: FINER * getattr(attribution, name) for name in ("SPP", "FEW_SPP", "EXACT_SPP")}
+    with mock.patch.multiple(attribution, **more, EXACT_EFFECTS=MOST):
+        record: Attribution = attribution.find(ready, case.source, case.options).record
+    return {item.effect: item.removes.value for item in record.effects}
+
+
+def _own_picture(make, spp: int) -> np.ndarray:
+    """Return the scene (H, W, 3) as Mitsuba renders it, without a plan."""
+    scene = mi.load_dict(make())
+    passes = max(1, round(spp / PASS))
+    total = 0.0
+    for seed in range(passes):
+        total = total + np.array(mi.render(scene, spp=PASS, seed=TRUE_SEED + seed), float)
+    return total[..., :3] / passes
+
+
+def table(results: Sequence[SceneMeasured]) -> Iterator[str]:
+    """Yield a table of how many intervals hold their true values, by scene and number."""
+    rows = [("Scene", "true mean", "mean", "share", "effects", "closure")]
+    sums = {"mean": [0, 0], "share": [0, 0], "effects": [0, 0], "closure": [0, 0]}
+    for result in results:
+        counts = {
+            "mean": result.held(MEAN),
+            "share": result.held(SHARE),
+            "effects": result.held(*result.effects),
+            "closure": result.held(CLOSURE),
+        }
+        for name, (held, count) in counts.items():
+            sums[name][0] += held
+            sums[name][1] += count
+        cells = [f"{held} of {count}" for held, count in counts.values()]
+        rows.append((result.scene, f"{result.departure:.2f}", *cells))
+    rows.append(("**all**", "", *(f"{100 * held / count:.0f} %" for held, count in sums.values())))
+    yield from tables.markdown(rows)
+
+
+def load(folder: Path) -> list[SceneMeasured]:
+    """Return what a folder keeps, in the scenes' order."""
+    results = []
+    for make in SCENES:
+        file = folder / f"{make.__name__}.json"
+        if file.exists():
+            content = json.loads(file.read_bytes())
+            numbers = [Measured(**number) for number in content.pop("numbers")]
+            results.append(SceneMeasured(**content, numbers=numbers))
+    return results
+
+
+def main(arguments: Sequence[str]) -> None:
+    """Measure scenes that a folder does not keep yet, and print the table of all that it keeps."""
+    folder = Path(arguments[0])
+    folder.mkdir(parents=True, exist_ok=True)
+    for make in SCENES:
+        file = folder / f"{make.__name__}.json"
+        if not file.exists() and (make.__name__ in arguments[1:] or not arguments[1:]):
+            file.write_text(json.dumps(asdict(measured(make)), indent=1))
+            print(make.__name__, flush=True)
+    print("\n".join(table(load(folder))))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
