@@ -34,9 +34,11 @@ from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
+from fotismos.comparisons.price_record import Price
 from fotismos.heuristic.errors import InstallationError
-from fotismos.reference.records import Interval, Missing, Pixels
-from fotismos.reference.rendering.renderer import Progress, Renderer, passes
+from fotismos.reference.records import Pixels
+from fotismos.reference.rendering.gbuffer import image_size
+from fotismos.reference.rendering.renderer import Progress, passes
 from fotismos.reference.rendering.sums import (
     DEVIATION,
     MEAN,
@@ -175,7 +177,7 @@ def _measured(
     estimates = render(ready, ready.counted, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
     with alone or nullcontext():
-        spent = _times(heuristic, reference, options)
+        price = _price(ready)
     done("timing")
 
     # The departure.
@@ -196,7 +198,10 @@ def _measured(
         pixels=Pixels(counted=int(images.counted.sum()), total=images.counted.size),
         regions=regions.find(images.maps[LEADING.name], images.counted),
         pairing=ready.pair.pairing,
-        time=structs.replace(spent, stages=stages),
+        time=TimeSpent(
+            heuristic=heuristic.pass_times(), reference=reference.pass_times(), stages=stages
+        ),
+        price=price,
         unrepresentable=ready.pair.unrepresentable,
         integrator_given=ready.pair.integrator,
         overridden=ready.overridden,
@@ -210,25 +215,22 @@ def _measured(
     return Comparison(record=record, images=images), ready
 
 
-def _times(heuristic: Any, reference: Renderer, options: Options) -> TimeSpent:
-    """Return the times of both halves, without stages; the time of a picture is not known."""
-    ratio: Interval | Missing = timing.NOT_TIMED
-    if not options.image:
-        ratio = timing.measure(heuristic, reference, options.seed)
-    spent = TimeSpent(heuristic=heuristic.pass_times(), reference=reference.pass_times(), stages={})
-    if isinstance(ratio, Missing):
-        return structs.replace(spent, no_ratio=ratio.reason)
-    return structs.replace(
-        spent,
-        ratio=two_digits(ratio.value),
-        ratio_low=two_digits(ratio.low),
-        ratio_high=two_digits(ratio.high),
+def _price(ready: Prepared) -> Price:
+    """Return the times per sample of both halves; the time of a picture is not known."""
+    reference = ready.reference
+    if not ready.options.image:
+        return timing.measure(
+            ready.heuristic, reference, everything=ready.unpruned(), seed=ready.options.seed
+        )
+    width, height = image_size(reference.scene)
+    pixels = width * height
+    return Price(
+        ratio=None,
+        reason=timing.NOT_TIMED.reason,
+        heuristic_s=None,
+        reference_s=min(reference.times) / (reference.pass_spp * pixels),
+        pixels=pixels,
     )
-
-
-def two_digits(value: float) -> float:
-    """Return a number rounded to two significant digits."""
-    return float(f"{value:.2g}")
 
 
 def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> Estimates:

@@ -16,8 +16,10 @@ from msgspec import Meta, structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.departure.regions import ObjectShare, Region
 from fotismos.comparisons.departure.statistics import RatioSummary, Summary
+from fotismos.comparisons.price_record import Price
 from fotismos.comparisons.processes.pool import cores
 from fotismos.heuristic import __version__
 from fotismos.heuristic.convention import Floats
@@ -103,25 +105,11 @@ CAUSES = "causes"
 
 
 class TimeSpent(Record):
-    """Times of both renderings, and of other work by stage.
-
-    Attributes
-    ----------
-    ratio
-        The physical half's time per sample over the textbook's, to two digits, as it is shown.
-    ratio_low, ratio_high
-        Its 95 % interval.
-    no_ratio
-        Why there is no ratio; empty if there is one.
-    """
+    """Times of both renderings, and of other work by stage; for ratios see :class:`Price`."""
 
     heuristic: Times
     reference: Times
     stages: dict[str, float]
-    ratio: Positive | None = None
-    ratio_low: Positive | None = None
-    ratio_high: Positive | None = None
-    no_ratio: str = ""
 
     @property
     def total_s(self) -> float:
@@ -241,7 +229,8 @@ class Causes:
 
     ``maps`` are ``{effect: (H, W)}``, the ΔE2000 that each removes; with ``left``, what remains
     when all are simulated, they add up to ``departure``. ``counted`` (H, W) are the pixels that
-    count. ``previews`` are ``{labels of the simulated effects: (f H, f W, 3)}``, linear.
+    count. ``previews`` are ``{labels of the simulated effects: (f H, f W, 3)}``, linear, and
+    ``visible`` the shares of their pixels that differ visibly, by rising threshold.
     """
 
     record: Attribution
@@ -250,6 +239,7 @@ class Causes:
     left: Floats
     counted: NDArray[np.bool_]
     previews: dict[tuple[str, ...], Floats]
+    visible: dict[tuple[str, ...], tuple[VisibleShare, ...]]
 
 
 class PictureRecord(Record):
@@ -327,6 +317,9 @@ class ComparisonRecord(Record):
     ] = ()
     pairing: Pairing
     time: TimeSpent
+    price: Annotated[
+        Price | None, Meta(description="What it takes to look right; null in older records.")
+    ] = None
     unrepresentable: tuple[Unrepresentable, ...]
     integrator_given: Annotated[str | None, Meta(description="The scene's own integrator.")]
     overridden: tuple[Override, ...]

@@ -100,6 +100,18 @@ class Prepared:
 
         return definitions.metrics()
 
+    def unpruned(self) -> Renderer | None:
+        """Return what renders the physical half with everything simulated.
+
+        None if its plan does so.
+        """
+        whole = self.plan.unpruned()
+        if (whole.integrator, whole.max_depth) == (self.plan.integrator, self.plan.max_depth):
+            return None
+        integrator = physical_integrator(whole, self.scene, self.pair.hide_emitters)
+        spp = self.reference.pass_spp
+        return Renderer(self.scene, integrator, pass_spp=spp, label="everything simulated")
+
     @cached_property
     def counted(self) -> np.ndarray:
         """The pixels (H, W) that count: those that see a surface."""

@@ -15,6 +15,7 @@ from fotismos.comparisons.compare import Step
 from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
+from fotismos.comparisons.price import with_price
 from fotismos.heuristic import heuristics
 from fotismos.reference.rendering.renderer import Progress
 
@@ -22,15 +23,16 @@ from fotismos.reference.rendering.renderer import Progress
 def steps(options: Options, why: bool) -> list[Step]:
     """Return the steps for options; ``why`` traces the terms of 8.10, and finds causes."""
     if options.image:  # no effect can be added to a picture
-        return [with_picture, with_terms] if why else [with_picture]
-    added: list[Step] = []
+        added: list[Step] = [with_picture, with_terms] if why else [with_picture]
+        return [*added, with_price]
+    added = []
     if not heuristics.named(options.heuristic).is_own:
         added.append(with_mistakes)
     if why:
         from fotismos.comparisons.hybrids.attribution import with_causes  # see above
 
         added += [with_terms, with_causes]
-    return added
+    return [*added, with_price]
 
 
 def with_picture(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:

@@ -1,64 +1,116 @@
-"""How long a sample of the physical half takes, compared with one of the textbook half.
+"""The time per sample of both halves, their ratio, and what pruning saves.
 
-The halves of a pass are rendered one after the other, and the order alternates: after a pause the
-processor's threads are asleep, and whichever half comes first pays for waking them.
+It is measured like a study of cost (:mod:`fotismos.comparisons.cost.times`): pictures with few and
+with four times as many samples, in rounds whose order alternates, after compilation and with the
+processor's threads awake. Overhead cancels in the difference of both, so the ratio does not depend
+on the size of a picture.
 """
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping
 
 import numpy as np
 
-from fotismos.reference.records import Interval, Missing
-from fotismos.reference.rendering.renderer import Renderer, passes
-from fotismos.reference.rendering.sums import student
+from fotismos.comparisons.cost import times
+from fotismos.comparisons.price_record import Price
+from fotismos.reference.records import Missing
+from fotismos.reference.rendering.gbuffer import image_size, resize, size_of_width
+from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, Stream, passes
 
-WARM = 1
-"""Passes that do not count: the first one compiles, or wakes the threads."""
+WIDTH = 128
+"""Width of the pictures that are timed, whatever the film's is: a ratio is the same everywhere."""
 
-FEWEST = 3
-MOST = 48
-"""Pairs of passes that make a ratio."""
+LONG_S = 0.03
+"""Seconds that the picture with more samples takes, at least, if the film allows so many."""
 
-BATCHES = 6
-"""Groups of pairs, of each of which the shortest passes count: other work only ever adds time."""
+FACTOR = 4
+"""Samples of one picture over those of the other."""
 
-BUDGET_S = 1.0
-"""If enough pairs take less, they are timed again without a pause in between."""
+WARM = 2
+"""Pictures that do not count: the first compiles, or wakes the threads."""
+
+BUDGET_S = 0.5
+FEWEST = 4
+MOST = 12
+"""Seconds that all rounds take, and their number."""
 
 WIDEST = 0.3
 """The widest interval that a ratio may have, over the ratio."""
 
-TOO_FEW = Missing("too few passes to time")
 TOO_WIDE = Missing("passes too short, or the machine too busy, to time within 30 %")
 NOT_TIMED = Missing("a picture's time is not known")
 
 
-def measure(heuristic: Renderer, reference: Renderer, seed: int) -> Interval | Missing:
-    """Return the ratio of the times of both halves, physical over textbook.
+def measure(
+    heuristic: Renderer, reference: Renderer, everything: Renderer | None, seed: int
+) -> Price:
+    """Return the times of both halves, their ratio, and what pruning saves.
 
-    Both have rendered the same passes in turns
-    (:func:`fotismos.reference.rendering.renderer.passes`).
+    ``everything`` renders the physical half with everything simulated, if its plan leaves out
+    something.
     """
-    halves = (heuristic, reference)
-    count = min(MOST, int(BUDGET_S / np.add(heuristic.times, reference.times).min()))
-    if count >= FEWEST:
-        halves = (heuristic.sampled(heuristic.pass_spp), reference.sampled(reference.pass_spp))
-        for _ in passes(halves, seed, WARM + count):
+    renderers = {"heuristic": heuristic, "reference": reference}
+    if everything is not None:
+        renderers["everything"] = everything
+    found = lines(renderers, seed)
+    ratio = times.ratio(found["reference"], found["heuristic"])
+    is_known = ratio.high - ratio.low <= WIDEST * ratio.value
+    width, height = image_size(reference.scene)
+    return Price(
+        ratio=ratio if is_known else None,
+        reason="" if is_known else TOO_WIDE.reason,
+        heuristic_s=float(found["heuristic"].per_sample[0]),
+        reference_s=float(found["reference"].per_sample[0]),
+        everything_s=float(found["everything"].per_sample[0]) if everything else None,
+        pixels=width * height,
+    )
+
+
+def lines(renderers: Mapping[str, Renderer], seed: int) -> dict[str, times.Line]:
+    """Return the time of each renderer as a line over samples."""
+    films = [(renderer.scene, image_size(renderer.scene)) for renderer in renderers.values()]
+    first = next(iter(renderers.values()))
+    size = size_of_width(first.scene, WIDTH)
+    try:
+        pairs = {name: _pair(renderer, size) for name, renderer in renderers.items()}
+        timed = [renderer for pair in pairs.values() for renderer in pair]
+        # What a round takes tells how many there are.
+        round_s = sum(renderer.times[-1] for renderer in timed)
+        rounds = int(np.clip(BUDGET_S / round_s, FEWEST, MOST))
+        for renderer in timed:
+            renderer.times.clear()
+            renderer.processor_times.clear()
+        for _ in passes(timed, seed, rounds, stream=Stream.PROBE):
             pass
-    return ratio(halves[0].times[WARM:], halves[1].times[WARM:])
+    finally:
+        for scene, film in films:
+            resize(scene, film)
+    pixels = size[0] * size[1]
+    return times.lines(
+        {
+            name: {
+                renderer.pass_spp * pixels: (renderer.times, renderer.processor_times)
+                for renderer in pair
+            }
+            for name, pair in pairs.items()
+        }
+    )
 
 
-def ratio(heuristic: Sequence[float], reference: Sequence[float]) -> Interval | Missing:
-    """Return the geometric mean of the batches' ratios with its interval."""
-    if len(heuristic) < FEWEST:
-        return TOO_FEW
-    count = min(BATCHES, len(heuristic))
-    shortest_h = [batch.min() for batch in np.array_split(np.array(heuristic), count)]
-    shortest_r = [batch.min() for batch in np.array_split(np.array(reference), count)]
-    logarithms = np.log(np.divide(shortest_r, shortest_h))
-    error = float(logarithms.std(ddof=1)) / len(logarithms) ** 0.5
-    interval = student(float(logarithms.mean()), error, len(logarithms))
-    value, low, high = np.exp([interval.value, interval.low, interval.high]).tolist()
-    if high - low > WIDEST * value:
-        return TOO_WIDE
-    return Interval(value=value, low=low, high=high)
+def _pair(half: Renderer, size: tuple[int, int]) -> tuple[Renderer, Renderer]:
+    """Return a half with few and with more samples, at a size, both warm."""
+    pixels = size[0] * size[1]
+    most = max(FACTOR, LARGEST_PASS // pixels)
+    more = _warm(half, FACTOR, size)
+    while more.times[-1] < LONG_S and more.pass_spp < most:
+        growth = min(LONG_S / more.times[-1], most / more.pass_spp)
+        more = _warm(half, FACTOR * math.ceil(growth * more.pass_spp / FACTOR), size)
+    return _warm(half, more.pass_spp // FACTOR, size), more
+
+
+def _warm(half: Renderer, spp: int, size: tuple[int, int]) -> Renderer:
+    """Return a half with some samples per pixel, which has rendered :data:`WARM` pictures."""
+    renderer = half.sampled(spp, size)
+    for seed in range(WARM):
+        renderer.render(seed)
+    return renderer

@@ -15,16 +15,17 @@ from msgspec import Meta
 
 from fotismos.heuristic.errors import InputError
 
-VERSION = 3
+VERSION = 4
 """Version of all records. Records of fotismos 0.1 have none."""
 
+OLDER = (2, 3)
 CHANGES = (
     "version 3 calls rungs `methods` and prices `attribution`, and `visible` holds shares of pixels"
-    " with their intervals"
+    " with their intervals; version 4 holds the ratio of times in `price`"
 )
-"""What changed since version 2; records in which nothing changed are still read."""
+"""Older versions, and what changed since; records in which nothing changed are still read."""
 
-CHANGED = ("rung", "method", "price", "attribution", "visible")
+CHANGED = ("rung", "method", "price", "attribution", "visible", "ratio")
 """Parts of the names of these fields, which are in the message of a record that holds the old."""
 
 Kind = TypeVar("Kind")
@@ -102,7 +103,7 @@ def read(kind: type[Kind], text: str, where: str) -> Kind:
         content = json.loads(text)
         if isinstance(content, dict):
             version = content.get("record_version")
-            if version not in (2, VERSION):
+            if version not in (*OLDER, VERSION):
                 fault = f"its `record_version` is {json.dumps(version)}, not the number {VERSION}"
                 if version is None:
                     fault = f"this record is of fotismos 0.1, not version {VERSION}"
@@ -114,8 +115,8 @@ def read(kind: type[Kind], text: str, where: str) -> Kind:
     except RecursionError as error:
         raise InputError(f"{where}: it is nested too deep. Make it again.") from error
     except (ValueError, msgspec.ValidationError) as error:
-        is_old = version == 2 and any(name in str(error) for name in CHANGED)
-        reason = f"this record is version 2; {CHANGES} ({error})" if is_old else error
+        is_old = version in OLDER and any(name in str(error) for name in CHANGED)
+        reason = f"this record is version {version}; {CHANGES} ({error})" if is_old else error
         raise InputError(f"{where}: {reason}. Make it again.") from error
 
 

@@ -19,6 +19,7 @@ from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, Verdict, 
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.price_record import MOST_SPP, Price
 from fotismos.heuristic import program
 from fotismos.reference.planning.effects import EFFECTS, MICROFACETS
 from fotismos.reports.terminal.words import number, percent, seconds
@@ -41,8 +42,8 @@ CHOICES = ("--heuristic", "--pairing", "--interpolation")
 TEXTBOOK = ("phong", "blinn")
 """The heuristics of the chapters."""
 
-FIND = "To find the cheapest method that passes: "
-"""Begins the sentence on a command; the overview says it once for all scenes."""
+CHEAP = 1.5
+"""Times of the textbook's time that count as no more."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,11 @@ def _impossible_albedo(record: ComparisonRecord) -> float:
 def sentence(
     record: ComparisonRecord, cost: Cost | None = None, threshold: float = TOLERANCE
 ) -> str:
-    """Return what to do about a scene at a tolerance: nothing that fails the criterion itself."""
+    """Return what makes a scene look right at a tolerance.
+
+    In this order: nothing, brightness, the effects that are needed, and the samples with their
+    time. A study of cost names the cheapest method in place of the last two.
+    """
     if record.caution:
         return record.caution
     lead = record.metrics[LEADING.name]
@@ -131,16 +136,97 @@ def sentence(
                 f"Too close to call: {percent(found.low)} to {percent(found.high)} of the pixels"
                 f" differ, and {percent(LIMIT)} may. More {more} decide."
             )
-    # If 5 % may differ, the 95th percentile decides.
-    if lead.after_exposure.p95 + NOISE * lead.noise_floor <= threshold:
+    if _brightness_suffices(record, threshold):
         factor = lead.after_exposure.exposure
         change = "Brightening" if factor > 1 else "Darkening"
         return f"{change} the picture is enough: ×{number(factor)} makes it pass."
-    if record.picture:
-        return "The map shows where the picture is wrong."
-    if cost is None:
-        return f"{FIND}`{search(record, threshold)}`."
-    return _remedy(record, cost, threshold)
+    if cost is not None:
+        return _remedy(record, cost, threshold)
+    parts = [_effects_needed(record, threshold), _samples_needed(record, threshold)]
+    return " ".join(filter(None, parts)) or "The map shows where it is wrong."
+
+
+def _brightness_suffices(record: ComparisonRecord, threshold: float) -> bool:
+    """Return whether the best exposure makes a scene pass."""
+    # If 5 % may differ, the 95th percentile decides.
+    lead = record.metrics[LEADING.name]
+    return lead.after_exposure.p95 + NOISE * lead.noise_floor <= threshold
+
+
+def _effects_needed(record: ComparisonRecord, threshold: float) -> str:
+    """Return which effects a scene needs, and which may be left out; empty if that is unknown."""
+    needed = record.price and record.price.needed_at(threshold)
+    if not needed or not record.why:
+        return ""
+    if needed.effects is None:
+        return "Noise does not tell which effects are needed."
+    if not needed.effects:
+        return ""
+    all_effects = [contribution.effect for contribution in record.why.effects]
+    rest = [effect for effect in all_effects if effect not in needed.effects]
+    sentence = f"It needs {_joined(needed.effects, 'and')}"
+    return f"{sentence}, but not {_joined(rest, 'or')}." if rest else f"{sentence}."
+
+
+def _joined(effects: Sequence[str], word: str) -> str:
+    """Return effects as a list within a sentence."""
+    nouns = {effect.label: effect.noun for effect in EFFECTS}
+    *first, last = [nouns.get(effect) or effect for effect in effects]
+    return f"{', '.join(first)} {word} {last}" if first else last
+
+
+def _samples_needed(record: ComparisonRecord, threshold: float) -> str:
+    """Return with how many samples physics passes, and what they take; empty if it is unknown."""
+    price = record.price
+    found = price and price.samples_at(threshold)
+    if not price or not found:
+        return ""
+    if found.value is None:
+        return f"More than {MOST_SPP:,} samples per pixel pass."
+    count = f"{found.value:,} samples per pixel"
+    if found.high is None:
+        count = f"{count}, or more,"
+    elif found.low != found.high:
+        count = f"{count} ({found.low:,} to {found.high:,})"
+    time = _time_of(price, found.value)
+    return f"{count} pass{time}."
+
+
+def _time_of(price: Price, spp: int) -> str:
+    """Return the time of a physical picture, as the end of a sentence; empty if it is unknown."""
+    parts = []
+    if (times := price.times(spp)) is not None:
+        parts.append(f"{number(times)} times the textbook's time")
+    if (taken := price.seconds(spp)) is not None:
+        parts.append(seconds(taken))
+    return f": {', '.join(parts)}" if parts else ""
+
+
+def price_at(record: ComparisonRecord, threshold: float = TOLERANCE) -> float | None:
+    """Return the time of what makes a scene look right, over that of its textbook picture.
+
+    1 if that passes, or would if it were brighter; None if it is not known.
+    """
+    if decision(record, threshold) == "pass" or _brightness_suffices(record, threshold):
+        return 1.0
+    price = record.price
+    found = price and price.samples_at(threshold)
+    if not price or not found or found.value is None:
+        return None
+    return price.times(found.value)
+
+
+def costs(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> str:
+    """Return in how many scenes looking right costs little, as a sentence; empty if none tells."""
+    prices = [price_at(record, threshold) for record in records]
+    known = [price for price in prices if price is not None]
+    if len(records) < 2 or not known:
+        return ""
+    cheap = sum(price <= CHEAP for price in known)
+    return (
+        f"In {cheap} of {len(records)} scenes, looking right takes at most {CHEAP:g} times the"
+        " textbook's time."
+    )
 
 
 def _remedy(record: ComparisonRecord, cost: Cost, threshold: float) -> str:

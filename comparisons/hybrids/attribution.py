@@ -39,9 +39,12 @@ from fotismos.comparisons.departure.blocks import ratio
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
 from fotismos.comparisons.departure.noise import (
+    FEWEST,
     USUAL,
     Halves,
+    VisibleShare,
     contrasts,
+    debiased,
     distances_between,
     without_noise,
 )
@@ -59,9 +62,10 @@ from fotismos.reference.rendering.gbuffer import (
     image_size,
     require_surface,
     resize,
+    size_of_width,
 )
 from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, passes
-from fotismos.reference.rendering.sums import block_numbers, jackknifed
+from fotismos.reference.rendering.sums import Grouped, block_numbers, jackknifed
 from fotismos.reference.scene.source import Source
 
 WIDTH = 48
@@ -155,9 +159,7 @@ def find(
     width, height = image_size(ready.scene)
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
     most = most or (NARROW if is_large else WIDTH)
-    if tuple(ready.scene.sensors()[0].film().size()) != (width, height):
-        most = width  # a smaller crop would lie elsewhere, by parts of a pixel
-    size = min(most, width), max(1, round(height * min(1, most / width)))
+    size = size_of_width(ready.scene, min(most, width))
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
     surface = gbuffer(ready.scene, size)
     require_surface(surface.hit, source.name)
@@ -188,7 +190,14 @@ def find(
             )
             if progress:
                 progress(CAUSES, 0, 1)
-            found = attribute(images, meter, shapes=surface.shape, seed=options.seed, clean=clean)
+            found = attribute(
+                images,
+                meter,
+                shapes=surface.shape,
+                seed=options.seed,
+                clean=clean,
+                whole=width * height,
+            )
             before = took
             took = perf_counter() - started
             # The first samples also compile: more of them take less than their number says.
@@ -271,6 +280,29 @@ class ErrorMeter:
         between = distances_between(self.metric, shown, self.viewing)
         return Halves.of(between, differences, np.ones(len(differences)))
 
+    def visible(self, images: Floats, pixels: int) -> tuple[VisibleShare, ...]:
+        """Return the shares of pixels (R, H, W, 3) that differ visibly, without noise.
+
+        Their intervals also hold those of a picture of more ``pixels``, of which these are drawn.
+        """
+        images = np.asarray(images)[:, self.counted].astype(float)
+        reference = self._groups.mean(axis=0)
+        test = images.mean(axis=0)
+        grouped = Grouped(
+            # The noise of both is in the difference.
+            means=images - self._groups,
+            sizes=np.ones(len(images), int),
+            places=np.arange(len(test)),
+            blocks=self._blocks,
+            sampled=int(self._blocks.max()) + 1,
+            total=int(self._blocks.max()) + 1,
+        )
+        raw = self.metric.against(reference, ..., self.viewing)(test)
+        fields = debiased(self.metric, test[None], grouped, self.viewing, raw)
+        if fields is None:
+            raise InputError(f"{len(images)} replicates have no interval: give at least {FEWEST}.")
+        return tuple(_drawn(share, len(test), pixels) for share in fields["visible"])
+
     @cached_property
     def _references(self) -> list[tuple[NDArray[np.int64], list[Doubles]]]:
         """For each jackknifed set: which replicates it holds, and the reference's coordinates.
@@ -290,16 +322,25 @@ class ErrorMeter:
         return [self.metric.coordinates(pixels, self.viewing) for pixels in shown]
 
 
+def _drawn(share: VisibleShare, pixels: int, of: int) -> VisibleShare:
+    """Return a share of some pixels, with an interval for all ``of`` which they are drawn."""
+    variance = share.value * (1.0 - share.value) * max(1 / pixels - 1 / of, 0.0)
+    half = 2.0 * float(np.sqrt(variance))
+    return structs.replace(share, low=max(share.low - half, 0.0), high=min(share.high + half, 1.0))
+
+
 def attribute(
     images: HybridImages,
     meter: ErrorMeter,
     shapes: ObjectIds,
     seed: int,
     clean: tuple[Floats, Floats] | None = None,
+    whole: int = 0,
 ) -> Causes:
     """Attribute the departure to the effects, as a whole, on each shape, and in each pixel.
 
-    ``shapes`` are what each pixel sees; ``seed`` draws the orders. For ``clean`` see :func:`find`.
+    ``shapes`` are what each pixel sees; ``seed`` draws the orders; ``whole`` are the pixels of the
+    scene's picture. For ``clean`` see :func:`find`.
     """
     effects = images.effects
     everything = frozenset(images.effects)
@@ -328,7 +369,8 @@ def attribute(
 
     def error(simulated: frozenset[Effect]) -> Floats:
         """Errors (R + 1, N): the middle of both rules."""
-        return np.mean(both(simulated), axis=0)
+        errors: Floats = both(simulated).mean(axis=0)
+        return errors
 
     gains, sampling_errors, drawn = shares(
         effects, both, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS
@@ -394,6 +436,12 @@ def attribute(
         left=filled(left[0]),
         counted=meter.counted,
         previews={hybrid.effects: image for hybrid, image in zip(hybrids, previews, strict=True)},
+        visible={
+            labels(effects, simulated): meter.visible(
+                images.pixels(images.simulating(simulated)), whole
+            )
+            for simulated in rules
+        },
     )
 
 

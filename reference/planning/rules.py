@@ -65,9 +65,13 @@ class RuleResult(Record):
 
 @dataclass(frozen=True)
 class PruningRule:
-    """A rule of pruning: what is done if it applies, what is ``absent`` then, and why."""
+    """A rule of pruning: what is done if it applies, what is ``absent`` then, and why.
+
+    ``omits`` is what is not simulated, as a noun.
+    """
 
     name: str
+    omits: str
     absent: str
     proof: str
     premises: tuple[Premise, ...]
@@ -177,6 +181,7 @@ SAMPLED_AS_HIT = Premise(
 
 LIGHT_BY_LIGHT = PruningRule(
     name="light by light",
+    omits="the choice of one light",
     absent="noise of picking one light: the sum over all equals the mean of one over its chance",
     proof="The mean is the sum over all lights, which `direct_all` takes at each sample, if each"
     " estimate of a light has the right mean, however samples of the BSDF are weighted against it.",
@@ -290,6 +295,7 @@ def occluder(facts: Facts) -> str | None:
 
 NO_SHADOWS = PruningRule(
     name="no shadow rays",
+    omits="shadow rays",
     absent="no shape can stand between a light and a reflecting surface",
     proof="Light from a point y reaches a surface point x along a segment in the box around y and"
     " the shape of x. A shape whose box does not touch that one does not touch the segment. The"
@@ -320,6 +326,7 @@ def facing_pair(facts: Facts) -> str | None:
 
 NO_SECOND_REFLECTION = PruningRule(
     name="direct light alone",
+    omits="interreflection",
     absent="no point of a reflecting surface sees another one",
     proof="A second reflection needs two points that see each other, both on sides that reflect."
     " Two points on the outer side of one convex shape never do, nor do two of a flat one. No path"
@@ -371,6 +378,7 @@ def _uneven(facts: Facts) -> str | None:
 
 TABULATED_ENVIRONMENT = PruningRule(
     name="environment from a table",
+    omits="the sampled environment",
     absent="noise: the reflected environment is its radiance times an albedo",
     proof="If nothing is hidden, a surface point reflects the radiance L times the albedo of its"
     " BSDF for the view direction. For an isotropic BSDF that is the same everywhere this depends"

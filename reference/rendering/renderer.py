@@ -166,10 +166,15 @@ class Renderer:
                 )
         return image
 
-    def sampled(self, pass_spp: int) -> "Renderer":
-        """Return the same renderer with another number of samples."""
+    def sampled(self, pass_spp: int, size: tuple[int, int] | None = None) -> "Renderer":
+        """Return the same renderer with another number of samples, and another size if given."""
         other = copy(self)
         other.pass_spp = pass_spp
+        if size is not None:
+            other.size = size
+            # A recording holds the size of its image.
+            if self._replayed is not None:
+                other._replayed = dr.freeze(_rendered, warn_after=100)
         other.times = []
         other.processor_times = []
         other.compilation = 0.0
@@ -275,6 +280,7 @@ class Stream(IntEnum):
     OTHER_SIDE = 1
     REPLICATES = 2
     PROBE = 3
+    PRICE = 4
 
 
 def pass_seed(seed: int, number: int, stream: Stream = Stream.COMPARED) -> int:

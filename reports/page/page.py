@@ -11,6 +11,7 @@ text.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
@@ -58,7 +59,11 @@ Runs = list[tuple[int, str]]
 
 
 class PageScene(SceneView):
-    """A scene in the page: its name in the address, and ``(effect, colour, part)`` of its error."""
+    """A scene in the page: its name in the address, and ``(effect, colour, part)`` of its error.
+
+    ``prices`` are by threshold (:func:`fotismos.reports.verdict.price_at`); ``command`` finds the
+    cheapest method.
+    """
 
     id: str
     parts: tuple[tuple[str, str, float], ...]
@@ -66,6 +71,8 @@ class PageScene(SceneView):
     verdicts: str
     cause: str
     advice: Runs
+    prices: tuple[float | None, ...]
+    command: str
 
 
 def render(
@@ -84,7 +91,7 @@ def render(
     taken: set[str] = set()
     usual = THRESHOLDS.index(threshold)
     records = [view.record for view in views]
-    scenes = [_scene(view, taken) for view in views]
+    scenes = [_scene(view, taken, threshold) for view in views]
     scenes.sort(key=lambda scene: -scene.shares[usual])
     failed = {_identifier(failure.scene, taken): failure for failure in failures}
     # On the page of a check, what moved takes the place of the verdict.
@@ -101,8 +108,9 @@ def render(
         "usual": threshold,
         "headlines": _runs(lambda t: headline if since else verdict.headline(records, t)),
         "missing": _runs(lambda t: "" if since else verdict.most_missing(records, t)),
-        "find": verdict.FIND,
+        "costs": _runs(lambda t: "" if since else verdict.costs(records, t)),
         "terms": glossary.meanings(),
+        "axis": _axis(scenes),
         **_drawing(),
     }
     return rendered(
@@ -113,6 +121,7 @@ def render(
         scenes=scenes,
         failures=failed,
         usual=usual,
+        priced=[] if since or len(scenes) < 2 else scenes,
         charted=[scene for scene in scenes if scene.chart][:CHARTED],
         limit=LIMIT,
         usual_title=TITLE,
@@ -153,7 +162,7 @@ def _runs(text: Callable[[float], str]) -> Runs:
     return [(i, text) for i, text in enumerate(texts) if i == 0 or text != texts[i - 1]]
 
 
-def _scene(view: SceneView, taken: set[str]) -> PageScene:
+def _scene(view: SceneView, taken: set[str], usual: float) -> PageScene:
     record, cost = view.studied
     visible = record.metrics[LEADING.name].visible
     return PageScene(
@@ -168,7 +177,25 @@ def _scene(view: SceneView, taken: set[str]) -> PageScene:
         verdicts="".join(verdict.decision(record, threshold)[0] for threshold in THRESHOLDS),
         cause=verdict.cause(record),
         advice=_runs(lambda t: verdict.sentence(record, cost, t)),
+        prices=tuple(_digits(verdict.price_at(record, threshold)) for threshold in THRESHOLDS),
+        command=verdict.search(record, usual),
     )
+
+
+def _digits(price: float | None) -> float | None:
+    """Return a price with the digits that a chart can show."""
+    return None if price is None else float(f"{price:.3g}")
+
+
+def _axis(scenes: Sequence[PageScene]) -> dict[str, Any]:
+    """Return the ends of the chart of prices, and its marks: powers of ten.
+
+    The last part of the axis, from the largest power on, holds the scenes without a price.
+    """
+    prices = [price for scene in scenes for price in scene.prices if price]
+    low = math.floor(math.log10(min(prices, default=1.0)))
+    high = max(math.ceil(math.log10(max(prices, default=1.0))), low + 1)
+    return {"low": low, "high": high, "marks": [10.0**power for power in range(low, high + 1)]}
 
 
 def _scene_data(scene: PageScene) -> dict[str, Any]:
@@ -185,6 +212,7 @@ def _scene_data(scene: PageScene) -> dict[str, Any]:
         "shares": scene.shares,
         "verdicts": scene.verdicts,
         "advice": scene.advice,
+        "prices": scene.prices,
         "regions": [
             {key: getattr(region, key) for key in ("x", "y", "width", "height", "effect")}
             for region in record.regions

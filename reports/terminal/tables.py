@@ -146,7 +146,8 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
     yield from printed(rows, right=1)
     yield f"differ: above {LEADING.label} {threshold:g}; shape: the mean at the best exposure"
     yield "time: what a sample of the physical half takes, over one of the textbook's"
-    reasons = {record.time.no_ratio for record in records if not record.picture} - {""}
+    prices = [record.price for record in records if record.price and not record.picture]
+    reasons = {price.reason for price in prices} - {""}
     yield from (f"time ?: {reason}" for reason in sorted(reasons))
     # What is special about single scenes.
     for record in records:
@@ -168,8 +169,9 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
 
 def time_ratio(record: ComparisonRecord) -> str:
     """Return the ratio of the times of both halves, or "?"."""
-    ratio = record.time.ratio
-    return "?" if ratio is None else f"x {ratio:g}"
+    if record.price is None or record.price.ratio is None:
+        return "?"
+    return f"x {number(record.price.ratio.value)}"
 
 
 def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:

@@ -1,4 +1,4 @@
-// The first screen at a threshold: headline, order, pictures, bars and what to do.
+// The first screen at a threshold: headline, order, pictures, prices, bars and what is needed.
 
 /** Show all scenes at a threshold; Python made the sentences for each. @param {number} t */
 function showOverview(t) {
@@ -20,6 +20,39 @@ function showOverview(t) {
       });
     list.append(...items);
   }
+  showPrices(place);
+}
+
+/** Place each scene in the chart of prices. @param {number} place */
+function showPrices(place) {
+  const sentence = document.getElementById("costs-sentence");
+  if (!sentence) return;
+  sentence.textContent = textAt(page.costs, place);
+  const {low, high} = page.axis;
+  const points = /** @type {HTMLElement[]} */ ([...document.querySelectorAll("[data-price]")]);
+  const labelled = /** @type {{x: number, y: number}[]} */ ([]);
+  const scenes = /** @type {Scene[]} */ (page.scenes.filter(scene => !scene.failed));
+  const known = new Map(scenes.map(scene => [scene.id, scene]));
+  const spots = points.map(point => {
+    const scene = /** @type {Scene} */ (known.get(point.dataset.price ?? ""));
+    const price = scene.prices[place];
+    // The last part of the axis holds what has no price.
+    const steps = price ? clamp(Math.log10(price) - low, 0, high - low) : high - low + 1;
+    const time = price ? `${significant(price, 2)} times the time` : "no price is known";
+    const link = /** @type {HTMLElement} */ (point.firstElementChild);
+    link.title = `${scene.name}: ${percentText(scene.shares[place])} differ, ${time}`;
+    return {point, x: steps / (high - low + 1), y: scene.shares[place]};
+  });
+  // The names of those that differ most, as far as they do not overlap.
+  spots.sort((a, b) => b.y - a.y);
+  for (const {point, x, y} of spots) {
+    point.style.setProperty("--x", String(x));
+    point.style.setProperty("--y", String(y));
+    const overlaps = labelled.some(one => Math.abs(one.y - y) < 0.07 && Math.abs(one.x - x) < 0.16);
+    point.classList.toggle("named", !overlaps);
+    point.classList.toggle("left", x > 0.8);
+    if (!overlaps) labelled.push({x, y});
+  }
 }
 
 /** @param {HTMLElement} item @param {Scene} scene @param {number} place */
@@ -27,14 +60,23 @@ function showScene(item, scene, place) {
   for (const part of item.querySelectorAll("[data-show=share]"))
     part.textContent = percentText(scene.shares[place]);
   for (const part of item.querySelectorAll("[data-show=advice]")) {
-    const advice = textAt(scene.advice, place);
-    part.replaceChildren(
-      ...coded(part.hasAttribute("data-own") ? advice.replace(page.find, "") : advice),
-    );
+    part.replaceChildren(...coded(textAt(scene.advice, place)));
   }
+  for (const part of item.querySelectorAll("[data-command]"))
+    part.textContent = (part.textContent ?? "").replace(
+      /--within \S+/,
+      `--within ${page.thresholds[place]}`,
+    );
   item.dataset.verdict = scene.verdicts[place];
   item.style.setProperty("--share", String(scene.shares[place]));
 }
+
+document.addEventListener("click", event => {
+  const button = /** @type {HTMLElement} */ (event.target).closest("[data-copy]");
+  if (!button) return;
+  const command = button.parentElement?.querySelector("[data-command]")?.textContent ?? "";
+  void navigator.clipboard.writeText(command).then(() => (button.textContent = "Copied"));
+});
 
 /** Text in which `…` is code. @param {string} text */
 function coded(text) {

@@ -27,6 +27,7 @@
  * @property {number[]} shares   of the pixels that differ visibly, by threshold
  * @property {string} verdicts   a letter by threshold: p(ass), f(ail) or u(ndecided)
  * @property {Runs} advice
+ * @property {(number | null)[]} prices   over the textbook's time, by threshold
  * @property {Region[]} regions
  * @property {Manifest | null} images
  * @property {Effects | null} effects
@@ -48,7 +49,8 @@
  * @property {number} usual              the threshold shown first
  * @property {Runs} headlines
  * @property {Runs} missing
- * @property {string} find  the sentence on commands, which rows of the overview leave out
+ * @property {Runs} costs
+ * @property {{low: number, high: number, marks: number[]}} axis   of prices: powers of ten
  * @property {MapOf[]} maps
  * @property {string} noEffect
  * @property {Record<string, string>} colours   256 of each map, as "rrggbb"
