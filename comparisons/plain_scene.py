@@ -18,6 +18,7 @@ from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.lights import INTENSITIES, PLUGINS, lamps
 from fotismos.heuristic.materials import COEFFICIENTS, PHYSICAL
 from fotismos.heuristic.tessellation import RESOLUTION, to_mesh
+from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.pairing.halves import PairOptions, pair
 from fotismos.reference.rendering.gbuffer import gbuffer, image_size
 from fotismos.reference.scene.source import Source
@@ -62,7 +63,7 @@ def plain_scene(source: Source, options: Options) -> PlainScene:
     if not mi.is_rgb:
         raise InputError(f"variant {mi.variant()}: scenes are exported in RGB. Give llvm_ad_rgb.")
     chosen = PairOptions(
-        convention=options.convention,
+        convention=Convention(options.pairing),
         resolution=options.resolution,
         prune=False,
         sensor=options.sensor,

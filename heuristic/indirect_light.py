@@ -162,7 +162,8 @@ def fit(normal: Doubles, arriving: Doubles, k_d: Doubles, up: Doubles) -> tuple[
 def prepare(scene: Any) -> tuple[Array, Array, list[float], bool]:
     """Return sky, ground, the upward direction, and whether they replace ``I_a``."""
     up = upward(scene)
-    above, below = fit(*gather(scene), up)
+    normal, arriving, k_d = gather(scene)
+    above, below = fit(normal, arriving, k_d, up)
     sky = mi.Spectrum(above.tolist())
     ground = mi.Spectrum(below.tolist())
     dr.make_opaque(sky, ground)  # as literals they would compile a kernel for every scene

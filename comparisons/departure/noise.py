@@ -136,7 +136,7 @@ def _fields(metric: Metric, value: float, low: float, high: float, shares: Array
     shares = np.clip(shares, 0.0, 1.0)
     shares[1] = np.minimum.accumulate(shares[1])
     shares[2] = np.maximum.accumulate(shares[2][::-1])[::-1]
-    shares[0] = np.clip(np.minimum.accumulate(shares[0]), *shares[1:])
+    shares[0] = np.clip(np.minimum.accumulate(shares[0]), shares[1], shares[2])
     visible = tuple(
         VisibleShare(threshold=threshold, value=share, low=lowest, high=highest)
         for threshold, (share, lowest, highest) in zip(
@@ -374,7 +374,8 @@ class _Extrapolated:
             squares = np.array([grouped.by_block(values) for values in pair])
             # Sums over blocks by both rules; that of a mean square is its root times the pixels.
             lower = without_noise(before, after)
-            upper = np.minimum(without_noise(*np.sqrt(squares * pixels)), before)
+            roots = np.sqrt(squares * pixels)
+            upper = np.minimum(without_noise(roots[0], roots[1]), before)
             added = before - (lower + upper) / 2.0
             gap = max(float((upper - lower).sum() / pixels.sum()), 0.0)
             noise = np.sqrt(np.average((after**2 - before**2) / pixels**2, weights=pixels).clip(0))

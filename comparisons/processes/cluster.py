@@ -74,11 +74,15 @@ class Cluster(Pool):
         def submit(some: Iterable[Task]) -> list[Any]:
             futures = []
             for task in some:
-                more = () if task.progress is None else (silent,)
-                call = work, self._prepare, task.function, *task.arguments, *more
+                arguments = task.arguments
+                if task.progress is not None:
+                    arguments = (*arguments, silent)
                 # Dask treats tasks with equal keys as one, whoever submits them.
-                futures.append(self._client.submit(*call, key=f"{task.name}-{uuid4()}"))
-                by_key[futures[-1].key] = task
+                key = f"{task.name}-{uuid4()}"
+                futures.append(
+                    self._client.submit(work, self._prepare, task.function, *arguments, key=key)
+                )
+                by_key[key] = task
             return futures
 
         workers = max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))

@@ -106,9 +106,11 @@ class Pool:
             self._prepare()
             for task in tasks:
                 outcome: Future[Any] = Future()
+                arguments = task.arguments
+                if task.progress is not None:
+                    arguments = (*arguments, task.progress)
                 try:
-                    progress = filter(None, [task.progress])
-                    outcome.set_result(task.function(*task.arguments, *progress))
+                    outcome.set_result(task.function(*arguments))
                 except Exception as error:
                     outcome.set_exception(error)
                 yield task, outcome
@@ -196,10 +198,13 @@ class Worker:
         self.deadline = monotonic() + limit_s
         if isinstance(content, LostProcessError):
             content = LostProcessError(f"{self.task.name}: {content}")
-        if kind != "progress":
-            getattr(self.outcome, kind)(content)
-        elif self.task.progress:
-            self.task.progress(*content)
+        match kind:
+            case "result":
+                self.outcome.set_result(content)
+            case "failure":
+                self.outcome.set_exception(content)
+            case "progress" if self.task.progress:
+                self.task.progress(*content)
 
     def lose(self, reason: str = "") -> None:
         """End the process, and fail its task for a reason, or because the process ended."""
@@ -272,16 +277,17 @@ def _answer(
     arguments: tuple[Any, ...],
     with_progress: bool,
 ) -> tuple[str, Any]:
-    """Do a task; return the method of its outcome to call, and the argument."""
-    progress = [lambda *state: _send(pipe, "progress", state)] if with_progress else []
+    """Do a task; return the kind of the message about it, ``result`` or ``failure``, and which."""
+    if with_progress:
+        arguments = (*arguments, lambda *state: _send(pipe, "progress", state))
     try:
         once(prepare)
-        return "set_result", function(*arguments, *progress)
+        return "result", function(*arguments)
     except FotismosError as error:
-        return "set_exception", error
+        return "failure", error
     except BaseException as error:  # Ctrl-C is ignored here: this is the task's own
         LOGGER.info("a task failed", exc_info=True)
-        return "set_exception", LostProcessError(f"{type(error).__name__}: {error}")
+        return "failure", LostProcessError(f"{type(error).__name__}: {error}")
 
 
 def _send(pipe: Any, kind: str, content: Any) -> None:
@@ -291,7 +297,7 @@ def _send(pipe: Any, kind: str, content: Any) -> None:
         os._exit(0)
     except Exception as error:  # pickling can raise anything
         reason = f"its result cannot be sent: {type(error).__name__}: {error}"
-        pipe.send(("set_exception", LostProcessError(reason)))
+        pipe.send(("failure", LostProcessError(reason)))
 
 
 # --- Turns --------------------------------------------------------------------------------------

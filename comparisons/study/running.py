@@ -29,6 +29,7 @@ from fotismos.comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, lar
 from fotismos.heuristic import plugins
 from fotismos.heuristic.errors import FotismosError, InputError, unknown
 from fotismos.heuristic.heuristics import named
+from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.planning.effects import EFFECTS, PRUNED
 from fotismos.reference.planning.plan import Plan, physical_integrator
 from fotismos.reference.rendering import direct
@@ -175,7 +176,7 @@ def row(point: StudyPoint) -> Row:
     """
     _prepare()
     try:
-        convention = point.part.options.convention
+        convention = Convention(point.part.options.pairing)
         if point.part.scene == "lobe":
             columns, image, truth = scenes.lobe(point.values, convention)
             columns |= measure(image, truth, np.ones(image.shape[:2], bool))

@@ -170,7 +170,8 @@ def define() -> dict[str, Any]:
         def bbox(self) -> Any:
             if self.model is DirectionalLight:
                 return mi.ScalarBoundingBox3f()
-            return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(*(c[0] for c in self.position)))
+            x, y, z = self.position
+            return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(x[0], y[0], z[0]))
 
         def to_string(self) -> str:
             shown = ", ".join(f"{name} = {value}" for name, value in self.intensities.items())

@@ -266,11 +266,11 @@ def spot_to_physical(light: LightNode) -> None:
         power_flux(cutoff, exponent) / linear_flux(edge, beam_width),
     )
     fitted = f"linear from {beam_width:.4g} to {edge:.4g} deg, fitted to m = {exponent:g}"
-    # Origin, target, and the axis of the world most unlike the beam as up.
-    ends = (position, position + axis, np.eye(3)[np.argmin(np.abs(axis))])
+    target = position + axis
+    up = np.eye(3)[np.argmin(np.abs(axis))]  # the axis of the world most unlike the beam
     props = properties(
         "spot",
-        to_world=mi.ScalarTransform4f().look_at(*(end.tolist() for end in ends)),
+        to_world=mi.ScalarTransform4f().look_at(position.tolist(), target.tolist(), up.tolist()),
         intensity=light.scaled_intensity(factor),
         cutoff_angle=edge,
         beam_width=beam_width,

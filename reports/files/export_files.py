@@ -169,7 +169,7 @@ def _material(material: dict[str, Any]) -> dict[str, Any]:
 def _light(light: dict[str, Any]) -> dict[str, Any]:
     intensity = light.get("diffuse_intensity", light["intensity"])
     # glTF splits light into a colour up to 1 and an intensity; a dark light must not divide by 0.
-    largest = max(*intensity, 1e-30)
+    largest = max(max(intensity), 1e-30)
     outer = min(radians(light.get("cutoff", 0.0)), pi / 2)
     spot = {"spot": {"innerConeAngle": 0.0, "outerConeAngle": outer}}
     return {

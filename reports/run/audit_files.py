@@ -50,7 +50,10 @@ def furnace(record: Audit) -> Spec:
                     rows.append({"x": at, "y": value, "of": of})
     x = alt.X("x:Q").title("alpha" if varied else "viewer’s angle").scale(nice=False)
     y = alt.Y("y:Q").title("seen")
-    return _charts({kind: _chart(*lines, "viewer at", x, y) for kind, lines in kinds.items()})
+    charts = {
+        kind: _chart(rows, faint, of="viewer at", x=x, y=y) for kind, (rows, faint) in kinds.items()
+    }
+    return _charts(charts)
 
 
 def lobes(record: Audit) -> Spec:
@@ -64,7 +67,8 @@ def lobes(record: Audit) -> Spec:
             for view, value in zip(record.views, lobe, strict=True)
         ]
         if rows:
-            reach = 1.05 * max(1.0, *(max(abs(row["x"]), abs(row["y"])) for row in rows))
+            farthest = max(max(abs(row["x"]), abs(row["y"])) for row in rows)
+            reach = 1.05 * max(1.0, farthest)
             low = -reach if min(row["y"] for row in rows) < 0 else 0
             shown = {"tickCount": 4}
             x = alt.X("x:Q", axis=shown).title(None).scale(domain=[-reach, reach], nice=False)
