@@ -19,7 +19,7 @@ from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import named
 from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.pairing.halves import Pair, PairOptions, pair
-from fotismos.reference.pairing.prepare import Override
+from fotismos.reference.pairing.settings import Override
 from fotismos.reference.planning.guard import examine_plan
 from fotismos.reference.planning.plan import Guard, Plan, physical_integrator, plan
 from fotismos.reference.planning.rules import SAMPLED_AS_HIT, loses_light

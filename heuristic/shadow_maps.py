@@ -146,7 +146,7 @@ def _cube_texel(position: Any, size: int) -> Any:
     return (side * size + y) * size + x
 
 
-def prepare(scene: Any, resolution: float) -> tuple[DepthImage, ...]:
+def light_maps(scene: Any, resolution: float) -> tuple[DepthImage, ...]:
     """Trace the depth images of all lamps, in their order."""
     si = dr.zeros(mi.SurfaceInteraction3f)
     return tuple(light_map(scene, lamp.light(si), round(resolution)) for lamp in lamps(scene))
@@ -192,6 +192,6 @@ MAP = Heuristic(
     label="shadow map",
     needs=frozenset(INPUTS) - {"uv", "visible"},
     parameters=(RESOLUTION, BIAS),
-    prepare=prepare,
+    prepare=light_maps,
     refuse=refuse,
 )

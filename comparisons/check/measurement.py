@@ -29,7 +29,7 @@ from fotismos.heuristic import program
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference import records
-from fotismos.reference.pairing.prepare import film_size
+from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.records import VERSION, Amount, Record, Versions
 from fotismos.reference.rendering.renderer import Progress, passes
 from fotismos.reference.rendering.sums import jackknife_error

@@ -187,12 +187,12 @@ def debiased(
     half += whole.gap / 2.0 + np.sqrt(middle**2 + CURVATURE * whole.noise**2) - middle
     value, low, high = np.maximum(measured - added + half * np.array([0, -1, 1]), 0.0)
     # Up to here a linear metric is a mean square.
-    if metric.linear:
+    if metric.averages_squares:
         value, low, high = np.sqrt([value, low, high])
     shares = _shares(metric.visible, distances, grouped, raw)
     between = distances_between(metric, shown, viewing)
     apart = Halves.of(between, grouped.means, grouped.sizes)
-    if apart.are_heavy and not metric.linear:
+    if apart.are_heavy and not metric.averages_squares:
         low = max(min(low, measured - apart.below), 0.0)
         high = max(high, measured + apart.above)
         shares[1] -= shares_above(apart.halves, metric.visible)
@@ -336,7 +336,7 @@ def _draws(mean: Array, noise: Array, grouped: Grouped) -> Array:
 
 def _mean(metric: Metric, distances: Floats) -> float:
     """Return the mean of distances, of a linear metric the mean square."""
-    return float(np.mean(distances**2) if metric.linear else distances.mean())
+    return float(np.mean(distances**2) if metric.averages_squares else distances.mean())
 
 
 @dataclass(frozen=True)
@@ -365,7 +365,7 @@ class _Extrapolated:
         pixels = grouped.by_block(np.ones(len(plain)))
         before = grouped.by_block(plain)
         after = grouped.by_block(np.mean(noisy, axis=0))
-        if metric.linear:
+        if metric.averages_squares:
             added = grouped.by_block(np.mean(np.square(noisy), axis=0) - plain**2)
             gap = 0.0
             noise = 0.0

@@ -34,9 +34,9 @@ LOGGER = logging.getLogger(__name__)
 
 
 @cache
-def once(prepare: Callable[[], object]) -> None:
-    """Prepare this process once; again if that failed."""
-    prepare()
+def once(set_up: Callable[[], object]) -> None:
+    """Set this process up once; again if that failed."""
+    set_up()
 
 
 def cores() -> int:
@@ -66,15 +66,15 @@ class Pool:
     """Does tasks in separate processes; a context that ends the processes.
 
     At most ``count`` processes run at the same time. With 0 the tasks are done in this process, one
-    after another and without a time limit. Each calls ``prepare`` once, before its first task. A
+    after another and without a time limit. Each calls ``set_up`` once, before its first task. A
     task may take ``limit_s`` seconds without reporting progress, start-up included.
     """
 
     def __init__(
-        self, count: int, prepare: Callable[[], object] = tuple, limit_s: float = inf
+        self, count: int, set_up: Callable[[], object] = tuple, limit_s: float = inf
     ) -> None:
         self._count = count
-        self._prepare = prepare
+        self._set_up = set_up
         self._limit_s = limit_s
         self._idle: list[Worker] = []
         self._busy: list[Worker] = []
@@ -88,7 +88,7 @@ class Pool:
     def start(self) -> None:
         """Start the processes now: they get ready while this one does other things."""
         while len(self._idle) + len(self._busy) < self._count:
-            self._idle.append(Worker(self._prepare))
+            self._idle.append(Worker(self._set_up))
 
     def do(self, task: Task) -> Any:
         """Do one task, and return what it returned, or raise what it raised."""
@@ -103,7 +103,7 @@ class Pool:
         process that ended, and when the time is up.
         """
         if self._count == 0:
-            self._prepare()
+            self._set_up()
             for task in tasks:
                 outcome: Future[Any] = Future()
                 arguments = task.arguments
@@ -134,7 +134,7 @@ class Pool:
         for task in islice(waiting, self._count - len(self._busy)):
             # An idle process may have died since its last task.
             self._idle = [worker for worker in self._idle if worker.process.is_alive()]
-            worker = self._idle.pop() if self._idle else Worker(self._prepare)
+            worker = self._idle.pop() if self._idle else Worker(self._set_up)
             self._busy.append(worker)
             worker.give(task, self._limit_s)
 
@@ -169,11 +169,11 @@ class Worker:
     outcome: Future[Any]
     deadline: float
 
-    def __init__(self, prepare: Callable[[], object]) -> None:
+    def __init__(self, set_up: Callable[[], object]) -> None:
         context = get_context("spawn")  # a fork would share threads' locks with its parent
         self.is_over = False
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(theirs, prepare), daemon=True)
+        self.process = context.Process(target=_work, args=(theirs, set_up), daemon=True)
         resource_tracker.ensure_running()  # here, because it unblocks signals
         with held_back():
             self.process.start()
@@ -242,7 +242,7 @@ class Worker:
         self.process.join()
 
 
-def _work(pipe: Any, prepare: Callable[[], object]) -> NoReturn:
+def _work(pipe: Any, set_up: Callable[[], object]) -> NoReturn:
     """Do the tasks that come through the pipe, until it is closed."""
     # A group of its own, so that what a task starts ends with it.
     os.setpgid(0, 0)
@@ -258,7 +258,7 @@ def _work(pipe: Any, prepare: Callable[[], object]) -> NoReturn:
         except (EOFError, OSError):
             os._exit(0)  # the parent is gone
         function, arguments, with_progress = call
-        kind, content = _answer(pipe, prepare, function, arguments, with_progress)
+        kind, content = _answer(pipe, set_up, function, arguments, with_progress)
         _send(pipe, kind, content)
         del call, function, arguments, content  # what a task had must not outlive it
 
@@ -272,7 +272,7 @@ def _end_with_parent() -> None:
 
 def _answer(
     pipe: Any,
-    prepare: Callable[[], object],
+    set_up: Callable[[], object],
     function: Callable[..., Any],
     arguments: tuple[Any, ...],
     with_progress: bool,
@@ -281,7 +281,7 @@ def _answer(
     if with_progress:
         arguments = (*arguments, lambda *state: _send(pipe, "progress", state))
     try:
-        once(prepare)
+        once(set_up)
         return "result", function(*arguments)
     except FotismosError as error:
         return "failure", error

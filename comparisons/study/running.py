@@ -81,11 +81,11 @@ def all_points(study: StudyFile) -> list[StudyPoint]:
 
     It reads scenes and runs scripts.
     """
-    _prepare()
+    _set_up()
     return [point for part in study.parts for point in _points(part)]
 
 
-def _prepare() -> None:
+def _set_up() -> None:
     set_variant(RGB)
     plugins.register()
     direct.register()
@@ -174,7 +174,7 @@ def row(point: StudyPoint) -> Row:
 
     The row of a point that fails has its parameters and, in the column ``error``, the reason.
     """
-    _prepare()
+    _set_up()
     try:
         convention = Convention(point.part.options.pairing)
         if point.part.scene == "lobe":

@@ -32,7 +32,7 @@ from fotismos.reference.rendering.sums import Estimate
 from tests.shared.schemas import schema
 from tests.shared.small_scene import PLAIN
 
-OWN = [name for name, metric in METRICS.items() if METRICS.is_own(metric)]
+OWN = [name for name, metric in METRICS.items() if METRICS.is_builtin(metric)]
 
 
 def blurred(test, reference, viewing):
