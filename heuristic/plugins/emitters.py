@@ -59,7 +59,6 @@ from fotismos.heuristic.lights import (
     INTENSITIES,
     PLUGINS,
     UNATTENUATED,
-    DirectionalLight,
     Extent,
     Light,
 )
@@ -112,7 +111,7 @@ def define() -> dict[str, Any]:
                 )
                 dr.make_opaque(self.extent)
             self.m_flags = +mi.EmitterFlags.DeltaPosition
-            if self.model is DirectionalLight:
+            if self.model.parallel:
                 self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection
 
         def parameters_changed(self, keys: Sequence[str] = ()) -> None:
@@ -168,7 +167,7 @@ def define() -> dict[str, Any]:
             return self.sample_direction(it, None, active)[1]  # Mitsuba takes derivatives here
 
         def bbox(self) -> Any:
-            if self.model is DirectionalLight:
+            if self.model.parallel:
                 return mi.ScalarBoundingBox3f()
             x, y, z = self.position
             return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(x[0], y[0], z[0]))
