@@ -181,7 +181,7 @@ def option(name: str, command_default: str = "") -> Decorator:
     is_stated = default is None and isinstance(field.default, (int, str))
     return click.option(
         *(("-D", name) if name == "define" else (f"--{name.replace('_', '-')}",)),
-        **_kind(name, field.type.type),
+        **_kind(field.type.type),
         default=field.default if is_stated else None,
         show_default=is_stated and not isinstance(field.default, bool),
         metavar=METAVARS.get(name),
@@ -189,7 +189,7 @@ def option(name: str, command_default: str = "") -> Decorator:
     )
 
 
-def _kind(name: str, kind: Any) -> dict[str, Any]:
+def _kind(kind: Any) -> dict[str, Any]:
     """Return what click needs to know of an option's type."""
     # The second type of a union is None, which stands for an omitted option.
     match kind.types[0] if isinstance(kind, inspect.UnionType) else kind:
