@@ -93,19 +93,16 @@ def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerCha
         shown = legend if len(names) > 1 else None
         return channel("of:N", title=of, sort=names, legend=shown, scale=scale)
 
-    # Vega-Lite joins points by x; `order` lets a curve turn back.
-    below = (
-        alt.Chart(alt.Data(values=[row | {"order": order} for order, row in enumerate(faint)]))
-        .mark_line(clip=True, strokeWidth=1)
-        .encode(x=x, y=y, order="order:Q", strokeDash=style(alt.StrokeDash, DASHES))
-    )
-    above = (
-        alt.Chart(alt.Data(values=[row | {"order": order} for order, row in enumerate(rows)]))
-        .mark_line(clip=True, strokeWidth=2)
-        .encode(x=x, y=y, order="order:Q", strokeDash=style(alt.StrokeDash, DASHES))
-    )
-    layers = [below.encode(color=alt.value(FAINT)), above.encode(color=style(alt.Color, INKS))]
-    return alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH // 2)
+    def line(rows: Rows, width: int, colour: Any) -> alt.Chart:
+        # Vega-Lite joins points by x; `order` lets a curve turn back.
+        points = alt.Data(values=[row | {"order": order} for order, row in enumerate(rows)])
+        dashes = style(alt.StrokeDash, DASHES)
+        drawn = alt.Chart(points).mark_line(clip=True, strokeWidth=width)
+        return drawn.encode(x=x, y=y, order="order:Q", strokeDash=dashes, color=colour)
+
+    below = line(faint, 1, alt.value(FAINT))
+    above = line(rows, 2, style(alt.Color, INKS))
+    return alt.LayerChart(layer=[below, above], width=WIDTH, height=WIDTH // 2)
 
 
 def write(folder: Path, record: Audit) -> None:
