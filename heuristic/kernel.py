@@ -240,8 +240,8 @@ def _checked_lights(lights: object) -> Sequence[Light]:
 
 
 def _kinds_of_light() -> str:
-    *others, last = (kind.__name__ for kind in PLUGINS.values())
-    return f"{', '.join(others)} or {last}"
+    names = [kind.__name__ for kind in PLUGINS.values()]
+    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _check_sizes(values: dict[str, Any], lights: Sequence[Light]) -> None:
