@@ -17,8 +17,9 @@ from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import named
+from fotismos.reference.pairing import halves
 from fotismos.reference.pairing.factors import Convention
-from fotismos.reference.pairing.halves import Pair, PairOptions, pair
+from fotismos.reference.pairing.halves import Pair
 from fotismos.reference.pairing.settings import Override
 from fotismos.reference.planning.guard import examine_plan
 from fotismos.reference.planning.plan import Guard, Plan, physical_integrator, plan
@@ -198,7 +199,7 @@ class Prepared:
 
 def pair_for(source: Source, options: Options) -> Pair:
     """Derive both halves of a scene as the options say, for the current variant."""
-    chosen = PairOptions(
+    chosen = halves.PairOptions(
         convention=Convention(options.pairing),
         resolution=options.resolution,
         interpolation=options.polygon_shading,
@@ -207,7 +208,7 @@ def pair_for(source: Source, options: Options) -> Pair:
         sensor=options.sensor,
         heuristic=options.heuristic,
     )
-    return pair(source, chosen)
+    return halves.pair(source, chosen)
 
 
 def prepare(source: Source, options: Options | None = None) -> Prepared:
