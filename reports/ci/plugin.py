@@ -24,6 +24,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from fotismos.heuristic import llvm
+from fotismos.heuristic.errors import InstallationError
+
 if TYPE_CHECKING:
     from fotismos.reports.ci.testing import Fotismos  # loaded late: see below
 
@@ -56,7 +59,12 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 @pytest.fixture
 def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
     """Departures and baselines of scenes: see :class:`fotismos.reports.ci.testing.Fotismos`."""
-    from fotismos.reports.ci import testing  # loaded late: most suites use nothing of it
+    try:
+        llvm.check()
+    except InstallationError as error:
+        pytest.skip(f"fotismos cannot render here. {error}")
+    # Loaded late: it needs LLVM, and most suites use nothing of it.
+    from fotismos.reports.ci import testing
 
     variant = getattr(request, "param", None)
     with testing.rendering_in(variant):

@@ -8,15 +8,13 @@ from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
-import pytest
 
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import Case, Scene, open_case
 from fotismos.comparisons.check.measurement import PASSES, made_small, measure_scene
 from fotismos.comparisons.check.moved import LEVEL
 from fotismos.comparisons.options import Options
-from fotismos.heuristic import llvm
-from fotismos.heuristic.errors import InputError, InstallationError, unknown
+from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import in_file, known_as
 from fotismos.reference import records
 from fotismos.reference.rendering.sums import student
@@ -64,11 +62,7 @@ class Departure(float):
 
 @contextmanager
 def rendering_in(variant: str | None) -> Iterator[None]:
-    """Set a variant for a test, and the one before afterwards; skip the test without an LLVM."""
-    try:
-        llvm.check()
-    except InstallationError as error:
-        pytest.skip(f"fotismos cannot render here. {error}")
+    """Set a variant for a test, and the one before afterwards."""
     before = mi.variant()
     # A test may make a scene from Mitsuba's types, which needs a variant.
     set_variant(variant or before or "llvm_ad_rgb")

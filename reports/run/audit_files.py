@@ -97,8 +97,9 @@ def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerCha
         # Vega-Lite joins points by x; `order` lets a curve turn back.
         points = alt.Data(values=[row | {"order": order} for order, row in enumerate(rows)])
         dashes = style(alt.StrokeDash, DASHES)
-        drawn = alt.Chart(points).mark_line(clip=True, strokeWidth=width)
-        return drawn.encode(x=x, y=y, order="order:Q", strokeDash=dashes, color=colour)
+        chart: alt.Chart = alt.Chart(points).mark_line(clip=True, strokeWidth=width)
+        chart = chart.encode(x=x, y=y, order="order:Q", strokeDash=dashes, color=colour)
+        return chart
 
     below = line(faint, 1, alt.value(FAINT))
     above = line(rows, 2, style(alt.Color, INKS))
