@@ -24,7 +24,7 @@ def steps(options: Options, why: bool) -> list[Step]:
     if options.image:  # no effect can be added to a picture
         return [with_picture, with_terms] if why else [with_picture]
     added: list[Step] = []
-    if not heuristics.named(options.heuristic).is_own:
+    if not heuristics.named(options.heuristic).is_builtin:
         added.append(with_mistakes)
     if why:
         from fotismos.comparisons.hybrids.attribution import with_causes  # see above
