@@ -99,7 +99,7 @@ def compare(
     _require_colour_science()
     printed: list[str] = []
     with collect_messages(printed):
-        comparison, ready = _measured(source, options, progress, command, alone)
+        comparison, ready = _render_and_measure(source, options, progress, command, alone)
     comparison = comparison.warned(count_messages([*source.messages, *printed]))
     for step in then:
         comparison = step(comparison, ready, progress)
@@ -146,7 +146,7 @@ def _computed_twice(comparison: Comparison) -> Comparison:
     return replace(comparison, record=record).warned(warnings)
 
 
-def _measured(
+def _render_and_measure(
     source: Source,
     options: Options,
     progress: Progress | None,

@@ -25,7 +25,7 @@ from fotismos.heuristic import __version__
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.pairing.factors import Unrepresentable
 from fotismos.reference.pairing.halves import Pairing
-from fotismos.reference.pairing.prepare import Override
+from fotismos.reference.pairing.settings import Override
 from fotismos.reference.planning.plan import Plan
 from fotismos.reference.records import (
     VERSION,

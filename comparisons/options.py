@@ -18,9 +18,6 @@ from fotismos.heuristic.errors import InputError, unknown
 if TYPE_CHECKING:  # the command line reads options without loading Dr.Jit
     from fotismos.comparisons.departure.colour import Viewing
     from fotismos.heuristic.heuristics import Interpolation  # loaded late: help needs no Mitsuba
-    from fotismos.reference.pairing.factors import Convention  # loaded late: help needs no Mitsuba
-    from fotismos.reference.pairing.halves import Pair
-    from fotismos.reference.scene.source import Source
 
 LARGEST_SPP = 2**20
 """Samples per pixel: the noise is a thousandth of one sample's, and an image takes days."""
@@ -165,14 +162,6 @@ class Options(
         return program.command(*arguments)
 
     @property
-    def convention(self) -> Convention:
-        """How roughplastic and phong are paired."""
-        # Loaded late: help needs no Mitsuba.
-        from fotismos.reference.pairing.factors import Convention
-
-        return Convention(self.pairing)
-
-    @property
     def polygon_shading(self) -> Interpolation:
         """How the heuristic half shades polygons."""
         # Loaded late: help needs no Mitsuba.
@@ -188,22 +177,6 @@ class Options(
 
         density = self.pixels_per_degree
         return DEFAULT_VIEWING if density is None else Viewing(pixels_per_degree=density)
-
-    def pair(self, source: Source) -> Pair:
-        """Derive both halves of a scene, for the current variant."""
-        # Loaded late: help needs no Mitsuba.
-        from fotismos.reference.pairing.halves import PairOptions, pair
-
-        options = PairOptions(
-            convention=self.convention,
-            resolution=self.resolution,
-            interpolation=self.polygon_shading,
-            tessellation=self.tessellation,
-            prune=not self.everything,
-            sensor=self.sensor,
-            heuristic=self.heuristic,
-        )
-        return pair(source, options)
 
     def require_model(self, what: str) -> None:
         """Raise InputError if a picture replaces the heuristic half, which ``what`` renders."""

@@ -30,7 +30,7 @@ from fotismos.comparisons.comparison import Images, PictureRecord
 from fotismos.comparisons.departure.colour import CHROMATICITIES, from_srgb, luminance, to_srgb
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
-from fotismos.reference.pairing.prepare import film_size
+from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.rendering.renderer import LARGEST_VALUE, Renderer, Times
 from fotismos.reference.scene.source import Source

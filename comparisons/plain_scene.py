@@ -15,14 +15,13 @@ from fotismos.comparisons.options import Options
 from fotismos.heuristic import meshes
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
-from fotismos.heuristic.lights import INTENSITIES, PLUGINS, lamps
+from fotismos.heuristic.lights import INTENSITIES, lamps
 from fotismos.heuristic.materials import COEFFICIENTS, PHYSICAL
 from fotismos.heuristic.tessellation import RESOLUTION, to_mesh
+from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.pairing.halves import PairOptions, pair
 from fotismos.reference.rendering.gbuffer import gbuffer, image_size
 from fotismos.reference.scene.source import Source
-
-KINDS = {kind: plugin.removeprefix("heuristic_") for plugin, kind in PLUGINS.items()}
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ def plain_scene(source: Source, options: Options) -> PlainScene:
     if not mi.is_rgb:
         raise InputError(f"variant {mi.variant()}: scenes are exported in RGB. Give llvm_ad_rgb.")
     chosen = PairOptions(
-        convention=options.convention,
+        convention=Convention(options.pairing),
         resolution=options.resolution,
         prune=False,
         sensor=options.sensor,
@@ -192,7 +191,8 @@ def light_of(emitter: mi.Emitter, point: mi.SurfaceInteraction3f) -> dict[str, A
     A light of two intensities has them too.
     """
     light = emitter.light(point, True)
-    numbered: dict[str, Any] = {"name": emitter.id(), "type": KINDS[type(light)]}
+    kind = light.plugin.removeprefix("heuristic_")
+    numbered: dict[str, Any] = {"name": emitter.id(), "type": kind}
     for name, value in light.given().items():
         if isinstance(value, tuple):
             numbered[name] = [numbers(component)[0] for component in value]

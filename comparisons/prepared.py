@@ -17,8 +17,10 @@ from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import named
+from fotismos.reference.pairing import halves
+from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.pairing.halves import Pair
-from fotismos.reference.pairing.prepare import Override
+from fotismos.reference.pairing.settings import Override
 from fotismos.reference.planning.guard import examine_plan
 from fotismos.reference.planning.plan import Guard, Plan, physical_integrator, plan
 from fotismos.reference.planning.rules import SAMPLED_AS_HIT, loses_light
@@ -207,6 +209,20 @@ class Prepared:
                 )
 
 
+def pair_for(source: Source, options: Options) -> Pair:
+    """Derive both halves of a scene as the options say, for the current variant."""
+    chosen = halves.PairOptions(
+        convention=Convention(options.pairing),
+        resolution=options.resolution,
+        interpolation=options.polygon_shading,
+        tessellation=options.tessellation,
+        prune=not options.everything,
+        sensor=options.sensor,
+        heuristic=options.heuristic,
+    )
+    return halves.pair(source, chosen)
+
+
 def prepare(source: Source, options: Options | None = None) -> Prepared:
     """Pair and plan a scene in the current variant, and make both halves ready to render."""
     options = options or Options()
@@ -214,7 +230,7 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
         from fotismos.comparisons import pictures  # loaded late: few comparisons have any
 
         options = pictures.at_size_of_pictures(source, options)
-    pair = options.pair(source)
+    pair = pair_for(source, options)
     sampler = STOCK_SAMPLER if options.everything else SAMPLER
     physical = with_sampler(pair.physical, sampler).instantiate()
     width, height = image_size(physical)
@@ -277,7 +293,7 @@ def _heuristic_renderer(
     """Make the heuristic half ready to render, in its own variant if it has one."""
     with variant(options.heuristic_variant or mi.variant()):
         if options.heuristic_variant:
-            pair = options.pair(source)
+            pair = pair_for(source, options)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
         renderer = Renderer(scene, None, pass_spp=spp, label="heuristic image")
         if not options.image:

@@ -26,7 +26,7 @@ def steps(options: Options, why: bool) -> list[Step]:
         added: list[Step] = [with_picture, with_terms] if why else [with_picture]
         return [*added, with_price]
     added = []
-    if not heuristics.named(options.heuristic).is_own:
+    if not heuristics.named(options.heuristic).is_builtin:
         added.append(with_mistakes)
     if why:
         from fotismos.comparisons.hybrids.attribution import with_causes  # see above

@@ -30,12 +30,12 @@ if TYPE_CHECKING:
     from fotismos.heuristic.kernel import shade
     from fotismos.heuristic.lights import DirectionalLight, PointLight, SpotLight
     from fotismos.heuristic.materials import Material
+    from fotismos.heuristic.plugins import register
     from fotismos.reports.ci.checks import CheckRecord
     from fotismos.reports.notebook import Shown, audit, check, compare, cost, declare, fit, plan
     from fotismos.reports.terminal.plan_lines import PlanReport
 
 __version__ = heuristic.__version__
-register = heuristic.register
 
 NAMES = {
     "comparisons.audit.checks": ("Audit",),

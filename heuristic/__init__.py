@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fotismos.heuristic.kernel import shade
     from fotismos.heuristic.lights import DirectionalLight, PointLight, SpotLight
     from fotismos.heuristic.materials import Material
+    from fotismos.heuristic.plugins import register
 
 llvm.configure()  # Dr.Jit looks for LLVM once, at its first import
 
@@ -25,9 +26,10 @@ HOMES = {
     "PointLight": "fotismos.heuristic.lights",
     "Range": "fotismos.heuristic.heuristics",
     "SpotLight": "fotismos.heuristic.lights",
+    "register": "fotismos.heuristic.plugins",
     "shade": "fotismos.heuristic.kernel",
 }
-"""Where names come from when they are asked for: errors and options need no Dr.Jit."""
+"""Where names come from when they are asked for: errors need no Dr.Jit, the kernel no Mitsuba."""
 
 __all__ = [
     "DirectionalLight", "Heuristic", "Material", "Parameter", "PointLight", "Range", "SpotLight",
@@ -39,10 +41,3 @@ def __getattr__(name: str) -> object:
     if name not in HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(HOMES[name]), name)
-
-
-def register() -> None:
-    """Register the Mitsuba plugins for the current variant (:mod:`fotismos.heuristic.plugins`)."""
-    from fotismos.heuristic import plugins  # the kernel alone does not need Mitsuba
-
-    plugins.register()

@@ -42,7 +42,7 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
         self.added[declaration.name] = declaration
         return declaration
 
-    def is_own(self, declaration: Any) -> bool:
+    def is_builtin(self, declaration: Any) -> bool:
         """Return whether a declaration is the package's own."""
         return declaration.name in self._own and self[declaration.name] is declaration
 

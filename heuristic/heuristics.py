@@ -310,7 +310,7 @@ class Heuristic:
 
         None for others' Python, of which nobody knows what else it reads.
         """
-        if self.is_own:
+        if self.is_builtin:
             return self.name
         return self.code if self.name.endswith(".glsl") else None
 
@@ -332,7 +332,7 @@ class Heuristic:
             prepared=prepared,
             wavelengths=wavelengths,
         )
-        if self.is_own:
+        if self.is_builtin:
             return self.shade(point)
         return pkgutil.resolve_name(SHADED)(self.name, self.shade, point)
 
@@ -342,9 +342,9 @@ class Heuristic:
         return self.reads or tuple(sorted(self.needs))
 
     @property
-    def is_own(self) -> bool:
+    def is_builtin(self) -> bool:
         """Whether the package itself declares it."""
-        return HEURISTICS.is_own(self)
+        return HEURISTICS.is_builtin(self)
 
 
 HEURISTICS: Declared[Heuristic] = Declared(

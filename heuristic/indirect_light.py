@@ -159,10 +159,11 @@ def fit(normal: Doubles, arriving: Doubles, k_d: Doubles, up: Doubles) -> tuple[
     return np.maximum(level + slope, 0), np.maximum(level - slope, 0)
 
 
-def prepare(scene: Any) -> tuple[Array, Array, list[float], bool]:
+def fitted_sky(scene: Any) -> tuple[Array, Array, list[float], bool]:
     """Return sky, ground, the upward direction, and whether they replace ``I_a``."""
     up = upward(scene)
-    above, below = fit(*gather(scene), up)
+    normal, arriving, k_d = gather(scene)
+    above, below = fit(normal, arriving, k_d, up)
     sky = mi.Spectrum(above.tolist())
     ground = mi.Spectrum(below.tolist())
     dr.make_opaque(sky, ground)  # as literals they would compile a kernel for every scene
@@ -190,6 +191,6 @@ HEMISPHERE = Heuristic(
     shade=shade,
     label="hemisphere ambient light",
     needs=frozenset(INPUTS) - {"uv", "visible"},
-    prepare=prepare,
+    prepare=fitted_sky,
     refuse=refuse,
 )

@@ -21,7 +21,7 @@ from fotismos.heuristic.convention import (
     Visibility,
 )
 from fotismos.heuristic.errors import InputError, type_of
-from fotismos.heuristic.lights import INTENSITIES, Arrival, Light
+from fotismos.heuristic.lights import INTENSITIES, PLUGINS, Arrival, Light
 from fotismos.heuristic.materials import COEFFICIENTS, Material
 
 HOW = "give a Dr.Jit array of three components, such as drjit.auto.Array3f(x, y, z)"
@@ -230,17 +230,18 @@ def checked_vectors(position: Any, normal: Any, view: Any) -> tuple[Any, ...]:
 def _checked_lights(lights: object) -> Sequence[Light]:
     if isinstance(lights, (str, bytes, Mapping)) or not isinstance(lights, Iterable):
         raise InputError(
-            f"lights is {type_of(lights)}: give a list of PointLight, DirectionalLight or"
-            " SpotLight, empty for none."
+            f"lights is {type_of(lights)}: give a list of {_kinds_of_light()}, empty for none."
         )
     lights = lights if isinstance(lights, Sequence) else list(lights)
     for number, light in enumerate(lights):
         if not isinstance(light, Light):
-            raise InputError(
-                f"lights[{number}] is {type_of(light)}: give a PointLight, DirectionalLight or"
-                " SpotLight."
-            )
+            raise InputError(f"lights[{number}] is {type_of(light)}: give a {_kinds_of_light()}.")
     return lights
+
+
+def _kinds_of_light() -> str:
+    names = [kind.__name__ for kind in PLUGINS.values()]
+    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _check_sizes(values: dict[str, Any], lights: Sequence[Light]) -> None:

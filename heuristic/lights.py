@@ -9,6 +9,7 @@ a kernel.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from inspect import signature
 from math import inf, isfinite
 from numbers import Real
 from typing import Any, ClassVar, NamedTuple, Self
@@ -70,10 +71,11 @@ class Light:
     ``plugin`` is its emitter in a Mitsuba scene. Fields of the same name mean the same in all
     kinds; :data:`CHECKS` checks them. ``diffuse_intensity`` is ``L_d``, the light that takes part
     in diffuse reflection (6.6), ``specular_intensity`` ``L_s`` (6.8); each is ``intensity`` if
-    omitted.
+    omitted. Without a position its rays are ``parallel``.
     """
 
     plugin: ClassVar[str]
+    parallel: ClassVar[bool] = False
     intensity: Colour
     diffuse_intensity: Colour
     specular_intensity: Colour
@@ -175,6 +177,7 @@ class DirectionalLight(Light):
     """
 
     plugin: ClassVar[str] = "heuristic_directional"
+    parallel: ClassVar[bool] = True
 
     direction: Direction
     intensity: Colour
@@ -258,9 +261,15 @@ class SpotLight(Light):
         return super().compiled() | even
 
 
-KINDS: tuple[type[Light], ...] = (DirectionalLight, PointLight, SpotLight)
-PLUGINS: dict[str, type[Light]] = {kind.plugin: kind for kind in KINDS}
+PLUGINS: dict[str, type[Light]] = {
+    kind.plugin: kind for kind in (PointLight, DirectionalLight, SpotLight)
+}
 """The kinds of light, by their emitter plugin in a Mitsuba scene."""
+
+
+def plugins_with(field: str) -> list[str]:
+    """Return the plugins of the kinds of light that have a field."""
+    return [plugin for plugin, kind in PLUGINS.items() if field in signature(kind).parameters]
 
 
 def lamps(scene: Scene) -> list[Any]:

@@ -20,7 +20,7 @@ import numpy as np
 from fotismos.heuristic import meshes
 from fotismos.heuristic.convention import Array, Doubles
 from fotismos.heuristic.heuristics import INPUTS, Heuristic, Parameter, Point
-from fotismos.heuristic.lights import FAR, DirectionalLight, lamps
+from fotismos.heuristic.lights import FAR, lamps
 
 LAMPS = 16
 """Lamps with a depth image, at most."""
@@ -69,7 +69,7 @@ def light_map(scene: Any, light: Any, resolution: int) -> DepthImage:
     low, high = box(scene)
     # Half the diagonal of the box, above 0 even for an empty one.
     radius = 0.5 * float(np.linalg.norm(high - low)) + float(np.finfo(np.float32).tiny)
-    if not isinstance(light, DirectionalLight):
+    if not light.parallel:
         # In all directions from the lamp, beginning outside its own body.
         centre = mi.Point3f(light.position)
         start = dr.maximum(LEAST * radius, light.shell)
@@ -146,7 +146,7 @@ def _cube_texel(position: Any, size: int) -> Any:
     return (side * size + y) * size + x
 
 
-def prepare(scene: Any, resolution: float) -> tuple[DepthImage, ...]:
+def light_maps(scene: Any, resolution: float) -> tuple[DepthImage, ...]:
     """Trace the depth images of all lamps, in their order."""
     si = dr.zeros(mi.SurfaceInteraction3f)
     return tuple(light_map(scene, lamp.light(si), round(resolution)) for lamp in lamps(scene))
@@ -192,6 +192,6 @@ MAP = Heuristic(
     label="shadow map",
     needs=frozenset(INPUTS) - {"uv", "visible"},
     parameters=(RESOLUTION, BIAS),
-    prepare=prepare,
+    prepare=light_maps,
     refuse=refuse,
 )

@@ -181,7 +181,7 @@ def option(name: str, command_default: str = "") -> Decorator:
     is_stated = default is None and isinstance(field.default, (int, str))
     return click.option(
         *(("-D", name) if name == "define" else (f"--{name.replace('_', '-')}",)),
-        **_kind(name, field.type.type),
+        **_kind(field.type.type),
         default=field.default if is_stated else None,
         show_default=is_stated and not isinstance(field.default, bool),
         metavar=METAVARS.get(name),
@@ -189,7 +189,7 @@ def option(name: str, command_default: str = "") -> Decorator:
     )
 
 
-def _kind(name: str, kind: Any) -> dict[str, Any]:
+def _kind(kind: Any) -> dict[str, Any]:
     """Return what click needs to know of an option's type."""
     # The second type of a union is None, which stands for an omitted option.
     match kind.types[0] if isinstance(kind, inspect.UnionType) else kind:
@@ -310,18 +310,18 @@ def pool(
         workers = min(workers or cores(), max(1, tasks))
         # Dr.Jit takes all cores by default: processes that run together share them.
         threads = max(1, cores() // workers) if workers > 1 else None
-        return Pool(workers, Ready(level(), threads), timeout)
+        return Pool(workers, ProcessSetup(level(), threads), timeout)
     if workers and workers > 1:
         raise click.UsageError("--workers and --scheduler exclude each other.")
     from fotismos.comparisons.processes import cluster  # loaded late: Dask is an extra
 
-    ready = Ready(
+    set_up = ProcessSetup(
         level=level(), threads=None, folder=os.getcwd(), program=shlex.join(program.program())
     )
-    return cluster.connected(scheduler, ready)
+    return cluster.connected(scheduler, set_up)
 
 
-def work(command_name: str, processes: Pool, /, **options: Any) -> Any:
+def work(command_name: str, processes: Pool, /, **arguments: Any) -> Any:
     """Run the worker of a command: ``run(processes, ...)`` in :mod:`fotismos.reports.work`.
 
     It is imported here, since the help of a command needs none of it, and beside the processes,
@@ -330,12 +330,12 @@ def work(command_name: str, processes: Pool, /, **options: Any) -> Any:
     with processes as pool:
         pool.start()
         worker = import_module(f"fotismos.reports.work.{command_name}")
-        return worker.run(pool, **options)
+        return worker.run(pool, **arguments)
 
 
 @dataclass(frozen=True)
-class Ready:
-    """Gets a process ready to render, as verbose as this one; a `folder` becomes its own.
+class ProcessSetup:
+    """Sets a process up to render, as verbose as this one; a `folder` becomes its own.
 
     ``threads`` are Dr.Jit's, by default one per core; ``program`` begins printed commands.
     """
@@ -346,7 +346,7 @@ class Ready:
     program: str | None = None
 
     def __call__(self) -> None:
-        """Get this process ready."""
+        """Set this process up."""
         if self.program is not None:
             os.environ[program.VARIABLE] = self.program
         # Scenes and results are named relative to the user's folder.
@@ -376,11 +376,11 @@ class Ready:
 class Job:
     """What a command does with each of its scenes.
 
-    ``request`` says how to render; ``fresh`` renders finished scenes again; pixels differ
+    ``options`` say how to render; ``fresh`` renders finished scenes again; pixels differ
     visibly above the ΔE2000 ``within``. Of the scenes ``ladders`` methods are measured, too.
     """
 
-    request: Options
+    options: Options
     figures: bool = False
     with_causes: bool = False
     fresh: bool = False
@@ -393,6 +393,6 @@ def command_line() -> str:
     return program.command(*sys.argv[1:])
 
 
-def request(given: Mapping[str, Any]) -> Options:
-    """Return the rendering request of a command's options."""
+def chosen_options(given: Mapping[str, Any]) -> Options:
+    """Return the options of a comparison among those of a command."""
     return Options.of({**given, "define": dict(given.get("define") or ())})

@@ -285,11 +285,11 @@ def search(record: ComparisonRecord, threshold: float, spp: int | None = None) -
     return program.command("plan", scene, "--within", f"{threshold:g}", *kept, *more)
 
 
-def about(record: ComparisonRecord, cost: Cost | None = None, threshold: float = TOLERANCE) -> str:
+def about(record: ComparisonRecord) -> str:
     """Return a scene's verdict, what is mostly missing, and what to do, in a few sentences."""
-    parts = [headline([record], threshold)]
-    if not record.caution and decision(record, threshold) != "pass":
-        parts += [cause(record), sentence(record, cost, threshold)]
+    parts = [headline([record])]
+    if not record.caution and decision(record) != "pass":
+        parts += [cause(record), sentence(record)]
     return " ".join(dict.fromkeys(filter(None, parts)))
 
 

@@ -252,9 +252,11 @@ def light_from_below(subject: Subject) -> Checked:
     """Check that light from behind the surface is not seen, unless it is to be transmitted."""
     if subject.eta:
         return _checked("light from below", None, None, "0", "it transmits light")
-    degrees = np.linspace(91, 180, 90), np.arange(0, 181, 20.0), np.array([0.0, 30, 60, 80])
-    # Every combination of light, azimuth and viewer, (3, N).
-    angles = np.deg2rad(np.stack(np.meshgrid(*degrees)).reshape(3, -1))
+    lights = np.linspace(91, 180, 90)
+    azimuths = np.arange(0, 181, 20.0)
+    viewers = np.array([0.0, 30, 60, 80])
+    # Every combination of the three, (3, N).
+    angles = np.deg2rad(np.stack(np.meshgrid(lights, azimuths, viewers)).reshape(3, -1))
     polar, azimuth, viewer = angles
     light = furnace.direction(polar, azimuth)
     view = furnace.direction(viewer, 0 * viewer)

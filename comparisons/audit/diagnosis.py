@@ -87,7 +87,7 @@ def describe(name: str) -> tuple[str, ...]:
     There are none of a built-in one, or one that prepares a scene.
     """
     heuristic = heuristics.named(name)
-    if heuristic.is_own or heuristic.prepare is not None:
+    if heuristic.is_builtin or heuristic.prepare is not None:
         return ()
     with mi.scoped_set_variant(DEFAULT_VARIANT):
         return tuple(_describe(heuristics.named(name)))

@@ -98,7 +98,8 @@ def _about(degrees: float, grid: tuple[int, int], eta: float | None) -> tuple[Fl
     z = fixed[2, 0]
     edge = 1.0 if eta is None else float(z / eta if z > 0 else -z * eta)
     # An edge of 1 or more is none; a cut elsewhere keeps the number of nodes.
-    return fixed, *sphere(*grid, edge if edge < 1 or eta is None else 0.5)
+    azimuths, heights = grid
+    return fixed, *sphere(azimuths, heights, edge if edge < 1 or eta is None else 0.5)
 
 
 def seen(

@@ -82,7 +82,10 @@ class Subject(ABC):
         is_wrong = ~(np.isfinite(values) & (values >= -user_shaders.ROUNDING))
         if is_wrong.any():
             channel, index = np.argwhere(is_wrong)[0]
-            where = f"{description}, {furnace.describe(*pairs, index)}" if pairs else description
+            where = description
+            if pairs:
+                light, view = pairs
+                where += f", {furnace.describe(light, view, index)}"
             self.faults.append(f"{values[channel, index]:.3g} ({where})")
 
 

@@ -29,7 +29,7 @@ from fotismos.heuristic import program
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference import records
-from fotismos.reference.pairing.prepare import film_size
+from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.records import VERSION, Amount, Record, Versions
 from fotismos.reference.rendering.renderer import Progress, passes
 from fotismos.reference.rendering.sums import jackknife_error
@@ -229,15 +229,16 @@ def _half(images: Array) -> Half:
         return values.mean(axis=0), values.std(axis=0, ddof=1) / np.sqrt(len(values))
 
     # Means of each pass first: passes are independent, neighbouring pixels are not.
-    whole = estimate(images.mean(axis=(1, 2)))
-    blocks = estimate(block_means(images))
-    rows = zip(*(part.tolist() for part in blocks), strict=True)
-    plain = [
-        [{"mean": mean, "error": error} for mean, error in zip(*row, strict=True)] for row in rows
+    mean, error = estimate(images.mean(axis=(1, 2)))
+    means, errors = estimate(block_means(images))
+    blocks = [
+        [
+            {"mean": means[row, column].tolist(), "error": errors[row, column].tolist()}
+            for column in range(means.shape[1])
+        ]
+        for row in range(means.shape[0])
     ]
-    return msgspec.convert(
-        {"mean": whole[0].tolist(), "error": whole[1].tolist(), "blocks": plain}, Half
-    )
+    return msgspec.convert({"mean": mean.tolist(), "error": error.tolist(), "blocks": blocks}, Half)
 
 
 def block_means(images: Array) -> Array:

@@ -226,11 +226,12 @@ def _correlation(sums: Mapping[str, Sequence[Array]], variance: Array, count: in
 
 def _folded(image: Array) -> Array:
     """Return sums (side, side, ...) over the same pixel of all whole tiles."""
-    side = min(_side(image), *image.shape[:2])
-    height = image.shape[0] // side
-    width = image.shape[1] // side
-    whole = image[: height * side, : width * side]
-    tiles = whole.reshape(height, side, width, side, *image.shape[2:])
+    height, width, *channels = image.shape
+    side = min(_side(image), height, width)
+    rows = height // side
+    columns = width // side
+    whole = image[: rows * side, : columns * side]
+    tiles = whole.reshape([rows, side, columns, side, *channels])
     folded: Array = tiles.sum(axis=(0, 2))
     return folded
 

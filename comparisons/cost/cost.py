@@ -30,7 +30,7 @@ from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.hybrids.attribution import find
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.pairing.prepare import film_size
+from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.plan import Guard
 from fotismos.reference.records import VERSION, Pixels, Positive, Record, Resolution
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, require_memory

@@ -30,7 +30,7 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.pairing.prepare import film_size
+from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import gbuffer, image_size, resize
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, Renderer, Stream, passes

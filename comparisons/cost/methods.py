@@ -319,8 +319,8 @@ class Ladder:
         return self._known.get(form) or structs.replace(form, name=name)
 
     def _make_kernel_scene(self, interpolation: Interpolation, name: str) -> mi.Scene:
-        is_own = name == self.pairs.heuristic_variant
-        if is_own and interpolation is self.options.polygon_shading:
+        is_pairs_variant = name == self.pairs.heuristic_variant
+        if is_pairs_variant and interpolation is self.options.polygon_shading:
             return self.ready.heuristic.scene
         graph = self.pairs.of(interpolation).heuristic
         return with_sampler(graph, self.ready.plan.sampler).instantiate()

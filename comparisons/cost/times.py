@@ -76,15 +76,16 @@ def lines(measured: Mapping[str, Mapping[int, Rounds]], seed: int = 0) -> dict[s
         processor = np.array([by_count[int(n)][1] for n in counts])[:, drawn].min(axis=2)
         best[name] = counts, wall
         span = counts[-1] - counts[0]
-        for found, times in ((slopes, wall), (work, processor)):
+        for rates, times in ((slopes, wall), (work, processor)):
             # Above 0, because other times are divided by it.
             least = LEAST_SLOPE * times[-1] / counts[-1]
-            found.append(np.maximum((times[-1] - times[0]) / span, least))
+            rates.append(np.maximum((times[-1] - times[0]) / span, least))
     processors = np.median(np.array(work) / np.array(slopes), axis=0)
-    return {
-        name: _line(*best[name], seconds / processors, float(processors[0]))
-        for name, seconds in zip(measured, work, strict=True)
-    }
+    found = {}
+    for name, seconds in zip(measured, work, strict=True):
+        counts, wall = best[name]
+        found[name] = _line(counts, wall, seconds / processors, processors=float(processors[0]))
+    return found
 
 
 def _line(counts: Floats, wall: Floats, per_sample: Draws, processors: float) -> Line:

@@ -154,7 +154,7 @@ def _chances(
     from scipy.special import ndtri, stdtr
 
     # Where the test image is brighter, light may be missing from the reference, else from it.
-    size = np.where(difference > 0.0, *sizes)
+    size = np.where(difference > 0.0, sizes[0], sizes[1])
     supposed = variance + size * np.abs(difference)
     deviations = np.zeros(supposed.shape)
     np.divide(np.abs(difference), np.sqrt(supposed), out=deviations, where=supposed > 0.0)

@@ -33,8 +33,9 @@ Every image is a float array (H, W, 3) of linear light with the sRGB primaries (
 1.0 is display white. Statistics over an image are in `fotismos.comparisons.departure.statistics`.
 """
 
+import warnings
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import InitVar, dataclass
 from types import EllipsisType
 from typing import Any
 
@@ -89,8 +90,9 @@ class Metric:
     ``function(test, reference, viewing) -> (H, W)`` returns distances, ≥ 0 and finite, of linear
     images (H, W, 3). `Pixelwise` needs none. Summaries give the share of pixels above each
     threshold in ``visible``, in rising order. ``rounding`` is the difference that rounding of
-    float32 renderings can make in its mean. Its map is shown and saved if it is ``drawn``. The mean
-    of a ``linear`` difference is a root mean square, and its best exposure minimises squares.
+    float32 renderings can make in its mean. Its map is shown and saved if it is ``drawn``. If it
+    ``averages_squares``, its mean is a root mean square, and its best exposure minimises squares.
+    ``linear`` is the former name of that.
     """
 
     name: str
@@ -104,16 +106,24 @@ class Metric:
     rounding: float = 1e-3
     heading: str = ""
     drawn: bool = True
-    linear: bool = False
+    averages_squares: bool = False
+    linear: InitVar[bool] = False
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, linear: bool) -> None:
         if not self.name.isidentifier() or self.name in RESERVED:
             raise InputError(
                 f"metric {self.name!r}: use a name of letters, digits and _, other than"
                 f" {', '.join(sorted(RESERVED))}."
             )
+        if linear:
+            warnings.warn(
+                "Metric: linear is now called averages_squares", DeprecationWarning, stacklevel=3
+            )
+            object.__setattr__(self, "averages_squares", True)
         if not self.heading:
-            object.__setattr__(self, "heading", f"{self.label}, mean")
+            is_mean = self.label.lower().startswith("mean ")
+            heading = self.label if is_mean else f"{self.label}, mean"
+            object.__setattr__(self, "heading", heading)
 
     def __call__(
         self, test: ArrayLike, reference: ArrayLike, viewing: Viewing = DEFAULT_VIEWING
@@ -144,7 +154,7 @@ class Metric:
         """Return the metric's mean of distances; 0 if there are none."""
         if not values.size:
             return 0.0
-        if self.linear:
+        if self.averages_squares:
             # Each distance is a root mean square of channels: squares average over all values.
             return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
         return float(values.mean(dtype=np.float64))
@@ -265,7 +275,7 @@ RMSE = METRICS.own(
         rounding=1e-6,
         heading="RMSE, linear",
         drawn=False,
-        linear=True,
+        averages_squares=True,
         coordinates=linear,
         difference=root_mean_square,
     )

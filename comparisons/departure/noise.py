@@ -139,7 +139,7 @@ def _fields(metric: Metric, value: float, low: float, high: float, shares: Array
     shares = np.clip(shares, 0.0, 1.0)
     shares[1] = np.minimum.accumulate(shares[1])
     shares[2] = np.maximum.accumulate(shares[2][::-1])[::-1]
-    shares[0] = np.clip(np.minimum.accumulate(shares[0]), *shares[1:])
+    shares[0] = np.clip(np.minimum.accumulate(shares[0]), shares[1], shares[2])
     visible = tuple(
         VisibleShare(threshold=threshold, value=share, low=lowest, high=highest)
         for threshold, (share, lowest, highest) in zip(
@@ -190,12 +190,12 @@ def debiased(
     half += whole.gap / 2.0 + np.sqrt(middle**2 + CURVATURE * whole.noise**2) - middle
     value, low, high = np.maximum(measured - added + half * np.array([0, -1, 1]), 0.0)
     # Up to here a linear metric is a mean square.
-    if metric.linear:
+    if metric.averages_squares:
         value, low, high = np.sqrt([value, low, high])
     shares = _shares(metric.visible, distances, grouped, raw)
     between = distances_between(metric, shown, viewing)
     apart = Halves.of(between, grouped.means, grouped.sizes)
-    if apart.are_heavy and not metric.linear:
+    if apart.are_heavy and not metric.averages_squares:
         low = max(min(low, measured - apart.below), 0.0)
         high = max(high, measured + apart.above)
         shares[1] -= shares_above(apart.halves, metric.visible)
@@ -344,7 +344,7 @@ def _draws(mean: Array, noise: Array, grouped: Grouped) -> Array:
 
 def _mean(metric: Metric, distances: Floats) -> float:
     """Return the mean of distances, of a linear metric the mean square."""
-    return float(np.mean(distances**2) if metric.linear else distances.mean())
+    return float(np.mean(distances**2) if metric.averages_squares else distances.mean())
 
 
 @dataclass(frozen=True)
@@ -373,7 +373,7 @@ class _Extrapolated:
         pixels = grouped.by_block(np.ones(len(plain)))
         before = grouped.by_block(plain)
         after = grouped.by_block(np.mean(noisy, axis=0))
-        if metric.linear:
+        if metric.averages_squares:
             added = grouped.by_block(np.mean(np.square(noisy), axis=0) - plain**2)
             gap = 0.0
             noise = 0.0
@@ -382,7 +382,8 @@ class _Extrapolated:
             squares = np.array([grouped.by_block(values) for values in pair])
             # Sums over blocks by both rules; that of a mean square is its root times the pixels.
             lower = without_noise(before, after)
-            upper = np.minimum(without_noise(*np.sqrt(squares * pixels)), before)
+            roots = np.sqrt(squares * pixels)
+            upper = np.minimum(without_noise(roots[0], roots[1]), before)
             added = before - (lower + upper) / 2.0
             gap = max(float((upper - lower).sum() / pixels.sum()), 0.0)
             noise = np.sqrt(np.average((after**2 - before**2) / pixels**2, weights=pixels).clip(0))

@@ -220,7 +220,7 @@ def best_exposure(
 
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
-    if metric.linear or not isinstance(metric, Pixelwise):
+    if metric.averages_squares or not isinstance(metric, Pixelwise):
         return least_squares_factor(test[mask], reference[mask])
     lit = [(mask & (image > 0.0).any(axis=-1)).any() for image in (test, reference)]
     if not all(lit):

@@ -183,7 +183,7 @@ def _completed(options: Options) -> Options:
     """Fill in a fit's own defaults."""
     options.require_model("a fit")
     heuristic = named(options.heuristic)
-    if heuristic is not PHONG and heuristic.is_own:
+    if heuristic is not PHONG and heuristic.is_builtin:
         raise InputError(
             f"heuristic {options.heuristic} cannot be fitted: `form` has the built-in lobes,"
             f" {' and '.join(FORMS)}. Omit `heuristic`."

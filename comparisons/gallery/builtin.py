@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from fotismos.heuristic.errors import InputError, suggestion
@@ -56,24 +57,16 @@ def builtin(name: str) -> BuiltIn:
     return SCENES[name]
 
 
-def _scene(function: str, *arguments: Any, **more: Any) -> dict[str, Any]:
-    """Make a scene by a function of ``gallery.scenes``, which imports Mitsuba."""
-    from fotismos.comparisons.gallery import scenes  # loaded late: names need no Mitsuba
-
-    scene: dict[str, Any] = getattr(scenes, function)(*arguments, **more)
-    return scene
-
-
-def _spectral(function: str) -> dict[str, Any]:
-    """Make a scene by a function of ``gallery.spectra``, which few scenes load."""
-    from fotismos.comparisons.gallery import spectra  # loaded late: few scenes have any
-
-    scene: dict[str, Any] = getattr(spectra, function)()
+def _scene(module: str, function: str, **values: Any) -> dict[str, Any]:
+    """Make a scene by a function of a module of the gallery, loaded here: it imports Mitsuba."""
+    maker = import_module(f"fotismos.comparisons.gallery.{module}")
+    scene: dict[str, Any] = getattr(maker, function)(**values)
     return scene
 
 
 def _figure(name: str, title: str, lights: Any, viewer: Any, **coefficients: float) -> BuiltIn:
-    return BuiltIn(name, title, partial(_scene, "figure", lights, viewer, **coefficients))
+    make = partial(_scene, "scenes", "figure", lights=lights, viewer=viewer, **coefficients)
+    return BuiltIn(name, title, make)
 
 
 def _figures() -> Iterator[BuiltIn]:
@@ -104,22 +97,22 @@ def _chapter_six() -> Iterator[BuiltIn]:
     yield BuiltIn(
         "two-intensities",
         "Equations 6.6 and 6.8: an orange diffuse and a white specular intensity of one light",
-        partial(_scene, "two_intensities"),
+        partial(_scene, "scenes", "two_intensities"),
     )
     for m in (1.0, 40.0):
         title = f"Figure 6.5: a spot of {'small' if m < 10 else 'large'} exponent, m = {m:g}"
-        yield BuiltIn(f"fig-6-5-m{m:g}", title, partial(_scene, "spot", m))
+        yield BuiltIn(f"fig-6-5-m{m:g}", title, partial(_scene, "scenes", "spot", exponent=m))
     yield BuiltIn(
         "fig-6-10",
         "Figure 6.10: flat shading of a coarse sphere; see it with gouraud or phong interpolation",
-        partial(_scene, "coarse_sphere"),
+        partial(_scene, "scenes", "coarse_sphere"),
         interpolation="flat",
         tessellation=4,
     )
     yield BuiltIn(
         "fig-6-14",
         "Figure 6.14: a highlight inside a triangle, lost by Gouraud shading, kept by Phong's",
-        partial(_scene, "highlight_in_a_triangle"),
+        partial(_scene, "scenes", "highlight_in_a_triangle"),
         interpolation="gouraud",
         tessellation=1,
     )
@@ -134,7 +127,8 @@ def _physical() -> Iterator[BuiltIn]:
          " spectra", True),
         ("cornell-box", "The Cornell box: a lamp, shadows and colour bleeding", False),
     ):  # fmt: skip
-        make = partial(_spectral if is_spectral else _scene, name.replace("-", "_"))
+        module = "spectra" if is_spectral else "scenes"
+        make = partial(_scene, module, name.replace("-", "_"))
         yield BuiltIn(
             name=name,
             title=title,

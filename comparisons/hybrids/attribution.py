@@ -129,7 +129,7 @@ def with_causes(
         causes = find(ready, ready.source, ready.options, progress, clean, limit_s=limit_s)
     except FotismosError as error:
         return comparison.warned([f"The causes are unknown: {error}"])
-    record = structs.replace(named(comparison, causes.maps), why=causes.record)
+    record = structs.replace(with_effects_named(comparison, causes.maps), why=causes.record)
     comparison = replace(comparison, record=record, causes=causes)
     return comparison.timed(CAUSES, perf_counter() - begin)
 
@@ -541,7 +541,7 @@ def dominating(effects: Mapping[str, Floats], counted: NDArray[np.bool_]) -> NDA
     return np.where(counted, places, UNCOUNTED)
 
 
-def named(comparison: Comparison, effects: Mapping[str, Floats]) -> ComparisonRecord:
+def with_effects_named(comparison: Comparison, effects: Mapping[str, Floats]) -> ComparisonRecord:
     """Return a comparison's record in which regions, shapes and materials name their effect.
 
     ``effects`` are ``{name: (h, w)}``, the ΔE2000 that each removes; the maps may be smaller.

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.blocks import averaged, ratio
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import Prepared
+from fotismos.comparisons.prepared import Prepared, pair_for
 from fotismos.heuristic.convention import Floats, Scene
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.pairing import lights
@@ -115,7 +115,7 @@ class Pairs:
             changed = self.options.changed(
                 interpolation=interpolation.value, tessellation=tessellation
             )
-            self._known[key] = changed.pair(self._source)
+            self._known[key] = pair_for(self._source, changed)
         return self._known[key]
 
 

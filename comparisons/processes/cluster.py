@@ -30,10 +30,10 @@ TIMEOUT = 20
 _one_at_a_time = Lock()
 
 
-def work(prepare: Callable[[], object], function: Callable[..., Any], *arguments: Any) -> Any:
+def work(set_up: Callable[[], object], function: Callable[..., Any], *arguments: Any) -> Any:
     """Do a task in a worker, one at a time per process: Mitsuba uses all threads."""
     with _one_at_a_time:
-        once(prepare)
+        once(set_up)
         return function(*arguments)
 
 
@@ -44,13 +44,13 @@ def silent(*arguments: object) -> None:
 class Cluster(Pool):
     """Does tasks on a Dask cluster, as a pool does in processes here.
 
-    ``prepare`` is called once in each worker, before its first task. It must be picklable, and
+    ``set_up`` is called once in each worker, before its first task. It must be picklable, and
     equal to its pickled copies.
     """
 
-    def __init__(self, client: Any, prepare: Callable[[], object]) -> None:
+    def __init__(self, client: Any, set_up: Callable[[], object]) -> None:
         self._client = client
-        self._prepare = prepare
+        self._set_up = set_up
 
     def start(self) -> None:
         """Do nothing: workers run already."""
@@ -74,11 +74,15 @@ class Cluster(Pool):
         def submit(some: Iterable[Task]) -> list[Any]:
             futures = []
             for task in some:
-                more = () if task.progress is None else (silent,)
-                call = work, self._prepare, task.function, *task.arguments, *more
+                arguments = task.arguments
+                if task.progress is not None:
+                    arguments = (*arguments, silent)
                 # Dask treats tasks with equal keys as one, whoever submits them.
-                futures.append(self._client.submit(*call, key=f"{task.name}-{uuid4()}"))
-                by_key[futures[-1].key] = task
+                key = f"{task.name}-{uuid4()}"
+                futures.append(
+                    self._client.submit(work, self._set_up, task.function, *arguments, key=key)
+                )
+                by_key[key] = task
             return futures
 
         workers = max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
@@ -106,7 +110,7 @@ class Cluster(Pool):
             queue.update(submit(islice(waiting, 1)))
 
 
-def connected(address: str, prepare: Callable[[], object] = tuple) -> Cluster:
+def connected(address: str, set_up: Callable[[], object] = tuple) -> Cluster:
     """Return the Dask cluster whose scheduler is at an address, such as ``tcp://host:8786``.
 
     ``InstallationError`` if the extra is not installed, or the scheduler does not answer.
@@ -127,4 +131,4 @@ def connected(address: str, prepare: Callable[[], object] = tuple) -> Cluster:
     # Messages about lost workers and schedulers are Dask's own affair.
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    return Cluster(client, prepare)
+    return Cluster(client, set_up)

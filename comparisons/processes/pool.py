@@ -34,9 +34,9 @@ LOGGER = logging.getLogger(__name__)
 
 
 @cache
-def once(prepare: Callable[[], object]) -> None:
-    """Prepare this process once; again if that failed."""
-    prepare()
+def once(set_up: Callable[[], object]) -> None:
+    """Set this process up once; again if that failed."""
+    set_up()
 
 
 def cores() -> int:
@@ -66,15 +66,15 @@ class Pool:
     """Does tasks in separate processes; a context that ends the processes.
 
     At most ``count`` processes run at the same time. With 0 the tasks are done in this process, one
-    after another and without a time limit. Each calls ``prepare`` once, before its first task. A
+    after another and without a time limit. Each calls ``set_up`` once, before its first task. A
     task may take ``limit_s`` seconds without reporting progress, start-up included.
     """
 
     def __init__(
-        self, count: int, prepare: Callable[[], object] = tuple, limit_s: float = inf
+        self, count: int, set_up: Callable[[], object] = tuple, limit_s: float = inf
     ) -> None:
         self._count = count
-        self._prepare = prepare
+        self._set_up = set_up
         self._limit_s = limit_s
         self._idle: list[Worker] = []
         self._busy: list[Worker] = []
@@ -88,7 +88,7 @@ class Pool:
     def start(self) -> None:
         """Start the processes now: they get ready while this one does other things."""
         while len(self._idle) + len(self._busy) < self._count:
-            self._idle.append(Worker(self._prepare))
+            self._idle.append(Worker(self._set_up))
 
     def do(self, task: Task) -> Any:
         """Do one task, and return what it returned, or raise what it raised."""
@@ -103,12 +103,14 @@ class Pool:
         process that ended, and when the time is up.
         """
         if self._count == 0:
-            self._prepare()
+            self._set_up()
             for task in tasks:
                 outcome: Future[Any] = Future()
+                arguments = task.arguments
+                if task.progress is not None:
+                    arguments = (*arguments, task.progress)
                 try:
-                    progress = filter(None, [task.progress])
-                    outcome.set_result(task.function(*task.arguments, *progress))
+                    outcome.set_result(task.function(*arguments))
                 except Exception as error:
                     outcome.set_exception(error)
                 yield task, outcome
@@ -132,7 +134,7 @@ class Pool:
         for task in islice(waiting, self._count - len(self._busy)):
             # An idle process may have died since its last task.
             self._idle = [worker for worker in self._idle if worker.process.is_alive()]
-            worker = self._idle.pop() if self._idle else Worker(self._prepare)
+            worker = self._idle.pop() if self._idle else Worker(self._set_up)
             self._busy.append(worker)
             worker.give(task, self._limit_s)
 
@@ -167,11 +169,11 @@ class Worker:
     outcome: Future[Any]
     deadline: float
 
-    def __init__(self, prepare: Callable[[], object]) -> None:
+    def __init__(self, set_up: Callable[[], object]) -> None:
         context = get_context("spawn")  # a fork would share threads' locks with its parent
         self.is_over = False
         self.pipe, theirs = context.Pipe()
-        self.process = context.Process(target=_work, args=(theirs, prepare), daemon=True)
+        self.process = context.Process(target=_work, args=(theirs, set_up), daemon=True)
         resource_tracker.ensure_running()  # here, because it unblocks signals
         with held_back():
             self.process.start()
@@ -196,10 +198,13 @@ class Worker:
         self.deadline = monotonic() + limit_s
         if isinstance(content, LostProcessError):
             content = LostProcessError(f"{self.task.name}: {content}")
-        if kind != "progress":
-            getattr(self.outcome, kind)(content)
-        elif self.task.progress:
-            self.task.progress(*content)
+        match kind:
+            case "result":
+                self.outcome.set_result(content)
+            case "failure":
+                self.outcome.set_exception(content)
+            case "progress" if self.task.progress:
+                self.task.progress(*content)
 
     def lose(self, reason: str = "") -> None:
         """End the process, and fail its task for a reason, or because the process ended."""
@@ -237,7 +242,7 @@ class Worker:
         self.process.join()
 
 
-def _work(pipe: Any, prepare: Callable[[], object]) -> NoReturn:
+def _work(pipe: Any, set_up: Callable[[], object]) -> NoReturn:
     """Do the tasks that come through the pipe, until it is closed."""
     # A group of its own, so that what a task starts ends with it.
     os.setpgid(0, 0)
@@ -253,7 +258,7 @@ def _work(pipe: Any, prepare: Callable[[], object]) -> NoReturn:
         except (EOFError, OSError):
             os._exit(0)  # the parent is gone
         function, arguments, with_progress = call
-        kind, content = _answer(pipe, prepare, function, arguments, with_progress)
+        kind, content = _answer(pipe, set_up, function, arguments, with_progress)
         _send(pipe, kind, content)
         del call, function, arguments, content  # what a task had must not outlive it
 
@@ -267,21 +272,22 @@ def _end_with_parent() -> None:
 
 def _answer(
     pipe: Any,
-    prepare: Callable[[], object],
+    set_up: Callable[[], object],
     function: Callable[..., Any],
     arguments: tuple[Any, ...],
     with_progress: bool,
 ) -> tuple[str, Any]:
-    """Do a task; return the method of its outcome to call, and the argument."""
-    progress = [lambda *state: _send(pipe, "progress", state)] if with_progress else []
+    """Do a task; return the kind of the message about it, ``result`` or ``failure``, and which."""
+    if with_progress:
+        arguments = (*arguments, lambda *state: _send(pipe, "progress", state))
     try:
-        once(prepare)
-        return "set_result", function(*arguments, *progress)
+        once(set_up)
+        return "result", function(*arguments)
     except FotismosError as error:
-        return "set_exception", error
+        return "failure", error
     except BaseException as error:  # Ctrl-C is ignored here: this is the task's own
         LOGGER.info("a task failed", exc_info=True)
-        return "set_exception", LostProcessError(f"{type(error).__name__}: {error}")
+        return "failure", LostProcessError(f"{type(error).__name__}: {error}")
 
 
 def _send(pipe: Any, kind: str, content: Any) -> None:
@@ -291,7 +297,7 @@ def _send(pipe: Any, kind: str, content: Any) -> None:
         os._exit(0)
     except Exception as error:  # pickling can raise anything
         reason = f"its result cannot be sent: {type(error).__name__}: {error}"
-        pipe.send(("set_exception", LostProcessError(reason)))
+        pipe.send(("failure", LostProcessError(reason)))
 
 
 # --- Turns --------------------------------------------------------------------------------------

@@ -29,6 +29,7 @@ from fotismos.comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, lar
 from fotismos.heuristic import plugins
 from fotismos.heuristic.errors import FotismosError, InputError, unknown
 from fotismos.heuristic.heuristics import named
+from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.planning.effects import EFFECTS, PRUNED
 from fotismos.reference.planning.plan import Plan, physical_integrator
 from fotismos.reference.rendering import direct
@@ -80,11 +81,11 @@ def all_points(study: StudyFile) -> list[StudyPoint]:
 
     It reads scenes and runs scripts.
     """
-    _prepare()
+    _set_up()
     return [point for part in study.parts for point in _points(part)]
 
 
-def _prepare() -> None:
+def _set_up() -> None:
     set_variant(RGB)
     plugins.register()
     direct.register()
@@ -173,9 +174,9 @@ def row(point: StudyPoint) -> Row:
 
     The row of a point that fails has its parameters and, in the column ``error``, the reason.
     """
-    _prepare()
+    _set_up()
     try:
-        convention = point.part.options.convention
+        convention = Convention(point.part.options.pairing)
         if point.part.scene == "lobe":
             columns, image, truth = scenes.lobe(point.values, convention)
             columns |= measure(image, truth, np.ones(image.shape[:2], bool))

@@ -94,6 +94,6 @@ def picture(found: dict[str, list[str]]) -> Figure:
         axes.add_patch(Rectangle((column, row - 0.42), 0.96, 0.84, facecolor=FILLS[column]))
         axes.text(middle, row - 0.22, "/".join(parts[1:]) or parts[0], ha="center", va="center",
                   size=8.5, weight="bold")  # fmt: skip
-        text = fill(", ".join(modules), 50)
+        text = fill(", ".join(modules), 48)
         axes.text(middle, row + 0.13, text, ha="center", va="center", size=5.5, linespacing=1.05)
     return figure

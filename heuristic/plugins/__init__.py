@@ -25,15 +25,12 @@ from typing import Any
 
 import mitsuba as mi
 
-from fotismos.heuristic import llvm
+from fotismos.heuristic import lights, llvm
 from fotismos.heuristic.errors import InputError
 
 TEXTURES = ("product", "share", "rest", "sum", "blend", "sides", "exponent", "interior", "tilt")
 PLUGINS = {"phong": ("bsdf", "phong"), "heuristic": ("integrator", "integrator")}
-PLUGINS |= {
-    f"heuristic_{name}": ("emitter", "emitters")
-    for name in ("point", "spot", "directional", "glow")
-}
+PLUGINS |= dict.fromkeys([*lights.PLUGINS, "heuristic_glow"], ("emitter", "emitters"))
 PLUGINS |= {f"heuristic_{name}": ("texture", "textures") for name in TEXTURES}
 """Kind and module of each plugin."""
 

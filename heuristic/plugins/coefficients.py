@@ -115,7 +115,7 @@ class SceneMaterials:
         """
         if not self.bsdfs:
             return []  # a scene without shapes
-        present = sorted(set().union(*(bsdf.present for bsdf in self.bsdfs)))
+        present = sorted({name for bsdf in self.bsdfs for name in bsdf.present})
         present = present if self.prune else list(COEFFICIENTS)
         readers = [partial(self._read, bsdf, present) for bsdf in self.bsdfs]
         *values, n, is_blinn = self.switch(readers, si, active)

@@ -59,7 +59,6 @@ from fotismos.heuristic.lights import (
     INTENSITIES,
     PLUGINS,
     UNATTENUATED,
-    DirectionalLight,
     Extent,
     Light,
 )
@@ -112,7 +111,7 @@ def define() -> dict[str, Any]:
                 )
                 dr.make_opaque(self.extent)
             self.m_flags = +mi.EmitterFlags.DeltaPosition
-            if self.model is DirectionalLight:
+            if self.model.parallel:
                 self.m_flags = mi.EmitterFlags.Infinite | mi.EmitterFlags.DeltaDirection
 
         def parameters_changed(self, keys: Sequence[str] = ()) -> None:
@@ -168,9 +167,10 @@ def define() -> dict[str, Any]:
             return self.sample_direction(it, None, active)[1]  # Mitsuba takes derivatives here
 
         def bbox(self) -> Any:
-            if self.model is DirectionalLight:
+            if self.model.parallel:
                 return mi.ScalarBoundingBox3f()
-            return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(*(c[0] for c in self.position)))
+            x, y, z = self.position
+            return mi.ScalarBoundingBox3f(mi.ScalarPoint3f(x[0], y[0], z[0]))
 
         def to_string(self) -> str:
             shown = ", ".join(f"{name} = {value}" for name, value in self.intensities.items())

@@ -77,7 +77,7 @@ def define() -> dict[str, Any]:
             self.preparation = 0.0
             self.occlusion = props.get("occlusion", False) or "visible" in self.model.needs
             # A user's heuristic gets only arrays: a plain 0 has no components.
-            self.prune = props.get("prune", True) and self.model.is_own
+            self.prune = props.get("prune", True) and self.model.is_builtin
             self.interpolation = Interpolation(props.get("interpolation", "phong"))
 
         def sample(
@@ -176,7 +176,7 @@ def define() -> dict[str, Any]:
             # Prepared again for another scene, and for other values of prepared parameters.
             if not (is_same and all(map(is_, parts, self.parts)) and self.values == self.numbers):
                 self.materials = SceneMaterials(
-                    scene, self.prune, form=self.model.form, physical=not self.model.is_own
+                    scene, self.prune, form=self.model.form, physical=not self.model.is_builtin
                 )
                 begin = perf_counter()
                 self.prepared = self.model.prepared(scene, self.numbers)
@@ -187,7 +187,7 @@ def define() -> dict[str, Any]:
                 self.values = self.numbers
             return self
 
-        def prepare(self, scene: Scene) -> None:
+        def collect(self, scene: Scene) -> None:
             """Collect what a rendering needs; otherwise the first sample does."""
             self.known(scene)
 

@@ -153,7 +153,7 @@ def derived(base: type) -> type:
             for mesh in _meshes(scene):
                 at = shading_points(mesh, self.interpolation)
                 material = mesh.bsdf().material(
-                    at, True, self.prune, self.model.form, not self.model.is_own
+                    at, True, self.prune, self.model.form, not self.model.is_builtin
                 )
                 shade_mesh(
                     mesh,

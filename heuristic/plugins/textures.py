@@ -159,12 +159,10 @@ def define() -> dict[str, Any]:
         def _displaced(self, si: Interaction, active: Mask) -> Direction:
             slope = self.scale * self.maps["heights"].eval_1_grad(si, active)
             n = mi.Vector3f(si.sh_frame.n)
-            across = [
-                # The rise replaces what the tangent has along the shading normal.
-                dp + n * (rise - dr.dot(n, dp))
-                for dp, rise in ((si.dp_du, slope.x), (si.dp_dv, slope.y))
-            ]
-            normal = dr.normalize(dr.cross(*across))
+            # The rise replaces what the tangents have along the shading normal.
+            along_u = si.dp_du + n * (slope.x - dr.dot(n, si.dp_du))
+            along_v = si.dp_dv + n * (slope.y - dr.dot(n, si.dp_dv))
+            normal = dr.normalize(dr.cross(along_u, along_v))
             # Onto the side of the geometric normal: a parametrisation may be left-handed.
             normal = dr.mulsign(normal, dr.dot(si.n, normal))
             return si.to_local(normal)

@@ -104,12 +104,14 @@ class Albedo(NamedTuple):
 
 def of_roughplastic(plastic: RoughPlastic) -> Albedo:
     """Return the :class:`Albedo` of a :class:`RoughPlastic` at normal incidence."""
-    _, alpha, eta = plastic.interface
+    distribution, alpha, eta = plastic.interface
     if not alpha:
-        interface = plastic.int_ior, plastic.ext_ior, plastic.nonlinear
-        smooth = [of_smooth_plastic(rho, *interface)[0] for rho in plastic.diffuse_reflectance]
+        smooth = [
+            of_smooth_plastic(rho, plastic.int_ior, plastic.ext_ior, nonlinear=plastic.nonlinear)[0]
+            for rho in plastic.diffuse_reflectance
+        ]
         return Albedo(np.array(smooth), specular_of(plastic))
-    transmittance, returned = coat(*plastic.interface)
+    transmittance, returned = coat(distribution, alpha, eta)
     theta, weight = nodes(max(alpha, LEAST_SPREAD))
     # The plugin interpolates its 64 values linearly, too.
     cosine = np.cos(theta)

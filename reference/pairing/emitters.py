@@ -17,14 +17,15 @@ Physical light has one intensity. A heuristic light of two (6.6, 6.8) is paired 
 which determines the irradiance; its ``L_s`` is recorded as lost.
 """
 
+import pkgutil
 from collections.abc import Callable, Iterator
-from types import ModuleType
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
 from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
+from fotismos.reference.pairing import lights
 from fotismos.reference.pairing.factors import Convention, Replacements
 from fotismos.reference.pairing.lights import (
     SECOND_INTENSITY,
@@ -59,17 +60,12 @@ def to_heuristic(
             hide_emitters=hide_emitters,
             replaced=replaced,
         )
-        if light.plugin == "point" and shape is None:
-            position = mi.ScalarPoint3d(light.position())
-            intensity = light.value("intensity", 1.0)
-            light.replace(heuristic("heuristic_point", position=position, intensity=intensity))
-        elif light.plugin == "directional" and shape is None:
-            travel = mi.ScalarVector3f(light.travel())
-            intensity = light.value("irradiance", 1.0)
-            light.replace(heuristic("heuristic_directional", direction=travel, intensity=intensity))
-        else:
-            glow = _lamps().to_heuristic(light)
-            ambient = ambient if glow is None else glow
+        kind = lights.of(light.plugin)
+        if not kind.to_heuristic or kind.on_shape != (shape is not None):
+            light.leave_out()
+            continue
+        glow = _rule(kind.to_heuristic)(light)
+        ambient = ambient if glow is None else glow
     return ambient
 
 
@@ -80,29 +76,49 @@ def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements
         if len(set(light.intensities())) > 1:
             nearest = "its diffuse intensity L_d, for all reflection"
             replaced.lose(light.label, light.plugin, SECOND_INTENSITY, nearest)
-        if light.plugin == "heuristic_point":
-            factor, note = level(light, lambda travel: 1.0, lambda travel: 1.0, 1.0)
-            position = mi.ScalarPoint3d(light.position())
-            intensity = light.scaled_intensity(factor)
-            props = properties("point", position=position, intensity=intensity)
-            light.replace(props, factor, not note, note)
-        elif light.plugin == "heuristic_directional":
-            travel = light.value("direction", mi.ScalarVector3f(0, 0, 1))
-            irradiance = light.scaled_intensity(IRRADIANCE_PER_INTENSITY)
-            props = properties("directional", direction=travel, irradiance=irradiance)
-            light.replace(props, IRRADIANCE_PER_INTENSITY)
-        elif light.plugin == "heuristic_spot":
-            _lamps().spot_to_physical(light)
-        else:
+        rule = lights.of(light.plugin).to_physical
+        if not rule:
             raise NotImplementedError(
-                f"{light.plugin} has no physical form. Add one to `emitters.to_physical`."
+                f"{light.plugin} has no physical form. Name one in its `LightKind`."
             )
+        _rule(rule)(light)
 
 
-def _lamps() -> ModuleType:
-    from fotismos.reference.pairing import lamps  # loaded late: most scenes have points alone
+def _rule(name: str) -> Callable[[LightNode], Any]:
+    """Return a rule of pairing; its module is loaded here, since most scenes have points alone."""
+    rule: Callable[[LightNode], Any] = pkgutil.resolve_name(f"{__package__}.{name}")
+    return rule
 
-    return lamps
+
+def point_to_heuristic(light: LightNode) -> None:
+    """Replace a point by the heuristic's."""
+    position = mi.ScalarPoint3d(light.position())
+    intensity = light.value("intensity", 1.0)
+    light.replace(heuristic("heuristic_point", position=position, intensity=intensity))
+
+
+def point_to_physical(light: LightNode) -> None:
+    """Replace a heuristic point by Mitsuba's."""
+    factor, note = level(light, lambda travel: 1.0, lambda travel: 1.0, 1.0)
+    position = mi.ScalarPoint3d(light.position())
+    intensity = light.scaled_intensity(factor)
+    props = properties("point", position=position, intensity=intensity)
+    light.replace(props, factor, not note, note)
+
+
+def directional_to_heuristic(light: LightNode) -> None:
+    """Replace parallel light by the heuristic's."""
+    travel = mi.ScalarVector3f(light.travel())
+    intensity = light.value("irradiance", 1.0)
+    light.replace(heuristic("heuristic_directional", direction=travel, intensity=intensity))
+
+
+def directional_to_physical(light: LightNode) -> None:
+    """Replace heuristic parallel light by Mitsuba's."""
+    travel = light.value("direction", mi.ScalarVector3f(0, 0, 1))
+    irradiance = light.scaled_intensity(IRRADIANCE_PER_INTENSITY)
+    props = properties("directional", direction=travel, irradiance=irradiance)
+    light.replace(props, IRRADIANCE_PER_INTENSITY)
 
 
 def _physical(graph: Graph) -> Iterator[tuple[int | None, str, int]]:

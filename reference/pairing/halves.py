@@ -25,7 +25,7 @@ from fotismos.reference.pairing.factors import (
     Unrepresentable,
     specular_albedo,
 )
-from fotismos.reference.pairing.prepare import Override, Settings, prepare
+from fotismos.reference.pairing.settings import Override, Settings, complete
 from fotismos.reference.records import Record
 from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.scene.graph import Graph, properties
@@ -97,7 +97,7 @@ def pair(source: Source, options: PairOptions | None = None) -> Pair:
     options = options or PairOptions()
     register()
     graph = source.parse()
-    settings = prepare(graph, options.resolution, options.sensor)
+    settings = complete(graph, options.resolution, options.sensor)
     try:
         return _paired(graph, settings, options)
     except FotismosError:
@@ -120,7 +120,7 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
     model = named(options.heuristic)
     half = graph.copy()
     replaced = Replacements()
-    for_users = options.with_partners or not model.is_own
+    for_users = options.with_partners or not model.is_builtin
     context = bsdfs.Context(half, options.convention, for_users=for_users)
     if any(half.plugin(index) not in bsdfs.RULES for index in half.nodes(BSDF)):
         from fotismos.reference.pairing import (

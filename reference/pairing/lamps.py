@@ -27,25 +27,20 @@ BSDF = mi.ObjectType.BSDF
 EMITTER = mi.ObjectType.Emitter
 
 
-def to_heuristic(light: LightNode) -> Any:
-    """Replace a light by its nearest form, and return the radiance that becomes ``I_a``, if any."""
-    match light.plugin:
-        case "area" if light.shape is not None:
-            _area(light)
-        case "spot" if light.shape is None and light.value("texture", None) is None:
-            _spot_to_heuristic(light)
-        case "constant" if light.shape is None:
-            light.becomes_ambient()
-            return light.value("radiance", 1.0)
-        case "sunsky" | "timed_sunsky" if light.shape is None:
-            return _daylight(light)
-        case _ if light.shape is None and light.emitter.is_environment():
-            ambient = probe.mean_radiance(light.graph, light.emitter)
-            light.becomes_ambient(probe.MEAN, "directions of the environment's light")
-            return ambient
-        case _:
-            light.leave_out()
-    return None
+def constant_to_ambient(light: LightNode) -> Any:
+    """Return the radiance of an even environment."""
+    light.becomes_ambient()
+    return light.value("radiance", 1.0)
+
+
+def environment_to_ambient(light: LightNode) -> Any:
+    """Return the mean radiance of an environment; leave out a light that is none."""
+    if not light.emitter.is_environment():
+        light.leave_out()
+        return None
+    ambient = probe.mean_radiance(light.graph, light.emitter)
+    light.becomes_ambient(probe.MEAN, "directions of the environment's light")
+    return ambient
 
 
 FLATNESS = 0.5
@@ -55,7 +50,8 @@ FLAT = 1 - 1e-4
 """A light with a mean normal longer than this is flat."""
 
 
-def _area(light: LightNode) -> None:
+def area_to_heuristic(light: LightNode) -> None:
+    """Replace a shape's light by a point or an even spot, and a glow of the shape."""
     graph = light.graph
     shape = light.shape
     radiance = light.value("radiance", 1.0)
@@ -123,7 +119,8 @@ def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float], float]:
     return centroid.tolist(), area, normal.tolist(), float(radius)
 
 
-def _daylight(light: LightNode) -> Any:
+def sky_to_ambient(light: LightNode) -> Any:
+    """Return the mean radiance of a sky; the sun becomes a directional light."""
     sun = probe.irradiance(light.graph, _only(light, "sky_scale"))
     note = probe.MEAN
     if sun is not None:
@@ -228,7 +225,11 @@ def _cone(cutoff: float) -> tuple[np.ndarray, np.ndarray]:
     return theta, np.sin(np.radians(theta))
 
 
-def _spot_to_heuristic(light: LightNode) -> None:
+def spot_to_heuristic(light: LightNode) -> None:
+    """Replace a spot by the nearest heuristic one; leave out one that projects a picture."""
+    if light.value("texture", None) is not None:
+        light.leave_out()
+        return
     cutoff = light.number("cutoff_angle", 20.0)
     beam_width = light.number("beam_width", 0.75 * cutoff)
     exponent = exponent_for(cutoff, beam_width)
@@ -266,11 +267,11 @@ def spot_to_physical(light: LightNode) -> None:
         power_flux(cutoff, exponent) / linear_flux(edge, beam_width),
     )
     fitted = f"linear from {beam_width:.4g} to {edge:.4g} deg, fitted to m = {exponent:g}"
-    # Origin, target, and the axis of the world most unlike the beam as up.
-    ends = (position, position + axis, np.eye(3)[np.argmin(np.abs(axis))])
+    target = position + axis
+    up = np.eye(3)[np.argmin(np.abs(axis))]  # the axis of the world most unlike the beam
     props = properties(
         "spot",
-        to_world=mi.ScalarTransform4f().look_at(*(end.tolist() for end in ends)),
+        to_world=mi.ScalarTransform4f().look_at(position.tolist(), target.tolist(), up.tolist()),
         intensity=light.scaled_intensity(factor),
         cutoff_angle=edge,
         beam_width=beam_width,

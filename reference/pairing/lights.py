@@ -126,20 +126,28 @@ class LightNode:
 
 @dataclass(frozen=True)
 class LightKind:
-    """A kind of light.
+    """A kind of light, and how it is paired.
+
+    ``to_heuristic`` and ``to_physical`` are rules: functions of a :class:`LightNode`, each named by
+    its module in this folder and its name. The first replaces a light by its nearest form in the
+    heuristic half, and returns the radiance that becomes ``I_a``, if any; a kind without it is left
+    out. The second replaces its heuristic form, if there is one, by the nearest physical light.
 
     ``plugins`` are Mitsuba's emitters of this kind, ``model`` its class in
     :mod:`fotismos.heuristic.lights`; None if the heuristic has no light of this kind. ``colour`` is
     the parameter that holds the intensity, if the kind is paired by its parameters. ``place``
     returns ``position`` or ``toward``, the direction to the light, (3,) each, if it has one. It may
-    be ``exact`` (it needs no random numbers), or shine from everywhere (``surrounds``), evenly so
-    (``uniform``).
+    shine from a shape (``on_shape``), be ``exact`` (it needs no random numbers), or shine from
+    everywhere (``surrounds``), evenly so (``uniform``).
     """
 
     plugins: tuple[str, ...]
     model: type[Light] | None = None
     colour: str = ""
+    to_heuristic: str = ""
+    to_physical: str = ""
     place: Callable[[LightNode], dict[str, Any]] = lambda light: {}
+    on_shape: bool = False
     exact: bool = False
     surrounds: bool = False
     uniform: bool = False
@@ -153,24 +161,52 @@ def _at_point(light: LightNode) -> dict[str, Any]:
     return {"position": light.position()}
 
 
-ENVIRONMENT = LightKind(plugins=("envmap",), surrounds=True)
+ENVIRONMENT = LightKind(
+    plugins=("envmap",), to_heuristic="lamps:environment_to_ambient", surrounds=True
+)
 
 KINDS = (
-    LightKind(plugins=("area",), colour="radiance"),
-    ENVIRONMENT,
-    LightKind(plugins=("constant",), colour="radiance", surrounds=True, uniform=True),
-    LightKind(plugins=("sunsky", "timed_sunsky"), surrounds=True),
     LightKind(
-        plugins=("point",), model=PointLight, colour="intensity", place=_at_point, exact=True
+        plugins=("area",), colour="radiance", to_heuristic="lamps:area_to_heuristic", on_shape=True
+    ),
+    ENVIRONMENT,
+    LightKind(
+        plugins=("constant",),
+        colour="radiance",
+        to_heuristic="lamps:constant_to_ambient",
+        surrounds=True,
+        uniform=True,
+    ),
+    LightKind(
+        plugins=("sunsky", "timed_sunsky"), to_heuristic="lamps:sky_to_ambient", surrounds=True
+    ),
+    LightKind(
+        plugins=("point",),
+        model=PointLight,
+        colour="intensity",
+        to_heuristic="emitters:point_to_heuristic",
+        to_physical="emitters:point_to_physical",
+        place=_at_point,
+        exact=True,
     ),
     LightKind(
         plugins=("directional",),
         model=DirectionalLight,
         colour="irradiance",
+        to_heuristic="emitters:directional_to_heuristic",
+        to_physical="emitters:directional_to_physical",
         place=lambda light: {"toward": -light.travel()},
         exact=True,
     ),
-    LightKind(plugins=("spot",), model=SpotLight, colour="intensity", place=_at_point, exact=True),
+    LightKind(
+        plugins=("spot",),
+        model=SpotLight,
+        colour="intensity",
+        to_heuristic="lamps:spot_to_heuristic",
+        to_physical="lamps:spot_to_physical",
+        place=_at_point,
+        exact=True,
+    ),
     LightKind(plugins=("projector",)),
 )
 
@@ -190,7 +226,7 @@ def by_plugin(kinds: Sequence[LightKind]) -> dict[str, LightKind]:
     return result
 
 
-_by_plugin = by_plugin(KINDS)
+BY_PLUGIN = by_plugin(KINDS)
 
 
 def of(plugin: str) -> LightKind:
@@ -198,7 +234,7 @@ def of(plugin: str) -> LightKind:
 
     An unknown one counts as an environment, about which premises may assume the least.
     """
-    return _by_plugin.get(plugin, ENVIRONMENT)
+    return BY_PLUGIN.get(plugin, ENVIRONMENT)
 
 
 def is_heuristic(plugin: str) -> bool:

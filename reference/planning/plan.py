@@ -35,7 +35,7 @@ from fotismos.heuristic.heuristics import Interpolation
 from fotismos.heuristic.materials import COEFFICIENTS
 from fotismos.reference.pairing import lights
 from fotismos.reference.pairing.halves import Pair
-from fotismos.reference.pairing.prepare import PATHS
+from fotismos.reference.pairing.settings import PATHS
 from fotismos.reference.planning.effects import (
     EFFECTS,
     INTERREFLECTION,

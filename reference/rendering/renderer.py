@@ -100,7 +100,7 @@ class Renderer:
         self.integrator = integrator or scene.integrator()
         self.pass_spp = pass_spp
         shading = getattr(self.integrator, "model", None)  # only the integrator `heuristic` has it
-        self._is_users = shading is not None and not shading.is_own
+        self._is_users = shading is not None and not shading.is_builtin
         self.label = f"{label} ({shading.name})" if shading and self._is_users else label
         self.size = size
         self.variant = mi.variant()
@@ -185,8 +185,8 @@ class Renderer:
         spp = self.pass_spp
         if self._replayed is not None:
             try:
-                if hasattr(self.integrator, "prepare"):  # what cannot be recorded
-                    self.integrator.prepare(self.scene)
+                if hasattr(self.integrator, "collect"):  # what cannot be recorded
+                    self.integrator.collect(self.scene)
                 with _no_collection():
                     return self._replayed(self.scene, self.integrator, spp, seed)
             except InputError:  # the scene cannot be prepared

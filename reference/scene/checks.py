@@ -13,6 +13,7 @@ import numpy as np
 
 from fotismos.heuristic import meshes
 from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.lights import plugins_with
 from fotismos.reference.scene.graph import Graph, find_file, require_regular_file
 
 LARGEST = float(np.finfo(np.float32).max)
@@ -52,7 +53,7 @@ RANGES = (
     ("albedo", "homogeneous heterogeneous", (0, 1), "a share from 0 to 1"),
     (
         "direction sun_direction",
-        "directional distant sunsky timed_sunsky heuristic_directional",
+        " ".join(("directional", "distant", "sunsky", "timed_sunsky", *plugins_with("direction"))),
         ANY,
         "a vector of any length but 0",
     ),

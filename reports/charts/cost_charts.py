@@ -114,7 +114,7 @@ def _by_family(channel: Callable[..., Any], column: int) -> Any:
 def _domain(values: Sequence[float]) -> Ends:
     """Return the ends of a logarithmic axis: room on both sides of the values."""
     low = max(min(values), LEAST_ERROR)
-    high = max(*values, LEAST_ERROR)
+    high = max(max(values), LEAST_ERROR)
     room = 10 ** max(0.06 * log10(high / low), 0.05)
     return low / room, high * room
 

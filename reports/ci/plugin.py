@@ -24,8 +24,11 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from fotismos.heuristic import llvm
+from fotismos.heuristic.errors import InstallationError
+
 if TYPE_CHECKING:
-    from fotismos.reports.ci.testing import Fotismos  # likewise
+    from fotismos.reports.ci.testing import Fotismos  # loaded late: see below
 
 MARK = "fotismos_variant"
 
@@ -56,30 +59,21 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 @pytest.fixture
 def fotismos(request: pytest.FixtureRequest) -> Iterator[Fotismos]:
     """Departures and baselines of scenes: see :class:`fotismos.reports.ci.testing.Fotismos`."""
-    from fotismos.heuristic import llvm  # loaded late: most suites use nothing of it
-    from fotismos.heuristic.errors import InstallationError  # likewise
-
     try:
         llvm.check()
     except InstallationError as error:
         pytest.skip(f"fotismos cannot render here. {error}")
-    import mitsuba as mi
+    # Loaded late: it needs LLVM, and most suites use nothing of it.
+    from fotismos.reports.ci import testing
 
-    from fotismos.reference.scene.graph import set_variant  # likewise
-    from fotismos.reports.ci.testing import Fotismos  # likewise
-
-    before = mi.variant()
     variant = getattr(request, "param", None)
-    # A test may make a scene from Mitsuba's types, which needs a variant.
-    set_variant(variant or before or "llvm_ad_rgb")
-    yield Fotismos(
-        folder=request.path.parent / "baselines",
-        pictures=lambda: request.getfixturevalue("tmp_path"),
-        variant=variant,
-        update=request.config.getoption("--fotismos-update"),
-    )
-    if before is not None:
-        mi.set_variant(before)
+    with testing.rendering_in(variant):
+        yield testing.Fotismos(
+            folder=request.path.parent / "baselines",
+            pictures=lambda: request.getfixturevalue("tmp_path"),
+            variant=variant,
+            update=request.config.getoption("--fotismos-update"),
+        )
 
 
 def pytest_assertrepr_compare(op: str, left: object, right: object) -> list[str] | None:

@@ -1,10 +1,13 @@
 """Assertions on a scene: how far it departs from physics, and that nothing moved."""
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import mitsuba as mi
 
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import Case, Scene, open_case
@@ -15,6 +18,7 @@ from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import in_file, known_as
 from fotismos.reference import records
 from fotismos.reference.rendering.sums import student
+from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines, checks, summary
 
 
@@ -54,6 +58,17 @@ class Departure(float):
             f"{self.scene}: mean {self.metric} {float(self):.6g}, standard error {self.error:.2g}",
             f"95 % interval: {low:.6g} to {high:.6g}{floor}",
         ]
+
+
+@contextmanager
+def rendering_in(variant: str | None) -> Iterator[None]:
+    """Set a variant for a test, and the one before afterwards."""
+    before = mi.variant()
+    # A test may make a scene from Mitsuba's types, which needs a variant.
+    set_variant(variant or before or "llvm_ad_rgb")
+    yield
+    if before is not None:
+        mi.set_variant(before)
 
 
 @dataclass(frozen=True)

@@ -83,7 +83,7 @@ def compare(
         scenes=scenes,
         output=output,
         job=jobs.Job(
-            request=jobs.request(rendering),
+            options=jobs.chosen_options(rendering),
             figures=figures,
             with_causes=with_causes,
             fresh=fresh,

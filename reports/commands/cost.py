@@ -49,7 +49,7 @@ def cost(
         jobs.pool(timeout),
         scene=scene,
         output=output,
-        request=jobs.request(rendering),
+        options=jobs.chosen_options(rendering),
         rounds=rounds,
         at=at,
         is_measured=is_measured,

@@ -23,5 +23,5 @@ def export(scene: str, output: Path, timeout: float, **rendering: Any) -> None:
       fotismos export cornell-box
       fotismos export my_scene.xml --resolution 640x480 -o for_my_engine
     """  # noqa: D301 click reads the \b as: keep these lines
-    request = jobs.request(rendering)
-    jobs.work("export", jobs.pool(timeout), scene=scene, output=output, request=request)
+    options = jobs.chosen_options(rendering)
+    jobs.work("export", jobs.pool(timeout), scene=scene, output=output, options=options)

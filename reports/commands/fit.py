@@ -55,7 +55,7 @@ def fit(
         jobs.pool(timeout),
         scenes=scenes,
         output=output,
-        request=jobs.request(rendering),
+        options=jobs.chosen_options(rendering),
         loss=loss,
         form=form,
         as_json=as_json,

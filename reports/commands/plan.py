@@ -35,7 +35,7 @@ def plan(scene: str, as_json: bool, within: float | None, timeout: float, **rend
         "plan",
         jobs.pool(timeout),
         scene=scene,
-        request=jobs.request(rendering),
+        options=jobs.chosen_options(rendering),
         within=within,
         as_json=as_json,
     )

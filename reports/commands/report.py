@@ -51,9 +51,9 @@ def report(
     """  # noqa: D301 click reads the \b as: keep these lines
     if quick:
         rendering |= {name: rendering[name] or value for name, value in QUICK.items()}
-    request = jobs.request(rendering)
+    options = jobs.chosen_options(rendering)
     job = jobs.Job(
-        request=request,
+        options=options,
         figures=figures,
         with_causes=True,
         fresh=fresh,

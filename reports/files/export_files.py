@@ -169,16 +169,21 @@ def _material(material: dict[str, Any]) -> dict[str, Any]:
 def _light(light: dict[str, Any]) -> dict[str, Any]:
     intensity = light.get("diffuse_intensity", light["intensity"])
     # glTF splits light into a colour up to 1 and an intensity; a dark light must not divide by 0.
-    largest = max(*intensity, 1e-30)
-    outer = min(radians(light.get("cutoff", 0.0)), pi / 2)
-    spot = {"spot": {"innerConeAngle": 0.0, "outerConeAngle": outer}}
+    largest = max(max(intensity), 1e-30)
+    # glTF has three types of light.
+    cone = {}
+    if "cutoff" in light:
+        kind = "spot"
+        cone = {"innerConeAngle": 0.0, "outerConeAngle": min(radians(light["cutoff"]), pi / 2)}
+    else:
+        kind = "point" if "position" in light else "directional"
     return {
         "name": light["name"],
-        "type": light["type"],
+        "type": kind,
         "color": [value / largest for value in intensity],
         "intensity": pi * largest,
         "extras": {key: value for key, value in light.items() if key not in ("name", "type")},
-        **(spot if light["type"] == "spot" else {}),
+        **({"spot": cone} if cone else {}),
     }
 
 

@@ -68,7 +68,7 @@ def embed(channels: Mapping[str, ArrayLike], counted: ArrayLike) -> Embedded:
     # The rounding of exact pairs would fill most of a page.
     planes[LEADING.name] = encode(np.where((error > 0) & (error < LEAST), LEAST / 2, error))
     for name, metric in drawn().items():
-        if not METRICS.is_own(metric):  # of the package's own, the files have the maps
+        if not METRICS.is_builtin(metric):  # of the package's own, the files have the maps
             planes[name] = encode(_means(channels[f"{name}.Y"], block))
     deviation = np.stack([channels[f"reference_stderr.{c}"] for c in "RGB"]).max(axis=0)
     planes["standard_error"] = encode(_means(deviation, block), 32 * STEP)

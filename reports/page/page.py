@@ -243,7 +243,7 @@ def _board(why: WhyView | None, found: Attribution | None) -> dict[str, Any] | N
 
 def _drawing() -> dict[str, Any]:
     """Return the maps, their colours, and XYZ of linear RGB, under the script's names."""
-    declared = [metric for metric in drawn().values() if not METRICS.is_own(metric)]
+    declared = [metric for metric in drawn().values() if not METRICS.is_builtin(metric)]
     maps = (
         (LEADING.name, LEADING.label, "difference", 0),
         ("effects", EFFECTS_TITLE, "effects", 0),

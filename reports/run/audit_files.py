@@ -50,7 +50,10 @@ def furnace(record: Audit) -> Spec:
                     rows.append({"x": at, "y": value, "of": of})
     x = alt.X("x:Q").title("alpha" if varied else "viewer’s angle").scale(nice=False)
     y = alt.Y("y:Q").title("seen")
-    return _charts({kind: _chart(*lines, "viewer at", x, y) for kind, lines in kinds.items()})
+    charts = {
+        kind: _chart(rows, faint, of="viewer at", x=x, y=y) for kind, (rows, faint) in kinds.items()
+    }
+    return _charts(charts)
 
 
 def lobes(record: Audit) -> Spec:
@@ -64,7 +67,8 @@ def lobes(record: Audit) -> Spec:
             for view, value in zip(record.views, lobe, strict=True)
         ]
         if rows:
-            reach = 1.05 * max(1.0, *(max(abs(row["x"]), abs(row["y"])) for row in rows))
+            farthest = max(max(abs(row["x"]), abs(row["y"])) for row in rows)
+            reach = 1.05 * max(1.0, farthest)
             low = -reach if min(row["y"] for row in rows) < 0 else 0
             shown = {"tickCount": 4}
             x = alt.X("x:Q", axis=shown).title(None).scale(domain=[-reach, reach], nice=False)
@@ -89,19 +93,17 @@ def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerCha
         shown = legend if len(names) > 1 else None
         return channel("of:N", title=of, sort=names, legend=shown, scale=scale)
 
-    # Vega-Lite joins points by x; `order` lets a curve turn back.
-    below = (
-        alt.Chart(alt.Data(values=[row | {"order": order} for order, row in enumerate(faint)]))
-        .mark_line(clip=True, strokeWidth=1)
-        .encode(x=x, y=y, order="order:Q", strokeDash=style(alt.StrokeDash, DASHES))
-    )
-    above = (
-        alt.Chart(alt.Data(values=[row | {"order": order} for order, row in enumerate(rows)]))
-        .mark_line(clip=True, strokeWidth=2)
-        .encode(x=x, y=y, order="order:Q", strokeDash=style(alt.StrokeDash, DASHES))
-    )
-    layers = [below.encode(color=alt.value(FAINT)), above.encode(color=style(alt.Color, INKS))]
-    return alt.LayerChart(layer=layers, width=WIDTH, height=WIDTH // 2)
+    def line(rows: Rows, width: int, colour: Any) -> alt.Chart:
+        # Vega-Lite joins points by x; `order` lets a curve turn back.
+        points = alt.Data(values=[row | {"order": order} for order, row in enumerate(rows)])
+        dashes = style(alt.StrokeDash, DASHES)
+        chart: alt.Chart = alt.Chart(points).mark_line(clip=True, strokeWidth=width)
+        chart = chart.encode(x=x, y=y, order="order:Q", strokeDash=dashes, color=colour)
+        return chart
+
+    below = line(faint, 1, alt.value(FAINT))
+    above = line(rows, 2, style(alt.Color, INKS))
+    return alt.LayerChart(layer=[below, above], width=WIDTH, height=WIDTH // 2)
 
 
 def write(folder: Path, record: Audit) -> None:

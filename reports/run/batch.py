@@ -142,11 +142,11 @@ def run(
     """
     checked_threshold(job.within)
     # Before anything is written, since a placeholder may be unknown.
-    requests = dict(zip(scenes, _requests(job.request, scenes), strict=True))
+    options_by_scene = dict(zip(scenes, _options_for(job.options, scenes), strict=True))
     command = command_line()
     with results.hold(folder, command) as folder:
         places = results.places(folder, scenes)
-        _require_inputs_apart(job.request, [folder / target for target in places])
+        _require_inputs_apart(job.options, [folder / target for target in places])
         for name in (TABLES, FIGURES) if job.figures else (TABLES,):
             results.own(folder / name)
         batch = Batch(
@@ -154,7 +154,7 @@ def run(
         )
         batch.stages["start-up"] = perf_counter() - START
         calls = {
-            target: (word, folder, target, replace(job, request=requests[word]))
+            target: (word, folder, target, replace(job, options=options_by_scene[word]))
             for target, word in places.items()
         }
         total = SCENE * len(places) + (HARD_CASES if hard_cases else 0.0)
@@ -181,8 +181,8 @@ def run(
         raise type(error)(f"{count}among them: {error}") from error
 
 
-def _requests(whole: Options, scenes: Sequence[str]) -> list[Options]:
-    """Return the request for each scene: with values only for the placeholders that it has."""
+def _options_for(whole: Options, scenes: Sequence[str]) -> list[Options]:
+    """Return the options for each scene: with values only for the placeholders that it has."""
     if len(scenes) == 1 or not whole.define:
         return [whole] * len(scenes)
     known = (placeholders(Path(scene)) for scene in scenes)
@@ -238,9 +238,9 @@ def _compare(
         batch.grow_page()
 
 
-def _require_inputs_apart(request: Options, places: Sequence[Path]) -> None:
+def _require_inputs_apart(options: Options, places: Sequence[Path]) -> None:
     """Refuse pictures in a folder whose files are about to be replaced."""
-    for word in request.image:
+    for word in options.image:
         path, _ = picture_parts(word)
         if path.resolve().parent in [target.resolve() for target in places]:
             raise InputError(

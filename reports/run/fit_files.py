@@ -127,6 +127,9 @@ def _parameters(fit: FormFit) -> Iterator[Cells]:
         for parameter in material.parameters
     ]
     for owner, parameter in owned:
+        name = f"{parameter.name} {parameter.channel}".strip()
+        if parameter.is_factor:
+            name += " (factor)"
         interval = parameter.interval
         note = "at its bound" if parameter.at_bound else ""
         if parameter.reason:
@@ -134,7 +137,7 @@ def _parameters(fit: FormFit) -> Iterator[Cells]:
             note = f"not identifiable: {parameter.reason}{partners}"
         yield (
             owner,
-            f"{parameter.name} {parameter.channel}".strip() + " (factor)" * parameter.is_factor,
+            name,
             f"{parameter.paired:.4g}",
             "–" if parameter.fitted is None else f"{parameter.fitted:.4g}",
             f"{interval[0]:.4g} to {interval[1]:.4g}" if interval else "",

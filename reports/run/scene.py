@@ -56,7 +56,7 @@ def compare(
     with Turn(folder, folder / results.TABLES) as turn:
         begin = perf_counter()
         # A finished scene is recognised by its key.
-        case = open_case(name, job.request)
+        case = open_case(name, job.options)
         key = key_of(case, job)
         view = None if job.fresh else load(folder / target, key)
         spent = {"finished scenes": perf_counter() - begin}
@@ -82,14 +82,14 @@ def compare(
         )
         spent = _stages(comparison.record, perf_counter() - begin)
         # The costs of methods, for a few scenes.
-        study = None
+        costs = None
         causes = comparison.causes
         if case.word in job.ladders and causes:
             from fotismos.comparisons.cost.cost import quick  # loaded late: for a handful of scenes
 
             begin = perf_counter()
             command = case.command("cost")
-            study = quick(
+            costs = quick(
                 source,
                 options,
                 causes=causes,
@@ -103,7 +103,7 @@ def compare(
             from fotismos.reports.charts import figures
 
             figures.write_scene(folder / results.FIGURES, target, comparison)
-        view = write(folder, target, comparison, study, key)
+        view = write(folder, target, comparison, costs, key)
         return view, spent | {"files": perf_counter() - begin}
 
 
@@ -164,7 +164,7 @@ def load(folder: Path, key: str | None) -> SceneView | None:
         view = found.view
         if view.cost:
             from fotismos.comparisons.cost.cost_record import (
-                Cost,  # loaded late: few scenes have a study
+                Cost,  # loaded late: few scenes have costs
             )
 
             record = msgspec.convert(view.cost.record, Cost, builtin_types=())
@@ -185,7 +185,7 @@ def write(
     folder: Path,
     name: str,
     comparison: Comparison,
-    study: "Study | None" = None,
+    costs: "Study | None" = None,
     key: str | None = None,
 ) -> SceneView:
     """Write the files of one comparison to ``folder/name``, and return its part of the page.
@@ -205,13 +205,13 @@ def write(
         for picture, png in images.pictures(comparison.images, record.viewing.exposure).items()
     }
     linked: tuple[str, ...] = (RECORD, PICTURE)
-    if study:
+    if costs:
         from fotismos.reports.run import cost_files  # loaded late: for a handful of scenes
 
-        made |= cost_files.documents(study)
+        made |= cost_files.documents(costs)
         linked = (*linked, "cost.json")
-        chart = cost_files.figure(study.record)
-        view = structs.replace(view, chart=chart, cost=cost_files.view(study))
+        chart = cost_files.figure(costs.record)
+        view = structs.replace(view, chart=chart, cost=cost_files.view(costs))
     view = structs.replace(view, files={file: f"{name}/{file}" for file in linked})
     for file, content in made.items():
         results.write(target / file, content)

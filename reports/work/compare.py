@@ -29,8 +29,8 @@ def run(
         return 0
     from fotismos.reports.ci import summary  # loaded late: most comparisons need no CI
 
-    shader = job.request.heuristic.partition(":")[0]  # FILE:NAME, or a name alone
-    pictures = [picture_parts(word)[0] for word in job.request.image]
+    shader = job.options.heuristic.partition(":")[0]  # FILE:NAME, or a name alone
+    pictures = [picture_parts(word)[0] for word in job.options.image]
     summary.require_free(junit, summary_file, [*scenes, shader, *pictures])
     code = 0
 

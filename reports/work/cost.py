@@ -25,14 +25,14 @@ def run(
     pool: Pool,
     scene: str,
     output: Path,
-    request: Options,
+    options: Options,
     rounds: int | None,
     at: Size | None,
     is_measured: bool,
     as_json: bool,
 ) -> None:
     """Study one scene, and print the table or the record."""
-    arguments = (request, rounds, at, is_measured)
+    arguments = (options, rounds, at, is_measured)
     records = results_of(pool, output / "cost", scenes=[scene], work=measured, arguments=arguments)
     ((folder, record),) = records.items()
     if as_json:
@@ -44,7 +44,7 @@ def run(
 
 def measured(
     name: str,
-    request: Options,
+    options: Options,
     rounds: int | None,
     at: Size | None,
     is_measured: bool,
@@ -52,7 +52,7 @@ def measured(
     progress: Any,
 ) -> Cost:
     """Study what each step of accuracy costs, and write its files."""
-    case = open_case(name, request)
+    case = open_case(name, options)
     effort = Effort() if rounds is None else Effort(rounds=rounds)
     size = at and f"{at[0]}x{at[1]}"
     repeated = case.command("cost", rounds=rounds, at=size, measure=is_measured or None)

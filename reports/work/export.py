@@ -12,16 +12,16 @@ from fotismos.reports.terminal.words import tell_where
 from fotismos.reports.work.folders import results_of
 
 
-def run(pool: Pool, scene: str, output: Path, request: Options) -> None:
+def run(pool: Pool, scene: str, output: Path, options: Options) -> None:
     """Export one scene."""
     (folder,) = results_of(
-        pool, output / "export", scenes=[scene], work=exported, arguments=[request]
+        pool, output / "export", scenes=[scene], work=exported, arguments=[options]
     )
     tell_where(folder)
 
 
-def exported(name: str, request: Options, target: Path, progress: Any) -> None:
+def exported(name: str, options: Options, target: Path, progress: Any) -> None:
     """Write the files that another program needs to render a scene."""
-    case = open_case(name, request)
+    case = open_case(name, options)
     scene = plain_scene(case.source, case.options)
     export_files.write(target, scene, case.command(image="YOURS.exr"))

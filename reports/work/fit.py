@@ -24,14 +24,14 @@ def run(
     pool: Pool,
     scenes: Sequence[str],
     output: Path,
-    request: Options,
+    options: Options,
     loss: str,
     form: str,
     as_json: bool,
 ) -> None:
     """Fit each scene, and print the tables or the records."""
     records = results_of(
-        pool, output / "fit", scenes=scenes, work=fitted, arguments=(request, loss, form)
+        pool, output / "fit", scenes=scenes, work=fitted, arguments=(options, loss, form)
     )
     if as_json:
         click.echo(json.dumps(plain([*records.values()]), indent=2, ensure_ascii=False))
@@ -43,10 +43,10 @@ def run(
 
 
 def fitted(
-    name: str, request: Options, loss: str, form: str, target: Path, progress: Any
+    name: str, options: Options, loss: str, form: str, target: Path, progress: Any
 ) -> FitRecord:
     """Fit the heuristic to a scene, and write the fit's files."""
-    case = open_case(name, request)
+    case = open_case(name, options)
     command = case.command("fit", loss=loss, form=form)
     forms = FORMS if form == "all" else (form,)
     result = fit(case.source, case.options, loss, forms, progress, command)

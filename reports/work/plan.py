@@ -16,13 +16,13 @@ from fotismos.reports.terminal.plan_lines import PlanReport, plan_report
 from fotismos.reports.terminal.words import tell
 
 
-def run(pool: Pool, scene: str, request: Options, within: float | None, as_json: bool) -> int:
+def run(pool: Pool, scene: str, options: Options, within: float | None, as_json: bool) -> int:
     """Print a scene's plan, or its fastest method within a tolerance; return the exit code."""
     code = 0
     lines: Iterable[str]
     result: Record
     if within is None:
-        report: PlanReport = pool.do(Task(scene, planned, (scene, request)))
+        report: PlanReport = pool.do(Task(scene, planned, (scene, options)))
         lines = plan_lines.plan_lines(report)
         result = report
     else:
@@ -30,7 +30,7 @@ def run(pool: Pool, scene: str, request: Options, within: float | None, as_json:
             task = Task(
                 name=scene,
                 function=chosen,
-                arguments=(scene, request, within),
+                arguments=(scene, options, within),
                 progress=bar.of(scene),
             )
             choice: Choice = pool.do(task)
@@ -44,13 +44,13 @@ def run(pool: Pool, scene: str, request: Options, within: float | None, as_json:
     return code
 
 
-def planned(name: str, request: Options) -> PlanReport:
+def planned(name: str, options: Options) -> PlanReport:
     """Return the plan of a scene."""
-    case = open_case(name, request)
+    case = open_case(name, options)
     return plan_report(case.name, prepare(case.source, case.options), case.variant)
 
 
-def chosen(name: str, request: Options, within: float, progress: Any) -> Choice:
+def chosen(name: str, options: Options, within: float, progress: Any) -> Choice:
     """Measure the methods of a scene, and name the fastest that passes at a tolerance."""
-    case = open_case(name, request)
+    case = open_case(name, options)
     return choose(case.source, within, options=case.options, progress=progress)

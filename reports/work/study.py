@@ -56,7 +56,7 @@ def write(study: StudyFile, table: pa.Table, folder: Path) -> tuple[Path, Path]:
 
 def summary(study: StudyFile, table: pa.Table, done: int) -> Iterator[str]:
     """Yield a line for each part: points, failures, and the range of the departure."""
-    width = max(4, *(len(part.name) for part in study.parts))
+    width = max(len(name) for name in ["part", *(part.name for part in study.parts)])
     yield f"{'part':<{width}}  points  failed  mean ΔE2000: least  median   most"
     rows = table.to_pylist()
     for part in study.parts:

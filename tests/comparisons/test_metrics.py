@@ -11,6 +11,7 @@ from fotismos.comparisons.departure.metrics import (
     LEADING,
     LOG2_EPSILON,
     METRICS,
+    Metric,
     Pixelwise,
     log2_luminance_ratio,
 )
@@ -171,6 +172,25 @@ def test_known_extremes():
     assert LEADING(two, four, Viewing(exposure=0.25)) > 10.0
 
 
+def declared(label, **more):
+    """A metric with a label and nothing of note."""
+    made = {"name": "mine", "unit": "1", "definition": "", "caution": "", "map_range": (0, 1)}
+    return Metric(label=label, **made, **more)
+
+
+def test_a_heading_says_mean_once():
+    assert declared("Contrast").heading == "Contrast, mean"
+    assert declared("Mean contrast").heading == "Mean contrast"
+
+
+def test_the_former_name_of_a_root_mean_square_still_works():
+    with pytest.warns(DeprecationWarning, match="averages_squares"):
+        former = declared("Contrast", linear=True)
+    for metric in (former, declared("Contrast", averages_squares=True)):
+        assert metric.mean(np.array([3.0, 4.0])) == pytest.approx(12.5**0.5)
+    assert declared("Contrast").mean(np.array([3.0, 4.0])) == 3.5
+
+
 def test_log2_ratio_is_signed_and_defined_at_black():
     greys = np.array([[0.5, 0.125, 0, -1, 0], [0.25, 0.25, 0, 0, 1]])
     found = log2_luminance_ratio(*greys[..., None] * np.ones(3))
@@ -266,7 +286,7 @@ def test_best_exposure_finds_a_known_factor(metric, images):
     reference = images[1]
     mask, black = np.ones(reference.shape[:2], bool), np.zeros_like(reference)
     for factor in (0.11, 1.0, 13.0):
-        precision = 1e-12 if metric.linear else 1e-6
+        precision = 1e-12 if metric.averages_squares else 1e-6
         found = best_exposure(metric, reference / factor, reference, mask)
         assert found == pytest.approx(factor, rel=precision)
     after = summarise(metric, reference / 1.7, reference, mask)[0].after_exposure
@@ -300,7 +320,7 @@ def test_summary_is_of_the_mask(metric, images):
     values = metric(test, reference)
     np.testing.assert_array_equal(distance, values.astype(np.float32))
     values = values[mask]
-    mean = np.sqrt((values**2).mean()) if metric.linear else values.mean()
+    mean = np.sqrt((values**2).mean()) if metric.averages_squares else values.mean()
     found = (summary.mean, summary.p50, summary.p95, summary.max)
     assert found == pytest.approx((mean, *np.percentile(values, (50, 95, 100))))
     for share in summary.visible:

@@ -13,6 +13,7 @@ import pytest
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.plain_scene import plain_scene
+from fotismos.comparisons.prepared import pair_for
 from fotismos.heuristic import meshes
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.rendering.gbuffer import gbuffer
@@ -51,7 +52,7 @@ def test_the_files_hold_all_that_the_textbooks_picture_is_made_of(rgb):
     """The picture that the export makes in NumPy is the kernel's, but for edges."""
     for scene in ("fig-6-5-m40", "two-intensities", "plastic-spheres", "cornell-box"):
         case, found = exported_of(scene)
-        half = case.options.pair(case.source).heuristic.instantiate()
+        half = pair_for(case.source, case.options).heuristic.instantiate()
         pixels = map(np.arange, SIZE)
         image, expected = shaded(found), centres(half, half.integrator(), SIZE, *pixels)
         edge = np.abs(image - expected).max(axis=-1) > 2e-4 * max(1, expected.max())

@@ -199,7 +199,7 @@ def test_packages_declare_by_entry_points_that_are_loaded_once(monkeypatch):
     mine = registry.declare(Heuristic("mine", toon))
     assert list(registry) == ["phong", "mine", "late"]
     assert (len(registry), "none" in registry, loads) == (3, False, [1])
-    assert (registry.is_own(PHONG), registry.is_own(mine)) == (True, False)
+    assert (registry.is_builtin(PHONG), registry.is_builtin(mine)) == (True, False)
     again = registry.declare(Heuristic("mine", shadowed))
     assert registry["mine"] is again
     entry.load = lambda: 1 / 0

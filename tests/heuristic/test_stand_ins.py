@@ -82,7 +82,7 @@ def test_ambient_light_of_its_own_stays_without_an_environment(rgb):
 
 
 def test_sky_and_ground_are_found_again(rgb):
-    prepared = indirect_light.prepare(mi.load_dict(sky_above(two_colours)))
+    prepared = indirect_light.fitted_sky(mi.load_dict(sky_above(two_colours)))
     assert list(prepared[2]) == [0, 0, 1]
     for side, end in zip(prepared, (1, -1), strict=False):
         (expected,) = two_colours(np.array([(0, 0, end)]))

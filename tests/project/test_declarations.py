@@ -29,10 +29,11 @@ from fotismos.heuristic.declared import Declared
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import HEURISTICS, Heuristic
 from fotismos.reference.rendering.sums import Estimate
+from tests.shared.programs import python
 from tests.shared.schemas import schema
 from tests.shared.small_scene import PLAIN
 
-OWN = [name for name, metric in METRICS.items() if METRICS.is_own(metric)]
+OWN = [name for name, metric in METRICS.items() if METRICS.is_builtin(metric)]
 
 
 def blurred(test, reference, viewing):
@@ -181,3 +182,20 @@ def test_a_method_and_a_heuristic_are_in_json_tables_page_and_chart(
         text = (out / name).read_text(encoding="utf-8")
         assert "no &lt;shadows&gt;" in text
         assert "Phong kernel: Flat &lt;tone&gt;" in text
+
+
+LIGHT_FOUND = """\
+heuristic_trial is paired as directional
+departure: 0.0
+exact: True
+trial is exported as directional
+scene: lamp: direction = [0, 0, 0] is not allowed: give a vector of any length but 0.
+lights is of type str: give a list of PointLight, DirectionalLight, SpotLight or TrialLight, empty \
+for none.
+"""
+
+
+def test_a_kind_of_light_is_found_by_its_declaration_alone():
+    """Registered, shaded, paired, planned, exported, checked and named: in a process of its own."""
+    ended = python("-m", "tests.shared.trial_light_program")
+    assert (ended.stdout, ended.returncode) == (LIGHT_FOUND, 0), ended.stderr

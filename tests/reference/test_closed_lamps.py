@@ -6,6 +6,7 @@ import pytest
 
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import pair_for
 from fotismos.comparisons.steps import steps
 from fotismos.reference.scene.source import Source
 from tests.shared.parts import camera, moved
@@ -32,7 +33,7 @@ def room(kind):
 
 @pytest.mark.parametrize("kind", LAMPS)
 def test_a_lamp_casts_no_shadow_on_what_it_lights(rgb, kind):
-    pair = Options().pair(Source("lamp", room(kind)))
+    pair = pair_for(Source("lamp", room(kind)), Options())
     scene = pair.heuristic.instantiate()
     floor = {"spp": 16, "seed": 1}
     bare, shadowed, mapped, traced = (

@@ -395,6 +395,6 @@ def test_a_junit_path_that_cannot_be_written_is_named_by_its_option(tmp_path):
 def test_files_for_ci_never_replace_a_picture_whatever_its_name_and_layer(tmp_path, layer):
     picture = tmp_path / "a:b.exr"
     picture.touch()
-    job = SimpleNamespace(request=SimpleNamespace(heuristic="phong", image=[f"{picture}{layer}"]))
+    job = SimpleNamespace(options=SimpleNamespace(heuristic="phong", image=[f"{picture}{layer}"]))
     with pytest.raises(InputError, match="is an input of the same command"):
         work.run(None, [], tmp_path, job, 5.0, picture, None, is_opened=False)

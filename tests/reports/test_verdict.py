@@ -168,7 +168,7 @@ def test_a_run_ends_with_its_verdict_and_finds_causes_unless_told_not_to(
 
 
 def test_the_heuristics_called_textbook_are_those_of_the_package_that_shade_as_the_chapters_do():
-    own = [one for one in HEURISTICS.values() if one.is_own]
+    own = [one for one in HEURISTICS.values() if one.is_builtin]
     assert set(verdict.TEXTBOOK) == {one.name for one in own if one.shade is Point.textbook}
     named = {"hemisphere-ambient": "hemisphere-ambient", "shaders/toon.py:shade": "toon.py:shade"}
     for heuristic, name in named.items():

@@ -1,4 +1,4 @@
-"""Preparation for both halves of a pair: sensor, film, integrator, ids and BSDFs."""
+"""What both halves of a pair need: sensor, film, integrator, ids and BSDFs."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -37,7 +37,7 @@ class Override(Record):
 
 @dataclass
 class Settings:
-    """What a scene asks for besides its content, filled while it is prepared.
+    """What a scene asks for besides its content, filled while it is completed.
 
     ``integrator`` is its plugin, None if the scene has none; ``max_depth`` counts like Mitsuba's,
     -1 for no limit; ``rr_depth`` is None if omitted; ``overridden`` is what it does not get.
@@ -56,7 +56,7 @@ class Settings:
         self.overridden.append(Override(what=what, given=given, used=used))
 
 
-def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -> Settings:
+def complete(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -> Settings:
     """Check the graph, add what both halves need, and return its :class:`Settings`.
 
     One of several sensors is kept, by its number in the Mitsuba scene. The integrator is removed:
@@ -80,7 +80,7 @@ def prepare(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) -
             graph.props(shape).set_id(f"shape-{shape}")
     settings = Settings()
     camera = keep_sensor(graph, sensor)
-    _prepare_film(graph, camera, resolution=resolution, settings=settings)
+    _set_film(graph, camera, resolution=resolution, settings=settings)
     for _, index in graph.children(camera, SAMPLER):
         count = graph.props(index).get("sample_count", 4)
         before = f"{graph.plugin(index)}, {count} samples per pixel"
@@ -125,7 +125,7 @@ def keep_sensor(graph: Graph, number: int) -> int:
     return int(places[number][2])
 
 
-def _prepare_film(
+def _set_film(
     graph: Graph, sensor: int, resolution: tuple[int, int] | None, settings: Settings
 ) -> None:
     films = graph.children(sensor, FILM)
