@@ -128,14 +128,16 @@ def sentence(
         case "undecided":
             more = "repeats of the picture" if record.picture else "samples (--spp, --noise)"
             if found.low > LIMIT:
-                return (
+                doubt = (
                     f"Noise may explain it: {percent(found.value)} of the pixels differ, but no"
                     f" difference is certain anywhere. More {more} decide."
                 )
-            return (
-                f"Too close to call: {percent(found.low)} to {percent(found.high)} of the pixels"
-                f" differ, and {percent(LIMIT)} may. More {more} decide."
-            )
+            else:
+                doubt = (
+                    f"Too close to call: {percent(found.low)} to {percent(found.high)} of the"
+                    f" pixels differ, and {percent(LIMIT)} may. More {more} decide."
+                )
+            return f"{doubt} {_samples_needed(record, threshold)}".strip()
     if _brightness_suffices(record, threshold):
         factor = lead.after_exposure.exposure
         change = "Brightening" if factor > 1 else "Darkening"
