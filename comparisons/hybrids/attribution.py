@@ -150,7 +150,7 @@ def find(
     if media := sorted(name for name, _ in ready.pair.media):
         raise InputError(
             f"{source.name} has participating media ({', '.join(media)}), which no image of some"
-            " effects can hold. Give `no_why` to do without causes."
+            " effects can hold. The other numbers do not need them."
         )
     width, height = image_size(ready.scene)
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
@@ -328,7 +328,8 @@ def attribute(
 
     def error(simulated: frozenset[Effect]) -> Floats:
         """Errors (R + 1, N): the middle of both rules."""
-        return np.mean(both(simulated), axis=0)
+        errors: Floats = both(simulated).mean(axis=0)
+        return errors
 
     gains, sampling_errors, drawn = shares(
         effects, both, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS
