@@ -17,9 +17,10 @@ from fotismos.heuristic import plugins
 from fotismos.reference.rendering import direct
 from fotismos.reference.scene.graph import set_variant
 from tests.benchmarks import kernel, prediction
+from tests.shared import noisy_scenes
 from tests.shared.verification import verify
 from tests.shared.wrong_shaders import WRONG
-from tests.witnesses import page, povray, povray_scenes
+from tests.witnesses import noise, page, povray, povray_scenes
 
 FINER = 4
 """POV-Ray's rays along each side of a pixel."""
@@ -34,6 +35,11 @@ def witnesses():
         part.replace("_", " "): list(getattr(page, part)())
         for part in ("closed_forms", "figures", "whole_scenes")
     }
+
+
+def intervals_in_noise():
+    """How many intervals hold the truth in scenes that are hard to sample."""
+    return list(noise.table([noise.measured(make) for make in noisy_scenes.SCENES]))
 
 
 def mistakes():
@@ -67,7 +73,10 @@ def drawn(scene, side):
     return picture.reshape(side, FINER, side, FINER, 3).mean(axis=(1, 3)).tolist()
 
 
-FACTS = {fact.__name__: fact for fact in (witnesses, mistakes, predictions, speed, gains, drawn)}
+FACTS = {
+    fact.__name__: fact
+    for fact in (witnesses, intervals_in_noise, mistakes, predictions, speed, gains, drawn)
+}
 
 if __name__ == "__main__":
     name, file, *words = sys.argv[1:]

@@ -154,7 +154,7 @@ def find(
     if media := sorted(name for name, _ in ready.pair.media):
         raise InputError(
             f"{source.name} has participating media ({', '.join(media)}), which no image of some"
-            " effects can hold. Give `no_why` to do without causes."
+            " effects can hold. The other numbers do not need them."
         )
     width, height = image_size(ready.scene)
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY

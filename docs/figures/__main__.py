@@ -172,12 +172,13 @@ def _site() -> None:
 
 
 def _measurements() -> None:
-    """Measure all errors and times in the documents again, for a quarter of an hour."""
+    """Measure all errors and times in the documents again, for three quarters of an hour."""
     found = density.measured()
     atomic.write(DOCS / "models-density.svg", figures.drawn(density.chart(found), "svg"))
     replace("models.md", "density", density.sentences(found))
     for measure in (measured.baselines, measured.findings):
         measure()
+    replace("witnesses.md", "noise", fact("intervals_in_noise"))
     replace("fit.md", "fits", measured.fits())
     replace("../README.md", "cost", measured.attribution())
     replace("plans.md", "gains", measured.gains())

@@ -176,7 +176,7 @@ def table(results: Sequence[SceneMeasured]) -> Iterator[str]:
         for name, (held, count) in counts.items():
             sums[name][0] += held
             sums[name][1] += count
-        cells = [f"{held} of {count}" for held, count in counts.values()]
+        cells = [f"{held} of {count}" if count else "–" for held, count in counts.values()]
         rows.append((result.scene, f"{result.departure:.2f}", *cells))
     rows.append(("**all**", "", *(f"{100 * held / count:.0f} %" for held, count in sums.values())))
     yield from tables.markdown(rows)
