@@ -14,7 +14,7 @@ image passes are needed; what is not among them may be left out.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Any
 
@@ -52,6 +52,9 @@ PASS = 64
 PASSES = 8
 """Samples per pixel of a pass, and passes."""
 
+GROUPS = (1, 4)
+"""Passes whose mean is one picture."""
+
 SINGLE = (4, 16)
 PICTURES = 2
 """Counts of samples below a pass, and pictures of each."""
@@ -85,55 +88,93 @@ def with_price(comparison: Comparison, ready: Prepared, progress: Progress | Non
 # --- Samples ---------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True)
+class NoisyPictures:
+    """A converged picture (N, 3), and how noisy ones deviate from it, {spp: (J, N, 3)}."""
+
+    clean: Floats
+    deviations: Mapping[int, Floats]
+    metric: Pixelwise
+    viewing: Viewing
+
+    def distances(self, spp: int, factor: float = 1.0) -> Iterator[Doubles]:
+        """Yield how far each picture of some samples is, (N,), its deviations times a factor."""
+        fixed = self.metric.coordinates(self.clean, self.viewing)
+        for deviation in self.deviations[spp]:
+            shown = self.clean + factor * deviation
+            yield self.metric.difference(fixed, self.metric.coordinates(shown, self.viewing))
+
+    def visible(self, spp: int, factor: float = 1.0) -> Doubles:
+        """Return the share of pixels above each threshold (T,), over all pictures."""
+        found = self.distances(spp, factor)
+        shares = np.array([shares_above(distances, THRESHOLDS) for distances in found])
+        mean: Doubles = shares.mean(axis=0)
+        return mean
+
+    @property
+    def growth(self) -> float:
+        """How much farther pictures of half as many samples are, by those with the most samples.
+
+        At most √2, which is usual, and at least 1.
+        """
+        *_, fewer, most = sorted(self.deviations)
+        few = np.mean([distances.mean() for distances in self.distances(fewer)])
+        many = np.mean([distances.mean() for distances in self.distances(most)])
+        if many <= 0.0:
+            return USUAL
+        return float(np.clip((few / many) ** (1.0 / np.log2(most / fewer)), 1.0, USUAL))
+
+
 def samples_that_pass(
     ready: Prepared, price: Price, metric: Pixelwise
 ) -> tuple[SamplesThatPass, ...]:
     """Return the samples with which the physical half passes, for each threshold."""
+    noisy = _noisy_pictures(ready, price, metric)
+    if noisy is None:
+        return ()
+    shares = {spp: noisy.visible(spp) for spp in noisy.deviations}
+    # Beyond the pictures that were rendered: as usual, and as slowly as they show.
+    slower = dict(shares)
+    growth = noisy.growth
+    largest = max(shares)
+    spp = 4 * largest
+    while spp <= MOST_SPP:
+        doublings = float(np.log2(spp / largest))
+        shares[spp] = noisy.visible(largest, USUAL**-doublings)
+        slower[spp] = noisy.visible(largest, growth**-doublings)
+        spp *= 4
+    return tuple(
+        _passing(
+            threshold,
+            {spp: float(found[place]) for spp, found in shares.items()},
+            {spp: float(found[place]) for spp, found in slower.items()},
+            pixels=len(noisy.clean),
+        )
+        for place, threshold in enumerate(THRESHOLDS)
+    )
+
+
+def _noisy_pictures(ready: Prepared, price: Price, metric: Pixelwise) -> NoisyPictures | None:
+    """Render passes, and pictures with fewer samples; None if no pixel counts."""
     size = size_of_width(ready.scene, _width(ready, price))
     film = image_size(ready.scene)
-    viewing = ready.options.viewing
     try:
         counted = gbuffer(ready.scene, size).hit
         if not counted.any():
-            return ()
-        # (K, N, 3) passes of the reference, and of its difference from the textbook half.
+            return None
         pictures, long = _deviating(ready, size, PASS, PASSES, counted)
         short = {spp: _deviating(ready, size, spp, PICTURES, counted)[1] for spp in SINGLE}
     finally:
         for half in _halves(ready):
             resize(half.scene, film)
-    clean = pictures.mean(axis=0)
     middle = long.mean(axis=0)
-
-    def visible(deviations: Floats) -> Doubles:
-        """Return the share of pixels above each threshold (T,), over deviations (J, N, 3)."""
-        distances = _distances(metric, clean, deviations, viewing)
-        shares = np.array([shares_above(found, THRESHOLDS) for found in distances])
-        mean: Doubles = shares.mean(axis=0)
-        return mean
-
-    by_count = {spp: visible(images - middle) for spp, images in short.items()}
-    sizes = {PASS: 1, 2 * PASS: 2, 4 * PASS: 4}
-    apart = {spp: _means_apart(long, size) for spp, size in sizes.items()}
-    by_count |= {spp: visible(deviations) for spp, deviations in apart.items()}
-    growth = _growth(metric, clean, apart, viewing)
-    largest = max(sizes)
-    slower = dict(by_count)
-    spp = 4 * largest
-    while spp <= MOST_SPP:
-        doublings = np.log2(spp / largest)
-        by_count[spp] = visible(apart[largest] * USUAL**-doublings)
-        slower[spp] = visible(apart[largest] * growth**-doublings)
-        spp *= 4
-    pixels = int(counted.sum())
-    return tuple(
-        _passing(
-            threshold,
-            {spp: float(shares[place]) for spp, shares in by_count.items()},
-            {spp: float(shares[place]) for spp, shares in slower.items()},
-            pixels=pixels,
-        )
-        for place, threshold in enumerate(THRESHOLDS)
+    deviations = {spp: images - middle for spp, images in short.items()}
+    deviations |= {size * PASS: _means_apart(long, size) for size in GROUPS}
+    return NoisyPictures(
+        clean=pictures.mean(axis=0),
+        deviations=deviations,
+        metric=metric,
+        viewing=ready.options.viewing,
     )
 
 
@@ -182,30 +223,6 @@ def _means_apart(passes_of: Floats, size: int) -> Floats:
         others = (total - chosen) / (count - size)
         deviations.append((chosen / size - others) * np.sqrt((count - size) / count))
     return np.array(deviations)
-
-
-def _distances(
-    metric: Pixelwise, clean: Floats, deviations: Floats, viewing: Viewing
-) -> Iterator[Doubles]:
-    """Yield how far each deviating picture is from the clean one, (N,)."""
-    fixed = metric.coordinates(clean, viewing)
-    for deviation in deviations:
-        yield metric.difference(fixed, metric.coordinates(clean + deviation, viewing))
-
-
-def _growth(
-    metric: Pixelwise, clean: Floats, apart: Mapping[int, Floats], viewing: Viewing
-) -> float:
-    """Return how much farther a picture of half as many samples is, by passes and halves of them.
-
-    At most √2, which is usual, and at least 1.
-    """
-    fewest, *_, most = sorted(apart)
-    single = np.mean([found.mean() for found in _distances(metric, clean, apart[fewest], viewing)])
-    halves = np.mean([found.mean() for found in _distances(metric, clean, apart[most], viewing)])
-    if halves <= 0.0:
-        return USUAL
-    return float(np.clip((single / halves) ** (1.0 / np.log2(most / fewest)), 1.0, USUAL))
 
 
 def _passing(

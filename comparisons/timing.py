@@ -1,7 +1,7 @@
 """The time per sample of both halves, their ratio, and what pruning saves.
 
 It is measured like a study of cost (:mod:`fotismos.comparisons.cost.times`): pictures with few and
-with four times as many samples, in rounds whose order alternates, after compilation and with the
+with many samples, in rounds whose order alternates, after compilation and with the
 processor's threads awake. Overhead cancels in the difference of both, so the ratio does not depend
 on the size of a picture.
 """
@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from fotismos.comparisons.cost import times
-from fotismos.comparisons.price_record import Price
+from fotismos.comparisons.price_record import FEWEST_SPP, Price
 from fotismos.reference.records import Missing
 from fotismos.reference.rendering.gbuffer import image_size, resize, size_of_width
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, Stream, passes
@@ -20,18 +20,15 @@ from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, Stream
 WIDTH = 128
 """Width of the pictures that are timed, whatever the film's is: a ratio is the same everywhere."""
 
-LONG_S = 0.03
+LONG_S = 0.02
 """Seconds that the picture with more samples takes, at least, if the film allows so many."""
-
-FACTOR = 4
-"""Samples of one picture over those of the other."""
 
 WARM = 2
 """Pictures that do not count: the first compiles, or wakes the threads."""
 
 BUDGET_S = 0.5
-FEWEST = 4
-MOST = 12
+FEWEST = 6
+MOST = 15
 """Seconds that all rounds take, and their number."""
 
 WIDEST = 0.3
@@ -99,13 +96,18 @@ def lines(renderers: Mapping[str, Renderer], seed: int) -> dict[str, times.Line]
 
 def _pair(half: Renderer, size: tuple[int, int]) -> tuple[Renderer, Renderer]:
     """Return a half with few and with more samples, at a size, both warm."""
-    pixels = size[0] * size[1]
-    most = max(FACTOR, LARGEST_PASS // pixels)
-    more = _warm(half, FACTOR, size)
-    while more.times[-1] < LONG_S and more.pass_spp < most:
-        growth = min(LONG_S / more.times[-1], most / more.pass_spp)
-        more = _warm(half, FACTOR * math.ceil(growth * more.pass_spp / FACTOR), size)
-    return _warm(half, more.pass_spp // FACTOR, size), more
+    fewer = more = _warm(half, FEWEST_SPP, size)
+    most = LARGEST_PASS // (size[0] * size[1])
+    # Powers of 4: each new count compiles.
+    while more.times[-1] < LONG_S:
+        steps = math.ceil(math.log(LONG_S / more.times[-1], 4))
+        spp = more.pass_spp * 4**steps
+        if spp > most:
+            break
+        more = _warm(half, spp, size)
+    if more is fewer:  # a slow scene, or a large film
+        more = _warm(half, 4 * FEWEST_SPP, size)
+    return fewer, more
 
 
 def _warm(half: Renderer, spp: int, size: tuple[int, int]) -> Renderer:
