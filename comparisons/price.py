@@ -7,7 +7,9 @@ means of passes of 64 make pictures of 256. The picture that is judged is the co
 plus the deviation of the difference of both halves, which trace the same rays: edges, which both
 share, cancel, and channels share their noise. ``j`` of ``K`` passes deviate from the others by more
 than from the truth, by ``√(K / (K − j))``. Beyond 256 the deviation is scaled: by ``1 / √n``, and
-where halves of the passes show that noise falls more slowly, between that and what they show.
+where halves of the passes show that noise falls more slowly, between that and what they show. Where
+it falls so slowly that bright paths are rare, what no pass has seen is unknown: more samples may be
+needed (`HEAVY`).
 
 **Effects.** Causes render images in which some effects are simulated. The fewest with which an
 image passes are needed; what is not among them may be left out.
@@ -62,6 +64,9 @@ PICTURES = 2
 EXACT = 1e-4
 """Noise, over the mean of a picture, that is rounding."""
 
+HEAVY = 1.25
+"""Growth of the noise with half of the samples, below which bright paths are rare."""
+
 SURE = 2.0
 """Standard errors to each side of a share of pixels."""
 
@@ -115,11 +120,12 @@ class NoisyPictures:
     def growth(self) -> float:
         """How much farther pictures of half as many samples are, by those with the most samples.
 
-        At most √2, which is usual, and at least 1.
+        In linear values, since colour spaces compress large deviations. At most √2, which is usual,
+        and at least 1.
         """
         *_, fewer, most = sorted(self.deviations)
-        few = np.mean([distances.mean() for distances in self.distances(fewer)])
-        many = np.mean([distances.mean() for distances in self.distances(most)])
+        few = np.abs(self.deviations[fewer]).mean()
+        many = np.abs(self.deviations[most]).mean()
         if many <= 0.0:
             return USUAL
         return float(np.clip((few / many) ** (1.0 / np.log2(most / fewer)), 1.0, USUAL))
@@ -149,6 +155,7 @@ def samples_that_pass(
             {spp: float(found[place]) for spp, found in shares.items()},
             {spp: float(found[place]) for spp, found in slower.items()},
             pixels=len(noisy.clean),
+            is_heavy=growth < HEAVY,
         )
         for place, threshold in enumerate(THRESHOLDS)
     )
@@ -226,11 +233,16 @@ def _means_apart(passes_of: Floats, size: int) -> Floats:
 
 
 def _passing(
-    threshold: float, shares: Mapping[int, float], slower: Mapping[int, float], pixels: int
+    threshold: float,
+    shares: Mapping[int, float],
+    slower: Mapping[int, float],
+    pixels: int,
+    is_heavy: bool,
 ) -> SamplesThatPass:
     """Return the fewest samples whose share of visible pixels is allowed, with an interval.
 
-    ``slower`` are the shares if noise falls as slowly as the passes show.
+    ``slower`` are the shares if noise falls as slowly as the passes show. If it ``is_heavy``, the
+    interval has no upper end.
     """
 
     def first(is_allowed: Callable[[int], bool]) -> int | None:
@@ -241,7 +253,7 @@ def _passing(
         threshold=threshold,
         value=first(lambda spp: shares[spp] <= LIMIT),
         low=first(lambda spp: shares[spp] - error[spp] <= LIMIT),
-        high=first(lambda spp: slower[spp] + error[spp] <= LIMIT),
+        high=None if is_heavy else first(lambda spp: slower[spp] + error[spp] <= LIMIT),
     )
 
 

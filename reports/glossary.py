@@ -47,6 +47,10 @@ RESULTS: Terms = {
     ("mostly", "mostly missing", "effect", "worth most", "cause", "causes"): (
         "The difference between the two halves that adds most to the departure there."
     ),
+    ("time", "price"): (
+        "The time of what makes the scene look right, over that of the textbook picture with 4"
+        " samples per pixel; 1 if that picture looks right."
+    ),
     ("differ visibly", "pixels that differ visibly"): (
         "The share of the pixels whose ΔE2000 is above the threshold."
     ),

@@ -158,7 +158,7 @@ def _brightness_suffices(record: ComparisonRecord, threshold: float) -> bool:
 def _effects_needed(record: ComparisonRecord, threshold: float) -> str:
     """Return which effects a scene needs, and which may be left out; empty if that is unknown."""
     needed = record.price and record.price.needed_at(threshold)
-    if not needed or not record.why:
+    if not needed or not record.why or _impossible_albedo(record):
         return ""
     if needed.effects is None:
         return "Noise does not tell which effects are needed."
@@ -202,6 +202,20 @@ def _time_of(price: Price, spp: int) -> str:
     if (taken := price.seconds(spp)) is not None:
         parts.append(seconds(taken))
     return f": {', '.join(parts)}" if parts else ""
+
+
+def saving(record: ComparisonRecord) -> str:
+    """Return what the plan leaves out, and what that saves, as a sentence; empty if nothing."""
+    price = record.price
+    if not price or not price.left_out:
+        return ""
+    sentence = f"Left out, since it changes nothing: {', '.join(price.left_out)}"
+    if price.saved is None:
+        return f"{sentence}."
+    costs = f"With it, a sample takes {number(price.saved.time)} times as long"
+    if price.saved.noise is not None:
+        costs = f"{costs} and has {number(price.saved.noise)} times the noise"
+    return f"{sentence}. {costs}."
 
 
 def price_at(record: ComparisonRecord, threshold: float = TOLERANCE) -> float | None:

@@ -4,7 +4,7 @@ Indirect light is added if requested.
 
 Mitsuba's ``direct`` picks one emitter at random for each sample, so even two point lights make
 noise. This one evaluates each in turn: lights at a point or in a direction are exact at each camera
-ray, and only lights with an extent are sampled, by emitter and by BSDF, with the balance heuristic.
+ray, and only lights with an extent are sampled, by emitter and by BSDF, with the power heuristic.
 
 More than :data:`UNROLLED` lights become the targets of one call in a loop. Dr.Jit merges targets
 with the same code: the kernel grows with the kinds of lights, not with their number.
@@ -37,7 +37,13 @@ import mitsuba as mi
 
 from fotismos.heuristic import numerics
 from fotismos.heuristic.convention import Colour, Mask, Scene
-from fotismos.reference.rendering.transport import Transport, found_by_bsdf, sums, visibility
+from fotismos.reference.rendering.transport import (
+    Transport,
+    found_by_bsdf,
+    power_share,
+    sums,
+    visibility,
+)
 
 UNROLLED = 16
 """Lights of a kind that have their own code."""
@@ -217,8 +223,8 @@ def _of_all(
         for transport, visible in zip(transports, reached, strict=True):
             term = value * weight
             if is_weighted and transport.bsdf_samples:
-                # The balance heuristic: a sample of the BSDF can also find the light.
-                term = term * density / (density + bsdf_density)
+                # A sample of the BSDF can also find the light.
+                term = term * power_share(density, bsdf_density)
             colours.append(dr.select(visible, term, 0))
         return colours
 
@@ -280,7 +286,7 @@ def _from_bsdf(
     is_delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
     if not any(transport.bsdf_samples for transport in transports):
         active &= is_delta
-    # The other half of the balance heuristic; a delta direction has no rival.
-    share = dr.select(is_delta, 1, bs.pdf / (bs.pdf + emitter_pdf))
+    # A delta direction has no rival.
+    share = dr.select(is_delta, 1, power_share(bs.pdf, emitter_pdf))
     value = weight * emitter.eval(hit, active) * share
     return found_by_bsdf(active, is_delta, value=value, transports=transports)

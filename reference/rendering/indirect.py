@@ -7,7 +7,13 @@ import drjit as dr
 import mitsuba as mi
 
 from fotismos.heuristic.convention import Colour, Interaction, Mask, Scene
-from fotismos.reference.rendering.transport import Transport, found_by_bsdf, sums, visibility
+from fotismos.reference.rendering.transport import (
+    Transport,
+    found_by_bsdf,
+    power_share,
+    sums,
+    visibility,
+)
 
 SURVIVAL = 0.95
 """Largest chance that Russian roulette lets a path continue, as in Mitsuba's ``path``."""
@@ -53,7 +59,7 @@ def indirect_light(
         is_indirect = active & (depth > 2)
         # Emitter samples never take the direction that a mirror, glass or a mask needs.
         emitter_pdf = scene.pdf_emitter_direction(previous, ds, is_indirect & ~previous_delta)
-        share = dr.select(previous_delta, 1, previous_pdf / (previous_pdf + emitter_pdf))
+        share = dr.select(previous_delta, 1, power_share(previous_pdf, emitter_pdf))
         value = throughput * emitter.eval(si, is_indirect) * share
         light = sums(
             light, found_by_bsdf(is_indirect, previous_delta, value=value, transports=transports)
@@ -63,13 +69,13 @@ def indirect_light(
         active &= si.is_valid() & (depth < limit)
         vertex = si.bsdf(ray)
         direct = active & mi.has_flag(vertex.flags(), mi.BSDFFlags.Smooth)
-        # A sample of one light, picked at random, against one of the BSDF (balance heuristic).
+        # A sample of one light, picked at random, against one of the BSDF (power heuristic).
         ds, weight = scene.sample_emitter_direction(si, sampler.next_2d(direct), False, direct)
         direct &= ds.pdf > 0
         value, bsdf_pdf = vertex.eval_pdf(context, si, wo=si.to_local(ds.d), active=direct)
         reached = visibility(scene, si, ds.p, direct, transports)
         # No ray hits a point or a direction, so such a sample counts in full.
-        share = dr.select(ds.delta, 1, ds.pdf / (ds.pdf + bsdf_pdf))
+        share = dr.select(ds.delta, 1, power_share(ds.pdf, bsdf_pdf))
         value = throughput * value * weight
         light = sums(light, _weighted(reached, value, share, transports))
 

@@ -11,9 +11,6 @@ from fotismos.reports import jobs
 QUICK = {"resolution": (64, 64), "spp": 16}
 """The defaults of ``--quick``."""
 
-LADDERS = frozenset({"fig-6-10", "plastic-spheres", "cornell-box"})
-"""Scenes of which methods are measured: a lobe on a mesh, shadows, and interreflection."""
-
 
 @jobs.command()
 @jobs.output_option("out/report")
@@ -24,6 +21,14 @@ LADDERS = frozenset({"fig-6-10", "plastic-spheres", "cornell-box"})
 @jobs.option("colour_science")
 @jobs.verbosity_options
 @click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
+@click.option(
+    "--cost",
+    "ladders",
+    type=click.Choice(list(SCENES)),
+    multiple=True,
+    metavar="SCENE",
+    help="Measure the error and time of methods in a scene, too; repeat it for more scenes.",
+)
 @jobs.open_option
 @jobs.within_option
 def report(
@@ -34,6 +39,7 @@ def report(
     workers: int | None,
     scheduler: str | None,
     quick: bool,
+    ladders: tuple[str, ...],
     is_opened: bool,
     within: float,
     **rendering: Any,
@@ -46,6 +52,7 @@ def report(
     \b
     Examples:
       fotismos report
+      fotismos report --cost cornell-box
       fotismos report --quick --open
       fotismos report --resolution 128x128 -o small --figures
     """  # noqa: D301 click reads the \b as: keep these lines
@@ -58,7 +65,7 @@ def report(
         with_causes=True,
         fresh=fresh,
         within=within,
-        ladders=frozenset() if quick else LADDERS,
+        ladders=frozenset(ladders),
     )
     processes = jobs.pool(timeout, len(SCENES), workers=workers, scheduler=scheduler)
     jobs.work("report", processes, output=output, job=job, is_opened=is_opened)

@@ -1,7 +1,10 @@
 """The first screen: the verdict at a threshold, its pictures, and its bars."""
 
+import math
+
 import pytest
 
+from fotismos.comparisons.departure.metrics import THRESHOLDS
 from fotismos.reports.page.page import render
 from tests.browser.conftest import EXACT, FAILED, NOISY, NOISY_ID, PHONE
 from tests.shared import records
@@ -116,20 +119,80 @@ def test_labels_of_bars_are_whole_or_hidden(visitor):
     assert found == {"whole", "hidden"}
 
 
-def test_the_overview_says_once_what_commands_do(chromium, tmp_path):
-    """Rows have their own commands alone, at each threshold."""
-    wrong = records.data()
+def priced(name, low, high):
+    """Return a scene that fails, and needs ``low`` samples at 3 and above, and ``high`` below."""
+    wrong = records.data() | {"scene": name}
     for share in wrong["metrics"]["dE2000"]["visible"]:
-        share |= dict.fromkeys(("value", "low", "high"), 0.9)
-    views = [records.view(wrong | {"scene": name}) for name in ("a", "b")]
-    file, page = tmp_path / "index.html", chromium.new_page()
-    file.write_text(render(views))
-    for threshold in (2, 3):
-        page.goto(f"{file.as_uri()}#t={threshold}")
-        shown = page.locator(".bars .advice").all_text_contents()
-        assert [text.split(" 1 ")[0].split(" 2 ")[0].strip() for text in shown] == [
-            f"fotismos plan fig-8-9 --within {threshold}."
-        ] * 2
-        said = page.locator("#scenes").text_content()
-        assert said.count("the cheapest method that passes") == 1
+        value = 0.9 if share["threshold"] < 4 else 0.5
+        share |= dict.fromkeys(("value", "low", "high"), value)
+    samples = []
+    for threshold in THRESHOLDS:
+        count = low if threshold >= 3 else high
+        samples.append({"threshold": threshold, "value": count, "low": count, "high": count})
+    wrong["price"] = {
+        "ratio": {"value": 2.0, "low": 1.9, "high": 2.1},
+        "reason": "",
+        "heuristic_s": 1e-6,
+        "reference_s": 2e-6,
+        "pixels": 100,
+        "samples": samples,
+    }
+    return records.view(wrong)
+
+
+@pytest.fixture(params=[DESK, PHONE], ids=["desk", "phone"])
+def prices(request, chromium, tmp_path):
+    """A page of two scenes with prices."""
+    file = tmp_path / "index.html"
+    page = chromium.new_page(**request.param)
+    file.write_text(render([priced("a", 4, 64), priced("b", 16, None)]))
+    yield page, file.as_uri()
     page.close()
+
+
+def test_rows_chart_sentence_and_address_agree_about_prices(prices):
+    page, address = prices
+    page.goto(f"{address}#t=2")
+    slider = page.locator("#overview [data-threshold]")
+    rows = {name: page.locator(f".bars [data-scene='{name}'] [data-show=advice]") for name in "ab"}
+    points = {name: page.locator(f"[data-price='{name}'] a") for name in "ab"}
+
+    def centre(name):
+        box = points[name].bounding_box()
+        return box["x"] + box["width"] / 2
+
+    plot = page.locator(".plot").bounding_box()
+    assert rows["a"].text_content() == (
+        "64 samples per pixel pass: 32.0 times the textbook's time, 12.8 ms."
+    )
+    assert rows["b"].text_content() == "More than 65,536 samples per pixel pass."
+    assert "In 0 of 2 scenes" in page.locator("#costs-sentence").text_content()
+    # From 1 to 100, and a part for what has no price.
+    first = plot["x"] + plot["width"] * math.log10(32) / 3
+    assert centre("a") == pytest.approx(first, abs=3)
+    assert centre("b") == pytest.approx(plot["x"] + plot["width"], abs=3)
+    assert "no price is known" in points["b"].get_attribute("title")
+
+    slider.focus()
+    for _ in range(4):
+        page.keyboard.press("ArrowRight")
+    assert page.evaluate("location.hash") == "#t=3"
+    assert rows["a"].text_content().startswith("4 samples per pixel pass: 2.00 times")
+    assert rows["b"].text_content().startswith("16 samples per pixel pass: 8.00 times")
+    assert centre("a") == pytest.approx(plot["x"] + plot["width"] * math.log10(2) / 3, abs=3)
+    assert centre("b") == pytest.approx(plot["x"] + plot["width"] * math.log10(8) / 3, abs=3)
+    points["a"].click()
+    assert page.evaluate("location.hash") == "#scene=a&t=3"
+    command = page.locator(".scene:visible [data-command]").text_content()
+    assert command.endswith("--within 3")
+
+
+def test_points_of_the_chart_stay_within_it_and_names_do_not_overlap(prices):
+    page, address = prices
+    page.goto(f"{address}#t=2")
+    names = page.locator(".plot .named span")
+    assert names.count() == 2
+    boxes = [name.bounding_box() for name in names.all()]
+    width = page.evaluate("innerWidth")
+    assert all(box["x"] >= 0 and box["x"] + box["width"] <= width for box in boxes)
+    assert page.evaluate("document.documentElement.scrollWidth") <= width

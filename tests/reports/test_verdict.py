@@ -12,6 +12,7 @@ from fotismos.comparisons.cost import cost_record
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.price_record import EffectsThatPass, Price, SamplesThatPass
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic.heuristics import HEURISTICS, Interpolation, Point
 from fotismos.reference.records import Interval
@@ -67,6 +68,27 @@ def study(*points):
     )  # fmt: skip
 
 
+def price(spp, effects=(), low=0, high=0):
+    """Return the price of a picture of 100 pixels, whose physical half takes 8 times as long.
+
+    ``low`` and ``high`` are the ends of the interval of its samples, if they are not ``spp``.
+    """
+    visible = None if effects is None else Interval(value=0.03, low=0.02, high=0.04)
+    found = EffectsThatPass(threshold=2.0, effects=effects, visible=visible)
+    samples = SamplesThatPass(
+        threshold=2.0, value=spp, low=low or spp, high=spp if high == 0 else high
+    )
+    return Price(
+        ratio=Interval(value=8.0, low=7.5, high=8.5),
+        reason="",
+        heuristic_s=1e-4 / 8,
+        reference_s=1e-4,
+        pixels=100,
+        samples=(samples,),
+        needed=(found,),
+    )
+
+
 AMBIENT, PATH = ("hemisphere ambient", 16, 4.6, 1.8), ("path, depth 8", 64, 260, 1.2)
 SAME = ("shadow map", 16, 4.7, 1.5)
 RULES = {
@@ -80,8 +102,8 @@ RULES = {
         scene(exposed=1.5), None, 2.0, "Brightening the picture is enough: ×1.11 makes it pass.",
     ),
     "level, if noise does not hide more": (
-        scene(exposed=1.9), None, 2.0,
-        "To find the cheapest method that passes: `fotismos plan a --within 2`.",
+        scene(exposed=1.9, price=price(16)), None, 2.0,
+        "16 samples per pixel pass: 32.0 times the textbook's time, 160 ms.",
     ),
     "level at another tolerance": (
         scene(exposed=1.5), study(PATH), 1.0,
@@ -101,20 +123,44 @@ RULES = {
         "None of the 2 methods measured is closer. To try more samples: `fotismos plan a --within 2"
         " --spp 16`.",
     ),
-    "not measured": (
-        scene(command="fotismos compare 'my scene.xml' --variant x -D a=1 --seed 3"), None, 1.0,
-        "To find the cheapest method that passes: `fotismos plan 'my scene.xml' --within 1 -D"
-        " a=1`.",
+    "effects and samples": (
+        scene(why=why(occlusion=3.0, spectral=1.0), price=price(64, ("occlusion",))), None, 2.0,
+        "It needs occlusion, but not spectral light. 64 samples per pixel pass: 128 times the"
+        " textbook's time, 640 ms.",
     ),
-    "the scene's defaults are not repeated": (
-        scene(command="fotismos compare fig-6-14 --heuristic phong --interpolation gouraud"), None,
-        2.0, "To find the cheapest method that passes: `fotismos plan fig-6-14 --within 2`.",
+    "all effects": (
+        scene(why=why(occlusion=3.0, spectral=1.0), price=price(4, ("occlusion", "spectral"))),
+        None, 2.0,
+        "It needs occlusion and spectral light. 4 samples per pixel pass: 8.00 times the"
+        " textbook's time, 40.0 ms.",
     ),
-    "other choices than the scene's are": (
-        scene(command="fotismos compare fig-6-14 --heuristic blinn --interpolation phong"), None,
-        2.0, "To find the cheapest method that passes: `fotismos plan fig-6-14 --within 2"
-        " --heuristic blinn --interpolation phong`.",
+    "effects that noise hides": (
+        scene(why=why(occlusion=3.0), price=price(4, None)), None, 2.0,
+        "Noise does not tell which effects are needed. 4 samples per pixel pass: 8.00 times the"
+        " textbook's time, 40.0 ms.",
     ),
+    "an interval of samples": (
+        scene(price=price(64, low=16, high=256)), None, 2.0,
+        "64 samples per pixel (16 to 256) pass: 128 times the textbook's time, 640 ms.",
+    ),
+    "samples without an upper end": (
+        scene(price=price(64, high=None)), None, 2.0,
+        "64 samples per pixel, or more, pass: 128 times the textbook's time, 640 ms.",
+    ),
+    "more samples than are named": (
+        scene(price=price(None)), None, 2.0, "More than 65,536 samples per pixel pass.",
+    ),
+    "no time": (
+        scene(price=structs.replace(price(64), ratio=None, reference_s=None)), None, 2.0,
+        "64 samples per pixel pass.",
+    ),
+    "undecided, with samples": (
+        scene(0.03, 0.08, price=price(64)), None, 2.0,
+        "Too close to call: 3.00 % to 8.00 % of the pixels differ, and 5.00 % may. More samples"
+        " (--spp, --noise) decide. 64 samples per pixel pass: 128 times the textbook's time,"
+        " 640 ms.",
+    ),
+    "without a price": (scene(), None, 2.0, "The map shows where it is wrong."),
     "caution": (scene(caution="No pixel sees light."), None, 2.0, "No pixel sees light."),
 }  # fmt: skip
 
@@ -124,6 +170,50 @@ RULES = {
 def test_each_rule_has_its_sentence(rule):
     record, cost, threshold, expected = RULES[rule]
     assert verdict.sentence(record, cost, threshold) == expected
+
+
+@pytest.mark.parametrize(
+    ("command", "expected"),
+    [
+        (
+            "fotismos compare 'my scene.xml' --variant x -D a=1 --seed 3",
+            "fotismos plan 'my scene.xml' --within 2 -D a=1",
+        ),
+        (
+            "fotismos compare fig-6-14 --heuristic phong --interpolation gouraud",
+            "fotismos plan fig-6-14 --within 2",
+        ),
+        (
+            "fotismos compare fig-6-14 --heuristic blinn --interpolation phong",
+            "fotismos plan fig-6-14 --within 2 --heuristic blinn --interpolation phong",
+        ),
+    ],
+)
+def test_the_command_that_finds_methods_repeats_what_is_not_the_default(command, expected):
+    assert verdict.search(scene(command=command), 2.0) == expected
+
+
+@pytest.mark.parametrize(
+    ("record", "expected"),
+    [
+        (scene(0.01, price=price(64)), 1.0),
+        (scene(exposed=1.5, price=price(64)), 1.0),
+        (scene(price=price(64)), 128.0),
+        (scene(price=price(None)), None),
+        (scene(), None),
+    ],
+    ids=["passes", "passes if brighter", "samples", "too many samples", "no price"],
+)
+def test_the_price_is_over_the_textbook_picture(record, expected):
+    assert verdict.price_at(record) == expected
+
+
+def test_a_run_counts_the_scenes_in_which_looking_right_costs_little():
+    made = [scene(0.01, price=price(4)), scene(price=price(64)), scene()]
+    expected = "In 1 of 3 scenes, looking right takes at most 1.5 times the textbook's time."
+    assert verdict.costs(made) == expected
+    assert verdict.costs(made[:1]) == ""
+    assert verdict.costs([scene(), scene()]) == ""
 
 
 def test_what_cannot_be_seen_is_exact():

@@ -63,6 +63,7 @@ def causes():
         departure=sum(maps.values()),
         left=np.zeros((HEIGHT, WIDTH)),
         counted=counted,
+        visible={},
         previews={
             each: np.full((2 * HEIGHT, 2 * WIDTH, 3), 0.1 * (place + 1))
             for place, each in enumerate(HYBRIDS)
