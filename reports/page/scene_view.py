@@ -70,15 +70,15 @@ class CostView(Record):
 
     ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, whose type few pages need
     to load. ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are
-    sentences on its sums and on the machine, ``unreached`` one on more samples; ``colours`` are
-    those of the effects.
+    sentences on its sums and on the machine, ``answer`` one on the cheapest method that looks
+    right; ``colours`` are those of the effects.
     """
 
     record: Any
     images: dict[str, bytes]
     said: str
     busy: str
-    unreached: str
+    answer: str
     colours: tuple[str, ...]
 
 

@@ -12,7 +12,7 @@ from fotismos.reports.charts import cost_charts, theme, vega
 from fotismos.reports.files import images, results
 from fotismos.reports.page.scene_view import CostView
 from fotismos.reports.page.templating import HELP, rendered
-from fotismos.reports.terminal.cost_tables import busy, closure, together, unreached
+from fotismos.reports.terminal.cost_tables import answer, busy, closure, together
 
 if TYPE_CHECKING:
     from fotismos.comparisons.cost.cost import Study
@@ -81,6 +81,6 @@ def view(study: Study) -> CostView:
         },
         said=re.sub(r"(?<!\d)-(?=\d)", "−", " ".join(said)),
         busy=busy(record) if record.is_busy else "",
-        unreached=unreached(record),
+        answer=answer(record),
         colours=tuple(theme.EFFECT_COLOURS[effect.effect] for effect in effects),
     )

@@ -27,6 +27,8 @@ def lines(record: Cost) -> Iterator[str]:
     """Yield the lines of a study: methods, points, attribution, and what is predicted."""
     reference = record.reference
     size = sized(record.resolution)
+    yield answer(record)
+    yield ""
     yield (
         f"{record.scene}, {size}, {record.rounds} rounds with {record.threads} threads on"
         f" {record.machine.processor}"
@@ -41,16 +43,18 @@ def lines(record: Cost) -> Iterator[str]:
         yield "a probe disagreed with the plan, so everything is simulated: please report it"
     # Methods with their times, and what is odd or absent among them.
     yield from _section("Time of each method: overhead + samples x time per sample", _times(record))
-    for method in record.methods:
-        if abs(method.bend) > BENT:
-            yield f"{method.name}: a third count is {method.bend:+.0%} off the straight line"
+    bent = [method.name for method in record.methods if abs(method.bend) > BENT]
+    if bent:
+        yield (
+            f"Times of {', '.join(bent)} do not lie on a straight line over samples: what is"
+            " predicted from them is rough."
+        )
     # The names of the others say what they are.
     yield from _explained(method.name for method in record.methods if method.family == "physical")
     for name, reason in record.left_out.items():
         yield f"left out: {name}: {reason}"
     # Errors, and what each effect contributes.
     yield from _section(f"Error and time of one image at {size}", _points(record.points))
-    yield from filter(None, [unreached(record)])
     if record.attribution.effects:
         yield from _section("What each effect removes and adds", _attribution(record))
         measured = sized(record.attribution.size)
@@ -92,13 +96,25 @@ def together(record: Cost) -> str:
     )
 
 
-def unreached(record: Cost) -> str:
-    """Return that no method measured looks right, and whether more samples would; else nothing."""
+def answer(record: Cost) -> str:
+    """Return the cheapest method that looks right, at the size that was asked for.
+
+    If none does, whether more samples would.
+    """
     points = record.predicted or record.points
-    if sufficient(points, TOLERANCE):
-        return ""
-    advice = beyond(reach(points, TOLERANCE))
-    return f"No measured method passes at {LEADING.label} {TOLERANCE:g}. {advice}"
+    size = sized(record.at if record.at and record.predicted else record.resolution)
+    best = sufficient(points, TOLERANCE)
+    if best is None:
+        advice = beyond(reach(points, TOLERANCE))
+        return f"No measured method looks right at {size}. {advice}"
+    time = seconds(best.seconds.value)
+    sentence = f"Cheapest that looks right at {size}: {best.method} with {best.spp} samples, {time}"
+    # The ladder begins with the textbook kernel.
+    kernel = next(point for point in points if point.method == record.methods[0].name)
+    if kernel.method == best.method:
+        return f"{sentence}."
+    outcome = "looks right, too" if kernel.tolerance.high <= TOLERANCE else "fails"
+    return f"{sentence}; the textbook kernel takes {seconds(kernel.seconds.value)} and {outcome}."
 
 
 def closure(record: Cost) -> str:
