@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING
 
 from fotismos.comparisons.comparison import ComparisonRecord
@@ -216,6 +217,17 @@ def saving(record: ComparisonRecord) -> str:
     if price.saved.noise is not None:
         costs = f"{costs} and has {number(price.saved.noise)} times the noise"
     return f"{sentence}. {costs}."
+
+
+def savings(records: Sequence[ComparisonRecord]) -> str:
+    """Return what the plans of a run save, as a sentence; empty for a single scene."""
+    factors = [record.price.saved.time for record in records if record.price and record.price.saved]
+    if len(records) < 2 or not factors:
+        return ""
+    return (
+        f"In {len(factors)} of {len(records)} scenes the plan leaves out what changes nothing; with"
+        f" it, a sample takes {number(median(factors))} times as long (median)."
+    )
 
 
 def price_at(record: ComparisonRecord, threshold: float = TOLERANCE) -> float | None:

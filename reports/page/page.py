@@ -121,6 +121,7 @@ def render(
         scenes=scenes,
         failures=failed,
         usual=usual,
+        savings="" if since else verdict.savings(records),
         priced=[] if since or len(scenes) < 2 else scenes,
         charted=[scene for scene in scenes if scene.chart][:CHARTED],
         limit=LIMIT,

@@ -273,6 +273,11 @@ def _write(batch: Batch, is_interrupted: bool = False) -> None:
     if views:
         tell(tables.summary(records, batch.within))
         tell(["", verdict.headline(records, batch.within)])
-        tell(filter(None, [verdict.most_missing(records, batch.within)]))
+        sentences = [
+            verdict.most_missing(records, batch.within),
+            verdict.costs(records, batch.within),
+            verdict.savings(records),
+        ]
+        tell(filter(None, sentences))
         tell(verdict.advice([view.studied for view in views], batch.within))
     tell_where(folder / results.PAGE)

@@ -12,7 +12,7 @@ from fotismos.comparisons.cost import cost_record
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.price_record import EffectsThatPass, Price, SamplesThatPass
+from fotismos.comparisons.price_record import EffectsThatPass, Price, SamplesThatPass, Saving
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic.heuristics import HEURISTICS, Interpolation, Point
 from fotismos.reference.records import Interval
@@ -214,6 +214,31 @@ def test_a_run_counts_the_scenes_in_which_looking_right_costs_little():
     assert verdict.costs(made) == expected
     assert verdict.costs(made[:1]) == ""
     assert verdict.costs([scene(), scene()]) == ""
+
+
+def test_a_run_says_what_its_plans_save():
+    def saved(time):
+        return structs.replace(price(4), saved=Saving(time=time, noise=None))
+
+    made = [scene(price=saved(2.0)), scene(price=saved(6.0)), scene(price=saved(3.0)), scene()]
+    assert verdict.savings(made) == (
+        "In 3 of 4 scenes the plan leaves out what changes nothing; with it, a sample takes 3.00"
+        " times as long (median)."
+    )
+    assert verdict.savings(made[:1]) == ""
+    assert verdict.savings([scene(), scene()]) == ""
+
+
+def test_a_scene_says_what_its_plan_leaves_out_and_saves():
+    left_out = structs.replace(price(4), left_out=("shadow rays", "interreflection"))
+    saved = structs.replace(left_out, saved=Saving(time=2.0, noise=6.0))
+    sentence = "Left out, since it changes nothing: shadow rays, interreflection."
+    assert verdict.saving(scene(price=price(4))) == ""
+    assert verdict.saving(scene(price=left_out)) == sentence
+    expected = (
+        f"{sentence} With it, a sample takes 2.00 times as long and has 6.00 times the noise."
+    )
+    assert verdict.saving(scene(price=saved)) == f"{sentence} {takes}"
 
 
 def test_what_cannot_be_seen_is_exact():
