@@ -47,8 +47,8 @@ WIDTH = 128
 NARROWEST = 24
 """Widths of the pictures whose noise is measured, in pixels."""
 
-BUDGET_S = 1.0
-"""Seconds that they take, about: if a sample takes long, they are narrower."""
+SAMPLES = 2**21
+"""Samples of all of them, at most; not seconds: a result must not depend on the machine."""
 
 PASS = 64
 PASSES = 8
@@ -81,7 +81,7 @@ def with_price(comparison: Comparison, ready: Prepared, progress: Progress | Non
     causes = comparison.causes
     price = structs.replace(
         price,
-        samples=samples_that_pass(ready, price, leading),
+        samples=samples_that_pass(ready, leading),
         needed=None if causes is None else effects_that_pass(causes.visible),
         left_out=tuple(left_out(ready.plan)),
         saved=saving(ready, price),
@@ -131,11 +131,9 @@ class NoisyPictures:
         return float(np.clip((few / many) ** (1.0 / np.log2(most / fewer)), 1.0, USUAL))
 
 
-def samples_that_pass(
-    ready: Prepared, price: Price, metric: Pixelwise
-) -> tuple[SamplesThatPass, ...]:
+def samples_that_pass(ready: Prepared, metric: Pixelwise) -> tuple[SamplesThatPass, ...]:
     """Return the samples with which the physical half passes, for each threshold."""
-    noisy = _noisy_pictures(ready, price, metric)
+    noisy = _noisy_pictures(ready, metric)
     if noisy is None:
         return ()
     shares = {spp: noisy.visible(spp) for spp in noisy.deviations}
@@ -161,9 +159,9 @@ def samples_that_pass(
     )
 
 
-def _noisy_pictures(ready: Prepared, price: Price, metric: Pixelwise) -> NoisyPictures | None:
+def _noisy_pictures(ready: Prepared, metric: Pixelwise) -> NoisyPictures | None:
     """Render passes, and pictures with fewer samples; None if no pixel counts."""
-    size = size_of_width(ready.scene, _width(ready, price))
+    size = size_of_width(ready.scene, _width(ready))
     film = image_size(ready.scene)
     try:
         counted = gbuffer(ready.scene, size).hit
@@ -190,12 +188,11 @@ def _halves(ready: Prepared) -> list[Renderer]:
     return [ready.reference] if ready.options.image else [ready.heuristic, ready.reference]
 
 
-def _width(ready: Prepared, price: Price) -> int:
-    """Return the width of the pictures, for which the budget suffices."""
+def _width(ready: Prepared) -> int:
+    """Return the width of the pictures, for which the samples suffice."""
     columns, rows = image_size(ready.scene)
-    samples = PASS * PASSES + PICTURES * sum(SINGLE)
-    per_pixel = samples * sum(filter(None, (price.heuristic_s, price.reference_s)))
-    affordable = np.sqrt(BUDGET_S / max(per_pixel, 1e-9) * columns / rows)
+    of_a_pixel = PASS * PASSES + PICTURES * sum(SINGLE)
+    affordable = np.sqrt(SAMPLES / of_a_pixel * columns / rows)
     return int(np.clip(affordable, min(NARROWEST, columns), min(WIDTH, columns)))
 
 
@@ -296,7 +293,7 @@ def saving(ready: Prepared, price: Price) -> Saving | None:
     whole = ready.unpruned()
     if whole is None or not price.everything_s or not price.reference_s:
         return None
-    size = size_of_width(ready.scene, _width(ready, price))
+    size = size_of_width(ready.scene, _width(ready))
     film = image_size(ready.scene)
     renderers = [half.sampled(max(SINGLE), size) for half in (*_halves(ready), whole)]
     try:

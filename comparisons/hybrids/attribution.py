@@ -94,9 +94,11 @@ SLOWEST = float(np.sqrt(4 / 3))
 """Growth of the noise with half of the samples, at least, by which it is extrapolated."""
 
 MORE = 4
-PATIENCE = 2.0
-"""Factor of more samples for causes that do not add up, and the longest time that all of it takes,
-over the comparison's own."""
+PATIENCE = 2
+AFFORDABLE = 2**24
+"""Factor of more samples for causes that do not add up; all of their images have at most PATIENCE
+times the comparison's own samples, or AFFORDABLE ones. Not seconds: a result must not depend on how
+busy the machine was."""
 
 CLOSED = 0.025
 """Largest closure, as a share of the departure, that needs no more samples; its interval may have
@@ -125,8 +127,9 @@ def with_causes(
     begin = perf_counter()
     try:
         clean = comparison.images.reference, comparison.images.reference_stderr
-        limit_s = PATIENCE * comparison.record.time.total_s
-        causes = find(ready, ready.source, ready.options, progress, clean, limit_s=limit_s)
+        both_halves = 2 * comparison.record.plan.spp * comparison.images.counted.size
+        most_samples = max(PATIENCE * both_halves, AFFORDABLE)
+        causes = find(ready, ready.source, ready.options, progress, clean, limit=most_samples)
     except FotismosError as error:
         return comparison.warned([f"The causes are unknown: {error}"])
     record = structs.replace(with_effects_named(comparison, causes.maps), why=causes.record)
@@ -141,16 +144,15 @@ def find(
     progress: Progress | None = None,
     clean: tuple[Floats, Floats] | None = None,
     most: int | None = None,
-    limit_s: float = 0.0,
+    limit: int = 0,
 ) -> "Causes":
     """Attribute the departure of a prepared scene, on a film of at most ``most`` pixels' width.
 
     If ``most`` is omitted, it is :data:`WIDTH` or :data:`NARROW`. ``clean`` are the reference (H,
     W, 3) on the scene's own film and its standard error, if known: they make previews less noisy.
     While the effects do not add up to the departure, the samples are multiplied by :data:`MORE`, as
-    long as this takes less than ``limit_s`` seconds in all.
+    long as all images have at most ``limit`` samples.
     """
-    begin = perf_counter()
     if media := sorted(name for name, _ in ready.pair.media):
         raise InputError(
             f"{source.name} has participating media ({', '.join(media)}), which no image of some"
@@ -169,10 +171,8 @@ def find(
     reference = Renderer(
         ready.scene, ready.reference.integrator, pass_spp=spp, label="reference image", size=size
     )
-    took = 0.0
     try:
         while True:
-            started = perf_counter()
             # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
             loop = passes(
                 [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
@@ -198,14 +198,12 @@ def find(
                 clean=clean,
                 whole=width * height,
             )
-            before = took
-            took = perf_counter() - started
-            # The first samples also compile: more of them take less than their number says.
-            growth = took / before if before else 2.0
-            is_late = perf_counter() - begin + growth * took > limit_s
-            if is_closed(found.record) or is_late:
+            more = MORE * reference.pass_spp
+            count = len(found.record.hybrids) * REPLICATES
+            is_enough = count * more * size[0] * size[1] > limit
+            if is_closed(found.record) or is_enough:
                 break
-            reference = reference.sampled(MORE * reference.pass_spp)
+            reference = reference.sampled(more)
     finally:
         # The scene is the comparison's: it gets its size back.
         resize(ready.scene, (width, height))

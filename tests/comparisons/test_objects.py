@@ -9,7 +9,7 @@ import pytest
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure import regions
-from fotismos.comparisons.hybrids.attribution import BIAS, by_object, named
+from fotismos.comparisons.hybrids.attribution import BIAS, by_object, with_effects_named
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.steps import steps
 from fotismos.reference.rendering import sums
@@ -66,7 +66,8 @@ def test_intervals_on_shapes_tell_the_spread_of_replicates():
     means = np.array([spread.mean(), *left_out])
     removed = np.stack([means, means, *[np.full(9, 2.0)] * 3], axis=1)
     departure = np.where(counted, 3.0, 0)
-    rows = by_object(departure, {"shadow": removed}, departure[counted], counted, owners)
+    by_both_rules = np.stack([removed, removed])
+    rows = by_object(departure, {"shadow": by_both_rules}, departure[counted], counted, owners)
     found = {row.name: row for row in rows}
     still, noisy = found["still"], found["noisy"]
     assert (still.pixels, noisy.pixels) == (3, 2)
@@ -128,7 +129,7 @@ def test_effects_are_taken_where_the_pixels_of_a_shape_lie():
         regions.Region(x=x, y=1, width=2, height=2, share=0.5, mean_dE2000=1.0) for x in (0, 2)
     ]
     record = records.record(objects=carriers, materials=carriers, regions=tuple(boxes))
-    found = named(records.Comparison(record, images), effects)
+    found = with_effects_named(records.Comparison(record, images), effects)
     assert {each.name: each.effect for each in found.objects} == {
         "left": "shadow",
         "right": "gloss",

@@ -74,7 +74,7 @@ def true_share(deviation, spp):
 def test_samples_are_the_fewest_that_pass(monkeypatch, deviation):
     """Measured up to 256 samples, and scaled beyond."""
     monkeypatch.setattr(price, "_noisy_pictures", lambda *_: normal(deviation))
-    found = price.samples_that_pass(None, None, LEADING)[AT_TWO]
+    found = price.samples_that_pass(None, LEADING)[AT_TWO]
     assert true_share(deviation, found.high) <= LIMIT
     assert found.low <= found.value <= found.high
     if found.value > 4:
@@ -83,7 +83,7 @@ def test_samples_are_the_fewest_that_pass(monkeypatch, deviation):
 
 def test_noise_that_never_passes_needs_more_samples_than_are_named(monkeypatch):
     monkeypatch.setattr(price, "_noisy_pictures", lambda *_: normal(60.0))
-    found = price.samples_that_pass(None, None, LEADING)[AT_TWO]
+    found = price.samples_that_pass(None, LEADING)[AT_TWO]
     assert found.value is None
     assert true_share(60.0, MOST_SPP) > LIMIT
 
@@ -98,8 +98,7 @@ def test_noise_that_never_passes_needs_more_samples_than_are_named(monkeypatch):
 def test_a_scene_passes_with_the_samples_of_its_price(name, rgb):
     case = open_case(name, Options(resolution=(48, 48)))
     ready = guarded(case.source, case.options)
-    times = timing.measure(ready.heuristic, ready.reference, everything=None, seed=0)
-    found = price.samples_that_pass(ready, times, LEADING)
+    found = price.samples_that_pass(ready, LEADING)
     counted = ready.counted
 
     def differences(spp, seed, count):

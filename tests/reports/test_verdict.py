@@ -235,9 +235,7 @@ def test_a_scene_says_what_its_plan_leaves_out_and_saves():
     sentence = "Left out, since it changes nothing: shadow rays, interreflection."
     assert verdict.saving(scene(price=price(4))) == ""
     assert verdict.saving(scene(price=left_out)) == sentence
-    expected = (
-        f"{sentence} With it, a sample takes 2.00 times as long and has 6.00 times the noise."
-    )
+    takes = "With it, a sample takes 2.00 times as long and has 6.00 times the noise."
     assert verdict.saving(scene(price=saved)) == f"{sentence} {takes}"
 
 

@@ -33,6 +33,8 @@ def _is_time(name):
 
 
 def _without_times(value):
+    if isinstance(value, dict) and "heuristic_s" in value:  # a price: other ratios are results
+        value = {k: v for k, v in value.items() if k not in ("ratio", "reason")}
     if isinstance(value, dict):
         return {k: _without_times(v) for k, v in value.items() if not _is_time(k)}
     if isinstance(value, list):
