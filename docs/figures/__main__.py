@@ -25,6 +25,7 @@ from docs.figures import (
     lessons,
     measured,
     model_figures,
+    prices,
     renderers,
     rooms,
     schemes,
@@ -70,17 +71,23 @@ POLYGONS = (
 
 
 def main(words: Sequence[str]) -> None:
-    """Make everything; ``--all`` adds the slow parts, ``--accuracy`` makes only one page."""
-    if not set(words) <= {"--all", "--accuracy", "--site"}:
+    """Make everything; ``--all`` adds the slow parts.
+
+    ``--accuracy`` makes only one page, ``--prices`` only the first part of it.
+    """
+    if not set(words) <= {"--all", "--accuracy", "--prices", "--site"}:
         sys.exit(__doc__)
     if words == ["--site"]:
         return _site()
     set_variant("llvm_ad_rgb")
     if words == ["--accuracy"]:
         return _accuracy()
+    if words == ["--prices"]:
+        return _prices()
     if words == ["--all"]:
         _measurements()
         _accuracy()
+        _prices()
     _guarantees()
     replace("plans.md", "rules", rules())
     _hero()
@@ -194,6 +201,15 @@ def _accuracy() -> None:
     replace("accuracy.md", "predictions", accuracy.predictions())
     for record, path in accuracy.charts(records):
         atomic.write(DOCS / path, vega.paper(titled(record)))
+
+
+def _prices() -> None:
+    """Compare many scenes, and write what looking right takes in each."""
+    records = prices.measured()
+    atomic.write(DOCS / "prices.svg", figures.drawn(prices.chart(records), "svg"))
+    for page in ("accuracy.md", "../README.md"):
+        replace(page, "prices", prices.sentences(records))
+    replace("accuracy.md", "table of prices", prices.table(records))
 
 
 def _guarantees() -> None:

@@ -1,0 +1,137 @@
+"""What looking right takes in each scene, from comparisons alone: a table, a chart, and sentences.
+
+``./run docs --prices`` measures for some six minutes on an idle machine.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from docs.figures.accuracy import LARGER
+from docs.figures.model_figures import GROUND, STYLE
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare
+from fotismos.comparisons.comparison import ComparisonRecord
+from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.price_record import Price
+from fotismos.comparisons.steps import steps
+from fotismos.reports import verdict
+from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.words import number, percent, seconds
+
+SIZE = 256, 192
+THRESHOLD = 2.0
+
+NAMED_ABOVE = 1.6
+"""Times of the textbook's time above which the chart names a scene."""
+
+
+def measured() -> list[ComparisonRecord]:
+    """Compare each scene, with its causes."""
+    records = []
+    for name in (*SCENES, *map(str, LARGER)):
+        case = open_case(name, Options(resolution=SIZE))
+        then = steps(case.options, why=True)
+        made = compare(case.source, case.options, command=case.command(), then=then)
+        records.append(made.record)
+        print(name, flush=True)
+    return records
+
+
+def sentences(records: Sequence[ComparisonRecord]) -> Iterator[str]:
+    """Yield what all scenes show together."""
+    width, height = SIZE
+    yield (
+        f"{len(records)} scenes at {width} by {height} pixels. {verdict.headline(records)}"
+        f" {verdict.costs(records)} {verdict.savings(records)}"
+    )
+
+
+def table(records: Sequence[ComparisonRecord]) -> Iterator[str]:
+    """Yield a row for each scene: what differs, what is needed, and what that takes."""
+    rows: list[tuple[str, ...]] = [
+        ("Scene", "differ", "needs", "sample", "samples", "price", "time")
+    ]
+    rows += [_row(record) for record in records]
+    yield from markdown(rows, right=2)
+    yield ""
+    yield (
+        "*Differ*: the share of the pixels above ΔE2000 2. *Sample*: the time of one of the"
+        " physical half over one of the textbook half. *Samples*: per pixel, with which the"
+        " physical half passes. *Price*: the time of what passes over that of the textbook picture"
+        " with 4 samples."
+    )
+
+
+def _row(record: ComparisonRecord) -> tuple[str, ...]:
+    price = record.price
+    assert price is not None
+    samples = price.samples_at(THRESHOLD)
+    needed = price.needed_at(THRESHOLD)
+    effects = "noise hides it"
+    if needed is not None and needed.effects is not None:
+        effects = ", ".join(needed.effects) or "nothing"
+    count = "–"
+    if samples is not None:
+        count = "more than 65,536" if samples.value is None else f"{samples.value:,}"
+        if samples.value is not None and samples.high is None:
+            count = f"{count} or more"
+    over_textbook = verdict.price_at(record, THRESHOLD)
+    return (
+        record.scene,
+        percent(verdict.share(record).value),
+        effects,
+        "?" if price.ratio is None else number(price.ratio.value),
+        count,
+        "–" if over_textbook is None else number(over_textbook),
+        _seconds(record, price),
+    )
+
+
+def _seconds(record: ComparisonRecord, price: Price) -> str:
+    """Return the time of the physical picture that passes."""
+    samples = price.samples_at(THRESHOLD)
+    if samples is None or samples.value is None:
+        return "–"
+    taken = price.seconds(samples.value)
+    return "–" if taken is None else seconds(taken)
+
+
+def chart(records: Sequence[ComparisonRecord]) -> Figure:
+    """Draw the share of pixels that differ over the price, logarithmic."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(7, 3.6), facecolor=GROUND, layout="constrained")
+        axes = figure.subplots()
+        known = [(record, verdict.price_at(record, THRESHOLD)) for record in records]
+        points = [(record, price) for record, price in known if price is not None]
+        axes.scatter(
+            [price for _, price in points],
+            [100 * verdict.share(record).value for record, _ in points],
+            color="#1a56a0",
+            zorder=2,
+        )
+        for record, price in points:
+            if price > NAMED_ABOVE:
+                _name(axes, record, price)
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.set(
+            xlabel="time of what looks right, over the textbook picture's",
+            ylabel="pixels that differ without it (%)",
+        )
+        axes.set_facecolor(GROUND)
+        axes.grid(alpha=0.25)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.margins(x=0.14)
+    return figure
+
+
+def _name(axes: Axes, record: ComparisonRecord, price: float) -> None:
+    position = price, 100 * verdict.share(record).value
+    name = record.scene.replace("_", " ")
+    axes.annotate(name, position, xytext=(5, 3), textcoords="offset points", fontsize=8)
