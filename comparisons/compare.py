@@ -7,7 +7,7 @@ The seed of pass ``i`` is hashed from the run's seed and ``i``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from importlib import import_module
 from importlib.util import find_spec
@@ -176,8 +176,7 @@ def _render_and_measure(
     # The passes, and their times.
     estimates = render(ready, ready.counted, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
-    with alone or nullcontext():
-        price = _price(ready)
+    price = _price(ready, alone)
     done("timing")
 
     # The departure.
@@ -215,12 +214,16 @@ def _render_and_measure(
     return Comparison(record=record, images=images), ready
 
 
-def _price(ready: Prepared) -> Price:
+def _price(ready: Prepared, alone: AbstractContextManager[Any] | None) -> Price:
     """Return the times per sample of both halves; the time of a picture is not known."""
     reference = ready.reference
     if not ready.options.image:
         return timing.measure(
-            ready.heuristic, reference, everything=ready.unpruned(), seed=ready.options.seed
+            ready.heuristic,
+            reference,
+            everything=ready.unpruned(),
+            seed=ready.options.seed,
+            alone=alone,
         )
     width, height = image_size(reference.scene)
     pixels = width * height

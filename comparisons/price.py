@@ -295,7 +295,7 @@ def saving(ready: Prepared, price: Price) -> Saving | None:
         return None
     size = size_of_width(ready.scene, _width(ready))
     film = image_size(ready.scene)
-    renderers = [half.sampled(max(SINGLE), size) for half in (*_halves(ready), whole)]
+    renderers = [half.sampled(PASS, size) for half in (*_halves(ready), whole)]
     try:
         loop = passes(renderers, ready.options.seed, 2, stream=Stream.PRICE)
         first, second = [np.array(rendered.images, float) for rendered in loop]

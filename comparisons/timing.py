@@ -8,6 +8,8 @@ on the size of a picture.
 
 import math
 from collections.abc import Mapping
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
 
 import numpy as np
 
@@ -20,13 +22,13 @@ from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, Stream
 WIDTH = 128
 """Width of the pictures that are timed, whatever the film's is: a ratio is the same everywhere."""
 
-LONG_S = 0.02
+LONG_S = 0.015
 """Seconds that the picture with more samples takes, at least, if the film allows so many."""
 
 WARM = 2
 """Pictures that do not count: the first compiles, or wakes the threads."""
 
-BUDGET_S = 0.5
+BUDGET_S = 0.4
 FEWEST = 6
 MOST = 15
 """Seconds that all rounds take, and their number."""
@@ -39,17 +41,21 @@ NOT_TIMED = Missing("a picture's time is not known")
 
 
 def measure(
-    heuristic: Renderer, reference: Renderer, everything: Renderer | None, seed: int
+    heuristic: Renderer,
+    reference: Renderer,
+    everything: Renderer | None,
+    seed: int,
+    alone: AbstractContextManager[Any] | None = None,
 ) -> Price:
     """Return the times of both halves, their ratio, and what pruning saves.
 
     ``everything`` renders the physical half with everything simulated, if its plan leaves out
-    something.
+    something. Times are taken within the context ``alone``.
     """
     renderers = {"heuristic": heuristic, "reference": reference}
     if everything is not None:
         renderers["everything"] = everything
-    found = lines(renderers, seed)
+    found = lines(renderers, seed, alone)
     ratio = times.ratio(found["reference"], found["heuristic"])
     is_known = ratio.high - ratio.low <= WIDEST * ratio.value
     width, height = image_size(reference.scene)
@@ -63,7 +69,9 @@ def measure(
     )
 
 
-def lines(renderers: Mapping[str, Renderer], seed: int) -> dict[str, times.Line]:
+def lines(
+    renderers: Mapping[str, Renderer], seed: int, alone: AbstractContextManager[Any] | None = None
+) -> dict[str, times.Line]:
     """Return the time of each renderer as a line over samples."""
     films = [(renderer.scene, image_size(renderer.scene)) for renderer in renderers.values()]
     first = next(iter(renderers.values()))
@@ -77,8 +85,10 @@ def lines(renderers: Mapping[str, Renderer], seed: int) -> dict[str, times.Line]
         for renderer in timed:
             renderer.times.clear()
             renderer.processor_times.clear()
-        for _ in passes(timed, seed, rounds, stream=Stream.PROBE):
-            pass
+        # Compiling is over: only what is timed needs the machine alone.
+        with alone or nullcontext():
+            for _ in passes(timed, seed, rounds, stream=Stream.PROBE):
+                pass
     finally:
         for scene, film in films:
             resize(scene, film)

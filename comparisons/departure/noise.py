@@ -132,21 +132,26 @@ def roughly(metric: Metric, values: Floats, noise: Floats) -> dict[str, Any]:
 
 
 def _fields(metric: Metric, value: float, low: float, high: float, shares: Array) -> dict[str, Any]:
-    """Return the mean without noise, its interval, and shares (3, T): values, low and high ends.
+    """Return the mean without noise, its interval, and shares (3, T): values, low and high ends."""
+    visible = _visible(metric, shares)
+    return {"debiased": value, "low": low, "high": high, "visible": visible}
 
-    Shares never rise with the threshold: ends that do are moved outwards.
+
+def _visible(metric: Metric, shares: Array) -> tuple[VisibleShare, ...]:
+    """Return shares (3, T): values, low and high ends.
+
+    They never rise with the threshold: ends that do are moved outwards.
     """
     shares = np.clip(shares, 0.0, 1.0)
     shares[1] = np.minimum.accumulate(shares[1])
     shares[2] = np.maximum.accumulate(shares[2][::-1])[::-1]
     shares[0] = np.clip(np.minimum.accumulate(shares[0]), shares[1], shares[2])
-    visible = tuple(
+    return tuple(
         VisibleShare(threshold=threshold, value=share, low=lowest, high=highest)
         for threshold, (share, lowest, highest) in zip(
             metric.visible, shares.T.tolist(), strict=True
         )
     )
-    return {"debiased": value, "low": low, "high": high, "visible": visible}
 
 
 def shares_above(distances: Floats, thresholds: Sequence[float]) -> Array:
@@ -168,13 +173,7 @@ def debiased(
     if count < FEWEST:
         return None
     shown = test.reshape(-1, 3)[grouped.places].astype(np.float64)
-    coordinates = metric.coordinates(shown, viewing)
-
-    def distances(differences: Array) -> Array:
-        # All noise of the difference goes to the reference: the test image stays as shown.
-        references = metric.coordinates(shown - differences, viewing)
-        return metric.difference(references, np.broadcast_to(coordinates, references.shape))
-
+    distances = _distances_from(metric, shown, viewing)
     whole = _Extrapolated.of(metric, distances, grouped, range(count))
     left_out = [
         _Extrapolated.of(metric, distances, grouped, [k for k in range(count) if k != out]).clean
@@ -192,15 +191,50 @@ def debiased(
     # Up to here a linear metric is a mean square.
     if metric.averages_squares:
         value, low, high = np.sqrt([value, low, high])
-    shares = _shares(metric.visible, distances, grouped, raw)
     between = distances_between(metric, shown, viewing)
     apart = Halves.of(between, grouped.means, grouped.sizes)
     if apart.are_heavy and not metric.averages_squares:
         low = max(min(low, measured - apart.below), 0.0)
         high = max(high, measured + apart.above)
-        shares[1] -= shares_above(apart.halves, metric.visible)
-        shares[2] += shares_above(apart.halves, metric.visible)
+    shares = _widened(metric, _shares(metric.visible, distances, grouped, raw), apart)
     return _fields(metric, float(value), low=float(low), high=float(high), shares=shares)
+
+
+def visible_shares(
+    metric: Pixelwise, test: Array, grouped: Grouped, viewing: Viewing
+) -> tuple[VisibleShare, ...]:
+    """Return the shares of pixels (P, 3) above a metric's thresholds, without noise.
+
+    ``grouped`` holds at least :data:`FEWEST` groups of passes of their difference from the
+    reference, at all of them.
+    """
+    distances = _distances_from(metric, test, viewing)
+    apart = Halves.of(distances_between(metric, test, viewing), grouped.means, grouped.sizes)
+    mean = np.average(grouped.means, axis=0, weights=grouped.sizes)
+    raw = distances(mean[None])[0]
+    return _visible(
+        metric, _widened(metric, _shares(metric.visible, distances, grouped, raw), apart)
+    )
+
+
+def _widened(metric: Metric, shares: Array, apart: Halves) -> Array:
+    """Return shares (3, T) whose ends hold the pixels that heavy noise makes differ."""
+    if not apart.are_heavy or metric.averages_squares:
+        return shares
+    noise = shares_above(apart.halves, metric.visible)
+    return shares + np.array([[0.0], [-1.0], [1.0]]) * noise
+
+
+def _distances_from(metric: Pixelwise, shown: Array, viewing: Viewing) -> Distances:
+    """Return the distance (..., P) of references by their differences (..., P, 3) from an image."""
+    coordinates = metric.coordinates(shown, viewing)
+
+    def distances(differences: Array) -> Array:
+        # All noise of the difference goes to the reference: the test image stays as shown.
+        references = metric.coordinates(shown - differences, viewing)
+        return metric.difference(references, np.broadcast_to(coordinates, references.shape))
+
+    return distances
 
 
 Between = Callable[[Array, Array], Array]

@@ -39,13 +39,12 @@ from fotismos.comparisons.departure.blocks import ratio
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
 from fotismos.comparisons.departure.noise import (
-    FEWEST,
     USUAL,
     Halves,
     VisibleShare,
     contrasts,
-    debiased,
     distances_between,
+    visible_shares,
     without_noise,
 )
 from fotismos.comparisons.departure.regions import Region, find_objects
@@ -284,22 +283,18 @@ class ErrorMeter:
         Their intervals also hold those of a picture of more ``pixels``, of which these are drawn.
         """
         images = np.asarray(images)[:, self.counted].astype(float)
-        reference = self._groups.mean(axis=0)
-        test = images.mean(axis=0)
+        blocks = int(self._blocks.max()) + 1
         grouped = Grouped(
             # The noise of both is in the difference.
             means=images - self._groups,
             sizes=np.ones(len(images), int),
-            places=np.arange(len(test)),
+            places=np.arange(images.shape[1]),
             blocks=self._blocks,
-            sampled=int(self._blocks.max()) + 1,
-            total=int(self._blocks.max()) + 1,
+            sampled=blocks,
+            total=blocks,
         )
-        raw = self.metric.against(reference, ..., self.viewing)(test)
-        fields = debiased(self.metric, test[None], grouped, self.viewing, raw)
-        if fields is None:
-            raise InputError(f"{len(images)} replicates have no interval: give at least {FEWEST}.")
-        return tuple(_drawn(share, len(test), pixels) for share in fields["visible"])
+        shares = visible_shares(self.metric, images.mean(axis=0), grouped, self.viewing)
+        return tuple(_drawn(share, images.shape[1], pixels) for share in shares)
 
     @cached_property
     def _references(self) -> list[tuple[NDArray[np.int64], list[Doubles]]]:

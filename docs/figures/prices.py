@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Iterator, Sequence
+from math import log10
 
 import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
@@ -26,6 +27,9 @@ from fotismos.reports.terminal.words import number, percent, seconds
 
 SIZE = 256, 192
 THRESHOLD = 2.0
+
+NEAR = 7.0
+"""Percent of pixels by which points differ at least, to have labels of their own."""
 
 NAMED_ABOVE = 1.6
 """Times of the textbook's time above which the chart names a scene."""
@@ -55,13 +59,14 @@ def sentences(records: Sequence[ComparisonRecord]) -> Iterator[str]:
 def table(records: Sequence[ComparisonRecord]) -> Iterator[str]:
     """Yield a row for each scene: what differs, what is needed, and what that takes."""
     rows: list[tuple[str, ...]] = [
-        ("Scene", "differ", "needs", "sample", "samples", "price", "time")
+        ("Scene", "needs", "differ", "sample", "samples", "price", "time")
     ]
     rows += [_row(record) for record in records]
     yield from markdown(rows, right=2)
     yield ""
     yield (
-        "*Differ*: the share of the pixels above ΔE2000 2. *Sample*: the time of one of the"
+        "*Needs*: the fewest effects with which an image passes; undecided where noise hides them."
+        " *Differ*: the share of the pixels above ΔE2000 2. *Sample*: the time of one of the"
         " physical half over one of the textbook half. *Samples*: per pixel, with which the"
         " physical half passes. *Price*: the time of what passes over that of the textbook picture"
         " with 4 samples."
@@ -73,7 +78,7 @@ def _row(record: ComparisonRecord) -> tuple[str, ...]:
     assert price is not None
     samples = price.samples_at(THRESHOLD)
     needed = price.needed_at(THRESHOLD)
-    effects = "noise hides it"
+    effects = "undecided"
     if needed is not None and needed.effects is not None:
         effects = ", ".join(needed.effects) or "nothing"
     count = "–"
@@ -84,8 +89,8 @@ def _row(record: ComparisonRecord) -> tuple[str, ...]:
     over_textbook = verdict.price_at(record, THRESHOLD)
     return (
         record.scene,
-        percent(verdict.share(record).value),
         effects,
+        percent(verdict.share(record).value),
         "?" if price.ratio is None else number(price.ratio.value),
         count,
         "–" if over_textbook is None else number(over_textbook),
@@ -115,9 +120,7 @@ def chart(records: Sequence[ComparisonRecord]) -> Figure:
             color="#1a56a0",
             zorder=2,
         )
-        for record, price in points:
-            if price > NAMED_ABOVE:
-                _name(axes, record, price)
+        _name(axes, [point for point in points if point[1] > NAMED_ABOVE])
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.set(
@@ -131,7 +134,26 @@ def chart(records: Sequence[ComparisonRecord]) -> Figure:
     return figure
 
 
-def _name(axes: Axes, record: ComparisonRecord, price: float) -> None:
-    position = price, 100 * verdict.share(record).value
-    name = record.scene.replace("_", " ")
-    axes.annotate(name, position, xytext=(5, 3), textcoords="offset points", fontsize=8)
+def _name(axes: Axes, points: Sequence[tuple[ComparisonRecord, float]]) -> None:
+    """Write the names of scenes beside their points, those of near points together."""
+    groups: list[tuple[float, float, list[str]]] = []
+    for record, price in sorted(points, key=lambda point: -verdict.share(point[0]).value):
+        height = 100 * verdict.share(record).value
+        name = record.scene.replace("_", " ")
+        for x, y, names in groups:
+            if abs(y - height) < NEAR and abs(log10(x / price)) < NEAR / 20:
+                names.append(name)
+                break
+        else:
+            groups.append((price, height, [name]))
+    right = max(x for x, _, _ in groups)
+    for x, y, names in groups:
+        is_right = x > right / 10
+        axes.annotate(
+            ", ".join(names),
+            (x, y),
+            xytext=(-6 if is_right else 6, -3),
+            textcoords="offset points",
+            ha="right" if is_right else "left",
+            fontsize=8,
+        )
