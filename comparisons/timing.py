@@ -15,7 +15,7 @@ import numpy as np
 
 from fotismos.comparisons.cost import times
 from fotismos.comparisons.price_record import FEWEST_SPP, Price
-from fotismos.reference.records import Missing
+from fotismos.reference.records import Interval, Missing
 from fotismos.reference.rendering.gbuffer import image_size, resize, size_of_width
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, Stream, passes
 
@@ -31,7 +31,8 @@ WARM = 2
 BUDGET_S = 0.4
 FEWEST = 6
 MOST = 15
-"""Seconds that all rounds take, and their number."""
+ATTEMPTS = 4
+"""Seconds that all rounds take, their number, and how often they are repeated, if need be."""
 
 WIDEST = 0.3
 """The widest interval that a ratio may have, over the ratio."""
@@ -52,13 +53,21 @@ def measure(
     ``everything`` renders the physical half with everything simulated, if its plan leaves out
     something. Times are taken within the context ``alone``.
     """
-    renderers = {"heuristic": heuristic, "reference": reference}
+    halves = {"heuristic": heuristic, "reference": reference}
     if everything is not None:
-        renderers["everything"] = everything
-    found = lines(renderers, seed, alone)
-    ratio = times.ratio(found["reference"], found["heuristic"])
-    is_known = ratio.high - ratio.low <= WIDEST * ratio.value
+        halves["everything"] = everything
+    films = [(half.scene, image_size(half.scene)) for half in halves.values()]
     width, height = image_size(reference.scene)
+    size = size_of_width(reference.scene, WIDTH)
+    try:
+        pairs = {name: _pair(half, size) for name, half in halves.items()}
+        # Compiling is over: only what is timed needs the machine alone.
+        with alone or nullcontext():
+            found, ratio = _lines(pairs, size[0] * size[1], seed)
+    finally:
+        for scene, film in films:
+            resize(scene, film)
+    is_known = _is_narrow(ratio)
     return Price(
         ratio=ratio if is_known else None,
         reason="" if is_known else TOO_WIDE.reason,
@@ -69,39 +78,41 @@ def measure(
     )
 
 
-def lines(
-    renderers: Mapping[str, Renderer], seed: int, alone: AbstractContextManager[Any] | None = None
-) -> dict[str, times.Line]:
-    """Return the time of each renderer as a line over samples."""
-    films = [(renderer.scene, image_size(renderer.scene)) for renderer in renderers.values()]
-    first = next(iter(renderers.values()))
-    size = size_of_width(first.scene, WIDTH)
-    try:
-        pairs = {name: _pair(renderer, size) for name, renderer in renderers.items()}
-        timed = [renderer for pair in pairs.values() for renderer in pair]
-        # What a round takes tells how many there are.
-        round_s = sum(renderer.times[-1] for renderer in timed)
-        rounds = int(np.clip(BUDGET_S / round_s, FEWEST, MOST))
-        for renderer in timed:
-            renderer.times.clear()
-            renderer.processor_times.clear()
-        # Compiling is over: only what is timed needs the machine alone.
-        with alone or nullcontext():
-            for _ in passes(timed, seed, rounds, stream=Stream.PROBE):
-                pass
-    finally:
-        for scene, film in films:
-            resize(scene, film)
-    pixels = size[0] * size[1]
-    return times.lines(
-        {
-            name: {
-                renderer.pass_spp * pixels: (renderer.times, renderer.processor_times)
-                for renderer in pair
+def _lines(
+    pairs: Mapping[str, tuple[Renderer, Renderer]], pixels: int, seed: int
+) -> tuple[dict[str, times.Line], Interval]:
+    """Time pairs of renderers until the ratio of the halves is known, or the machine too busy.
+
+    Returns the time of each pair as a line over samples, and the ratio.
+    """
+    renderers = [renderer for pair in pairs.values() for renderer in pair]
+    # What a round takes tells how many there are.
+    round_s = sum(renderer.times[-1] for renderer in renderers)
+    rounds = int(np.clip(BUDGET_S / round_s, FEWEST, MOST))
+    for renderer in renderers:
+        renderer.times.clear()
+        renderer.processor_times.clear()
+    for _ in range(ATTEMPTS):
+        for _ in passes(renderers, seed, rounds, stream=Stream.PROBE):
+            pass
+        found = times.lines(
+            {
+                name: {
+                    renderer.pass_spp * pixels: (renderer.times, renderer.processor_times)
+                    for renderer in pair
+                }
+                for name, pair in pairs.items()
             }
-            for name, pair in pairs.items()
-        }
-    )
+        )
+        ratio = times.ratio(found["reference"], found["heuristic"])
+        if _is_narrow(ratio):
+            break
+    return found, ratio
+
+
+def _is_narrow(ratio: Interval) -> bool:
+    """Return whether a ratio is known well enough to be stated."""
+    return ratio.high - ratio.low <= WIDEST * ratio.value
 
 
 def _pair(half: Renderer, size: tuple[int, int]) -> tuple[Renderer, Renderer]:
