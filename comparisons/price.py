@@ -266,10 +266,18 @@ def effects_that_pass(visible: Visible) -> tuple[EffectsThatPass, ...]:
 
 
 def _fewest(visible: Visible, place: int, threshold: float) -> EffectsThatPass:
-    """Return the smallest set that passes at a threshold; of several, the one furthest below."""
+    """Return the smallest set that surely passes; of several, the one furthest below.
+
+    With all effects the image is the reference, whatever noise its share has. They are needed if
+    all other sets surely fail.
+    """
+    everything = max(visible, key=len)
     passing = [effects for effects, shares in visible.items() if shares[place].high <= LIMIT]
     if not passing:
-        return EffectsThatPass(threshold=threshold, effects=None, visible=None)
+        others = [shares[place] for effects, shares in visible.items() if effects != everything]
+        if any(share.low <= LIMIT for share in others):
+            return EffectsThatPass(threshold=threshold, effects=None, visible=None)
+        passing = [everything]
     effects = min(passing, key=lambda labels: (len(labels), visible[labels][place].high))
     share = visible[effects][place]
     interval = Interval(value=share.value, low=share.low, high=share.high)
