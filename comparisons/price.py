@@ -12,7 +12,8 @@ it falls so slowly that bright paths are rare, what no pass has seen is unknown:
 needed (`HEAVY`).
 
 **Effects.** Causes render images in which some effects are simulated. The fewest with which an
-image passes are needed; what is not among them may be left out.
+image surely passes are needed; what is not among them may be left out. Images are compared with the
+one in which all are simulated, with which they share paths and most of the noise.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -268,16 +269,9 @@ def effects_that_pass(visible: Visible) -> tuple[EffectsThatPass, ...]:
 def _fewest(visible: Visible, place: int, threshold: float) -> EffectsThatPass:
     """Return the smallest set that surely passes; of several, the one furthest below.
 
-    With all effects the image is the reference, whatever noise its share has. They are needed if
-    all other sets surely fail.
+    There is one: all effects leave no difference from themselves.
     """
-    everything = max(visible, key=len)
     passing = [effects for effects, shares in visible.items() if shares[place].high <= LIMIT]
-    if not passing:
-        others = [shares[place] for effects, shares in visible.items() if effects != everything]
-        if any(share.low <= LIMIT for share in others):
-            return EffectsThatPass(threshold=threshold, effects=None, visible=None)
-        passing = [everything]
     effects = min(passing, key=lambda labels: (len(labels), visible[labels][place].high))
     share = visible[effects][place]
     interval = Interval(value=share.value, low=share.low, high=share.high)

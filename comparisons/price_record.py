@@ -28,19 +28,17 @@ class SamplesThatPass(Record):
 
 
 class EffectsThatPass(Record):
-    """The fewest effects that must be simulated to pass at a threshold.
+    """The fewest effects that must be simulated to pass surely at a threshold.
 
     Attributes
     ----------
-    effects
-        Null if noise does not allow an answer.
     visible
-        The share of pixels that still differ visibly, with its interval; null like ``effects``.
+        The share of pixels that still differ visibly, with its interval.
     """
 
     threshold: Positive
-    effects: tuple[str, ...] | None
-    visible: Interval | None
+    effects: tuple[str, ...]
+    visible: Interval
 
 
 class Saving(Record):

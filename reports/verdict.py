@@ -161,8 +161,6 @@ def _effects_needed(record: ComparisonRecord, threshold: float) -> str:
     needed = record.price and record.price.needed_at(threshold)
     if not needed or not record.why or _impossible_albedo(record):
         return ""
-    if needed.effects is None:
-        return "Noise does not tell which effects are needed."
     if not needed.effects:
         return ""
     all_effects = [contribution.effect for contribution in record.why.effects]

@@ -277,16 +277,18 @@ class ErrorMeter:
         between = distances_between(self.metric, shown, self.viewing)
         return Halves.of(between, differences, np.ones(len(differences)))
 
-    def visible(self, images: Floats, pixels: int) -> tuple[VisibleShare, ...]:
-        """Return the shares of pixels (R, H, W, 3) that differ visibly, without noise.
+    def visible(self, images: Floats, everything: Floats, pixels: int) -> tuple[VisibleShare, ...]:
+        """Return the shares of pixels that differ visibly, without noise.
 
-        Their intervals also hold those of a picture of more ``pixels``, of which these are drawn.
+        Images (R, H, W, 3) are compared with those in which ``everything`` is simulated: they share
+        paths, and with them most of the noise. The intervals also hold the shares of a picture of
+        more ``pixels``, of which these are drawn.
         """
         images = np.asarray(images)[:, self.counted].astype(float)
+        everything = np.asarray(everything)[:, self.counted].astype(float)
         blocks = int(self._blocks.max()) + 1
         grouped = Grouped(
-            # The noise of both is in the difference.
-            means=images - self._groups,
+            means=images - everything,
             sizes=np.ones(len(images), int),
             places=np.arange(images.shape[1]),
             blocks=self._blocks,
@@ -431,7 +433,9 @@ def attribute(
         previews={hybrid.effects: image for hybrid, image in zip(hybrids, previews, strict=True)},
         visible={
             labels(effects, simulated): meter.visible(
-                images.pixels(images.simulating(simulated)), whole
+                images.pixels(images.simulating(simulated)),
+                images.pixels(images.simulating(everything)),
+                whole,
             )
             for simulated in rules
         },

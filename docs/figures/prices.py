@@ -65,7 +65,7 @@ def table(records: Sequence[ComparisonRecord]) -> Iterator[str]:
     yield from markdown(rows, right=2)
     yield ""
     yield (
-        "*Needs*: the fewest effects with which an image passes; undecided where noise hides them."
+        "*Needs*: the fewest effects with which an image passes."
         " *Differ*: the share of the pixels above ΔE2000 2. *Sample*: the time of one of the"
         " physical half over one of the textbook half. *Samples*: per pixel, with which the"
         " physical half passes. *Price*: the time of what passes over that of the textbook picture"
@@ -78,9 +78,8 @@ def _row(record: ComparisonRecord) -> tuple[str, ...]:
     assert price is not None
     samples = price.samples_at(THRESHOLD)
     needed = price.needed_at(THRESHOLD)
-    effects = "undecided"
-    if needed is not None and needed.effects is not None:
-        effects = ", ".join(needed.effects) or "nothing"
+    assert needed is not None
+    effects = ", ".join(needed.effects) or "nothing"
     count = "–"
     if samples is not None:
         count = "more than 65,536" if samples.value is None else f"{samples.value:,}"

@@ -150,10 +150,6 @@ def test_the_fewest_effects_that_surely_pass_are_needed():
     found = price.effects_that_pass(visible)[AT_TWO]
     assert found.effects == ("gloss", "sky")
     assert found.visible.high == 0.02
-    every = {(): shares(0.5, 0.6), ("gloss",): shares(0.3, 0.4), ("gloss", "sky"): shares(0.0, 0.2)}
-    assert price.effects_that_pass(every)[AT_TWO].effects == ("gloss", "sky")
-    every[("sky",)] = shares(0.04, 0.2)
-    assert price.effects_that_pass(every)[AT_TWO].effects is None
 
 
 @pytest.mark.thorough

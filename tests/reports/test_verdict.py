@@ -73,7 +73,7 @@ def price(spp, effects=(), low=0, high=0):
 
     ``low`` and ``high`` are the ends of the interval of its samples, if they are not ``spp``.
     """
-    visible = None if effects is None else Interval(value=0.03, low=0.02, high=0.04)
+    visible = Interval(value=0.03, low=0.02, high=0.04)
     found = EffectsThatPass(threshold=2.0, effects=effects, visible=visible)
     samples = SamplesThatPass(
         threshold=2.0, value=spp, low=low or spp, high=spp if high == 0 else high
@@ -132,11 +132,6 @@ RULES = {
         scene(why=why(occlusion=3.0, spectral=1.0), price=price(4, ("occlusion", "spectral"))),
         None, 2.0,
         "It needs occlusion and spectral light. 4 samples per pixel pass: 8.00 times the"
-        " textbook's time, 40.0 ms.",
-    ),
-    "effects that noise hides": (
-        scene(why=why(occlusion=3.0), price=price(4, None)), None, 2.0,
-        "Noise does not tell which effects are needed. 4 samples per pixel pass: 8.00 times the"
         " textbook's time, 40.0 ms.",
     ),
     "an interval of samples": (
