@@ -1,4 +1,4 @@
-"""What a run found, in sentences: how many scenes look right, what is missing, and what to do.
+"""What a run found, in sentences: how many scenes look right, what is missing, and what is needed.
 
 One quantity decides everything here, see :mod:`fotismos.comparisons.departure.criterion`: the share
 of the pixels that differ visibly, by more than a tolerance.
@@ -312,7 +312,7 @@ def search(record: ComparisonRecord, threshold: float, spp: int | None = None) -
 
 
 def about(record: ComparisonRecord) -> str:
-    """Return a scene's verdict, what is mostly missing, and what to do, in a few sentences."""
+    """Return a scene's verdict, what is mostly missing, and what is needed, in a few sentences."""
     parts = [headline([record])]
     if not record.caution and decision(record) != "pass":
         parts += [cause(record), sentence(record)]
@@ -369,7 +369,7 @@ def most_missing(records: Sequence[ComparisonRecord], threshold: float = TOLERAN
 
 
 def advice(scenes: Sequence[Studied], threshold: float = TOLERANCE) -> Iterator[str]:
-    """Yield a line for each scene that does not pass: what is missing, and what to do."""
+    """Yield a line for each scene that does not pass: what is missing, and what is needed."""
     for record, cost in scenes:
         if decision(record, threshold) != "pass" and not record.caution:
             parts = (f"{record.scene}:", cause(record), sentence(record, cost, threshold))

@@ -232,7 +232,7 @@ def of_comparison(
     threshold: float = TOLERANCE,
 ) -> str:
     """Return the summary of a run: verdict, a row for each scene, gates, and errors."""
-    headings = ("Scene", "Pixels that differ", f"Mean {LEADING.label}", "What to do")
+    headings = ("Scene", "Pixels that differ", f"Mean {LEADING.label}", "What makes it look right")
     rows: list[tuple[str, ...]] = []
     for record, cost in scenes:
         numbers = (
