@@ -198,15 +198,20 @@ def _times(record: Cost) -> Rows:
 
 def _points(points: Sequence[Point]) -> Rows:
     yield "method", "samples", "time", "interval", "mean ΔE2000", "passes at", "front"
+    cheapest = sufficient(points, TOLERANCE)
     for point in points:
-        close = f"front, too close to call: {', '.join(point.ties)}" if point.ties else "front"
+        notes = ["front"] if point.front else []
+        if point.front and point.ties:
+            notes.append(f"too close to call: {', '.join(point.ties)}")
+        if cheapest and (point.method, point.spp) == (cheapest.method, cheapest.spp):
+            notes.append("cheapest that looks right")
         yield (
             point.method,
             f"{point.spp}",
             *timed(point.seconds),
             f"{point.error.value:.3f} ± {point.error.high - point.error.value:.3f}",
             f"{point.tolerance.value:.2f} ± {point.tolerance.high - point.tolerance.value:.2f}",
-            close if point.front else "",
+            ", ".join(notes),
         )
 
 

@@ -95,6 +95,20 @@ def test_page_and_terminal_say_which_sample_count_would_pass(study):
         assert expected in Page(shown(replace(study, record=changed))).text
 
 
+def test_the_page_has_what_is_predicted_and_the_table_marks_the_cheapest(study):
+    record = study.record
+    right = structs.replace(record.points[2], tolerance=MeanError(value=1.0, low=0.9, high=1.1))
+    points = (*record.points[:2], right)
+    predicted = structs.replace(record, at=(1920, 1080), predicted=points)
+    html = Page(shown(replace(study, record=predicted))).text
+    assert "Predicted at 1920 × 1080" in html
+    assert "Predicted at" not in Page(shown(study)).text
+    rows = "\n".join(cost_tables.lines(predicted)).splitlines()
+    marked = [row for row in rows if "cheapest that looks right" in row]
+    assert len(marked) == 1
+    assert marked[0].startswith(right.method)
+
+
 def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_cost(study):
     machine = structs.replace(study.record.machine, processor=HOSTILE)
     hostile = replace(study, record=structs.replace(study.record, machine=machine))
