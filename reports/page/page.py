@@ -62,7 +62,7 @@ class PageScene(SceneView):
     """A scene in the page: its name in the address, and ``(effect, colour, part)`` of its error.
 
     ``prices`` are by threshold (:func:`fotismos.reports.verdict.price_at`); ``command`` finds the
-    cheapest method.
+    cheapest method; empty if the record has none to derive it from.
     """
 
     id: str
@@ -179,7 +179,7 @@ def _scene(view: SceneView, taken: set[str], usual: float) -> PageScene:
         cause=verdict.cause(record),
         advice=_runs(lambda t: verdict.sentence(record, cost, t)),
         prices=tuple(_digits(verdict.price_at(record, threshold)) for threshold in THRESHOLDS),
-        command=verdict.search(record, usual),
+        command=verdict.search(record, usual) if record.command else "",
     )
 
 

@@ -159,8 +159,8 @@ def test_a_baseline_reads_as_it_was_written(text):
 
 REFUSED = (
     ('{\n  "record', "", "not JSON"),
-    ('"record_version": 3', '"record_version": 9', "record_version` is 9, not"),
-    ('"record_version": 3', '"format": "fotismos baseline 1"', "of fotismos 0.1"),
+    ('"record_version": 4', '"record_version": 9', "record_version` is 9, not"),
+    ('"record_version": 4', '"format": "fotismos baseline 1"', "of fotismos 0.1"),
     ('"passes": 16', '"passes": 1', r"`int` >= 2 - at `\$.passes`"),
     ('"rmse"', '"rms"', "'rms' is not a metric"),
     ('"dE2000"', '"dE_ITP"', "'dE2000' is missing"),
