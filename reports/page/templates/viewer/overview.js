@@ -30,7 +30,8 @@ function showPrices(place) {
   sentence.textContent = textAt(page.costs, place);
   const {low, high} = page.axis;
   const points = /** @type {HTMLElement[]} */ ([...document.querySelectorAll("[data-price]")]);
-  const labelled = /** @type {{x: number, y: number}[]} */ ([]);
+  const labelled = /** @type {{from: number, to: number, y: number}[]} */ ([]);
+  const plot = points[0]?.parentElement?.clientWidth || 1;
   const scenes = /** @type {Scene[]} */ (page.scenes.filter(scene => !scene.failed));
   const known = new Map(scenes.map(scene => [scene.id, scene]));
   const spots = points.map(point => {
@@ -48,10 +49,17 @@ function showPrices(place) {
   for (const {point, x, y} of spots) {
     point.style.setProperty("--x", String(x));
     point.style.setProperty("--y", String(y));
-    const overlaps = labelled.some(one => Math.abs(one.y - y) < 0.07 && Math.abs(one.x - x) < 0.16);
+    // About 7 pixels for each letter, and the distance from the point.
+    const width = (18 + 7 * (point.textContent ?? "").trim().length) / plot;
+    const isLeft = x + width > 1;
+    const from = isLeft ? x - width : x;
+    const to = from + width;
+    const overlaps = labelled.some(
+      label => Math.abs(label.y - y) < 0.07 && label.from < to && from < label.to,
+    );
     point.classList.toggle("named", !overlaps);
-    point.classList.toggle("left", x > 0.8);
-    if (!overlaps) labelled.push({x, y});
+    point.classList.toggle("left", isLeft);
+    if (!overlaps) labelled.push({from, to, y});
   }
 }
 
