@@ -17,16 +17,13 @@ from fotismos.comparisons.cost import times
 from fotismos.comparisons.price_record import FEWEST_SPP, Price
 from fotismos.reference.records import Interval, Missing
 from fotismos.reference.rendering.gbuffer import image_size, resize, size_of_width
-from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, Stream, passes
+from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, Stream, passes, warm
 
 WIDTH = 128
 """Width of the pictures that are timed, whatever the film's is: a ratio is the same everywhere."""
 
 LONG_S = 0.015
 """Seconds that the picture with more samples takes, at least, if the film allows so many."""
-
-WARM = 2
-"""Pictures that do not count: the first compiles, or wakes the threads."""
 
 BUDGET_S = 0.4
 FEWEST = 6
@@ -132,8 +129,7 @@ def _pair(half: Renderer, size: tuple[int, int]) -> tuple[Renderer, Renderer]:
 
 
 def _warm(half: Renderer, spp: int, size: tuple[int, int]) -> Renderer:
-    """Return a half with some samples per pixel, which has rendered :data:`WARM` pictures."""
+    """Return a half with some samples per pixel, which is warm."""
     renderer = half.sampled(spp, size)
-    for seed in range(WARM):
-        renderer.render(seed)
+    warm(renderer)
     return renderer

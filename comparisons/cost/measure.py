@@ -33,7 +33,14 @@ from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import gbuffer, image_size, resize
-from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, Renderer, Stream, passes
+from fotismos.reference.rendering.renderer import (
+    LARGEST_PASS,
+    Progress,
+    Renderer,
+    Stream,
+    passes,
+    warm,
+)
 from fotismos.reference.rendering.sums import Accumulator, Estimate
 from fotismos.reference.scene.source import Source
 
@@ -61,9 +68,6 @@ REFERENCE_PASSES = 16
 
 MOST_SAMPLES = 2**24
 """Samples of one image, at most."""
-
-WARM = 2
-"""Images before those that are timed: the first traces and compiles, the second warms caches."""
 
 
 @dataclass(frozen=True)
@@ -254,7 +258,7 @@ def tried(
     """Return ``{(name, samples per pixel): renderer}`` for ``counts``, and some for the time.
 
     The largest takes at least :data:`times.LEAST_S`, and one a fourth of its samples. ``firsts``
-    have the most samples of the method's counts. All have rendered :data:`WARM` images.
+    have the most samples of the method's counts. All are warm.
     """
     renderers: dict[Key, Renderer] = {}
     for number, (name, first) in enumerate(firsts.items()):
@@ -282,12 +286,6 @@ def tried(
         renderers |= {(name, spp): by_spp[spp] for spp in sorted(by_spp)}
     progress("compiling", len(firsts), len(firsts))
     return renderers
-
-
-def warm(renderer: Renderer) -> None:
-    """Render the images that are not timed."""
-    for seed in range(WARM):
-        renderer.render(seed)
 
 
 def rendered(

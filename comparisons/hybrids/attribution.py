@@ -351,7 +351,8 @@ def attribute(
 
     shares(effects, note, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS)
     images.render(sets)
-    noise = meter.halves(images.pixels(images.simulating(everything)))
+    with_all = images.pixels(images.simulating(everything))
+    noise = meter.halves(with_all)
     growth = float(np.clip(noise.growth, SLOWEST, USUAL))
     rules: dict[frozenset[Effect], Floats] = {}
 
@@ -434,7 +435,7 @@ def attribute(
         visible={
             labels(effects, simulated): meter.visible(
                 images.pixels(images.simulating(simulated)),
-                images.pixels(images.simulating(everything)),
+                with_all,
                 whole,
             )
             for simulated in rules

@@ -41,6 +41,9 @@ BASE = 200 * 2**20
 """Memory that a comparison of any size takes, in addition to the process before it."""
 
 
+WARM = 2
+"""Images before those that are timed: the first traces and compiles, the second warms caches."""
+
 LARGEST_VALUE = 1e18
 """In units of display white: squares of differences must not overflow in single precision."""
 
@@ -199,6 +202,12 @@ class Renderer:
     def pass_times(self) -> Times:
         """Return the :class:`Times` of the passes so far."""
         return Times.of(self.times, self.compilation)
+
+
+def warm(renderer: Renderer) -> None:
+    """Render the images that are not timed."""
+    for seed in range(WARM):
+        renderer.render(seed)
 
 
 @contextmanager

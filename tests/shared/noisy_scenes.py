@@ -11,7 +11,7 @@ UP = (0, 1, 0)
 
 
 def scene(sensor, max_depth=8, **objects):
-    """Return a scene for ``path``; ``objects`` are shapes and lights by name."""
+    """Return a scene that ``path`` renders, with named shapes and lights."""
     integrator = {"type": "path", "max_depth": max_depth}
     return {"type": "scene", "integrator": integrator, "sensor": sensor, **objects}
 
