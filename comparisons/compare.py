@@ -221,7 +221,7 @@ def _price(ready: Prepared, alone: AbstractContextManager[Any] | None) -> Price:
         return timing.measure(
             ready.heuristic,
             reference,
-            everything=ready.unpruned(),
+            everything=ready.unpruned,
             seed=ready.options.seed,
             alone=alone,
         )

@@ -102,6 +102,7 @@ class Prepared:
 
         return definitions.metrics()
 
+    @cached_property
     def unpruned(self) -> Renderer | None:
         """Return what renders the physical half with everything simulated.
 

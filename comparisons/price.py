@@ -38,8 +38,6 @@ from fotismos.comparisons.price_record import (
     Saving,
 )
 from fotismos.heuristic.convention import Doubles, Floats
-from fotismos.reference.planning.plan import Plan
-from fotismos.reference.planning.rules import RULES
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import gbuffer, image_size, resize, size_of_width
 from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, pass_seed, passes
@@ -84,7 +82,7 @@ def with_price(comparison: Comparison, ready: Prepared, progress: Progress | Non
         price,
         samples=samples_that_pass(ready, leading),
         needed=None if causes is None else effects_that_pass(causes.visible),
-        left_out=tuple(left_out(ready.plan)),
+        left_out=ready.plan.omissions(),
         saved=saving(ready, price),
     )
     comparison = replace(comparison, record=structs.replace(record, price=price))
@@ -281,18 +279,12 @@ def _fewest(visible: Visible, place: int, threshold: float) -> EffectsThatPass:
 # --- Pruning ---------------------------------------------------------------------------------
 
 
-def left_out(plan: Plan) -> Iterator[str]:
-    """Yield what a plan leaves out by proof, as nouns."""
-    applied = {result.name for result in plan.rules if result.applies}
-    return (rule.omits for rule in RULES if rule.name in applied)
-
-
 def saving(ready: Prepared, price: Price) -> Saving | None:
     """Return what a plan saves, by times that are measured, and by the noise of two pictures.
 
     None if it saves nothing, and of pictures.
     """
-    whole = ready.unpruned()
+    whole = ready.unpruned
     if whole is None or not price.everything_s or not price.reference_s:
         return None
     size = size_of_width(ready.scene, _width(ready))

@@ -29,6 +29,7 @@ from fotismos.comparisons.cost.methods import FULL_PLAN
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.hybrids.attribution import find
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.price_record import Price
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.plan import Guard
@@ -69,7 +70,7 @@ def cost(
     :func:`fotismos.comparisons.compare.compare`, and
     :func:`fotismos.comparisons.cost.measure.measure_ladder` for an omitted resolution,
     ``options.spp`` and ``alone``. ``at`` is a size to predict for: times follow from overhead and
-    time per sample, and errors are those of the study's size. If ``is_measured``, methods also
+    time per sample, while errors are not predicted. If ``is_measured``, methods also
     render there. ``causes`` are those of the scene, if known.
     """
     progress = progress or (lambda *_: None)
@@ -209,6 +210,8 @@ class Choice(Record):
         Methods that the scene cannot have, and why.
     reach
         If none passes: what more samples would do, if known.
+    price
+        What it takes to look right without these methods.
     """
 
     scene: str
@@ -220,6 +223,7 @@ class Choice(Record):
     full: Point
     left_out: dict[str, str]
     reach: Reach | None = None
+    price: Price | None = None
     record_version: int = VERSION
 
 

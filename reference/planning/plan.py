@@ -185,6 +185,11 @@ class Plan(Record):
             bsdf_samples=1,
         )
 
+    def omissions(self) -> tuple[str, ...]:
+        """Return what the plan leaves out by proof, as nouns."""
+        applied = {result.name for result in self.rules if result.applies}
+        return tuple(rule.omits for rule in RULES if rule.name in applied)
+
     def unpruned(self, rule: str = "asked", evidence: str = "pruning is off") -> "Plan":
         """Return the plan that prunes nothing, Mitsuba's default, and the reason for it."""
         return Plan(

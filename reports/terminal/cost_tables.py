@@ -64,8 +64,8 @@ def lines(record: Cost) -> Iterator[str]:
         yield closure(record)
     # Another size, if one was requested.
     if record.at:
-        title = f"Predicted at {sized(record.at)}, with the errors at {size}"
-        yield from _section(title, _points(record.predicted))
+        title = f"Predicted times at {sized(record.at)}; errors are not predicted"
+        yield from _section(title, _predicted(record))
     if record.measured:
         yield from _section("Predicted and measured there, fewest samples", _off(record))
 
@@ -102,13 +102,16 @@ def answer(record: Cost) -> str:
     If none does, whether more samples would.
     """
     points = record.predicted or record.points
-    size = sized(record.at if record.at and record.predicted else record.resolution)
+    size = sized(record.resolution)
+    # Times can be predicted for another size, and errors cannot.
+    at = f" at {sized(record.at)}" if record.at and record.predicted else ""
     best = sufficient(points, TOLERANCE)
     if best is None:
         advice = beyond(reach(points, TOLERANCE))
         return f"No measured method looks right at {size}. {advice}"
     time = seconds(best.seconds.value)
-    sentence = f"Cheapest that looks right at {size}: {best.method} with {best.spp} samples, {time}"
+    method = f"{best.method} with {best.spp} samples"
+    sentence = f"Cheapest that looks right at {size}: {method}, {time}{at}"
     # The ladder begins with the textbook kernel.
     kernel = next(point for point in points if point.method == record.methods[0].name)
     if kernel.method == best.method:
@@ -215,22 +218,27 @@ def _points(points: Sequence[Point]) -> Rows:
         )
 
 
+def _predicted(record: Cost) -> Rows:
+    yield "method", "samples", "time", "interval"
+    for point in record.predicted:
+        yield point.method, f"{point.spp}", *timed(point.seconds)
+
+
 def _off(record: Cost) -> Rows:
-    """Yield how far off the predictions are."""
-    yield "method", "time", "predicted", "off", "mean ΔE2000", "predicted", "off"
+    """Yield how far off the predicted times are, and errors at both sizes."""
+    at = sized(record.resolution)
+    yield "method", "time", "predicted", "off", "mean ΔE2000", f"at {at}"
     forecasts = {(point.method, point.spp): point for point in record.predicted}
     for point in record.measured:
         forecast = forecasts[point.method, point.spp]
         time = point.seconds.value
-        error = point.error.value
         yield (
             point.method,
             seconds(time),
             seconds(forecast.seconds.value),
             f"{forecast.seconds.value / time - 1:+.0%}",
-            f"{error:.3f}",
+            f"{point.error.value:.3f}",
             f"{forecast.error.value:.3f}",
-            f"{forecast.error.value / error - 1:+.0%}" if error else "",
         )
 
 

@@ -33,6 +33,7 @@ class PlanReport(Plan):
     shading: str
     effects: tuple[PlannedEffect, ...]  # type: ignore[assignment]
     planning_s: Amount
+    left_out: tuple[str, ...]
     record_version: int = VERSION
 
 
@@ -44,6 +45,7 @@ def plan_report(scene: str, ready: Prepared, variant: str) -> PlanReport:
         variant=variant,
         shading=ready.pair.shading,
         planning_s=ready.planning_seconds,
+        left_out=ready.plan.omissions(),
         **asdict(plan) | {"effects": tuple(map(_planned, plan.effects))},
     )
 
@@ -81,6 +83,7 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
     yield f"variant       {plan.variant}"
     yield f"integrator    {plan.simulation}"
     yield f"depth         {depth}"
+    yield f"left out      {', '.join(plan.left_out) or 'nothing'}"
     yield f"samples       {plan.spp} per pixel in {plan.passes} passes, {plan.sampler}"
     yield f"planning      {plan.planning_s * 1e3:.0f} ms"
 

@@ -265,7 +265,13 @@ def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does
     assert code == 0
     made = json.loads(said)
     _, said, _ = run("plan", "lambert-sphere", "--resolution", "64x64", "--within", 10)
-    sentence, *_ = said.splitlines()
+    price, omitted, sentence, *_ = said.splitlines()
+    assert price == (
+        "At 64x64: Textbook shading passes at ΔE2000 10. Exact, as far as can be seen."
+    )
+    assert omitted.startswith("Left out, since it changes nothing: ")
+    assert made["price"]["left_out"]
+    assert {sample["threshold"] for sample in made["price"]["samples"]} >= {10.0}
     assert sentence.startswith("At 64x64: ")
     assert sentence.count(": measured at 12x12, 5 % of the pixels exceed ΔE2000") >= 1
     assert sentence.count("5 % of the pixels exceed") == sentence.count("measured at 12x12, 5 %")
@@ -278,7 +284,7 @@ def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does
     monkeypatch.setattr(studies, "measure_ladder", lambda *_, **__: replace(found, points=points))
     code, said, _ = run(*words, "--within", 10)
     assert code == 1
-    assert said.startswith("At 12x12 no measured method passes at ΔE2000 10")
+    assert "\nAt 12x12 no measured method passes at ΔE2000 10" in said
     assert "More samples (--spp) decide" in said
     code, _, said = run(*words, "--within", 1.1)
     assert (code, "in steps of 0.25" in said) == (2, True)

@@ -99,14 +99,21 @@ def test_the_page_has_what_is_predicted_and_the_table_marks_the_cheapest(study):
     record = study.record
     right = structs.replace(record.points[2], tolerance=MeanError(value=1.0, low=0.9, high=1.1))
     points = (*record.points[:2], right)
-    predicted = structs.replace(record, at=(1920, 1080), predicted=points)
+    predicted = structs.replace(record, at=(1920, 1080), points=points, predicted=points)
     html = Page(shown(replace(study, record=predicted))).text
-    assert "Predicted at 1920 × 1080" in html
-    assert "Predicted at" not in Page(shown(study)).text
+    assert "Predicted times at 1920 × 1080" in html
+    assert "Predicted times at" not in Page(shown(study)).text
     rows = "\n".join(cost_tables.lines(predicted)).splitlines()
     marked = [row for row in rows if "cheapest that looks right" in row]
     assert len(marked) == 1
     assert marked[0].startswith(right.method)
+    size = cost_tables.sized(record.resolution)
+    begin = f"Cheapest that looks right at {size}: {right.method} with {right.spp} samples, "
+    assert rows[0].startswith(begin)
+    assert f"{seconds(right.seconds.value)} at 1920x1080; the textbook kernel takes" in rows[0]
+    # Errors depend on the size, so none stands below.
+    first = rows.index("Predicted times at 1920x1080; errors are not predicted")
+    assert rows[first + 1].split() == ["method", "samples", "time", "interval"]
 
 
 def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_cost(study):
