@@ -83,6 +83,7 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
             "heuristic_variant": both,
             "interpolation": entry.interpolation,
             "tessellation": entry.tessellation,
+            "vertex_weights": entry.vertex_weights,
         }
         changes = {key: value for key, value in settings.items() if getattr(options, key) is None}
         return _complete(entry.source(), options.changed(**changes), entry.name)

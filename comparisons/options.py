@@ -82,6 +82,12 @@ class Options(
         _help("Mesh the shapes of the heuristic half: N edges per quarter turn or straight side.",
               "the scene's own, else 16 for flat and gouraud"),
     ] = None  # fmt: skip
+    vertex_weights: Annotated[
+        Literal["mean", "area", "angle"] | None,
+        _help("How much a face counts in its vertices' normals (6.32 to 6.34); the shapes of the"
+              " heuristic half become meshes with such normals.",
+              "the scene's own, else a mesh's normals, or angle if it has none"),
+    ] = None  # fmt: skip
     everything: Annotated[bool, _help("Switch off all pruning: simulate every effect.")] = False
     pairing: Annotated[
         Literal["literal", "matched"], _help("How roughplastic and phong are paired.")
@@ -170,6 +176,12 @@ class Options(
         return Interpolation(self.interpolation or "phong")
 
     @property
+    def has_meshes(self) -> bool:
+        """Whether the shapes of the heuristic half become meshes."""
+        is_phong = (self.interpolation or "phong") == "phong"
+        return not is_phong or bool(self.tessellation or self.vertex_weights)
+
+    @property
     def viewing(self) -> Viewing:
         """The viewing conditions."""
         # Loaded late: help needs no Mitsuba.
@@ -202,6 +214,7 @@ class OptionValues(TypedDict, total=False):
     heuristic: Any
     interpolation: Literal["flat", "gouraud", "phong"] | None
     tessellation: int | None
+    vertex_weights: Literal["mean", "area", "angle"] | None
     everything: bool
     pairing: Literal["literal", "matched"]
     define: Mapping[str, str]

@@ -217,6 +217,7 @@ def pair_for(source: Source, options: Options) -> Pair:
         resolution=options.resolution,
         interpolation=options.polygon_shading,
         tessellation=options.tessellation,
+        vertex_weights=options.vertex_weights,
         prune=not options.everything,
         sensor=options.sensor,
         heuristic=options.heuristic,

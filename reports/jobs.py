@@ -213,7 +213,7 @@ def _kind(kind: Any) -> dict[str, Any]:
 
 RENDERING = (
     "variant", "heuristic_variant", "seed", "spp", "resolution", "heuristic", "interpolation",
-    "tessellation", "everything", "pairing", "pixels_per_degree", "allow_empty",
+    "tessellation", "vertex_weights", "everything", "pairing", "pixels_per_degree", "allow_empty",
 )  # fmt: skip
 
 

@@ -69,7 +69,7 @@ def sufficient(points: Sequence[Point], tolerance: float) -> Point | None:
 def at_size(
     points: Sequence[Point], methods: Sequence[TimedMethod], size: tuple[int, int]
 ) -> list[Point]:
-    """Return points as they are at another size: with the times there, and the errors as measured."""
+    """Return points as they are at another size: the times are those there."""
     known = {method.name: method for method in methods}
     samples = size[0] * size[1]
     return [

@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # names are listed without importing Mitsuba
 VIEWER_A = (-3, -3, 0)
 VIEWER_C = (-3, 0, 1)
 WHITE_LIGHT = (((-4.24, 0, 0), (1, 1, 1)),)
+FAR_LIGHT = (((-424, 0, 0), (1, 1, 1)),)
 THREE_LIGHTS = (
     ((-4.24, 0, 0), (1, 0, 0)),
     ((-3.5, -3.5, 0), (0, 1, 0)),
@@ -28,8 +29,8 @@ class BuiltIn:
     """A built-in scene: a sentence on what it shows, and a function that makes its dictionary.
 
     ``variant`` is the variant that it needs, ``heuristic_variant`` the heuristic half's if
-    different: RGB against the spectral reference. ``interpolation`` and ``tessellation`` are the
-    heuristic half's.
+    different: RGB against the spectral reference. ``interpolation``, ``tessellation`` and
+    ``vertex_weights`` are the heuristic half's.
     """
 
     name: str
@@ -39,6 +40,7 @@ class BuiltIn:
     heuristic_variant: str | None = None
     interpolation: str = "phong"
     tessellation: int | None = None
+    vertex_weights: str | None = None
 
     def source(self) -> Source:
         """Return the scene for :func:`fotismos.reference.pair`."""
@@ -92,8 +94,26 @@ def _figures() -> Iterator[BuiltIn]:
         title = f"Figure 8.11: red, green and blue light, n = {n} (from the {reading})"
         yield _figure(f"fig-8-11-n{n}", title, lights=THREE_LIGHTS, viewer=VIEWER_C, **whole, n=n)
 
+    title = "The far lamp: as figure 8.6b, a hundred times as far; its light is as good as parallel"
+    yield _figure("far-lamp", title, lights=FAR_LIGHT, viewer=VIEWER_A, k_d=levels["b"])
+    yield BuiltIn(
+        "emission",
+        "Equation 8.1: a ball that glows, and lights nothing in the model",
+        partial(_scene, "scenes", "emission"),
+    )
+    yield BuiltIn(
+        "mirror",
+        "Equation 8.7: a ball that mirrors a matt one",
+        partial(_scene, "scenes", "mirror"),
+    )
+
 
 def _chapter_six() -> Iterator[BuiltIn]:
+    yield BuiltIn(
+        "fall-offs",
+        "Equation 6.1 and the text at 8.6: constant, linear, quadratic and clamped fall-off",
+        partial(_scene, "scenes", "fall_offs"),
+    )
     yield BuiltIn(
         "two-intensities",
         "Equations 6.6 and 6.8: an orange diffuse and a white specular intensity of one light",
@@ -115,6 +135,13 @@ def _chapter_six() -> Iterator[BuiltIn]:
         partial(_scene, "scenes", "highlight_in_a_triangle"),
         interpolation="gouraud",
         tessellation=1,
+    )
+
+    yield BuiltIn(
+        "vertex-normals",
+        "Equations 6.32 to 6.34: a block of twelve triangles; see it with other vertex weights",
+        partial(_scene, "scenes", "vertex_normals"),
+        vertex_weights="mean",
     )
 
 

@@ -5,9 +5,13 @@ that frames the sphere serves those of chapter 8. The figures of chapter 6 have 
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
+
+BLOCK = Path(__file__).with_name("block.obj")
+"""A block of 8 vertices, 2 by 1 by 1, each side divided along one diagonal."""
 
 HIGHLIGHT = (0.45, -0.3, 0.0)
 """Where the light of figure 6.14 is mirrored to the viewer: inside one of the two triangles."""
@@ -31,6 +35,18 @@ def _sphere(**bsdf: Any) -> dict[str, Any]:
     return {"type": "sphere", "bsdf": {"id": "sphere material", **bsdf}}
 
 
+def _ball(center: Sequence[float], **bsdf: Any) -> dict[str, Any]:
+    return {"type": "sphere", "center": center, "bsdf": bsdf}
+
+
+def _floor(**coefficients: float) -> dict[str, Any]:
+    return {
+        "type": "rectangle",
+        "to_world": mi.ScalarTransform4f().translate((0, 0, -1)).scale(6),
+        "bsdf": {"type": "phong", "id": "floor material", **coefficients},
+    }
+
+
 def _textbook(
     viewer: Sequence[float], field_of_view: float = 40.0, /, **content: Any
 ) -> dict[str, Any]:
@@ -51,6 +67,88 @@ def figure(lights: Any, viewer: Any, **coefficients: float) -> dict[str, Any]:
             "intensity": {"type": "rgb", "value": colour},
         }
     return scene
+
+
+def emission() -> dict[str, Any]:
+    """Equation 8.1: a ball that glows beside a matt one; in the model it lights nothing."""
+    return _textbook(
+        (0, -6, 2.5),
+        38.0,
+        floor=_floor(k_d=0.6),
+        **{
+            "matt ball": _ball((1.1, 0, 0), type="phong", id="matt", k_d=0.7),
+            "glowing ball": _ball(
+                (-1.1, 0, 0),
+                type="phong",
+                id="glowing",
+                k_i={"type": "rgb", "value": (0.9, 0.55, 0.15)},
+            ),
+        },
+        light={"type": "heuristic_directional", "direction": (1, 2, -3), "intensity": 0.4},
+    )
+
+
+def mirror() -> dict[str, Any]:
+    """Equation 8.7: a ball that mirrors, and a matt one that it should show."""
+    return _textbook(
+        (0, -6, 2.5),
+        38.0,
+        integrator={"type": "heuristic", "ambient": 1.0},
+        floor=_floor(k_a=0.1, k_d=0.5),
+        **{
+            "matt ball": _ball(
+                (1.1, 0, 0),
+                type="phong",
+                id="matt",
+                # A fifth of k_d, like the floor's: the sky that gives it is white.
+                k_a={"type": "rgb", "value": (0.16, 0.06, 0.02)},
+                k_d={"type": "rgb", "value": (0.8, 0.3, 0.1)},
+            ),
+            "mirror ball": _ball((-1.1, 0, 0), type="phong", id="mirror", k_s=0.9, n=float("inf")),
+        },
+        light={"type": "heuristic_directional", "direction": (1, 2, -3)},
+    )
+
+
+def fall_offs() -> dict[str, Any]:
+    """Equation 6.1 and the text at 8.6: constant, linear, quadratic and clamped, from the left.
+
+    Four beams, each along its own strip of floor, from near to far. All are alike at distance 3.
+    """
+    scene = _textbook((0, -8.5, 8), 42.0, floor=_floor(k_d=0.9))
+    attenuations = {
+        "constant": {"k0": 1.0, "k1": 0.0, "k2": 0.0},
+        "linear": {"k0": 0.0, "k1": 1 / 3, "k2": 0.0},
+        "quadratic": {"k0": 0.0, "k1": 0.0, "k2": 1 / 9},
+        "clamped": {"k0": 0.0, "k1": 0.0, "k2": 1 / 9, "clamped": True},
+    }
+    for number, (name, attenuation) in enumerate(attenuations.items()):
+        scene[f"{name} lamp"] = {
+            "type": "heuristic_spot",
+            "position": (2.6 * number - 3.9, -4, -0.3),
+            "direction": (0, 1, -0.2),
+            "intensity": 1.5,
+            "cutoff": 9.0,
+            **attenuation,
+        }
+    return scene
+
+
+def vertex_normals() -> dict[str, Any]:
+    """Equations 6.32 to 6.34: a block whose corners have one normal each, the mean of the faces'.
+
+    A side has one or two triangles at a corner, and counts once or twice in 6.32.
+    """
+    return _textbook(
+        (-2.2, -4, 2),
+        30.0,
+        block={
+            "type": "obj",
+            "filename": str(BLOCK),
+            "bsdf": {"type": "phong", "id": "block material", "k_d": 0.7, "k_s": 0.3, "n": 20},
+        },
+        light={"type": "heuristic_directional", "direction": (1, 2, -1.5)},
+    )
 
 
 def two_intensities() -> dict[str, Any]:

@@ -82,19 +82,20 @@ class Pairs:
         self.ready = ready
         self.heuristic_variant = options.heuristic_variant or ready.reference.variant
         self._source = source
-        key = ready.reference.variant, options.polygon_shading, options.tessellation
-        self._known = {key: ready.pair}
+        self._known = {self._key(ready.reference.variant, options): ready.pair}
 
     def of(self, interpolation: Interpolation) -> Pair:
         """Return the pair with an interpolation and the requested tessellation, in this variant.
 
         ``InputError`` if a shape cannot be a mesh, or flat and Gouraud shading have no viewpoint.
         """
-        return self._of(interpolation, self.options.tessellation)
+        return self._of(self.options.changed(interpolation=interpolation.value))
 
     def plain(self) -> Pair:
         """Return the pair with the scene's own geometry, in this variant."""
-        return self._of(Interpolation.PHONG, None)
+        return self._of(
+            self.options.changed(interpolation="phong", tessellation=None, vertex_weights=None)
+        )
 
     def effects(self, differences: Iterable[Effect]) -> tuple[Effect, ...]:
         """Return the effects in which the heuristic half as requested differs from the reference.
@@ -103,20 +104,25 @@ class Pairs:
         """
         options = self.options
         found = set(differences)
-        if options.polygon_shading is not Interpolation.PHONG or options.tessellation is not None:
+        if options.has_meshes:
             found.add(POLYGONS)
         if self.heuristic_variant != self.ready.reference.variant:
             found.add(SPECTRAL)
         return tuple(effect for effect in EFFECTS if effect in found)
 
-    def _of(self, interpolation: Interpolation, tessellation: int | None) -> Pair:
-        key = mi.variant(), interpolation, tessellation
+    def _of(self, options: Options) -> Pair:
+        key = self._key(mi.variant(), options)
         if key not in self._known:
-            changed = self.options.changed(
-                interpolation=interpolation.value, tessellation=tessellation
-            )
-            self._known[key] = pair_for(self._source, changed)
+            self._known[key] = pair_for(self._source, options)
         return self._known[key]
+
+    def _key(self, variant_name: str, options: Options) -> tuple[Any, ...]:
+        return (
+            variant_name,
+            options.polygon_shading,
+            options.tessellation,
+            options.vertex_weights,
+        )
 
 
 class HybridScenes:

@@ -22,6 +22,7 @@ import mitsuba as mi
 from fotismos.heuristic import meshes, tessellation
 from fotismos.heuristic.convention import (
     Colour,
+    Direction,
     Interaction,
     Mask,
     Mesh,
@@ -84,10 +85,12 @@ def shade_mesh(
     visible: Visibility | None = None,
     twosided: bool = False,
     model: Callable[..., Colour] = shade,
+    towards_viewer: Direction | None = None,
 ) -> None:
     """Evaluate the model (8.10) at a mesh's vertices or faces, and store the values in the mesh.
 
-    The values are as seen by a ``viewer`` ``P_V``: three numbers, or a Dr.Jit point. ``twosided``
+    The values are as seen by a ``viewer`` ``P_V``: three numbers, or a Dr.Jit point. A viewer
+    infinitely far away is in one direction, ``towards_viewer``, which replaces it. ``twosided``
     also stores those of the back, with reversed normals. ``model`` has the arguments of
     :func:`fotismos.heuristic.shade`; Dr.Jit values hold one entry, or one per vertex or face.
     Colours are RGB or single numbers: Mitsuba 3.9.1 reads attributes of 1 or 3 components.
@@ -95,7 +98,7 @@ def shade_mesh(
     si = shading_points(mesh, interpolation)
     position = mi.Vector3f(si.p)
     normal = mi.Vector3f(si.n)
-    view = mi.Vector3f(viewer) - position
+    view = mi.Vector3f(viewer) - position if towards_viewer is None else towards_viewer
     # Terms that do not depend on the position are a single number until spread out.
     everywhere = dr.zeros(mi.Float, dr.width(position))
     attributes = {}
@@ -147,7 +150,8 @@ def derived(base: type) -> type:
         """See :mod:`fotismos.heuristic.plugins.integrator`."""
 
         def render(self, scene: Scene, sensor: Any = 0, *others: Any, **named: Any) -> Any:
-            viewer = viewpoint(scene.sensors()[sensor] if isinstance(sensor, int) else sensor)
+            camera = scene.sensors()[sensor] if isinstance(sensor, int) else sensor
+            viewer, towards_viewer = viewpoint(camera)
             # Stored for all shapes alike, because reading cannot distinguish them.
             twosided = _is_twosided(scene)
             for mesh in _meshes(scene):
@@ -165,6 +169,7 @@ def derived(base: type) -> type:
                     visible=self.visibility(scene, at, True),
                     twosided=twosided,
                     model=self.model_at(scene, at),
+                    towards_viewer=towards_viewer,
                 )
             return super().render(scene, sensor, *others, **named)
 
@@ -195,14 +200,23 @@ def _meshes(scene: Scene) -> list[Mesh]:
     return shapes
 
 
-def viewpoint(sensor: Any) -> Position:
-    """Return the viewer's position; reject cameras without one."""
-    if not isinstance(sensor, mi.ProjectiveCamera) or "Orthographic" in sensor.class_name():
+def viewpoint(sensor: Any) -> tuple[Position, Direction | None]:
+    """Return the viewer's position, and the direction to an orthographic camera, else None.
+
+    Cameras that have neither are rejected.
+    """
+    if not isinstance(sensor, mi.ProjectiveCamera):
         raise InputError(
             f"sensor {sensor.id()!r} ({sensor.class_name()}) has no single viewpoint, which flat"
-            " and Gouraud shading need: use perspective or thinlens, or phong interpolation."
+            " and Gouraud shading need: use perspective, thinlens or orthographic, or phong"
+            " interpolation."
         )
-    return sensor.world_transform().translation()
+    to_world = sensor.world_transform()
+    position = to_world.translation()
+    if "Orthographic" not in sensor.class_name():
+        return position, None
+    # A camera looks along +z.
+    return position, dr.normalize(mi.Vector3f(to_world @ mi.Vector3f(0, 0, -1)))
 
 
 def require_colours() -> None:

@@ -76,7 +76,8 @@ class PairOptions:
     """How both halves are derived from a scene.
 
     FLAT and GOURAUD make meshes of the heuristic half's shapes, by ``tessellation``
-    (:mod:`fotismos.heuristic.tessellation`); if that is given, PHONG gets meshes too. ``prune``
+    (:mod:`fotismos.heuristic.tessellation`), with vertex normals by ``vertex_weights`` (6.32 to
+    6.34); if one of the two is given, PHONG gets meshes too. ``prune``
     lets the kernel leave out the terms that no material has. ``heuristic`` names the declaration
     that shades the heuristic half; ``with_partners`` lets its materials know their physical
     parameters (:mod:`fotismos.reference.pairing.nearest`), as they do for every user's heuristic.
@@ -86,10 +87,17 @@ class PairOptions:
     resolution: tuple[int, int] | None = None
     interpolation: Interpolation = Interpolation.PHONG
     tessellation: int | None = None
+    vertex_weights: str | None = None
     prune: bool = True
     sensor: int = 0
     heuristic: str = PHONG.name
     with_partners: bool = False
+
+    @property
+    def has_meshes(self) -> bool:
+        """Whether the heuristic half's shapes become meshes."""
+        is_phong = self.interpolation is Interpolation.PHONG
+        return not is_phong or bool(self.tessellation or self.vertex_weights)
 
 
 def pair(source: Source, options: PairOptions | None = None) -> Pair:
@@ -145,14 +153,17 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
     )
     props.set_id("integrator")  # identifies its parameters
     half.attach(0, "integrator", half.add(INTEGRATOR, props))
-    is_phong = options.interpolation is Interpolation.PHONG
-    if not is_phong or options.tessellation is not None:
+    if options.has_meshes:
         from fotismos.reference.pairing import (
             polygons,  # loaded late: few scenes are made into triangles
         )
 
         polygons.replace_shapes(
-            half, geometry(), resolution=options.tessellation, interpolation=options.interpolation
+            half,
+            geometry(),
+            resolution=options.tessellation,
+            interpolation=options.interpolation,
+            weights=options.vertex_weights,
         )
 
     # The physical half.

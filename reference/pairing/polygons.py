@@ -16,12 +16,17 @@ from fotismos.reference.scene.graph import Graph, Reference, properties
 
 
 def replace_shapes(
-    graph: Graph, scene: Scene, resolution: int | None, interpolation: Interpolation
+    graph: Graph,
+    scene: Scene,
+    resolution: int | None,
+    interpolation: Interpolation,
+    weights: str | None,
 ) -> None:
     """Replace every shape of a graph by a mesh of the same place, name, material and light.
 
     ``scene`` has the same shapes, instantiated; ids identify them. Gouraud shading needs one normal
-    per vertex, hence separate faces if the mesh has ``face_normals``.
+    per vertex, hence separate faces if the mesh has ``face_normals``. With ``weights``, vertex
+    normals are those of 6.32, 6.33 or 6.34, whatever a mesh has.
     """
     if interpolation is not Interpolation.PHONG:
         viewpoint(scene.sensors()[0])  # raises before anything renders
@@ -38,8 +43,8 @@ def replace_shapes(
         if mesh.has_face_normals():
             if interpolation is Interpolation.GOURAUD:
                 mesh = tessellation.split_faces(mesh)
-        elif not mesh.has_vertex_normals():
-            mesh = tessellation.with_vertex_normals(mesh)
+        elif weights or not mesh.has_vertex_normals():
+            mesh = tessellation.with_vertex_normals(mesh, weights or "angle")
         path = folder.path / f"{index}.ply"
         try:
             mesh.write_ply(str(path))

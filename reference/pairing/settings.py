@@ -202,8 +202,10 @@ def _take_integrator(graph: Graph, settings: Settings) -> None:
         if plugin == "heuristic":
             settings.ambient = props.get("ambient", None)
             settings.occlusion = props.get("occlusion", False)
-            # The chapters' background is black, although their ambient light fills the room.
-            settings.hide_emitters = settings.ambient is not None if hidden is None else hidden
+            # The chapters' background is black, although their ambient light fills the room. But
+            # what glows (8.1) is seen, and Mitsuba hides both or none.
+            is_black = settings.ambient is not None and not _glows(graph)
+            settings.hide_emitters = is_black if hidden is None else hidden
             continue
         is_kept = plugin in (*PATHS, "direct")
         try:
@@ -220,3 +222,9 @@ def _take_integrator(graph: Graph, settings: Settings) -> None:
         settings.hide_emitters = bool(hidden)
         settings.max_depth = 2 if plugin == "direct" else props.get("max_depth", -1)
         settings.rr_depth = props.get("rr_depth", None)
+
+
+def _glows(graph: Graph) -> bool:
+    """Return whether a material has an emission coefficient."""
+    materials = graph.nodes(mi.ObjectType.BSDF, "phong")
+    return any("k_i" in graph.props(index) for index in materials)

@@ -231,8 +231,13 @@ ONE_INTENSITY = Effect(
 def _inexact_lights(with_cone: bool) -> Callable[[Facts], list[str]]:
     """Find the keys of the scene's lights whose two forms differ by cone, or only by fall-off.
 
-    A spot's attenuation goes with its cone: Mitsuba has no spot with another fall-off.
+    A spot's attenuation goes with its cone: Mitsuba has no spot with another fall-off. An even cone
+    (``m = 0``) is the same in both forms.
     """
+
+    def has_cone(graph: Graph, index: int) -> bool:
+        is_spot = lights.of(graph.plugin(index)).has("cutoff")
+        return is_spot and graph.props(index).get("exponent", 0.0) != 0
 
     def sites(facts: Facts) -> list[str]:
         heuristic = facts.pair.heuristic
@@ -243,7 +248,7 @@ def _inexact_lights(with_cone: bool) -> Callable[[Facts], list[str]]:
             for key, index in heuristic.children(0, EMITTER)
             if key in physical
             and lights.of(heuristic.plugin(index)).has("attenuation")
-            and lights.of(heuristic.plugin(index)).has("cutoff") is with_cone
+            and has_cone(heuristic, index) is with_cone
             and heuristic.label(index) in inexact
         ]
 

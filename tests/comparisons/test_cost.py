@@ -193,7 +193,7 @@ def test_a_scene_says_why_it_cannot_have_a_method(rgb, tmp_path):
     path = tmp_path / "parallel.xml"
     path.write_text(SCENE.replace("perspective", "orthographic"))
     found = ladder(Source("parallel", path))
-    assert "has no single viewpoint" in found.left_out["Gouraud kernel"]
+    assert "it needs a mesh" in found.left_out["Gouraud kernel"]
     assert found.left_out["path 4"] == "the scene's own paths end at depth 3"
     source = Source("orthographic", CORPUS / "sensor-orthographic.xml")
     kernels = {each.name for each in ladder(source).methods if "kernel" in each.name}

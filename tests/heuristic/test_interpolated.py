@@ -5,6 +5,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.heuristic import DirectionalLight, Material, PointLight, meshes, shade, tessellation
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.normals import WEIGHTINGS
@@ -275,6 +276,31 @@ def test_flat_and_gouraud_shading_are_refused_by_wavelength(spectral):
         mi.load_dict(two_balls(twosided=False))
 
 
+@pytest.mark.parametrize("interpolation", [FLAT, GOURAUD])
+def test_an_orthographic_camera_sees_a_plane_evenly(rgb, interpolation):
+    """Then N, L and V are the same everywhere, which is the premise of flat shading."""
+    phong = {"type": "phong", "k_d": 0.3, "k_s": 0.6, "n": 12.0}
+    square = mi.load_dict({"type": "rectangle", "id": "square", "bsdf": phong})
+    pictures = {}
+    for plugin in ("orthographic", "perspective"):
+        scene = {
+            "type": "scene",
+            "integrator": {"type": "heuristic", "interpolation": interpolation.value},
+            "sensor": camera((0.4, -1, 2), size=8, type=plugin)
+            | ({"fov": 30.0} if plugin == "perspective" else {}),
+            "sun": {"type": "heuristic_directional", "direction": (0.5, -0.8, -2)},
+            "square": tessellation.to_mesh(square, 2),
+        }
+        image = np.array(mi.render(mi.load_dict(scene, optimize=False), spp=1))
+        pictures[plugin] = image[2:6, 2:6]
+    material = oracle.Material(k_d=0.3, k_s=0.6, n=12)
+    sun = oracle.Light("directional", 1.0, direction=(0.5, -0.8, -2))
+    view = np.array([(0.4, -1.0, 2.0)])
+    expected = oracle.shade(np.zeros((1, 3)), np.array([(0, 0, 1.0)]), view, material, [sun])
+    np.testing.assert_allclose(pictures["orthographic"], expected.ravel()[0], atol=1e-5)
+    assert np.ptp(pictures["perspective"]) > 0.02
+
+
 # --- A scene's shapes become meshes ---------------------------------------------------------------
 
 TETRAHEDRON = np.array([(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)], float)
@@ -310,6 +336,30 @@ def test_meshes_with_the_normals_of_faces_keep_them(rgb, tmp_path):
     assert len(np.unique(expected[..., 0].round(4))) > 3
     for name, picture in pictures.items():
         np.testing.assert_allclose(picture, expected, atol=1e-5, err_msg=name)
+
+
+@pytest.mark.parametrize("weights", WEIGHTINGS)
+def test_vertex_normals_have_the_weights_that_are_asked_for(rgb, weights):
+    """Those of the block's corners, summed over its triangles in NumPy (6.32 to 6.34)."""
+    scene = half(SCENES["vertex-normals"].source(), vertex_weights=weights)
+    (mesh,) = scene.shapes()
+    points = rows(meshes.positions(mesh)).astype(float)
+    corners = rows(meshes.faces(mesh)).astype(int)
+    expected = np.zeros_like(points)
+    for face in corners:
+        for corner in range(3):
+            here, after, before = points[np.roll(face, -corner)]
+            product = np.cross(after - here, before - here)
+            double_area = np.linalg.norm(product)
+            angle = np.arctan2(double_area, np.dot(after - here, before - here))
+            weight = {"mean": 1.0, "area": double_area, "angle": angle}[weights]
+            expected[face[corner]] += weight * product / double_area
+    expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+    assert len(points) == 8
+    np.testing.assert_allclose(rows(tessellation.normals(mesh)), expected, atol=1e-6)
+    # Only the angles do not depend on how a side is divided.
+    is_even = np.allclose(np.abs(expected), 1 / np.sqrt(3), atol=1e-6)
+    assert is_even is (weights == "angle")
 
 
 def test_instances_are_refused_by_name(rgb):
