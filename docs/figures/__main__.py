@@ -23,6 +23,7 @@ from docs.figures import (
     guarantees,
     hero,
     lessons,
+    light_counts,
     measured,
     model_figures,
     prices,
@@ -141,6 +142,7 @@ def _images(name: str, interpolation: Interpolation | None = None) -> Images:
         resolution=(SIDE, SIDE),
         interpolation=(interpolation or Interpolation(scene.interpolation)).value,
         tessellation=scene.tessellation,
+        vertex_weights=scene.vertex_weights,
     )
     return compare(scene.source(), options).images
 
@@ -183,6 +185,11 @@ def _measurements() -> None:
     found = density.measured()
     atomic.write(DOCS / "models-density.svg", figures.drawn(density.chart(found), "svg"))
     replace("models.md", "density", density.sentences(found))
+    shading = light_counts.measured()
+    atomic.write(
+        DOCS / "models-light-counts.svg", figures.drawn(light_counts.chart(shading), "svg")
+    )
+    replace("models.md", "light counts", light_counts.sentences(shading))
     for measure in (measured.baselines, measured.findings):
         measure()
     replace("witnesses.md", "noise", fact("intervals_in_noise"))
@@ -210,6 +217,7 @@ def _prices() -> None:
     for page in ("accuracy.md", "../README.md"):
         replace(page, "prices", prices.sentences(records))
     replace("accuracy.md", "table of prices", prices.table(records))
+    replace("models.md", "complexity", prices.complexity(records))
 
 
 def _guarantees() -> None:
@@ -286,9 +294,10 @@ def _renderers() -> None:
 
 
 def _lessons() -> None:
-    """Render the pixels of docs/lessons.md."""
+    """Render the pictures and pixels of docs/lessons.md."""
     for lesson in lessons.LESSONS:
-        replace("lessons.md", lesson, lessons.table(lesson))
+        atomic.write(DOCS / lessons.file(lesson), lessons.picture(lesson))
+        replace("lessons.md", lesson, lessons.lines(lesson))
 
 
 def _notebook() -> None:

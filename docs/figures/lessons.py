@@ -1,67 +1,201 @@
-"""The numbers of docs/lessons.md: what both halves of built-in scenes have at pixels."""
+"""The pictures, equations and numbers of docs/lessons.md: both halves of built-in scenes."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
+from PIL import Image, ImageDraw
 
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import Images
+from fotismos.comparisons.comparison import Comparison, Images
+from fotismos.comparisons.departure.metrics import LEADING, METRICS
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.pixel_terms import LightTerms, PixelTerms
+from fotismos.comparisons.steps import with_terms
+from fotismos.heuristic.convention import Floats
+from fotismos.reference.records import Missing
+from fotismos.reports.files import images as files
 from fotismos.reports.terminal.tables import markdown
 
 SIDE, SAMPLES = 64, 1024
+"""Size of the pictures whose pixels a lesson names, and samples per pixel."""
 
-LESSONS: dict[str, tuple[tuple[str, int, int], ...]] = {
-    "sky": (("fig-8-5a", 32, 32), ("fig-8-5a", 50, 32)),
-    "distance": (("fig-8-6a", 15, 32), ("fig-8-6a", 42, 32), ("lambert-sphere", 42, 32)),
-    "rim": (("fig-8-7a", 14, 32), ("fig-8-7a", 31, 32)),
-    "shadow": (("fig-8-8a", 49, 32),),
-    "sum": (("fig-8-8c", 32, 38),),
-    "exponent": (("fig-8-8c", 32, 38), ("fig-8-9", 32, 38), ("fig-8-8c", 32, 50),
-                 ("fig-8-9", 32, 50)),
-    "half vector": (("fig-8-9", 45, 32), ("fig-8-9 --heuristic blinn", 45, 32)),
-    "channels": (("fig-8-11-n9", 48, 32), ("fig-8-9", 48, 32)),
-    "beam": (("fig-6-5-m1", 44, 32), ("fig-6-5-m40", 32, 32), ("fig-6-5-m40", 44, 32)),
-    "edges": (("fig-6-10", 31, 32), ("fig-6-10", 32, 32),
-              ("fig-6-10 --interpolation phong", 31, 32),
-              ("fig-6-10 --interpolation phong", 32, 32)),
-    "vertices": (("fig-6-14", 42, 37), ("fig-6-14 --interpolation phong", 42, 37)),
-    "surfaces": (("cornell-box", 20, 6), ("cornell-box", 36, 50), ("cornell-box", 48, 58)),
-}  # fmt: skip
-"""Words of the command, column and row of the pixels of each lesson."""
+PANEL, PANEL_SAMPLES = 256, 64
+"""Side of the pictures that a lesson shows, and samples per pixel."""
+
+GAP = 8
+"""Pixels between two pictures."""
+
+RING = "#2ca0ff"
+"""The colour of the circles around the pixels that a lesson names."""
+
+
+@dataclass(frozen=True)
+class Pixel:
+    """A pixel of a scene: the words of the command that renders it, column and row."""
+
+    command: str
+    column: int
+    row: int
+
+
+LESSONS: dict[str, tuple[Pixel, ...]] = {
+    "emission": (Pixel("emission", 16, 31), Pixel("emission", 16, 51)),
+    "sky": (Pixel("fig-8-5a", 32, 32), Pixel("fig-8-5a", 50, 32)),
+    "distance": (
+        Pixel("fig-8-6a", 15, 32),
+        Pixel("fig-8-6a", 42, 32),
+        Pixel("lambert-sphere", 42, 32),
+    ),
+    "fall-offs": (
+        Pixel("fall-offs", 2, 45),
+        Pixel("fall-offs", 9, 20),
+        Pixel("fall-offs", 41, 45),
+        Pixel("fall-offs", 38, 20),
+    ),
+    "far": (Pixel("fig-8-6b", 15, 32), Pixel("far-lamp", 15, 32), Pixel("far-lamp", 42, 32)),
+    "rim": (Pixel("fig-8-7a", 14, 32), Pixel("fig-8-7a", 31, 32)),
+    "mirror": (Pixel("mirror", 16, 30), Pixel("mirror", 27, 26)),
+    "shadow": (Pixel("fig-8-8a", 49, 32),),
+    "sum": (Pixel("fig-8-8c", 32, 38),),
+    "exponent": (
+        Pixel("fig-8-8c", 32, 38),
+        Pixel("fig-8-9", 32, 38),
+        Pixel("fig-8-8c", 32, 50),
+        Pixel("fig-8-9", 32, 50),
+    ),
+    "half vector": (Pixel("fig-8-9", 45, 32), Pixel("fig-8-9 --heuristic blinn", 45, 32)),
+    "channels": (Pixel("fig-8-11-n9", 48, 32), Pixel("fig-8-9", 48, 32)),
+    "beam": (
+        Pixel("fig-6-5-m1", 44, 32),
+        Pixel("fig-6-5-m40", 32, 32),
+        Pixel("fig-6-5-m40", 44, 32),
+    ),
+    "weights": (
+        Pixel("vertex-normals", 26, 31),
+        Pixel("vertex-normals --vertex-weights angle", 26, 31),
+    ),
+    "edges": (
+        Pixel("fig-6-10", 31, 32),
+        Pixel("fig-6-10", 32, 32),
+        Pixel("fig-6-10 --interpolation phong", 31, 32),
+        Pixel("fig-6-10 --interpolation phong", 32, 32),
+    ),
+    "vertices": (Pixel("fig-6-14", 42, 37), Pixel("fig-6-14 --interpolation phong", 42, 37)),
+    "surfaces": (
+        Pixel("cornell-box", 20, 6),
+        Pixel("cornell-box", 36, 50),
+        Pixel("cornell-box", 48, 58),
+    ),
+}
+"""The pixels of each lesson; its picture shows the scene of the first."""
 
 
 @cache
-def images(command: str) -> Images:
+def compared(command: str, side: int = SIDE, spp: int = SAMPLES) -> Comparison:
     """Compare as a command does whose words are a scene and options."""
     scene, *words = command.split(" --")
-    given: dict[str, Any] = dict(word.split() for word in words)
-    case = open_case(scene, Options(resolution=(SIDE, SIDE), spp=SAMPLES, **given))
-    return compare(case.source, case.options).images
+    given: dict[str, Any] = dict(word.replace("-", "_").split() for word in words)
+    case = open_case(scene, Options(resolution=(side, side), spp=spp, **given))
+    return compare(case.source, case.options, then=[with_terms])
 
 
-def values(lesson: str) -> np.ndarray:
+def values(lesson: str) -> Floats:
     """Return the linear RGB of textbook and reference at each pixel, (pixels, 2, 3)."""
-    found = [(images(command), column, row) for command, column, row in LESSONS[lesson]]
-    return np.array([[half[row, column] for half in (one.heuristic, one.reference)]
-                     for one, column, row in found])  # fmt: skip
+    found = []
+    for pixel in LESSONS[lesson]:
+        shown: Images = compared(pixel.command).images
+        halves = (shown.heuristic, shown.reference)
+        found.append([half[pixel.row, pixel.column] for half in halves])
+    return np.array(found)
 
 
-def table(lesson: str) -> Iterator[str]:
-    """Yield the table of a lesson."""
+def lines(lesson: str) -> Iterator[str]:
+    """Yield the picture of a lesson, and its table: 8.10 with the numbers put in, both halves."""
+    yield f"![Textbook, physical, and the error: {LESSONS[lesson][0].command}]({file(lesson)})"
+    yield ""
     rows = [
-        (f"`{command}` at {column}, {row}", *map(_shown, halves))
-        for (command, column, row), halves in zip(LESSONS[lesson], values(lesson), strict=True)
+        (
+            f"`{pixel.command}` at {pixel.column}, {pixel.row}",
+            _equation(pixel),
+            *map(_shown, halves),
+        )
+        for pixel, halves in zip(LESSONS[lesson], values(lesson), strict=True)
     ]
-    yield from markdown([("Pixel", "Textbook", "Physical"), *rows], right=1)
+    yield from markdown([("Pixel", "8.10 at its centre", "Textbook", "Physical"), *rows], right=2)
 
 
-def _shown(colour: np.ndarray) -> str:
+def file(lesson: str) -> str:
+    """Return the path of a lesson's picture, from docs."""
+    return f"lessons/{lesson.replace(' ', '-')}.webp"
+
+
+def picture(lesson: str) -> bytes:
+    """Return a lesson's picture: both halves and the map of the error, with its pixels marked."""
+    command = LESSONS[lesson][0].command
+    shown = compared(command, PANEL, PANEL_SAMPLES).images
+    panels = [
+        files.tonemap(shown.heuristic),
+        files.tonemap(shown.reference),
+        files.error_map(shown.maps[LEADING.name], METRICS[LEADING.name].map_range[1]),
+    ]
+    width = len(panels) * (PANEL + GAP) - GAP
+    strip = Image.new("RGB", (width, PANEL), "white")
+    for number, panel in enumerate(panel.convert("RGB") for panel in panels):
+        drawing = ImageDraw.Draw(panel)
+        for pixel in LESSONS[lesson]:
+            if pixel.command == command:
+                x, y = ((place + 0.5) * PANEL / SIDE for place in (pixel.column, pixel.row))
+                drawing.ellipse((x - 5, y - 5, x + 5, y + 5), outline=RING, width=2)
+        strip.paste(panel, (number * (PANEL + GAP), 0))
+    return files.webp(strip)
+
+
+def _equation(pixel: Pixel) -> str:
+    """Return 8.10 with a pixel's numbers, in red; empty if its intensities are interpolated."""
+    grid = compared(pixel.command).terms
+    terms = None if grid is None or isinstance(grid, Missing) else grid.at(pixel.column, pixel.row)
+    if terms is None or terms.pixel != (pixel.column, pixel.row):
+        return ""
+    parts = [
+        *_product(terms.emission[0]),
+        *_product(terms.material.ambient[0], terms.material.k_a[0]),
+    ]
+    for light in terms.lights:
+        parts += _reflected(light, terms)
+    if not parts:
+        return "$0$"
+    return f"${' + '.join(parts)}$"
+
+
+def _reflected(light: LightTerms, terms: PixelTerms) -> Iterator[str]:
+    """Yield both terms of a light: ``I_p f_att k_d (N.L)``, and the same with ``k_s`` and lobe."""
+    material = terms.material
+    if light.cos_incidence <= 0:
+        return
+    yield from _product(light.intensity[0], light.attenuation, material.k_d[0], light.cos_incidence)
+    if material.k_s[0] and light.lobe > 0:
+        cosine = f"{light.cos_reflection:.3f}^{{{material.n:g}}}"
+        if material.form != "phong":
+            cosine = f"{light.lobe:.3f}"
+        front = _product(light.specular_intensity[0], light.attenuation, material.k_s[0])
+        yield from (rf"{factors} \cdot {cosine}" for factors in front)
+
+
+def _product(*factors: float) -> Iterator[str]:
+    """Yield factors as a product, without those that are 1; nothing if one is 0."""
+    if 0 in factors:
+        return
+    kept = [factor for factor in factors if abs(factor - 1) > 5e-4] or [1.0]
+    yield r" \cdot ".join(f"{factor:.3g}" for factor in kept)
+
+
+def _shown(colour: Floats) -> str:
     """Return a grey as one number, another colour as three."""
     shown = [f"{value:.3f}" for value in colour]
     return ", ".join(shown if len(set(shown)) > 1 else shown[:1])

@@ -56,6 +56,23 @@ def sentences(records: Sequence[ComparisonRecord]) -> Iterator[str]:
     )
 
 
+def complexity(records: Sequence[ComparisonRecord]) -> Iterator[str]:
+    """Yield what physics takes over the textbook in the figures of chapter 8."""
+    ratios = [
+        record.price.ratio.value
+        for record in records
+        if record.scene.startswith("fig-8") and record.price and record.price.ratio
+    ]
+    yield (
+        "Chapter 8 leaves physical models out because of their considerably greater complexity. In"
+        f" {len(ratios)} of its own figures a sample of the physical half takes"
+        f" {number(min(ratios))} to {number(max(ratios))} times as long as one of the textbook"
+        " half: both trace the same camera rays, and one ball hides and lights nothing else. In the"
+        " Cornell box it does take longer, and needs more samples"
+        " ([what accuracy costs](accuracy.md))."
+    )
+
+
 def table(records: Sequence[ComparisonRecord]) -> Iterator[str]:
     """Yield a row for each scene: what differs, what is needed, and what that takes."""
     rows: list[tuple[str, ...]] = [

@@ -185,7 +185,7 @@ POLYGONS = Effect(
     label="polygon interpolation",
     heuristic="flat, Gouraud (6.35-6.38)",
     reference="none",
-    cost="a lookup",
+    cost="a sum per vertex or face, then a lookup: saves time with many lights",
     rule=lambda facts: (
         facts.interpolation is not Interpolation.PHONG,
         f"interpolation {facts.interpolation.value}",

@@ -22,7 +22,21 @@ def falls_off(t, p):
     return np.ptp(p / t * distance**2) < 0.02 * p[0] / t[0] * distance[0] ** 2
 
 
+def computed(equation):
+    """The value of products and powers as the table has them, such as ``0.5 \\cdot 0.9^{3}``."""
+    total = 0.0
+    for product in equation.strip("$").split(" + "):
+        factors = (re.fullmatch(r"([\d.]+)(?:\^\{(\d+)\})?", f) for f in product.split(r" \cdot "))
+        total += np.prod([float(factor[1]) ** int(factor[2] or 1) for factor in factors])
+    return total
+
+
 CLAIMS = {
+    "emission": lambda t, p: (same(t[0], p[0]), p[1] > 1.5 * t[1]),
+    "fall-offs": lambda t, p: (p[0] > 2 * t[0], p[1] < t[1] / 3, same(t[2:], p[2:])),
+    "far": lambda t, p: (p[0] > 1.1 * t[0], same(t[1:], p[1:])),
+    "mirror": lambda t, p: (same(t, 0), p[0] > 0.1),
+    "weights": lambda t, p: (p[0] - t[0] > 5 * abs(p[1] - t[1]), same(p[0], p[1])),
     "sky": lambda t, p: (same(t, 0.5), same(p, 0.5)),
     "distance": lambda t, p: (p[0] > t[0], p[1] < t[1], same(t[2], p[2]),
                               falls_off(t[:2], p[:2])),
@@ -42,13 +56,22 @@ CLAIMS = {
 @pytest.mark.thorough
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.partition("\n")[0])
 def test_a_lesson_says_what_a_rendering_shows(section):
-    assert len(SECTIONS) == 12
+    assert len(SECTIONS) == 17
     ((name, table),) = TABLE.findall(section)
-    assert len(TABLE.sub("", section).split()) <= 80
+    assert len(TABLE.sub("", section).split()) <= 150
+    assert "**Try:** `./run compare " in section
+    assert section.count("<details><summary>Exercise: ") == 1
+    # The picture has a circle around each pixel of its scene, in all three parts.
+    assert (ROOT / "docs" / lessons.file(name)).read_bytes()[8:12] == b"WEBP"
     found = lessons.values(name)
-    rows = re.findall(r"^\| `(.*)` at (\d+), (\d+) \| (.*) \| (.*) \|$", table, re.MULTILINE)
-    assert [(scene, int(x), int(y)) for scene, x, y, *_ in rows] == [*lessons.LESSONS[name]]
-    for (*_, textbook, physical), halves in zip(rows, found, strict=True):
+    pattern = r"^\| `(.*)` at (\d+), (\d+) \| (.*) \| (.*) \| (.*) \|$"
+    rows = re.findall(pattern, table, re.MULTILINE)
+    pixels = [lessons.Pixel(scene, int(x), int(y)) for scene, x, y, *_ in rows]
+    assert pixels == [*lessons.LESSONS[name]]
+    for (*_, equation, textbook, physical), halves in zip(rows, found, strict=True):
+        if equation:
+            # The pixel is a mean over its square, the equation is that of its centre.
+            assert halves[0][0] == pytest.approx(computed(equation), abs=0.02, rel=0.02), equation
         for shown, colour in zip((textbook, physical), halves, strict=True):
             assert colour == pytest.approx(np.float64(shown.split(", ")) * np.ones(3), 0.02, 2e-3)
     if name == "channels":  # the red lamp's is the white lamp's
