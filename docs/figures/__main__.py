@@ -6,6 +6,7 @@ Pictures and tables come from renderings with fixed seeds. Marked parts of pages
 rest is written by hand.
 """
 
+import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
@@ -173,10 +174,14 @@ def _hero() -> None:
 
 
 def _site() -> None:
-    """Build the site from what is there, in out/site."""
+    """Build the site from what is there, in out/site, with a page for the lessons' scenes."""
     folder = ROOT / "out/site"
     if build.build(folder):
         raise SystemExit(f"The site in {folder} is not whole: mend the faults above.")
+    # The lessons' scenes, with live shading: nothing has to be installed to move the sliders.
+    size = f"{lessons.SIDE}x{lessons.SIDE}"
+    words = ["compare", *lessons.scenes(), "--resolution", size, "--output", str(folder / "live")]
+    subprocess.run([sys.executable, "-P", "-m", "fotismos.reports", *words], cwd=ROOT, check=True)
     print(folder / "index.html")
 
 

@@ -1,5 +1,6 @@
 """The pictures, equations and numbers of docs/lessons.md: both halves of built-in scenes."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -96,6 +97,15 @@ LESSONS: dict[str, tuple[Pixel, ...]] = {
 """The pixels of each lesson; its picture shows the scene of the first."""
 
 
+MOVED = {
+    "sky": "k_a:0:0.9",
+    "shadow": "k_a:0:0.39",
+    "exponent": "n:0:3",
+    "beam": "cutoff:0:20,m:0:0",
+}
+"""Sliders that a lesson moves: the part ``live`` of the page's address."""
+
+
 @cache
 def compared(command: str, side: int = SIDE, spp: int = SAMPLES) -> Comparison:
     """Compare as a command does whose words are a scene and options."""
@@ -154,6 +164,30 @@ def picture(lesson: str) -> bytes:
                 drawing.ellipse((x - 5, y - 5, x + 5, y + 5), outline=RING, width=2)
         strip.paste(panel, (number * (PANEL + GAP), 0))
     return files.webp(strip)
+
+
+def scenes() -> list[str]:
+    """Return the scenes of all lessons."""
+    commands = (pixel.command for pixels in LESSONS.values() for pixel in pixels)
+    return list(dict.fromkeys(command.partition(" ")[0] for command in commands))
+
+
+def with_pages(text: str, folder: str) -> str:
+    """Return docs/lessons.md with a link to each lesson's page in a folder, for the site."""
+    sections = re.split(r"(?m)^(?=## )", text)
+    return "".join(_with_page(section, folder) for section in sections)
+
+
+def _with_page(section: str, folder: str) -> str:
+    lesson = re.search(r"<!-- (.*?): made by", section)
+    command = re.search(r"\*\*Try:\*\* `\./run compare ([\w-]+)[^`]*`", section)
+    if lesson is None or command is None:
+        return section
+    fragment = f"scene={command[1]}"
+    if moved := MOVED.get(lesson[1]):
+        fragment = f"{fragment}&amp;live={moved}"
+    link = f'<a href="{folder}/index.html#{fragment}">Open it here.</a>'
+    return f"{section.rstrip()}\n\n{link}\n\n"
 
 
 def _equation(pixel: Pixel) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from posixpath import dirname, normpath, relpath
 
+from docs.figures import lessons
 from docs.figures.from_tests import ROOT
 from docs.website import api_pages, file_pages, notebook_page
 
@@ -15,6 +16,9 @@ PICTURES = (".png", ".svg", ".webp")
 
 ORDER = "docs/README.md"
 """The page that lists the others in reading order, under headings in bold."""
+
+LESSONS = "docs/lessons.md"
+"""The page whose scenes the site shows live."""
 
 PROJECT = ("CONTRIBUTING.md", "CHANGELOG.md")
 
@@ -27,6 +31,8 @@ def gather(folder: Path) -> None:
         text = with_links(path.read_text(encoding="utf-8"), page, linked)
         if page == "README.md":
             text += "\n".join(contents())
+        if page == LESSONS:
+            text = lessons.with_pages(text, "../live")
         write(folder / place(page), text)
     for path in (ROOT / "docs").rglob("*"):
         if path.suffix in PICTURES:
