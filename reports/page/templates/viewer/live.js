@@ -185,7 +185,8 @@ class LiveShading {
   arrange({ live: { lights }, numbers }) {
     const light = lights[Number(this.light.value)];
     this.part("place").textContent = light?.position ? "Position" : "Direction of travel";
-    this.part("law").textContent = `as given: ${light?.attenuation?.map(k => Number(k.toPrecision(3))).join(", ")}`;
+    const law = light?.attenuation?.map(k => Number(k.toPrecision(3)));
+    this.part("law").textContent = `as given: ${law?.join(", ")}`;
     const isLit = numbers.original("I_a", 0) !== null;
     for (const control of this.controls) {
       const { name } = control;
