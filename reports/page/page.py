@@ -45,7 +45,7 @@ TITLE = "Textbook shading against physically based rendering"
 
 SCRIPTS = (
     *HELP, "address", "overview", "images", "viewport", "drawing", "switches", "panels", "viewer",
-    "pointer", "keyboard", "terms", "shading", "live", "main",
+    "pointer", "keyboard", "terms", "shading", "numbers", "live", "main",
 )  # fmt: skip
 
 FIRST_MOVED = 3

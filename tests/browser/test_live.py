@@ -1,6 +1,7 @@
 """Shading again on the page: as the kernel does, and what follows the sliders."""
 
 import json
+import re
 
 import drjit as dr
 import mitsuba as mi
@@ -17,14 +18,16 @@ from fotismos.reference.rendering.renderer import variant
 from fotismos.reports.page.templating import TEMPLATES
 from fotismos.reports.page.why_view import live_view
 from tests.browser.conftest import EXACT, NOISY, NOISY_ID, PHONE, violations
-from tests.shared.spheres import prepared
+from tests.shared.misplanned import scene as described
+from tests.shared.parts import moved
+from tests.shared.spheres import centres, prepared
 
 SCENE = f"#scene={NOISY_ID}"
 SCENES = (
     "fig-8-5b", "fig-8-6b", "fig-8-9", "fig-8-11-n9", "fig-6-5-m40", "fig-6-10", "lambert-sphere",
     "plastic-spheres", "cornell-box", "two-intensities",
 )  # fmt: skip
-SCRIPTS = ("page", "images", "terms", "shading")
+SCRIPTS = ("page", "images", "terms", "shading", "numbers")
 
 STEP = 1 / 255
 """What a screen of 8 bits can show."""
@@ -32,6 +35,14 @@ STEP = 1 / 255
 SHADED = """
 const points = pointsOf(data.live, await decode(data.live.grid, data.text));
 return data.settings.map((each) => [...shaded(points, each)]);"""
+
+MOVED = """
+const points = pointsOf(data.live, await decode(data.live.grid, data.text));
+const numbers = new Numbers(data.live, points);
+return data.moved.map((text) => {
+  numbers.follow(text);
+  return { shaded: [...shaded(points, numbers.settings())], text: numbers.text };
+});"""
 
 DIFFERENCES = """
 page.xyz = data.xyz;
@@ -52,14 +63,19 @@ def changed(rng, start):
     """Return settings with every number moved at random."""
     settings = json.loads(json.dumps(start))
     for material in settings["materials"]:
-        for name in ("k_a", "k_d", "k_s"):
+        for name in ("k_a", "k_d", "k_s", "ambient"):
             material[name] = (np.array(material[name]) * rng.uniform(0, 1.5)).tolist()
+        material["k_i"] = rng.uniform(0, 0.2, 3).tolist()
         material["n"] *= rng.uniform(0.5, 2)
     for light in settings["lights"]:
         key = "position" if "position" in light else "direction"
         light[key] = (np.array(light[key]) + rng.normal(0, 0.3, 3)).tolist()
         for name in ("diffuse_intensity", "specular_intensity"):
             light[name] = (np.array(light[name]) * rng.uniform(0.5, 1.5)).tolist()
+        if "position" in light:
+            light["attenuation"] = rng.uniform(0.1, 1, 3).tolist()
+        if "cutoff" in light:
+            light |= {"cutoff": [rng.uniform(20, 80)], "exponent": [rng.uniform(0, 30)]}
     return settings
 
 
@@ -111,6 +127,99 @@ def test_the_page_shades_as_the_kernel_does(run, name):
     assert moved.min() > STEP
 
 
+def beam(ball=None, spot=None, key=None, ambient=(0.1, 0.2, 0.3)):
+    """Return a floor and a ball that shines, under a spot and a lamp; parts have other numbers."""
+    shiny = {"type": "phong", "id": "shiny", "k_i": 0.1, "k_a": 0.3, "k_d": 0.5, "k_s": 0.4, "n": 9}
+    matt = {"type": "phong", "id": "matt", "k_a": 0.5, "k_d": 0.8}
+    cone = {"type": "heuristic_spot", "position": [0.5, -1, 3], "direction": [0, 0.2, -1]}
+    cone |= {"intensity": 2.0, "cutoff": 25.0, "exponent": 4.0, "k0": 0.5, "k1": 0.2}
+    lamp = {"type": "heuristic_point", "position": [-2, -3, 2], "intensity": 0.7}
+    return described(
+        (0, -5, 3),
+        size=32,
+        floor={"type": "rectangle", "to_world": moved((0, 0, 0), 2.0), "bsdf": matt},
+        ball={"type": "sphere", "radius": 0.6, "bsdf": shiny | (ball or {})},
+        spot=cone | (spot or {}),
+        key=lamp | (key or {}),
+        integrator={"type": "heuristic", "ambient": {"type": "rgb", "value": list(ambient)}},
+    )
+
+
+def law(k0, k1, k2):
+    return {"k0": float(k0), "k1": float(k1), "k2": float(k2)}
+
+
+#: Sliders as the address has them, and the numbers of the scene that they must lead to.
+SLIDERS = {
+    "k_i:shiny:0.35": {"ball": {"k_i": 0.35}},
+    "I_a:0:0.6": {"ambient": (0.2, 0.4, 0.6)},
+    "f_att:spot:0": {"spot": law(1, 0, 0)},
+    "f_att:spot:1": {"spot": law(0, 1, 0)},
+    "f_att:key:2": {"key": law(0, 0, 1)},
+    "m:spot:20": {"spot": {"exponent": 20.0}},
+    "m:spot:0": {"spot": {"exponent": 0.0}},
+    "cutoff:spot:12": {"spot": {"cutoff": 12.0}},
+    "L_d:key:0.5,L_s:key:2": {"key": {"diffuse_intensity": 0.35, "specular_intensity": 1.4}},
+    "L_s:spot:0,intensity:spot:3": {"spot": {"diffuse_intensity": 3.0, "specular_intensity": 0.0}},
+    "I_a:0:0,cutoff:spot:40,f_att:spot:2,intensity:spot:30,m:spot:1.5": {
+        "ambient": (0.0, 0.0, 0.0),
+        "spot": law(0, 0, 1) | {"cutoff": 40.0, "exponent": 1.5, "intensity": 30.0},
+    },
+}
+
+
+def image_of(scene):
+    """Return what the integrator of a scene has at the centres of 40 × 30 pixels."""
+    ready, options = prepared(scene, resolution=(40, 30))
+    half = ready.heuristic
+    with variant(half.variant):
+        image = centres(half.scene, half.integrator, (40, 30), range(40), range(30))
+    return image, half, options
+
+
+@pytest.mark.guarantee(
+    "kernel", "A page's sliders show what a scene of their numbers does, to 1/255."
+)
+def test_sliders_lead_to_the_picture_of_a_scene_with_their_numbers(run):
+    before, half, options = image_of(beam())
+    points = pixel_terms.live(half, options)
+    view = live_view(points)
+    owners = view.materials, view.lights
+    names = [list(dict.fromkeys(one["name"] for one in several)) for several in owners]
+    places = {name: place for each in names for place, name in enumerate(each)}
+    texts = [
+        re.sub(r":([a-z]+):", lambda found: f":{places[found[1]]}:", words) for words in SLIDERS
+    ]
+    data = {"live": view.manifest(), "text": view.grid.data, "moved": ["", *texts, ""]}
+    start, *found, again = run(MOVED, data)
+    seen = points.planes["material"] > 0
+    assert start == again
+    for one, text, numbers in zip(found, texts, SLIDERS.values(), strict=True):
+        expected, *_ = image_of(beam(**numbers))
+        shaded = np.reshape(one["shaded"], (30, 40, 3))
+        off = abs(shaded - expected) / np.maximum(expected, 1)
+        assert off[seen].max() <= STEP, text
+        assert abs(expected - before)[seen].max() > 5 * STEP, text
+        assert one["text"] == text
+
+
+def test_an_address_moves_only_what_the_scene_has_and_within_its_range(run):
+    _, half, options = image_of("fig-6-5-m40")
+    view = live_view(pixel_terms.live(half, options))
+    absent = ("k_i:0:0.3", "I_a:0:0.3", "flat:0:1", "k_d:1:0.3", "m:1:3", "no:0:1", "__proto__:0:1")
+    wrong = ("m:0:", "m:0", "m:0:x", "f_att:0:-1")
+    kept = {
+        "m:0:3": "m:0:3",
+        "m:0:3,k_i:0:1,,:": "m:0:3",
+        "cutoff:0:500": "cutoff:0:90",
+        "intensity:0:1e9": "intensity:0:4",
+        "intensity:0:9,f_att:0:2": "f_att:0:2,intensity:0:9",
+    }
+    data = {"live": view.manifest(), "text": view.grid.data, "moved": [*absent, *wrong, *kept]}
+    found = [one["text"] for one in run(MOVED, data)]
+    assert found == ["" for _ in absent + wrong] + list(kept.values())
+
+
 def test_differences_of_colours_are_those_of_the_metric(run):
     rng = np.random.default_rng(1)
     first = rng.uniform(-0.1, 2, (500, 3)) ** 2
@@ -123,17 +232,39 @@ def test_differences_of_colours_are_those_of_the_metric(run):
     np.testing.assert_allclose(found, LEADING(*pair, viewing), rtol=1e-6, atol=1e-6)
 
 
+IN_SIGHT = """element => {
+  const box = element.getBoundingClientRect();
+  const there = document.elementFromPoint(box.left + 9, box.top + box.height / 2);
+  return there === element;
+}"""
+
+
 # --- On the page -------------------------------------------------------------------------------
 
 
 def opened(visitor):
     """Open the section of a scene's page, and return the section."""
-    page = visitor.open(SCENE)
-    section = page.locator("#live")
-    section.locator("summary").click()
-    page.wait_for_function("() => document.querySelector('#live [data-part=size]').textContent")
+    visitor.open(SCENE).locator("#live summary").click()
+    return ready(visitor)
+
+
+def ready(visitor):
+    """Wait until the section is drawn, and return it."""
+    visitor.page.wait_for_function(
+        "() => document.querySelector('#live [data-part=size]').textContent"
+    )
     visitor.settle()
-    return section
+    return visitor.page.locator("#live")
+
+
+def choice(section, name):
+    """Return the list of a name: material, lamp, f_att or flat."""
+    return section.locator(f"select:is([name={name}], [data-part={name}])")
+
+
+def names_shown(section):
+    """Return the names of the controls that are shown, in their order."""
+    return section.locator("[name]:visible").evaluate_all("all => all.map(one => one.name)")
 
 
 def slider(section, name):
@@ -218,7 +349,7 @@ def test_keys_materials_lights_and_normals(visitor):
     visitor.settle()
     assert float(slider(section, "k_d").get_attribute("aria-valuetext")) < 0.6
     assert shown(section)[0]["mean"] != start[0]["mean"]
-    material, light, normals = section.locator("select").all()
+    material, light, normals = (choice(section, name) for name in ("material", "lamp", "flat"))
     material.select_option("shiny")
     assert float(slider(section, "n").get_attribute("aria-valuetext")) == 12
     assert float(slider(section, "k_d").get_attribute("aria-valuetext")) == 0.6
@@ -228,12 +359,80 @@ def test_keys_materials_lights_and_normals(visitor):
     drag(visitor, section, "x", 0.9)
     assert shown(section)[1]["shown"] != before[1]["shown"]
     section.get_by_role("button", name="Start again").click()
-    normals.select_option("flat")
+    normals.select_option("1")
     visitor.settle()
     image = [np.reshape(each[1]["shown"], (32, 48, 4)) for each in (start, shown(section))]
     change = abs(image[1] - image[0])
     assert change[:, :24].max() <= 1  # no steps there
     assert change[:, 24:].max() > 20
+
+
+def test_controls_are_there_only_for_what_a_light_has(visitor):
+    section = opened(visitor)
+    material = ["k_i", "k_a", "k_d", "k_s", "n"]
+    point = ["intensity", "L_d", "L_s", "f_att", "x", "y", "z"]
+    for name, own in (
+        ("key", point),
+        ("sun", [name for name in point if name != "f_att"]),
+        ("cone", [*point[:4], "m", "cutoff", *point[4:]]),
+    ):
+        choice(section, "lamp").select_option(name)
+        assert names_shown(section) == [*material, *own, "I_a", "flat"]
+    assert slider(section, "cutoff").get_attribute("aria-valuetext") == "30.0°"
+    assert "as given: 1, 0, 0" in choice(section, "f_att").text_content()
+
+
+def test_each_new_slider_changes_the_picture_and_the_address_reopens_it(visitor):
+    section = opened(visitor)
+    choice(section, "material").select_option("shiny")
+    choice(section, "lamp").select_option("cone")
+    pictures = [shown(section)]
+    for name, part in (("k_i", 0.5), ("I_a", 0.8), ("L_d", 0.1), ("L_s", 0.9), ("m", 0.5),
+                       ("cutoff", 0.2)):  # fmt: skip
+        drag(visitor, section, name, part)
+        pictures.append(shown(section))
+        assert pictures[-1][1]["shown"] != pictures[-2][1]["shown"], name
+    choice(section, "f_att").select_option("quadratic: 1 / d²")
+    visitor.settle()
+    assert shown(section)[1]["shown"] != pictures[-1][1]["shown"]
+    choice(section, "flat").select_option("1")
+    visitor.settle()
+    now = shown(section)
+    address = visitor.page.url
+    assert {part.split(":")[0] for part in visitor.state()["live"].split(",")} == {
+        "k_i", "I_a", "L_d", "L_s", "m", "cutoff", "f_att", "flat"
+    }  # fmt: skip
+    places = section.locator("[name]").evaluate_all("all => all.map(one => one.value)")
+
+    visitor.page.goto("about:blank")
+    visitor.page.goto(address)
+    visitor.wait_for_viewer()
+    section = ready(visitor)
+    again = shown(section)
+    assert again[1] == now[1]
+    assert {name: again[0][name] for name in ("mean", "first")} == {
+        name: now[0][name] for name in ("mean", "first")
+    }
+    # What was moved is chosen.
+    assert section.locator("[name]").evaluate_all("all => all.map(one => one.value)") == places
+    assert visitor.page.url == address
+    section.get_by_role("button", name="Start again").click()
+    assert "live" not in visitor.state()
+    visitor.page.evaluate("hash => { location.hash = hash; }", "#" + address.split("#")[1])
+    visitor.settle()
+    visitor.settle()
+    assert shown(section)[1] == now[1]
+
+
+def test_another_view_of_the_page_keeps_the_sliders(visitor):
+    section = opened(visitor)
+    drag(visitor, section, "k_d", 0.9)
+    live, picture = visitor.state()["live"], shown(section)[1]["shown"]
+    visitor.page.locator("#viewer button[data-mode=error]").click()
+    visitor.settle()
+    assert visitor.state()["mode"] == "error"
+    assert visitor.state()["live"] == live
+    assert shown(section)[1]["shown"] == picture
 
 
 def test_a_scene_without_points_says_why(visitor):
@@ -246,7 +445,15 @@ def test_a_scene_without_points_says_why(visitor):
     "visitor", [{}, {"color_scheme": "dark"}, PHONE], indirect=True, ids=["light", "dark", "phone"]
 )
 def test_the_open_section_is_for_everybody(visitor):
-    opened(visitor)
+    choice(opened(visitor), "lamp").select_option("cone")
     assert not violations(visitor.page)
-    narrow = "document.documentElement.scrollWidth - window.innerWidth"
-    assert visitor.page.evaluate(narrow) <= 0
+    cut = """all => all.filter(one => one.scrollWidth > one.clientWidth + 1 ||
+      one.offsetLeft + one.offsetWidth > one.parentElement.offsetLeft +
+      one.parentElement.offsetWidth + 1).map(one => one.textContent)"""
+    assert not visitor.page.locator("#live label > :visible").evaluate_all(cut)
+    first = visitor.page.locator("#live canvas").first
+    for name in ("k_i", "z", "I_a"):
+        handle = slider(visitor.page.locator("#live"), name)
+        handle.evaluate("slider => slider.scrollIntoView()")
+        assert handle.evaluate(IN_SIGHT), name
+        assert first.evaluate(IN_SIGHT), name

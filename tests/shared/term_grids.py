@@ -1,5 +1,7 @@
 """A grid of terms with made-up numbers: a slope under two lamps, and nothing in its first row."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from fotismos.comparisons.pixel_terms import GridLight, LivePoints, TermGrid, TermMaterial
@@ -44,7 +46,10 @@ def _light(name, intensity, angle, view, azimuth, n):
 
 
 def points(resolution):
-    """Return points of a floor seen from above, with steps at its right, under three lights."""
+    """Return points of a floor seen from above, with steps at its right, under three lights.
+
+    Its lower half shines a little.
+    """
     width, height = resolution
     u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     x, y, corners = 2 * u - 1, 1.4 * v - 0.7, ((0, 0), (0, -1), (-1, 0))
@@ -70,9 +75,10 @@ def points(resolution):
     )
     sun = {"name": "sun", "direction": [0.0, 0.6, -0.8]} | own((0.5, 0.5, 0.9))
     cone = {"name": "cone", "direction": [0.0, 0.0, -1.0], "cutoff": [30.0], "exponent": [2.0]}
+    shiny = replace(_material("shiny", 0.5, 12.0), k_i=(0.02, 0.01, 0.0))
     return LivePoints(
         planes,
-        (_material("matt <b>", 0.0, 1.0), _material("shiny", 0.5, 12.0)),
+        (_material("matt <b>", 0.0, 1.0), shiny),
         (key, sun, key | cone),
         [[[0, 0, 4]] * 3, [[x[row, column], y[row, column], -2] for row, column in corners]],
         is_flat=False,

@@ -15,6 +15,7 @@
  * @property {number[] | null} box  the selection: left, top, width and height in pixels of the
  * image
  * @property {number[] | null} on    the effects that are switched on
+ * @property {string} live   the numbers that were moved by hand, as `Numbers` writes them
  */
 
 /** @type {View} */
@@ -31,6 +32,7 @@ const DEFAULT_VIEW = Object.freeze({
   pixel: null,
   box: null,
   on: null,
+  live: "",
 });
 
 /**
@@ -84,7 +86,7 @@ function fragmentOf(view) {
     if (String(value) === String(DEFAULT_VIEW[/** @type {keyof View} */ (key)])) continue;
     parts.set(key, typeof value === "number" ? String(Number(value.toFixed(3))) : String(value));
   }
-  return `#${String(parts).replaceAll("%2C", ",")}`;
+  return `#${String(parts).replaceAll("%2C", ",").replaceAll("%3A", ":")}`;
 }
 
 /**

@@ -1,13 +1,7 @@
 // The textbook half of a scene, shaded again while its numbers are changed by hand.
 
-const AXES = ["x", "y", "z"];
-
-/** The vector of a light that sliders move. @param {Source} light */
-const vectorOf = light => light.position ?? light.direction ?? [0, 0, 0];
-
 /**
- * A scene's points and pictures at their resolution, what was moved, and the error that this
- * leaves.
+ * A scene's points and pictures at their resolution, its numbers, and the error that they leave.
  */
 class Session {
   /** @param {Painter} painter @param {Live} live @param {Images} grid */
@@ -19,14 +13,8 @@ class Session {
     this.grid = grid;
     this.exposure = scene.exposure;
     this.points = pointsOf(live, grid);
-    /** Values by slider and what it is of. @type {Map<string, number>} */
-    this.moved = new Map();
-    this.isFlat = live.is_flat;
-    this.reach = this.points.position.reduce(
-      (most, value, p, all) => Math.max(most, Math.abs(value - all[p % 3])),
-      0,
-    );
-    this.start = shaded(this.points, this.settings());
+    this.numbers = new Numbers(live, this.points);
+    this.start = shaded(this.points, this.numbers.settings());
     /** Of each cell, over its pixels. */
     this.stored = new Float64Array(3 * count);
     this.reference = new Float64Array(3 * count);
@@ -62,7 +50,7 @@ class Session {
    * @returns {number}
    */
   shade() {
-    this.shown = shaded(this.points, this.settings()).map(
+    this.shown = shaded(this.points, this.numbers.settings()).map(
       (value, p) => this.stored[p] + (value - this.start[p]),
     );
     this.errors = differencesOf(labOf(this.shown, this.exposure), this.physical);
@@ -71,109 +59,53 @@ class Session {
     this.best = Math.min(this.best, this.mean);
     return this.mean;
   }
-
-  /** @returns {Settings} */
-  settings() {
-    const { live, moved } = this;
-    const colour = (
-      /** @type {number[]} */ was,
-      /** @type {string} */ name,
-      /** @type {string} */ owner,
-    ) => {
-      const value = moved.get(`${name} ${owner}`);
-      const largest = this.original(name, owner);
-      return value === undefined
-        ? was
-        : was.map(channel => (largest > 0 ? (channel / largest) * value : value));
-    };
-    return {
-      materials: live.materials.map(one => ({
-        ...one,
-        k_a: colour(one.k_a, "k_a", one.name),
-        k_d: colour(one.k_d, "k_d", one.name),
-        k_s: colour(one.k_s, "k_s", one.name),
-        n: colour([one.n], "n", one.name)[0],
-      })),
-      lights: live.lights.map((one, place) => ({
-        ...one,
-        diffuse_intensity: colour(one.diffuse_intensity, "intensity", String(place)),
-        specular_intensity: colour(one.specular_intensity, "intensity", String(place)),
-        [one.position ? "position" : "direction"]: vectorOf(one).map(
-          (value, c) => moved.get(`${AXES[c]} ${place}`) ?? value,
-        ),
-      })),
-      is_flat: this.isFlat,
-    };
-  }
-
-  /**
-   * A slider's value at the start; of colours, and of several materials of a name, the largest.
-   * @param {string} name
-   * @param {string} owner
-   */
-  original(name, owner) {
-    const { materials, lights } = this.live;
-    const light = lights[Number(owner)];
-    if (AXES.includes(name)) return vectorOf(light)[AXES.indexOf(name)];
-    if (name === "intensity")
-      return Math.max(...light.diffuse_intensity, ...light.specular_intensity);
-    return Math.max(
-      ...materials
-        .filter(one => one.name === owner)
-        .flatMap(one => one[/** @type {"k_d" | "n"} */ (name)]),
-    );
-  }
-
-  /** The least and the greatest value of a slider. @param {string} name @param {string} owner */
-  range(name, owner) {
-    const value = this.original(name, owner);
-    if (name === "n") return [0.5, Math.max(1024, 2 * value)];
-    if (name === "intensity") return [0, 4 * value || 1];
-    if (!AXES.includes(name)) return [0, Math.max(1, 2 * value)];
-    const reach = this.live.lights[Number(owner)].position ? this.reach : 1 + Math.abs(value);
-    return [value - reach, value + reach];
-  }
 }
 
 /** The section in which a scene is shaded again. */
 class LiveShading {
-  /** @param {HTMLElement} panel */
-  constructor(panel) {
+  /**
+   * @param {HTMLElement} panel
+   * @param {(changes: Partial<View>) => void} request requests a view of the page
+   */
+  constructor(panel, request) {
     this.panel = panel;
+    /** What is moved, as the address has it. */
+    this.text = "";
     this.whole = /** @type {HTMLDetailsElement} */ (this.part("whole"));
     this.scene = /** @type {Pictured | null} */ (null);
     this.painter = /** @type {Painter | null} */ (null);
     this.session = /** @type {Session | null} */ (null);
     this.threshold = page.usual;
     this.frame = 0;
-    this.sliders = /** @type {HTMLInputElement[]} */ ([...panel.querySelectorAll("input")]);
+    this.controls = /** @type {(HTMLInputElement | HTMLSelectElement)[]} */ ([
+      ...panel.querySelectorAll("[name]"),
+    ]);
     const select = (/** @type {string} */ name) =>
       /** @type {HTMLSelectElement} */ (this.part(name));
     this.material = select("material");
     this.light = select("lamp");
-    this.normals = select("interpolation");
     this.whole.addEventListener("toggle", () => void this.load());
     for (const choice of [this.material, this.light])
       choice.addEventListener("input", () => this.change());
-    for (const slider of this.sliders) {
-      const value = () => (slider.name === "n" ? 2 ** Number(slider.value) : Number(slider.value));
-      slider.addEventListener("input", () =>
-        this.change(session =>
-          session.moved.set(`${slider.name} ${this.ownerOf(slider)}`, value()),
-        ),
-      );
+    const keep = () => {
+      if (!this.session) return;
+      this.text = this.session.numbers.text;
+      request({ live: this.text });
+    };
+    for (const control of this.controls) {
+      const { name } = control;
+      control.addEventListener("input", () => {
+        const value = Number(control.value);
+        this.change(({ numbers }) =>
+          numbers.move(name, this.ownerOf(control), name === "n" ? 2 ** value : value),
+        );
+      });
+      control.addEventListener("change", keep); // a drag has ended: browsers allow few addresses
     }
-    this.normals.addEventListener("input", () =>
-      this.change(session => {
-        session.isFlat = this.normals.value === "flat";
-      }),
-    );
-    this.part("reset").addEventListener("click", () =>
-      this.change(session => {
-        session.moved.clear();
-        session.isFlat = session.live.is_flat;
-      }),
-    );
+    this.part("reset").addEventListener("click", () => {
+      this.change(({ numbers }) => numbers.moved.clear());
+      keep();
+    });
   }
 
   /** @param {string} name @returns {HTMLElement} */
@@ -184,7 +116,7 @@ class LiveShading {
   /** Move into a scene's section. @param {Pictured} scene @param {HTMLElement} section */
   open(scene, section) {
     const { live } = scene;
-    Object.assign(this, { scene, painter: null, session: null });
+    Object.assign(this, { scene, painter: null, session: null, text: "" });
     section.querySelector(".terms-slot")?.after(this.panel);
     this.panel.hidden = !live;
     this.whole.open = false;
@@ -194,10 +126,14 @@ class LiveShading {
       `The textbook half cannot be shaded again here. ${live?.missing}`;
   }
 
-  /** @param {Painter} painter @param {number} t */
-  show(painter, t) {
-    if (this.painter === painter && this.threshold === t) return;
-    Object.assign(this, { painter, threshold: t });
+  /** @param {Painter} painter @param {View} view */
+  show(painter, { t, live }) {
+    if (this.painter === painter && this.threshold === t && this.text === live) return;
+    if (this.text !== live) {
+      this.session?.numbers.follow(live);
+      this.whole.open ||= Boolean(live);
+    }
+    Object.assign(this, { painter, threshold: t, text: live });
     void this.load();
   }
 
@@ -210,49 +146,67 @@ class LiveShading {
     if (this.scene !== scene) return; // another one was opened meanwhile
     if (!this.session) {
       this.session = new Session(painter, live, grid);
-      const names = [...new Set(live.materials.map(one => one.name))];
-      this.material.replaceChildren(...names.map(name => new Option(name || "unnamed", name)));
+      const { numbers } = this.session;
+      numbers.follow(this.text);
+      this.material.replaceChildren(
+        ...numbers.names.map((name, place) => new Option(name || "unnamed", String(place))),
+      );
       this.light.replaceChildren(
         ...live.lights.map((one, place) => new Option(one.name, String(place))),
       );
+      this.choose(numbers);
       this.part("light").hidden = !live.lights.length;
-      this.part("normals").hidden = !this.session.points.face_normal;
       this.part("size").textContent = `${grid.width} × ${grid.height}`;
     }
     this.change();
   }
 
-  /**
-   * What a slider is of: a light's place, or a material's name.
-   * @param {HTMLInputElement} slider
-   */
-  ownerOf(slider) {
-    return this.part("light").contains(slider) ? this.light.value : this.material.value;
+  /** Where what a control is of is chosen, if there is a choice. @param {HTMLElement} control */
+  choiceOf(control) {
+    const of = control.closest("[data-of]")?.getAttribute("data-of");
+    return of ? (of === "light" ? this.light : this.material) : null;
   }
 
-  /** Put the sliders where the chosen material and light are. @param {Session} session */
-  arrange(session) {
-    const { lights, materials } = session.live;
-    const isLit = materials.some(
-      one => one.name === this.material.value && one.ambient.some(Boolean),
-    );
-    this.normals.value = session.isFlat ? "flat" : "phong";
-    this.part("place").textContent = lights[Number(this.light.value)]?.position
-      ? "Position"
-      : "Direction of travel";
-    for (const slider of this.sliders) {
-      const { name } = slider;
-      const owner = this.ownerOf(slider);
-      slider.disabled = name === "k_a" ? !isLit : !lights.length;
-      if (!lights.length && this.part("light").contains(slider)) continue;
-      const value = session.moved.get(`${name} ${owner}`) ?? session.original(name, owner);
-      const [min, max, place] = [...session.range(name, owner), value].map(one =>
+  /** What a control is of (`Numbers`). @param {HTMLElement} control */
+  ownerOf(control) {
+    return Number(this.choiceOf(control)?.value ?? 0);
+  }
+
+  /** Choose a material and a light of which something was moved. @param {Numbers} numbers */
+  choose(numbers) {
+    for (const control of this.controls) {
+      const key = [...numbers.moved.keys()].find(one => one.startsWith(`${control.name}:`));
+      const choice = this.choiceOf(control);
+      if (key && choice) [, choice.value] = key.split(":");
+    }
+  }
+
+  /** Put the controls where the chosen material and light are. @param {Session} session */
+  arrange({ live: { lights }, numbers }) {
+    const light = lights[Number(this.light.value)];
+    this.part("place").textContent = light?.position ? "Position" : "Direction of travel";
+    const law = light?.attenuation?.map(k => Number(k.toPrecision(3)));
+    this.part("law").textContent = `as given: ${law?.join(", ")}`;
+    const isLit = numbers.original("I_a", 0) !== null;
+    for (const control of this.controls) {
+      const { name } = control;
+      const owner = this.ownerOf(control);
+      const label = /** @type {HTMLElement} */ (control.closest("label"));
+      label.hidden = numbers.original(name, owner) === null;
+      if (label.hidden) continue;
+      if (name === "k_a") control.disabled = !isLit;
+      if (["k_d", "k_s", "n"].includes(name)) control.disabled = !lights.length;
+      const value = numbers.value(name, owner);
+      const [min, max, place] = [...numbers.range(name, owner), value].map(one =>
         String(name === "n" ? Math.log2(one) : one),
       );
-      Object.assign(slider, { min, max });
-      slider.value = place;
-      slider.ariaValueText = significant(value);
-      if (slider.nextElementSibling) slider.nextElementSibling.textContent = significant(value);
+      Object.assign(control, control instanceof HTMLInputElement && { min, max });
+      control.value = place;
+      const output = label.querySelector("output");
+      if (!output) continue;
+      const { before = "", unit = "" } = output.dataset;
+      output.textContent = `${before}${significant(value)}${unit}`;
+      control.ariaValueText = `${significant(value)}${unit}`;
     }
   }
 

@@ -3,7 +3,7 @@
 const address = makeAddress();
 const viewer = new Viewer(byId("viewer"), change);
 const terms = new TermsPanel(byId("terms"));
-const live = new LiveShading(byId("live"));
+const live = new LiveShading(byId("live"), change);
 let view = DEFAULT_VIEW;
 /** How far the overview was scrolled when it was left. */
 let left = 0;
@@ -77,7 +77,7 @@ function openScene(scene, section) {
 function showTerms() {
   if (!viewer.painter) return;
   terms.show(viewer.painter, view.pixel ?? viewer.panels.worst());
-  live.show(viewer.painter, view.t);
+  live.show(viewer.painter, view);
 }
 
 /** @param {number} step */
