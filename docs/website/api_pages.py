@@ -35,13 +35,15 @@ def lines(folder: Path) -> Iterator[str]:
 def name(path: str, words: str) -> str:
     """Return what a link to a module is about: the function that its text names, or the module.
 
-    Empty for files that are not Python's, and for folders that are not packages.
+    Empty for files that are not Python's, for folders that are not packages, and for modules that
+    have no page.
     """
     module = dotted(ROOT / path.removesuffix("/__init__.py").removesuffix(".py"))
-    if not (path.endswith(".py") or (ROOT / path / "__init__.py").exists()):
+    is_module = path.endswith(".py") or (ROOT / path / "__init__.py").exists()
+    if not is_module or path.endswith("__main__.py"):
         return ""
     import_module(module)
-    parts = words.strip("`").split(".")
+    parts = words.strip("`").removeprefix("fotismos.").split(".")
     names = (".".join([module, *parts[start:]]) for start in range(len(parts)))
     return next((each for each in names if locate(each)), module)
 
