@@ -106,7 +106,7 @@ def chart(found: Sequence[ShadingCost]) -> Figure:
         if cost.shading is Interpolation.PHONG
     }
     with rc_context(STYLE):
-        figure = Figure(figsize=(6, 3.4), facecolor=GROUND, layout="constrained")
+        figure = Figure(figsize=(6, 4.4), facecolor=GROUND, layout="constrained")
         time, error = figure.subplots(1, 2)
         for shading, (colour, shape, label) in MARKS.items():
             for fineness, line in FINENESS.items():
@@ -122,7 +122,7 @@ def chart(found: Sequence[ShadingCost]) -> Figure:
                 error.loglog(lights, [cost.error for cost in chosen], **style)
         time.axhline(1, color=MARKS[Interpolation.PHONG][0], linewidth=1)
         time.set(xlabel="lights", ylabel="processor time, Phong shading = 1")
-        error.set(xlabel="lights", ylabel="mean ΔE2000 to the sphere's image")
+        error.set(xlabel="lights", ylabel="mean ΔE2000 to the sphere")
         time.yaxis.set_major_formatter("{x:g}")
         time.yaxis.set_minor_formatter("{x:g}")
         error.yaxis.set_major_formatter("{x:g}")

@@ -295,6 +295,29 @@ def test_light_without_attenuation_gets_the_same_mean_irradiance_over_what_is_se
     assert not record.exact
 
 
+def test_what_glows_is_seen_in_both_halves_although_ambient_light_fills_the_room(rgb):
+    """Mitsuba hides both emitters or none, so the background is seen, too."""
+    ball = {"type": "sphere", "bsdf": {"type": "phong", "k_i": 0.8, "k_a": 0.1, "k_d": 0.5}}
+    described = {
+        "type": "scene",
+        "integrator": {"type": "heuristic", "ambient": 1.0},
+        "sensor": camera((0, -4, 0), size=9),
+        "ball": ball,
+    }
+    for is_glowing in (True, False):
+        if not is_glowing:
+            del ball["bsdf"]["k_i"]
+        found = halves.pair(Source("a test", described))
+        assert found.hide_emitters is not is_glowing
+        expected = 0.1 + 0.8 * is_glowing
+        shown = np.array(mi.render(found.heuristic.instantiate(), spp=1))[4, 4]
+        assert shown == pytest.approx(expected, abs=1e-5)
+        path = {"type": "path", "hide_emitters": found.hide_emitters}
+        physical = found.physical.instantiate()
+        seen = np.array(mi.render(physical, integrator=mi.load_dict(path), spp=4096))[4, 4]
+        assert seen == pytest.approx(expected, rel=0.02)
+
+
 def test_environments_are_ambient_light_and_emission_shines_at_their_radiance(rgb):
     pair = pair_of({"type": "diffuse", "reflectance": 0.5}, {"type": "constant", "radiance": 0.3})
     (index,) = pair.heuristic.nodes(mi.ObjectType.Integrator)
