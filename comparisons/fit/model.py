@@ -2,15 +2,15 @@
 
 For Phong's model, in a vector of numbers:
 
-=============  ======================================  ==================  ================
-Parameter      Number in the vector                    Bounds              A natural change
-=============  ======================================  ==================  ================
-``k_a, k_d``   itself                                  0 to 1              1
-``k_s``        the lobe's albedo at normal incidence,  0 to 1              1
+=============  ==============================================  ==================  ================
+Parameter      Number in the vector                            Bounds              A natural change
+=============  ==============================================  ==================  ================
+``k_a, k_d``   itself                                          0 to 1              1
+``k_s``        the lobe's albedo at normal incidence:          0 to 1              1
                ``k_s`` over
                :func:`fotismos.heuristic.terms.normalisation`
-``n``          ``ln n``                                :data:`EXPONENTS`   a factor e
-=============  ======================================  ==================  ================
+``n``          ``ln n``                                        :data:`EXPONENTS`   a factor e
+=============  ==============================================  ==================  ================
 
 An image shows the lobe's albedo for any ``n``, so the two are nearly independent in the search. A
 coefficient is one number if it is grey in the scene, and three if it has a colour. With a texture

@@ -186,7 +186,7 @@ def _with_page(section: str, folder: str) -> str:
     fragment = f"scene={command[1]}"
     if moved := MOVED.get(lesson[1]):
         fragment = f"{fragment}&amp;live={moved}"
-    link = f'<a href="{folder}/index.html#{fragment}">Open it here.</a>'
+    link = f'<a href="{folder}/index.html#{fragment}">Open its page, with sliders.</a>'
     return f"{section.rstrip()}\n\n{link}\n\n"
 
 
