@@ -206,7 +206,7 @@ def test_gradients_are_finite_at_any_distance(vector, make):
         for name, leaf in leaves.items():
             assert np.isfinite(np.array(dr.grad(leaf))).all(), (name, n, form)
         if make in (LIGHTS["inverse square"], LIGHTS["spot"]):
-            # `1 / d^2` is scaled by a distance, so its derivative is by the cube, or it is left out.
+            # `1 / d^2` falls with the square, its derivative with the cube, unless it is left out.
             steep = 5e-11 if vector is Array3f else 1e-100
             found = np.array(dr.grad(leaves["lamp"]).z, float)[np.array(exponents) < 11]
             near = 10.0 ** np.array(exponents)[np.array(exponents) < 11]
