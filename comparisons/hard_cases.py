@@ -28,6 +28,7 @@ ABSENT = 1e-3
 class HardCase:
     """A case; ``exactly`` replaces the formula in extended precision.
 
+    ``compiled`` exponents are plain numbers, for which the kernel may do without double precision.
     Errors are known once it is evaluated: infinite for a NaN, an infinity, or light where there is
     none.
     """
@@ -38,6 +39,7 @@ class HardCase:
     setting: Setting
     difficulty: str
     exactly: Floats | None = None
+    compiled: bool = False
     naive_error: float = np.inf
     our_error: float = np.inf
 
@@ -68,7 +70,7 @@ def evaluate(case: HardCase) -> HardCase:
     with np.errstate(all="ignore"):  # cases provoke NaN and infinities
         exact = np.asarray(case.exact(), np.longdouble)
         naive = error(textbook.shade(case.setting, NAIVE), exact)
-        ours = error(by_kernel(case.setting), exact)
+        ours = error(by_kernel(case.setting, case.compiled), exact)
     return replace(case, naive_error=naive, our_error=ours)
 
 
@@ -89,8 +91,11 @@ def error(values: ArrayLike, exact: np.ndarray) -> float:
 POINTS = 2001
 
 
-def by_kernel(setting: Setting) -> NDArray[np.float32]:
-    """Evaluate the kernel at a setting, in single precision: an array (N,)."""
+def by_kernel(setting: Setting, compiled: bool = False) -> NDArray[np.float32]:
+    """Evaluate the kernel at a setting, in single precision: an array (N,).
+
+    A ``compiled`` exponent is a plain number, as is that of a mirror.
+    """
     s = setting.rounded()
     # Everything becomes (N, 3), then (3, N); of a number's three equal rows, one is read.
     vectors = (np.reshape(v, (-1, 3)) for v in (s.position, s.normal, s.view, s.light))
@@ -112,8 +117,8 @@ def by_kernel(setting: Setting) -> NDArray[np.float32]:
             exponent=float(s.m),
             attenuation=(k0, k1, k2),
         )
-    exponent = n if np.isfinite(s.n).all() else np.inf  # a mirror is a plain number
-    material = Material(k_d=float(s.k_d), k_s=float(s.k_s), n=exponent)
+    exponent = float(s.n) if compiled or np.isinf(s.n).any() else n
+    material = Material(k_d=float(s.k_d), k_s=float(s.k_s), n=exponent, form=s.form)
     dr.eval(position, normal, view, n, light, intensity)
     value = shade(position, normal, view, material, [lamp])
     return np.array(value + dr.zeros(Float, len(columns[0][0])))
@@ -149,13 +154,18 @@ def _mirror_directions(n: float) -> Setting:
     )
 
 
-def _grazing() -> Setting:
-    """Return lights and views a little above surfaces of all directions, facing each other."""
+def _grazing(low: float, high: float, **changes: Any) -> Setting:
+    """Return lights and views a little above surfaces of all directions, facing each other.
+
+    Their height is between powers of ten, of a distance of 1.
+    """
     rng = np.random.default_rng(1)
     normal, other = rng.normal(size=(2, POINTS, 3)).astype(np.float32).astype(float)
     along = unit(np.cross(unit(normal), other))
-    height = np.logspace(-8, -6, POINTS)[:, None] * unit(normal)
-    return Setting(normal=normal, light=along + height, view=height - along, k_s=1.0, n=100.5)
+    height = np.logspace(low, high, POINTS)[:, None] * unit(normal)
+    light = along + height
+    view = height - along
+    return replace(Setting(normal=normal, light=light, view=view, k_s=1.0), **changes)
 
 
 def _under_spot(angle: Floats, **changes: Any) -> Setting:
@@ -186,6 +196,17 @@ CASES = tuple(replace(case, setting=case.setting.rounded()) for case in (
           setting=replace(_highlight(1e6), n=1e-3,
                   view=_about_mirror(np.pi / 2 + np.linspace(-3e-7, 3e-7, POINTS))),
           difficulty="The lobe is almost even and ends abruptly; only the sign of R·V matters."),
+    HardCase(name="exponent 500", group="Exponents", bound=5e-5, setting=_highlight(500),
+          compiled=True,
+          difficulty="A few rounding steps of R·V, 500 times: between round exponents, too."),
+    HardCase(name="exponent 12345.6", group="Exponents", bound=2e-4, setting=_highlight(12345.6),
+          difficulty="A few rounding steps of R·V, ten thousand times."),
+    HardCase(name="Blinn's form, exponent 500", group="Exponents", bound=5e-5, compiled=True,
+          setting=replace(_highlight(125), n=500.0, form="blinn"),
+          difficulty="N·H is wrong by rounding, as R·V is; half the angle takes four times n."),
+    HardCase(name="Blinn's form, exponent 1e6", group="Exponents", bound=2e-4,
+          setting=replace(_highlight(2.5e5), n=1e6, form="blinn"),
+          difficulty="The power multiplies the rounding of N·H near 1 by n."),
     HardCase(name="exponent 1e5", group="Exponents", bound=2e-4, setting=_highlight(1e5),
           difficulty="The power multiplies the rounding of R·V near 1 by n."),
     HardCase(name="exponent 1e6", group="Exponents", bound=2e-4, setting=_highlight(1e6),
@@ -212,8 +233,13 @@ CASES = tuple(replace(case, setting=case.setting.rounded()) for case in (
     HardCase(name="a viewer on the surface", group="Geometry", bound=2e-4,
           setting=Setting(k_s=1.0, n=9.5, view=(0.0, 0.0, 0.0)),
           difficulty="No view direction: 0 / 0."),
-    HardCase(name="grazing light and view", group="Geometry", bound=2e-4, setting=_grazing(),
+    HardCase(name="grazing light and view", group="Geometry", bound=2e-4,
+          setting=_grazing(-8, -6, n=100.5),
           difficulty="Within 1e-8 to 1e-6 radians of the surface, rounding decides the side."),
+    HardCase(name="Blinn's form, light opposite to view", group="Geometry", bound=3e-4,
+          compiled=True,
+          setting=_grazing(-6, -3, n=32.0, form="blinn"),
+          difficulty="Near the horizon L + V nearly cancels, and H is made of what rounding left."),
     HardCase(name="normals of length 1e-30", group="Geometry", bound=1e-5,
           setting=replace(_FLAT, normal=(0.6e-30, 0.0, 0.8e-30)),
           difficulty="Their square vanishes."),

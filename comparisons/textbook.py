@@ -40,6 +40,10 @@ def halfway(normal: Floats, toward: Floats, view: Floats) -> Floats:
     return dot(normal, unit(toward + view))
 
 
+COSINES = {"phong": mirrored, "blinn": halfway}
+"""The lobe's cosine by its form, of normal, light and view."""
+
+
 def clamped(cosine: Floats) -> Floats:
     """Return a cosine, or 0 if it is negative."""
     return np.maximum(cosine, 0)
@@ -54,7 +58,8 @@ def lobe(cosine: Floats, n: Any, incidence: Floats) -> Floats:
 class Setting:
     """Points, each with its own light; vectors are (N, 3) or (3,), numbers (N,) or single.
 
-    ``direction`` and ``cutoff`` (degrees) make the light a spot with the exponent ``m``.
+    ``direction`` and ``cutoff`` (degrees) make the light a spot with the exponent ``m``. ``form`` is
+    that of the lobe, one of :data:`COSINES`.
     """
 
     position: Any = (0.0, 0.0, 0.0)
@@ -69,11 +74,14 @@ class Setting:
     direction: Any = None
     cutoff: float = 90.0
     m: float = 0.0
+    form: str = "phong"
 
     def rounded(self) -> "Setting":
         """Return the setting with all numbers rounded to single precision."""
         single: dict[str, Any] = {
-            name: np.float32(value) for name, value in vars(self).items() if value is not None
+            name: np.float32(value)
+            for name, value in vars(self).items()
+            if value is not None and name != "form"
         }
         return replace(self, **single)
 
@@ -88,7 +96,7 @@ def shade(setting: Setting, dtype: Any) -> Floats:
         distance = np.sqrt(dot(offset, offset))
         toward = offset / distance
         cosine = dot(normal, toward)[..., 0]
-        reflection = mirrored(normal, toward, view)[..., 0]
+        reflection = COSINES[s.form](normal, toward, view)[..., 0]
         power = clamped(reflection) ** dtype(s.n)
         distance = distance[..., 0]
         # The light that arrives: 6.1, for a spot also its cone (6.2, 6.3) and fall-off (6.4).
@@ -114,7 +122,8 @@ def shade_exactly(setting: Setting) -> Floats:
         normal, view, toward = map(unit, _vectors(setting, EXACT))
         # Only without a diffuse term is the whole value the lobe's.
         if setting.k_d == 0:
-            value = np.where(mirrored(normal, toward, view)[..., 0] > 0, value, 0)
+            cosine = COSINES[setting.form](normal, toward, view)
+            value = np.where(cosine[..., 0] > 0, value, 0)
     # A vector of length 0 became NaN when `unit` divided it by that length.
     exists = ~np.isnan(dot(toward, toward) + dot(normal, normal) + dot(view, view))[..., 0]
     return np.where(exists, value, 0)

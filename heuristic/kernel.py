@@ -188,6 +188,13 @@ def contributions(
         if lobe:
             cosine = lobe(light, position, arrival.toward, cos_incidence)
             specular = terms.specular(arrival.specular, 1, cosine, material.n)
+        is_steep = light.is_steep(arrival.distance)
+        if is_steep is not None:
+            # The same variables, and no instruction, where nothing is differentiated.
+            diffuse, specular = (
+                None if term is None else dr.select(is_steep, dr.detach(term), term)
+                for term in (diffuse, specular)
+            )
         yield LightContribution(
             arrival=arrival,
             cos_incidence=cos_incidence,

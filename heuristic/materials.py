@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from numbers import Real
 from typing import Any
 
@@ -169,12 +170,20 @@ class PairedMaterial(Material):
 
 def _exponent(n: Any) -> Number:
     number = numerics.plain(n)
-    if number is None or (isinstance(number, int | float) and not number >= 0):
+    if number is None or (isinstance(number, int | float) and not is_exponent(number)):
         raise InputError(
-            f"n = {n!r} is not allowed: Phong's exponent is finite and 0 or more;"
-            " inf makes a mirror."
+            f"n = {n!r} is not allowed: Phong's exponent is finite and 0 or more, at most"
+            f" {numerics.LARGEST_EXPONENT:.2g}; inf makes a mirror."
         )
     return number
+
+
+def is_exponent(n: float) -> bool:
+    """Return whether a plain number is an exponent of the lobe that both precisions hold, or inf.
+
+    A finite one beyond :data:`fotismos.heuristic.numerics.LARGEST_EXPONENT` would become a mirror.
+    """
+    return 0 <= n <= numerics.LARGEST_EXPONENT or n == inf
 
 
 def check_form(form: str) -> None:

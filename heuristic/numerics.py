@@ -27,10 +27,17 @@ LARGEST_LITERAL_EXPONENT = 64
 rounding steps, in place of the logarithm, exponential and branch of a general power."""
 
 MODERATE_EXPONENTS = (2, 512)
-"""Exponents for which the cosine of two unit vectors in the kernel's precision is enough. It is
-wrong by up to three rounding steps of 2^-24, its power by ``3 n 2^-24``: within 1e-4 for these. For
-others, and for exponents unknown when the kernel is traced, the cosine has double precision. Below
-2 the small cosines need it: ``c^n > 1e-3`` reaches down to ``c = 10^(-3/n)``."""
+"""Exponents for which unit vectors in the kernel's precision are enough. Rounding turns them by a
+few steps of 2^-24. Where the highlight has fallen to 1e-3 of its peak, at ``sqrt(14 / n)`` from the
+middle, that changes it by ``sqrt(14 n)`` times as much: within 4e-5 for these, and as much for the
+products of a literal exponent, which multiply the rounding of the cosine by ``n``. For others, and
+for exponents unknown when the kernel is traced, the vectors have double precision. Below 2 the
+small cosines need it: ``c^n > 1e-3`` reaches down to ``c = 10^(-3/n)``."""
+
+
+LARGEST_EXPONENT = 2.0**128 - 2.0**104
+"""The largest number of single precision, 3.4e38: a larger exponent would round to infinity, which
+is a mirror (:func:`fotismos.heuristic.terms.mirror`)."""
 
 
 class Cosine(NamedTuple):
@@ -50,7 +57,9 @@ def plain(value: Any) -> Any:
         return value if dr.depth_v(value) == 1 and dr.is_jit_v(value) else None
     if isinstance(value, Integral):
         value = int(value)
-        return value if abs(value) < 2**63 else nan
+        if abs(value) < 2**63:
+            return value
+        return float(value) if abs(value) <= sys.float_info.max else nan
     return float(value) if isinstance(value, Real) else None
 
 
@@ -117,7 +126,8 @@ def exp2(x: Number) -> Number:
     ``|f| <= 1/2``; ``i`` is found by adding 1.5 * 2^23, which leaves it in the lowest bits.
     """
     if not _is_single(x):
-        return dr.exp2(x)
+        # Dr.Jit's own is -inf from -1024 to -1023.5.
+        return dr.select(x >= -1022, dr.exp2(at_least(x, -1022)), 0)
     x = at_least(x, -127)
     # Derivatives come from the polynomial, so the bits are taken without any.
     shifted = dr.detach(x) + _ROUNDER

@@ -28,6 +28,10 @@ from fotismos.comparisons.departure.metrics import METRICS, Metric
 AGREEMENT = 1e-4
 """Largest allowed deviation of the compiled colour differences from colour-science's."""
 
+ROUNDED = 1e-6
+"""By how much a colour is moved to see if a difference jumps there: far more than the rounding of
+L*a*b* (1e-12), and far less than what a wrong formula changes."""
+
 
 def lab(rgb: Array, viewing: Viewing) -> Array:
     """Return CIE L*a*b* of linear RGB (..., 3) as displayed."""
@@ -80,12 +84,31 @@ DEFINED: dict[str, tuple[Callable[..., Array], Callable[..., Any]]] = {
 def deviations(
     test: Array, reference: Array, values: Mapping[str, Array], viewing: Viewing = DEFAULT_VIEWING
 ) -> dict[str, float]:
-    """Return the largest deviation of each metric's ``values`` (N,), for linear colours (N, 3)."""
+    """Return the largest deviation of each metric's ``values`` (N,), for linear colours (N, 3).
+
+    ΔE2000 jumps where hues are 180 degrees apart: the mean hue turns to the other side, and
+    rounding decides. So a deviation counts only if it is one from :func:`_nearby` colours, too.
+    """
     apart = {}
     for name, (space, difference) in DEFINED.items():
-        defined = difference(space(test, viewing), space(reference, viewing))
-        apart[name] = float(np.abs(values[name] - defined).max(initial=0))
+        first = space(test, viewing)
+        second = space(reference, viewing)
+        deviation = np.abs(values[name] - difference(first, second))
+        far = np.flatnonzero(deviation > ROUNDED)
+        for turned in _nearby(first[far]):
+            other = np.abs(values[name][far] - difference(turned, second[far]))
+            deviation[far] = np.minimum(deviation[far], other)
+        apart[name] = float(deviation.max(initial=0))
     return apart
+
+
+def _nearby(colours: Array) -> list[Array]:
+    """Return colours (N, 3) whose hue is turned either way, by :data:`ROUNDED` along the circle."""
+    a = colours[:, 1]
+    b = colours[:, 2]
+    chroma = np.maximum(np.hypot(a, b), ROUNDED)
+    step = ROUNDED * np.stack([np.zeros(len(a)), -b / chroma, a / chroma], axis=-1)
+    return [colours + step, colours - step]
 
 
 def farthest() -> float:

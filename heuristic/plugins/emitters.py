@@ -18,8 +18,13 @@ Parameter                 Type (default)      Meaning
 ``half_u``, ``half_v``    vector (0, 0, 0)    point and spot: half the edges of a rectangular lamp
 ========================  ==================  =====================================================
 
-Position, direction, the given intensities and the coefficients are exposed to
-``mitsuba.traverse``. Python::
+All but the last two rows and ``clamped`` are exposed to ``mitsuba.traverse``, intensities only if
+given. Differentiable are intensities, ``scale``, ``k0`` to ``k2``, ``exponent``, and a spot's
+``direction``, of which the edge of the cone is left out. ``position``, ``cutoff``, ``shell`` and
+the ``direction`` of parallel light are marked as not differentiable, as in Mitsuba's own lights:
+``prb`` leaves out that ``L`` changes, ``N.L`` with it, and nothing has a derivative by ``cutoff``
+and ``shell``. By ``position`` and ``direction`` the integrators ``direct``, ``path`` and
+``heuristic`` do differentiate, after a warning of Mitsuba's. Python::
 
     {'type': 'heuristic_point', 'position': [-4.24, 0, 0], 'intensity': 1.0}
 
@@ -76,6 +81,10 @@ def define() -> dict[str, Any]:
     }
     coefficients = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
 
+    # As in Mitsuba's own lights: `prb` takes no derivative of the direction in which light arrives.
+    marks = dict.fromkeys(("position", "cutoff", "shell"), mi.ParamFlags.NonDifferentiable)
+    marks["direction"] = mi.ParamFlags.Differentiable | mi.ParamFlags.Discontinuous
+
     class HeuristicLight(mi.Emitter):
         """One of the kinds in :data:`fotismos.heuristic.lights.PLUGINS`, never hit by a ray."""
 
@@ -123,7 +132,10 @@ def define() -> dict[str, Any]:
         def traverse(self, callback: Any) -> None:
             numbers = {name: getattr(self, name) for name in self.numbers}
             for name, value in (self.intensities | numbers).items():
-                callback.put(name, value, mi.ParamFlags.Differentiable)
+                flags = marks.get(name, mi.ParamFlags.Differentiable)
+                if name == "direction" and self.model.parallel:
+                    flags = mi.ParamFlags.NonDifferentiable
+                callback.put(name, value, +flags)
 
         def light(self, it: Interaction, active: Mask = True) -> Light:
             """Return the kernel's form of this light, at the wavelengths of an interaction."""

@@ -50,7 +50,13 @@ from fotismos.heuristic.convention import (
     Sample,
 )
 from fotismos.heuristic.errors import InputError
-from fotismos.heuristic.materials import COEFFICIENTS, Material, PairedMaterial, check_form
+from fotismos.heuristic.materials import (
+    COEFFICIENTS,
+    Material,
+    PairedMaterial,
+    check_form,
+    is_exponent,
+)
 from fotismos.heuristic.plugins.coefficients import (
     coefficient,
     emitted,
@@ -359,5 +365,8 @@ def _exponent(props: Properties) -> Any:
 
 
 def _require_exponent(n: Number) -> None:
-    if not n >= 0:
-        raise InputError(f"phong: n = {n} is not allowed: give 0 or more; inf makes a mirror.")
+    if not is_exponent(n):
+        raise InputError(
+            f"phong: n = {n} is not allowed: give 0 or more, at most"
+            f" {numerics.LARGEST_EXPONENT:.2g}; inf makes a mirror."
+        )

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from colour.difference import delta_E_CIE2000
+from colour.models import Lab_to_XYZ
 
 import fotismos.comparisons.compare
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.comparison import Deviations
 from fotismos.comparisons.departure import definitions
-from fotismos.comparisons.departure.colour import ciede2000
+from fotismos.comparisons.departure.colour import BT709, DEFAULT_VIEWING, ciede2000, rgb_to_xyz
 from fotismos.comparisons.departure.definitions import AGREEMENT, DEFINED
 from fotismos.comparisons.departure.metrics import LEADING, METRICS
 from fotismos.comparisons.options import Options
@@ -81,6 +83,36 @@ def test_hostile_colours_deviate_by_little():
         maps = {name: METRICS[name](*halves).ravel() for name in DEFINED}
         apart = definitions.deviations(*halves.reshape(2, -1, 3), maps)
         assert max(apart.values()) < AGREEMENT
+
+
+def opposed(count=4000):
+    """Linear colours whose hues, as ΔE2000 stretches them, are 180 degrees apart but for rounding.
+
+    ``a' = (1 + G) a``, and G depends on the chroma of both, so it is found by repetition.
+    """
+    rng = np.random.default_rng(4)
+    hue = rng.uniform(0, 2 * np.pi, count)
+    chroma = 10.0 ** rng.uniform(-3, 1.3, (2, count)) * [[1], [-1]]
+    a, b = chroma * np.cos(hue), chroma * np.sin(hue)
+    stretch = 1.0
+    for _ in range(60):
+        power = np.hypot(a / stretch, b).mean(axis=0) ** 7
+        stretch = 1.5 - 0.5 * np.sqrt(power / (power + 25.0**7))
+    lightness = np.add(rng.uniform(40, 70, count), [[0], [5]])
+    halves = np.stack([lightness, a / stretch, b], axis=-1)
+    return Lab_to_XYZ(halves) @ np.linalg.inv(rgb_to_xyz(BT709)).T
+
+
+@pytest.mark.guarantee("means", "A jump of ΔE2000 itself is not taken for a wrong formula.")
+def test_colours_of_opposite_hue_deviate_by_rounding_alone_and_a_wrong_formula_still_does():
+    halves = opposed()
+    defined = delta_E_CIE2000(*(definitions.lab(half, DEFAULT_VIEWING) for half in halves))
+    ours = {name: METRICS[name](*halves[:, None]).ravel() for name in DEFINED}
+    assert (np.abs(ours["dE2000"] - defined) > 0.1).sum() > 100  # the jump
+    assert max(definitions.deviations(*halves, ours).values()) < AGREEMENT
+    wrong = ours | {"dE2000": 1.01 * ours["dE2000"]}
+    found = definitions.deviations(*halves, wrong)["dE2000"]
+    assert found == pytest.approx(ours["dE2000"].max() / 100, rel=0.01)
 
 
 def test_details_give_the_largest_deviation_of_all_scenes():

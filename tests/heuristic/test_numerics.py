@@ -60,6 +60,20 @@ def test_the_cone_holds_its_edge_and_nothing_beyond(float_type):
     np.testing.assert_array_equal(inside, [1, 1, 1, 0, 0, 0])
 
 
+@FLOATS
+def test_powers_below_the_smallest_float_are_zero_and_never_infinite(float_type):
+    """Dr.Jit's own power of two is -inf at -1024, in double precision."""
+    x = float_type(np.concatenate([np.linspace(-1030, 0, 20601), [-1e6, -1e30]]))
+    dr.enable_grad(x)
+    found = numerics.exp2(x)
+    dr.backward(found)
+    exact = 2.0 ** np.array(x, float)
+    largest_lost = 2.0**-126 if float_type is Single else 2.0**-1022
+    expected = np.where(exact >= largest_lost, exact, 0)
+    np.testing.assert_allclose(np.array(found, float), expected, rtol=4 * step(float_type))
+    assert np.isfinite(np.array(dr.grad(x))).all()
+
+
 @settings(max_examples=150, deadline=None)
 @given(st.lists(st.floats(-(2.0**90), 2.0**90, width=32), min_size=1, max_size=60))
 def test_sums_lose_next_to_nothing(values):
@@ -124,3 +138,79 @@ def _exact_unit(vector):
 
 def _exact_dot(a, b):
     return sum(x * y for x, y in zip(a, b, strict=True))
+
+
+# --- Between the tested points ----------------------------------------------------------------
+
+EXPONENTS = (1, 2, 2.5, 9, 33, 64, 65, 100.5, 128, 200, 333, 512, 513, 1e4, 1e6, 1e8, 1e10, 1e12)
+
+
+def hostile_points(n, count, dtype):
+    """Normals, lights and views: anywhere, near a highlight of ``n``, grazing, and opposed."""
+    rng = np.random.default_rng(5)
+    normal = rng.normal(size=(count, 3))
+    up = _unit(normal)
+    along = _unit(np.cross(up, rng.normal(size=(count, 3))))
+    across = np.cross(up, along)
+
+    def anywhere():
+        height, turn = rng.uniform(0, 1, (count, 1)), rng.uniform(0, 2 * np.pi, (count, 1))
+        flat = np.cos(turn) * along + np.sin(turn) * across
+        return height * up + np.sqrt(1 - height**2) * flat
+
+    low, other = 10.0 ** -rng.uniform(0, 6, (2, count, 1))
+    other = np.where(rng.random((count, 1)) < 0.5, low, other)
+    grazing = _unit(along + low * up)
+    turn = rng.normal(size=(count, 1)) * low * rng.choice([0, 1, 10], (count, 1))
+    kind = rng.integers(0, 4, (count, 1))
+    light = np.where(kind >= 2, grazing, anywhere())
+    mirrored = 2 * np.sum(up * light, axis=1, keepdims=True) * up - light
+    width = min(np.sqrt(14 / n), 1) * np.where(kind == 3, low, 1)
+    near = mirrored + width * rng.uniform(-1, 1, (count, 3))
+    opposed = other * up - np.cos(turn) * along + np.sin(turn) * across
+    view = np.select([kind == 0, kind == 2], [anywhere(), opposed], near)
+    sizes = rng.uniform(0.1, 10, (3, count, 1))
+    return [(v * s).astype(dtype) for v, s in zip((normal, light, view), sizes, strict=True)]
+
+
+def lobe_exactly(normal, light, view, n, form):
+    """The lobe, and ``N.L``, in extended precision."""
+    normal, light, view = (_unit(each.astype(np.longdouble)) for each in (normal, light, view))
+    incidence = np.sum(normal * light, axis=1)
+    other, side = 2 * incidence[:, None] * normal - light, view
+    if form == "blinn":
+        other, side = _unit(light + view), normal
+    chord = np.sum((other - side) ** 2, axis=1) / 2
+    value = np.sum(other * side, axis=1)
+    logarithm = np.where(chord < 0.5, np.log1p(-np.minimum(chord, 0.5)), np.log(value.clip(1e-99)))
+    return np.where((value > 0) & (incidence > 0), np.exp(n * logarithm), 0), incidence
+
+
+def _unit(vectors):
+    return vectors / np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
+
+
+def worst_error(n, form, count, vector_type):
+    """The largest relative error of the kernel's lobe where it exceeds 1e-3."""
+    dtype = np.float32 if vector_type is Array3f else np.float64
+    points = hostile_points(n, count, dtype)
+    exact, incidence = lobe_exactly(*points, np.longdouble(n), form)
+    normal, light, view = (vector_type(*np.ascontiguousarray(each.T)) for each in points)
+    material = fotismos.Material(k_s=1.0, n=n, form=form)
+    lamp = fotismos.PointLight(light, 1.0)
+    found = np.array(fotismos.shade(vector_type(0), normal, view, material, [lamp]), float)
+    assert np.isfinite(found).all()
+    # Closer to the horizon rounding decides the side.
+    counts = (exact > 1e-3) & (incidence > 8 * np.finfo(dtype).eps)
+    assert counts.sum() > count / 10
+    return float((np.abs(found - exact)[counts] / exact[counts]).max())
+
+
+@pytest.mark.guarantee(
+    "kernel", "Highlights are right to 1e-4 for any exponent, light and view; Blinn's to 3e-4."
+)
+@pytest.mark.parametrize("count", [40_000, pytest.param(400_000, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(("form", "bound"), [("phong", 1e-4), ("blinn", 3e-4)])
+def test_the_lobe_is_right_between_the_tested_points(form, bound, count):
+    for n in EXPONENTS:
+        assert worst_error(n, form, count, Array3f) < bound, n

@@ -225,6 +225,15 @@ def test_a_value_edited_below_zero_is_refused(rgb):
             params.update()
 
 
+def test_an_exponent_beyond_single_precision_is_refused_not_a_mirror(rgb):
+    for n in (3.5e38, 1e39, 1e300):
+        with pytest.raises(RuntimeError, match=r"phong: n = .* .*at most 3\.4e\+38; inf"):
+            mi.load_dict(phong(k_s=0.2, n=n))
+    for n in (3.4e38, float("inf")):
+        flags = mi.load_dict(phong(k_s=0.2, n=n)).flags()
+        assert mi.has_flag(flags, mi.BSDFFlags.DeltaReflection) == (n == float("inf"))
+
+
 def test_scalar_variants_are_refused(rgb):
     with mi.scoped_set_variant("scalar_rgb"), pytest.raises(InputError, match="they trace arrays"):
         fotismos.register()

@@ -96,7 +96,7 @@ NAN, INFINITY = float("nan"), float("inf")
 ODD = [None, "x", object(), [1, [2]], ["a"], 1j, {1: 2}, 10**400, NAN, -1, (), Array2f(1)]
 BAD = [-0.1, NAN, INFINITY, (0.5, -1.0, 0.5), (0.5, NAN, 0.5)]
 MADE = {
-    "n = .*finite and 0 or more": (lambda odd: Material(n=odd), [*ODD, -INFINITY]),
+    "n = .*finite and 0 or more": (lambda odd: Material(n=odd), [*ODD, -INFINITY, 1e39, 10**39]),
     "form = ": (lambda odd: Material(form=odd), ODD),
     "normalised = ": (lambda odd: Material(normalised=odd), ODD),
     "k_d = ": (lambda odd: Material(k_d=odd), [*ODD[:-1], *BAD, "red"]),
@@ -171,3 +171,47 @@ def test_gradients_are_finite_wherever_a_direction_is_missing(where, make):
         assert np.isfinite(np.array(value)).all()
         for name, leaf in leaves.items():
             assert np.abs(np.array(dr.grad(leaf))).max() < 1e4, (name, vector, n, form)
+
+
+def test_the_largest_exponent_is_an_ordinary_one_and_none_is_a_mirror_by_rounding():
+    """A larger one would be infinite in single precision; the message says what `inf` is."""
+    message = r"^n = 3\.5e\+38 is not allowed: .*at most 3\.4e\+38; inf makes a mirror\.$"
+    with pytest.raises(InputError, match=message):
+        Material(n=3.5e38)
+    assert Material(n=10**20).n == 1e20
+    for vector, form in product((Array3f, Array3f64), ("phong", "blinn")):
+        given = vector(0), vector(0, 0, 1), vector(0, [0, 1e-3], 1)
+        material = Material(k_s=1, n=3.4e38, form=form)
+        value = shade(*given, material, [PointLight((0, 0, 2), 1)])
+        assert np.array(value).tolist() == [1, 0]
+
+
+@pytest.mark.guarantee("kernel", "Gradients are finite at any distance from a light.")
+@pytest.mark.parametrize("make", LIGHTS.values(), ids=LIGHTS.keys())
+@pytest.mark.parametrize("vector", [Array3f, Array3f64], ids=["single", "double"])
+def test_gradients_are_finite_at_any_distance(vector, make):
+    """The derivative of ``1 / d^2`` exceeds all floats long before the value does."""
+    exponents = range(-36, 13) if vector is Array3f else range(-300, 101, 4)
+    scale = dr.value_t(vector)(10.0 ** np.array(exponents))
+    for n, form in product((2, 0.5, 1e5), ("phong", "blinn")):
+        leaves = {"lamp": vector(0.6, 0, 0.8) * scale, "position": vector(0)}
+        leaves |= {"normal": vector(0, 0, 1), "view": vector(-0.6, 0.1, 0.8)}
+        leaves |= {"axis": vector(0, 0, -1), "power": dr.value_t(vector)(9)}
+        leaves = {name: leaf + 0 * scale for name, leaf in leaves.items()}
+        dr.enable_grad(leaves)
+        material = Material(k_d=0.5, k_s=0.4, n=n, form=form)
+        light = make(leaves["lamp"], leaves["axis"], leaves["power"])
+        value = shade(leaves["position"], leaves["normal"], leaves["view"], material, [light])
+        dr.backward(value, flags=dr.ADFlag.Default | dr.ADFlag.AllowNoGrad)
+        for name, leaf in leaves.items():
+            assert np.isfinite(np.array(dr.grad(leaf))).all(), (name, n, form)
+        if make in (LIGHTS["inverse square"], LIGHTS["spot"]):
+            # `1 / d^2` falls with the square, its derivative with the cube, unless it is left out.
+            steep = 5e-11 if vector is Array3f else 1e-100
+            found = np.array(dr.grad(leaves["lamp"]).z, float)[np.array(exponents) < 11]
+            near = 10.0 ** np.array(exponents)[np.array(exponents) < 11]
+            assert not found[near < steep].any()
+            near, found = near[near > steep], found[near > steep]
+            np.testing.assert_allclose(
+                near * (near * (near * found)), found[near == 1][0], rtol=1e-3
+            )
