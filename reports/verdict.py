@@ -43,6 +43,9 @@ CHOICES = ("--heuristic", "--pairing", "--interpolation")
 TEXTBOOK = ("phong", "blinn")
 """The heuristics of the chapters."""
 
+SAME_NOISE = 0.05
+"""Share by which two noises differ at most that are called the same."""
+
 CHEAP = 1.5
 """Times of the textbook's time that count as no more."""
 
@@ -212,7 +215,7 @@ def saving(record: ComparisonRecord) -> str:
     if price.saved is None:
         return f"{sentence}."
     costs = f"With it, a sample takes {number(price.saved.time)} times as long"
-    if price.saved.noise is not None:
+    if price.saved.noise is not None and abs(price.saved.noise - 1) > SAME_NOISE:
         costs = f"{costs} and has {number(price.saved.noise)} times the noise"
     return f"{sentence}. {costs}."
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from fotismos.heuristic.errors import InputError, suggestion
 
@@ -40,7 +40,7 @@ class BuiltIn:
     heuristic_variant: str | None = None
     interpolation: str = "phong"
     tessellation: int | None = None
-    vertex_weights: str | None = None
+    vertex_weights: Literal["mean", "area", "angle"] | None = None
 
     def source(self) -> Source:
         """Return the scene for :func:`fotismos.reference.pair`."""

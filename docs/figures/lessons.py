@@ -59,7 +59,12 @@ LESSONS: dict[str, tuple[Pixel, ...]] = {
         Pixel("fall-offs", 41, 45),
         Pixel("fall-offs", 38, 20),
     ),
-    "far": (Pixel("fig-8-6b", 15, 32), Pixel("far-lamp", 15, 32), Pixel("far-lamp", 42, 32)),
+    "far": (
+        Pixel("far-lamp", 15, 32),
+        Pixel("far-lamp", 42, 32),
+        Pixel("fig-8-6b", 15, 32),
+        Pixel("fig-8-6b", 42, 32),
+    ),
     "rim": (Pixel("fig-8-7a", 14, 32), Pixel("fig-8-7a", 31, 32)),
     "mirror": (Pixel("mirror", 16, 30), Pixel("mirror", 27, 26)),
     "shadow": (Pixel("fig-8-8a", 49, 32),),
