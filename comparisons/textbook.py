@@ -58,8 +58,8 @@ def lobe(cosine: Floats, n: Any, incidence: Floats) -> Floats:
 class Setting:
     """Points, each with its own light; vectors are (N, 3) or (3,), numbers (N,) or single.
 
-    ``direction`` and ``cutoff`` (degrees) make the light a spot with the exponent ``m``. ``form`` is
-    that of the lobe, one of :data:`COSINES`.
+    ``direction`` and ``cutoff`` (degrees) make the light a spot with the exponent ``m``. The lobe's
+    ``form`` is one of :data:`COSINES`.
     """
 
     position: Any = (0.0, 0.0, 0.0)

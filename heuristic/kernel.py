@@ -15,6 +15,7 @@ from fotismos.heuristic.convention import (
     Array,
     Colour,
     Cosines,
+    Mask,
     Number,
     Position,
     Vector,
@@ -189,12 +190,8 @@ def contributions(
             cosine = lobe(light, position, arrival.toward, cos_incidence)
             specular = terms.specular(arrival.specular, 1, cosine, material.n)
         is_steep = light.is_steep(arrival.distance)
-        if is_steep is not None:
-            # The same variables, and no instruction, where nothing is differentiated.
-            diffuse, specular = (
-                None if term is None else dr.select(is_steep, dr.detach(term), term)
-                for term in (diffuse, specular)
-            )
+        diffuse = _constant_where(is_steep, diffuse)
+        specular = _constant_where(is_steep, specular)
         yield LightContribution(
             arrival=arrival,
             cos_incidence=cos_incidence,
@@ -202,6 +199,13 @@ def contributions(
             diffuse=diffuse,
             specular=specular,
         )
+
+
+def _constant_where(is_steep: Mask | None, term: Colour | None) -> Colour | None:
+    """Return a term without derivatives where it is too steep for them; the value is the same."""
+    if is_steep is None or term is None:
+        return term
+    return dr.select(is_steep, dr.detach(term), term)
 
 
 def _blocks(

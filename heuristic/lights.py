@@ -149,6 +149,11 @@ class Light:
         """Return ``L`` in double precision, as a vector and its inverse length."""
         return vectors.wide_light_vector(type(position)(self.position), position)
 
+    def offset(self, position: Position) -> numerics.Compensated:
+        """Return a vector towards the light, of any length, and what its rounding lost."""
+        half = type(position)(self.position) * 0.5
+        return numerics.add((half, 0), -0.5 * position)
+
     def given(self) -> dict[str, Any]:
         """Return the fields that the kernel reads and that are not omitted, with their values."""
         known = {name: value for name, value in vars(self).items() if name != "extent"}
@@ -214,6 +219,10 @@ class DirectionalLight(Light):
 
     def compiled(self) -> dict[str, Any]:
         return {}
+
+    def offset(self, position: Position) -> numerics.Compensated:
+        direction = type(position)(self.direction)
+        return -direction, 0 * direction
 
     def is_steep(self, distance: Number) -> None:
         return None
@@ -359,7 +368,12 @@ CHECKS: dict[str, Callable[[Any], Any]] = {
         lambda degrees: 0 < degrees < 180,
         "an angle between 0 and 180 degrees, both excluded",
     ),
-    "exponent": partial(_number, "exponent", lambda m: 0 <= m < inf, "a finite value of 0 or more"),
+    "exponent": partial(
+        _number,
+        "exponent",
+        lambda m: 0 <= m <= numerics.LARGEST_EXPONENT,
+        f"a finite value of 0 or more, at most {numerics.LARGEST_EXPONENT:.2g}",
+    ),
     "attenuation": _attenuation,
     "shell": partial(_number, "shell", lambda r: 0 <= r < inf, "a finite radius of 0 or more"),
     "clamped": partial(materials.checked_flag, "clamped"),

@@ -9,7 +9,8 @@ The module rests on three ideas:
 - A cosine near 1 travels with its *complement* ``1 - c``, which rounding would swallow. Then
   ``c^n = 2^(n log2(1 - (1 - c)))`` is as accurate as the complement is, for every ``n``.
 - Vectors are scaled by a power of two before they are squared, which rounds nothing.
-- A running sum carries what its last addition lost (Kahan 1965, as improved by Neumaier 1974).
+- A running sum carries what its last addition lost (Kahan 1965, as improved by Neumaier 1974), and
+  so do vectors where double precision itself is not enough (Dekker 1971).
 """
 
 import sys
@@ -254,6 +255,37 @@ def summed(total: Compensated) -> Array:
     return value + dr.select(dr.isfinite(lost), lost, 0)
 
 
+def exact_product(a: Array, b: Array) -> Compensated:
+    """Return ``a b``, and what its rounding lost."""
+    product = a * b
+    return product, dr.fma(a, b, -product)
+
+
+def exact_dot(a: Compensated, b: Compensated) -> Compensated:
+    """Return the scalar product of two vectors with twice the digits of their type."""
+    product, lost = exact_product(a[0], b[0])
+    total: Compensated = product.x, lost.x
+    for term, rest in ((product.y, lost.y), (product.z, lost.z)):
+        value, error = add(total, term)
+        total = value, error + rest
+    value, error = total
+    return value, error + dr.dot(a[0], b[1]) + dr.dot(a[1], b[0])
+
+
+def exact_unit(vector: Compensated) -> Compensated:
+    """Return a vector over its length with twice the digits of its type, and zero for zero."""
+    scaled_vector, factor, estimate = scaled(vector[0])
+    rest = vector[1] * factor
+    root = inverse_length(estimate)
+    square, lost = exact_dot((scaled_vector, rest), (scaled_vector, rest))
+    # What the estimate lacks, `1 - root^2 square`: one step of Newton in the lost digits.
+    power, power_lost = exact_product(root, root)
+    product, product_lost = exact_product(power, square)
+    lacks = (1 - product) - product_lost - power_lost * square - power * lost
+    unit, unit_lost = exact_product(scaled_vector, root)
+    return unit, unit_lost + rest * root + unit * (0.5 * lacks)
+
+
 def inverse_of_power(power_of_two: Number) -> Number:
     """Return the inverse of a power of two, without a division."""
     if not _is_single(power_of_two):
@@ -261,6 +293,11 @@ def inverse_of_power(power_of_two: Number) -> Number:
     # The biased exponents of `2^e` and `2^-e` add up to 254, in the bits 0x7F000000.
     bits = dr.reinterpret_array(dr.uint32_array_t(type(power_of_two)), power_of_two)
     return dr.reinterpret_array(type(power_of_two), 0x7F000000 - bits)
+
+
+def is_double(value: Any) -> bool:
+    """Return whether a value is an array of the JIT in double precision."""
+    return bool(dr.is_jit_v(value) and dr.itemsize_v(value) == 8)
 
 
 def _is_single(value: Any) -> bool:

@@ -99,9 +99,11 @@ def lobe(
     kernel's precision, for others from double precision throughout: rounding ``N``, ``L`` and ``V``
     to single precision alone turns them by 1e-7, which at ``n = 1e6`` changes the highlight by a
     thousandth. The sum ``L + V`` has double precision for all: near the horizon it may be so short
-    that nothing is left of its digits.
+    that nothing is left of its digits. A kernel in double precision carries what rounding lost.
     """
     is_blinn = material.form == "blinn"
+    if numerics.is_double(normal) and (is_blinn or not material.n_is_moderate):
+        return _exact_lobe(material.form, normal, view)
     unit = normalise if material.n_is_moderate else numerics.wide_unit
     unit_normal = unit(normal)
     sides = _sides(material.form, unit_normal, (numerics.wide_unit if is_blinn else unit)(view))
@@ -116,6 +118,32 @@ def lobe(
         return found._replace(value=dr.select(is_lit > 0, found.value, 0))
 
     return cosine
+
+
+def _exact_lobe(
+    form: str, normal: Vector, view: Vector
+) -> Callable[[Any, Position, Direction, Number], Cosines]:
+    """Return :func:`lobe` of vectors that carry what rounding lost, in double precision."""
+    n = numerics.exact_unit((normal, 0 * normal))
+    v = numerics.exact_unit((view, 0 * view))
+    cosine, lost = numerics.exact_dot(n, v)
+    # The mirror image of V, `2 (N.V) N - V`.
+    product, product_lost = numerics.exact_product(n[0], 2 * cosine)
+    mirrored = numerics.add((product, product_lost), -v[0])
+    rest = 2 * (cosine * n[1] + lost * n[0]) - v[1]
+
+    def chord(light: Any, position: Position, toward: Direction, cos_incidence: Number) -> Cosines:
+        a = numerics.exact_unit(light.offset(position))
+        b = mirrored[0], mirrored[1] + rest
+        if form == "blinn":
+            total, total_lost = numerics.add(a, v[0])
+            a = numerics.exact_unit((total, total_lost + v[1]))
+            b = n
+        apart = (a[0] - b[0]) + (a[1] - b[1])
+        value = dr.select(cos_incidence > 0, numerics.summed(numerics.exact_dot(a, b)), 0)
+        return numerics.Cosine(value, 0.5 * dr.squared_norm(apart))
+
+    return chord
 
 
 def local_lobe(form: str, is_moderate: bool, wi: Direction, wo: Direction) -> Cosines:

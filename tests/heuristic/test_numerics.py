@@ -118,12 +118,7 @@ def test_a_highlight_keeps_its_digits_at_any_exponent(form):
         mirrored = -toward + 2 * unit * (toward @ unit)
         view = np.float32(-mirrored + random.normal(size=3) / n**0.5).astype(float)
         with mpmath.workdps(40):
-            n_, l_, v_ = (_exact_unit(each) for each in (normal, -toward, view))
-            if form == "phong":
-                cosine = 2 * _exact_dot(n_, l_) * _exact_dot(n_, v_) - _exact_dot(l_, v_)
-            else:
-                cosine = _exact_dot(n_, _exact_unit([a + b for a, b in zip(l_, v_, strict=True)]))
-            expected = float(cosine ** mpmath.mpf(n))
+            expected = float(exact_cosine(form, normal, -toward, view) ** mpmath.mpf(n))
         sun = fotismos.DirectionalLight(tuple(toward), 1.0)
         material = fotismos.Material(k_s=1.0, n=n, form=form)
         place, *given = (Array3f(*map(float, each)) for each in ((0, 0, 0), normal, view))
@@ -131,9 +126,17 @@ def test_a_highlight_keeps_its_digits_at_any_exponent(form):
         assert abs(found[0] - expected) < 1e-4
 
 
+def exact_cosine(form, *vectors):
+    """The lobe's cosine of a normal, a light and a view, with mpmath's digits."""
+    normal, light, view = (_exact_unit([mpmath.mpf(each) for each in vector]) for vector in vectors)
+    if form == "phong":
+        return 2 * _exact_dot(normal, light) * _exact_dot(normal, view) - _exact_dot(light, view)
+    return _exact_dot(normal, _exact_unit([a + b for a, b in zip(light, view, strict=True)]))
+
+
 def _exact_unit(vector):
-    length = mpmath.sqrt(sum(mpmath.mpf(float(each)) ** 2 for each in vector))
-    return [mpmath.mpf(float(each)) / length for each in vector]
+    length = mpmath.sqrt(_exact_dot(vector, vector))
+    return [each / length for each in vector]
 
 
 def _exact_dot(a, b):
@@ -190,8 +193,8 @@ def _unit(vectors):
     return vectors / np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
 
 
-def worst_error(n, form, count, vector_type):
-    """The largest relative error of the kernel's lobe where it exceeds 1e-3."""
+def errors(n, form, count, vector_type):
+    """The kernel's lobe, its relative errors where it exceeds 1e-3, 0 elsewhere; and the points."""
     dtype = np.float32 if vector_type is Array3f else np.float64
     points = hostile_points(n, count, dtype)
     exact, incidence = lobe_exactly(*points, np.longdouble(n), form)
@@ -203,7 +206,7 @@ def worst_error(n, form, count, vector_type):
     # Closer to the horizon rounding decides the side.
     counts = (exact > 1e-3) & (incidence > 8 * np.finfo(dtype).eps)
     assert counts.sum() > count / 10
-    return float((np.abs(found - exact)[counts] / exact[counts]).max())
+    return found, np.where(counts, np.abs(found - exact) / np.where(counts, exact, 1), 0), points
 
 
 @pytest.mark.guarantee(
@@ -213,4 +216,38 @@ def worst_error(n, form, count, vector_type):
 @pytest.mark.parametrize(("form", "bound"), [("phong", 1e-4), ("blinn", 3e-4)])
 def test_the_lobe_is_right_between_the_tested_points(form, bound, count):
     for n in EXPONENTS:
-        assert worst_error(n, form, count, Array3f) < bound, n
+        assert errors(n, form, count, Array3f)[1].max() < bound, n
+
+
+@pytest.mark.parametrize("count", [20_000, pytest.param(400_000, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("form", ["phong", "blinn"])
+def test_in_double_precision_the_lobe_is_right_to_its_last_digits(form, count):
+    """By 50 digits, where it is farthest from extended precision, which loses more than it."""
+    for n in EXPONENTS:
+        found, apart, points = errors(n, form, count, Array3f64)
+        for row in np.argsort(apart)[-5:]:
+            with mpmath.workdps(50):
+                expected = exact_cosine(form, *(each[row] for each in points)) ** mpmath.mpf(n)
+                assert abs(found[row] - expected) < 1e-12 * expected, (n, row)
+
+
+@pytest.mark.parametrize("form", ["phong", "blinn"])
+def test_the_way_to_the_light_keeps_its_digits_far_from_the_origin(form):
+    """In double precision, by 50 digits: ``P_L - P`` has more than one double holds."""
+    rng = np.random.default_rng(6)
+    n = 1e12
+    position, lamp, normal = 3 * rng.normal(size=(3, 40, 3))
+    up, light = _unit(normal), _unit(lamp - position)
+    normal = normal * np.sign(np.sum(up * light, axis=1, keepdims=True))
+    view = 2 * np.sum(up * light, axis=1, keepdims=True) * up - light
+    view = view + rng.uniform(-1, 1, (40, 3)) / np.sqrt(n)
+    arrays = (Array3f64(*np.ascontiguousarray(each.T)) for each in (position, normal, view, lamp))
+    *given, place = arrays
+    material = fotismos.Material(k_s=1.0, n=n, form=form)
+    found = np.array(fotismos.shade(*given, material, [fotismos.PointLight(place, 1.0)]))
+    with mpmath.workdps(50):
+        for row, value in enumerate(found):
+            pairs = zip(lamp[row], position[row], strict=True)
+            way = [mpmath.mpf(there) - mpmath.mpf(here) for there, here in pairs]
+            expected = exact_cosine(form, normal[row], way, view[row]) ** mpmath.mpf(n)
+            assert abs(value - expected) < 1e-12 * expected

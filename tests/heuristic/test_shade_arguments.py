@@ -118,7 +118,7 @@ MADE = {
     "cutoff = .*between 0 and 180": (
         lambda odd: SpotLight(UP, UP, 1, odd), [*ODD, 0, -5, 180, 200, INFINITY],
     ),
-    "exponent = .*0 or more": (lambda odd: SpotLight(UP, UP, 1, 30, odd), [*ODD, INFINITY]),
+    "exponent = .*0 or more": (lambda odd: SpotLight(UP, UP, 1, 30, odd), [*ODD, INFINITY, 1e39]),
 }  # fmt: skip
 
 
