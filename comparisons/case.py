@@ -19,7 +19,7 @@ SPECTRAL = "llvm_ad_spectral"
 
 SUFFIXES = (".xml", ".py")
 """Suffixes of scene files: Mitsuba's, and Python's."""
-PICTURES = (".exr", ".png")
+PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".npy")
 
 Scene = str | Path | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
 

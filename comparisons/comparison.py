@@ -248,7 +248,9 @@ class PictureRecord(Record):
     Attributes
     ----------
     transfer
-        Transfer function of their values, as stated; null for EXR's own, which is linear.
+        Transfer function of their values, as stated; null if the files' own was taken.
+    notes
+        How the files were read, where they do not say it plainly.
     shift
         Pixels by which their content is too far right and too low; null if their edges are
         uninformative.
@@ -263,6 +265,7 @@ class PictureRecord(Record):
 
     files: tuple[str, ...]
     transfer: str | None
+    notes: tuple[str, ...] = ()
     repeats: Size
     shift: tuple[float, float] | None
     edges: float

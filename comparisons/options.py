@@ -99,12 +99,16 @@ class Options(
     ] = False
     image: Annotated[
         tuple[str, ...],
-        _help("A picture of the scene, .exr (FILE.exr:LAYER) or .png, that replaces the heuristic"
-              " half; several are repeats, which show its noise."),
+        _help("A picture of the scene (.exr, FILE.exr:LAYER, .png, .jpg, .hdr, .pfm, .npy) that"
+              " replaces the heuristic half; several are repeats, which show its noise."),
     ] = ()  # fmt: skip
     transfer: Annotated[
         Literal["linear", "srgb"] | None,
-        _help("Transfer function of the picture.", "linear for .exr"),
+        _help("Transfer function of the picture.", "the file's own: sRGB for .png and .jpg"),
+    ] = None
+    over: Annotated[
+        str | None,
+        _help("What lies behind a picture with alpha: black, white, or R,G,B in linear numbers."),
     ] = None
     pixels_per_degree: Annotated[
         Density | None, _help("FLIP: pixels per degree of vision.", "67")
@@ -222,6 +226,7 @@ class OptionValues(TypedDict, total=False):
     allow_empty: bool
     image: str | Sequence[str]
     transfer: Literal["linear", "srgb"] | None
+    over: str | None
     pixels_per_degree: float | None
     colour_science: bool
 

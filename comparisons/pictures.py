@@ -1,7 +1,6 @@
-"""Pictures of other renderers (EXR and PNG) as the heuristic half, and what is odd in them.
+"""Pictures of other renderers as the heuristic half, and what is odd in them.
 
-Values are linear, in units of display white, with the primaries of BT.709, like all images here. A
-PNG does not state its transfer function, so the user must. What cannot be compared is rejected.
+They are read by :mod:`fotismos.comparisons.picture_files`.
 
 The position is found by edges: a shift looks like wrong shading. Geometric edges, where the normal
 or the hit changes, are in any picture of the same scene, however it is shaded. The heuristic half
@@ -12,34 +11,26 @@ a shift of the reference itself, which is in its place: noise and shading explai
 half of the repeats must show it, too.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import permutations
 from math import pi
-from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons.case import PICTURES, picture_parts
 from fotismos.comparisons.comparison import Images, PictureRecord
-from fotismos.comparisons.departure.colour import CHROMATICITIES, from_srgb, luminance, to_srgb
+from fotismos.comparisons.departure.colour import from_srgb, luminance, to_srgb
 from fotismos.comparisons.options import Options
-from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
+from fotismos.comparisons.picture_files import read_file
+from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.rendering.gbuffer import gbuffer
-from fotismos.reference.rendering.renderer import LARGEST_VALUE, Renderer, Times
+from fotismos.reference.rendering.renderer import Renderer, Times
 from fotismos.reference.scene.source import Source
-
-SAME_PRIMARIES = 2e-3
-"""Largest difference of chromaticities that are the same: some files round them."""
-
-MOST_NEGATIVE = -1e-3
-"""Below this, a negative value is more than rounding."""
 
 
 class PictureHalf:
@@ -70,7 +61,7 @@ class PictureHalf:
 
 def read_all(options: Options) -> list[np.ndarray]:
     """Return the pictures that options name: all of one size, and one or an even number."""
-    images = [read(word, options.transfer) for word in options.image]
+    images = [read(word, options.transfer, options.over) for word in options.image]
     require_one_size(images)
     if len(images) > 1 and options.noise is not None:
         raise InputError(
@@ -82,6 +73,15 @@ def read_all(options: Options) -> list[np.ndarray]:
             f"{len(images)} repeats: give one, or an even number, whose halves give the noise."
         )
     return images
+
+
+def notes(options: Options) -> tuple[str, ...]:
+    """Return how the pictures of options are read, in words, where the files do not say it."""
+    files = (read_file(word, options.transfer, options.over) for word in options.image)
+    found = [note for file in files for note in file.notes]
+    if options.over is not None:
+        found.append(f"alpha over {options.over}")
+    return tuple(dict.fromkeys(found))
 
 
 def require_one_size(images: Iterable[np.ndarray]) -> None:
@@ -112,127 +112,9 @@ def at_size_of_pictures(source: Source, options: Options) -> Options:
     return options.changed(resolution=(width, height))
 
 
-def read(word: str, transfer: str | None = None) -> np.ndarray:
-    """Return a picture as linear RGB, (H, W, 3), float32.
-
-    ``word`` is the path of a file, or ``FILE.exr:LAYER``. Without a ``transfer`` function,
-    an EXR is linear.
-    """
-    path, layer = picture_parts(word)
-    if not path.is_file():
-        fault = "it is not a regular file" if path.exists() else "there is no such file"
-        raise InputError(f"{path}: {fault}. Give a {' or '.join(PICTURES)} picture.")
-    image = _exr(path, layer) if path.suffix.lower() == ".exr" else _png(path, transfer)
-    # A NaN would pass the later tests: it is neither above nor below.
-    wrong = ~np.isfinite(image).all(axis=-1)
-    if wrong.any():
-        raise NonFiniteError(f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture.")
-    if transfer == "srgb":
-        image = from_srgb(image)
-    wrong = np.any(image > LARGEST_VALUE, axis=-1)
-    if wrong.any():
-        raise InputError(
-            f"{word}: {_counted(wrong)} above {LARGEST_VALUE:g}, which is too bright. Divide the"
-            " picture and all lights by the same number."
-        )
-    wrong = np.any(image < MOST_NEGATIVE, axis=-1)
-    if wrong.any():
-        raise InputError(
-            f"{word}: {_counted(wrong)} negative. Colours outside BT.709 are negative, and so are"
-            " overshoots of a sharpening filter: write linear BT.709 without either."
-        )
-    return np.ascontiguousarray(image, np.float32)
-
-
-def _exr(path: Path, layer: str) -> np.ndarray:
-    import OpenEXR  # loaded late: PNGs do not need it
-
-    try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            parts = [part.name() for part in file.parts]
-            header = dict(file.header())
-            channels = {name: np.array(c.pixels) for name, c in file.channels().items()}
-    except Exception as error:  # the library raises many types for a file that is not EXR
-        raise InputError(f"{path}: not a readable EXR file: {error}.") from error
-    if len(parts) > 1:
-        raise InputError(
-            f"{path}: it has {len(parts)} parts, {', '.join(map(repr, parts))}. Save the picture"
-            " as a file of one part; several layers are allowed."
-        )
-    _require_plain(path, header)
-    prefix = f"{layer}." if layer else ""
-    if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
-        raise _without_colours(path, layer, channels)
-    _require_opaque(path, channels.get(f"{prefix}A"))
-    return np.stack([channels[f"{prefix}{c}"].astype(float) for c in "RGB"], axis=-1)
-
-
-def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> InputError:
-    layers = sorted({name[:-2] for name in channels if name.endswith(".R")})
-    if layer and {*"RGB"} <= set(channels):
-        return InputError(f"{path}: it has R, G and B but no layer {layer!r}: give {path}.")
-    if not layers:
-        return InputError(
-            f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B."
-        )
-    where = f"no layer {layer!r}{suggestion(layer, layers)}" if layer else "no channel R"
-    return InputError(
-        f"{path}: it has {where}. Its layers are {', '.join(layers)}: give {path}:{layers[0]}."
-    )
-
-
-def _require_plain(path: Path, header: Mapping[str, Any]) -> None:
-    """Require a whole picture in BT.709."""
-    data = np.array(header["dataWindow"]).tolist()
-    display = np.array(header["displayWindow"]).tolist()
-    if data != display:
-        sizes = (
-            f"{right - left + 1}x{bottom - top + 1} from ({left}, {top})"
-            for (left, top), (right, bottom) in (data, display)
-        )
-        raise InputError(
-            f"{path}: it is cropped: its data window is {next(sizes)}, its display window"
-            f" {next(sizes)}. Save the whole picture."
-        )
-    primaries = header.get("chromaticities")
-    if primaries is not None and max(abs(np.subtract(primaries, CHROMATICITIES))) > SAME_PRIMARIES:
-        raise InputError(
-            f"{path}: its primaries and white are ({', '.join(f'{v:.4g}' for v in primaries)})."
-            f" Convert it to BT.709 (sRGB): {', '.join(map(str, CHROMATICITIES))}."
-        )
-
-
-def _png(path: Path, transfer: str | None) -> np.ndarray:
-    if transfer is None:
-        raise InputError(
-            f"{path}: a PNG does not state its transfer function. Give `transfer=srgb` for"
-            " values encoded for displays, or `transfer=linear`."
-        )
-    try:
-        pixels = np.array(mi.Bitmap(str(path)))
-    except RuntimeError as error:
-        raise InputError(f"{path}: not a readable PNG file: {error}.") from error
-    image = pixels / float(np.iinfo(pixels.dtype).max)
-    image = image[..., None] if image.ndim == 2 else image
-    colours, rest = (3, image[..., 3:]) if image.shape[2] > 2 else (1, image[..., 1:])
-    _require_opaque(path, rest[..., 0] if rest.size else None)
-    return np.broadcast_to(image[..., :colours], (*image.shape[:2], 3))
-
-
-def _require_opaque(path: Path, alpha: np.ndarray | None) -> None:
-    if alpha is None or (alpha >= 1 - 1 / 512).all():
-        return
-    count = int(np.count_nonzero(alpha < 1 - 1 / 512))
-    raise InputError(
-        f"{path}: {count} of {alpha.size} pixels have an alpha below 1, and their colours may or"
-        " may not be premultiplied. Composite the picture over its background, without alpha."
-    )
-
-
-def _counted(wrong: np.ndarray) -> str:
-    y, x = np.unravel_index(np.argmax(wrong), wrong.shape)
-    count = int(np.count_nonzero(wrong))
-    return f"{count} of {wrong.size} pixels, the first at (x, y) = ({x}, {y}), are"
+def read(word: str, transfer: str | None = None, over: str | None = None) -> np.ndarray:
+    """Return a picture as linear RGB, (H, W, 3), float32; see :func:`picture_files.read_file`."""
+    return read_file(word, transfer, over).image
 
 
 # --- Position ----------------------------------------------------------------------------------
@@ -411,6 +293,7 @@ def picture_record(
     record = PictureRecord(
         files=files,
         transfer=options.transfer,
+        notes=notes(options),
         repeats=len(files),
         shift=None if is_doubtful else place.shift,
         edges=place.correlation,

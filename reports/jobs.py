@@ -252,13 +252,13 @@ verbosity_options = with_options(quiet_option, verbose_option)
 
 
 def percentage(text: str) -> float:
-    """Parse a percentage with its sign, from 0 % to 100 %, as a share from 0 to 1."""
-    digits, sign, rest = text.strip().partition("%")
+    """Parse a percentage, with or without its sign, from 0 % to 100 %, as a share from 0 to 1."""
+    digits, _, rest = text.strip().partition("%")
     try:
         share = float(digits) / 100.0
     except ValueError:
         share = math.nan
-    if not (sign and not rest and 0.0 <= share <= 1.0):
+    if rest or not 0.0 <= share <= 1.0:
         raise click.BadParameter(
             f"{text!r} is not a percentage: give one from 0% to 100%, such as 5%."
         )

@@ -29,7 +29,9 @@ SIZE = 256, 192
 THRESHOLD = 2.0
 
 NEAR = 7.0
-"""Percent of pixels by which points differ at least, to have labels of their own."""
+NEAR_DECADES = 0.13
+"""Percent of pixels, and decades of time, by which points differ at least, to have labels of their
+own."""
 
 NAMED_ABOVE = 1.6
 """Times of the textbook's time above which the chart names a scene."""
@@ -157,14 +159,14 @@ def _name(axes: Axes, points: Sequence[tuple[ComparisonRecord, float]]) -> None:
         height = 100 * verdict.share(record).value
         name = record.scene.replace("_", " ")
         for x, y, names in groups:
-            if abs(y - height) < NEAR and abs(log10(x / price)) < NEAR / 20:
+            if abs(y - height) < NEAR and abs(log10(x / price)) < NEAR_DECADES:
                 names.append(name)
                 break
         else:
             groups.append((price, height, [name]))
     right = max(x for x, _, _ in groups)
     for x, y, names in groups:
-        is_right = x > right / 10
+        is_right = x > right / 30
         axes.annotate(
             ", ".join(names),
             (x, y),

@@ -17,6 +17,7 @@ from fotismos.reports import jobs
 @jobs.scene_options
 @jobs.option("image")
 @jobs.option("transfer")
+@jobs.option("over")
 @jobs.verbosity_options
 @jobs.option("noise")
 @jobs.option("colour_science")

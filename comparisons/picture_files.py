@@ -1,0 +1,325 @@
+"""Reads pictures as people have them: linear RGB with the primaries of BT.709, display white is 1.
+
+=====================  ==========================================================================
+File                   Read as
+=====================  ==========================================================================
+``.exr``               linear; other primaries are converted, by the file's chromaticities; a data
+                       window is put into its display window, black around it
+``.png``               as its sRGB or gAMA chunk says, else sRGB; 8 or 16 bits
+``.jpg``, ``.jpeg``    sRGB
+``.hdr``, ``.pfm``     linear
+``.npy``               linear; an array (H, W, 3), (H, W, 4) with alpha, or (H, W)
+=====================  ==========================================================================
+
+``transfer`` replaces the encoding. What a file did not say plainly is said in words. Where alpha is
+below 1, the picture is put over the colour ``over``: in EXR colours are premultiplied, in other
+files they are not.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from fotismos.comparisons.case import PICTURES, picture_parts
+from fotismos.comparisons.departure.colour import BT709, CHROMATICITIES, Array, from_srgb
+from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
+from fotismos.reference.rendering.renderer import LARGEST_VALUE
+
+SAME_PRIMARIES = 2e-3
+"""Largest difference of chromaticities that are the same: some files round them."""
+
+MOST_NEGATIVE = -1e-3
+"""Below this, a negative value is more than rounding."""
+
+OPAQUE = 1 - 1 / 512
+"""The smallest alpha that is opaque: 8 bits round it."""
+
+COLOURS = {"black": (0.0, 0.0, 0.0), "white": (1.0, 1.0, 1.0)}
+"""The names of colours that a picture can be put over."""
+
+GAMMA_OF_SRGB = 1 / 2.2
+"""What a gAMA chunk has for sRGB (PNG specification, 11.3.3.2)."""
+
+PRIMARIES = {
+    "BT.2020": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
+    "Display P3": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
+    "ACEScg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
+    "ACES2065-1": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767),
+}
+"""Names of known primaries: x and y of red, green, blue and white."""
+
+
+@dataclass(frozen=True)
+class Layer:
+    """What a file holds, as encoded in it: colours (H, W, 3), and alpha (H, W) if it has any.
+
+    ``transfer`` decodes the colours; None if they are linear.
+    """
+
+    colours: Array
+    alpha: Array | None = None
+    transfer: Callable[[Array], Array] | None = None
+    is_premultiplied: bool = False
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class PictureFile:
+    """A picture, linear (H, W, 3) in float32, and how it was read, in words."""
+
+    image: Array
+    notes: tuple[str, ...] = ()
+
+
+def read_file(word: str, transfer: str | None = None, over: str | None = None) -> PictureFile:
+    """Return a picture; ``word`` is the path of a file, or ``FILE.exr:LAYER``."""
+    path, layer_name = picture_parts(word)
+    if not path.is_file():
+        fault = "it is not a regular file" if path.exists() else "there is no such file"
+        raise InputError(f"{path}: {fault}. Give a {' or '.join(PICTURES)} picture.")
+    suffix = path.suffix.lower()
+    if suffix == ".exr":
+        layer = _exr(path, layer_name)
+    elif suffix == ".npy":
+        layer = _array(path)
+    else:
+        layer = _bitmap(path, suffix)
+    # A NaN would pass the later tests: it is neither above nor below.
+    wrong = np.asarray(~np.isfinite(layer.colours).all(axis=-1))
+    if wrong.any():
+        raise NonFiniteError(f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture.")
+    decode = {"srgb": from_srgb, "linear": None}.get(transfer or "", layer.transfer)
+    image = layer.colours if decode is None else decode(layer.colours)
+    image = _opaque(path, image, layer, over)
+    wrong = np.any(image > LARGEST_VALUE, axis=-1)
+    if wrong.any():
+        raise InputError(
+            f"{word}: {_counted(wrong)} above {LARGEST_VALUE:g}, which is too bright. Divide the"
+            " picture and all lights by the same number."
+        )
+    wrong = np.any(image < MOST_NEGATIVE, axis=-1)
+    if wrong.any():
+        raise InputError(
+            f"{word}: {_counted(wrong)} negative. Colours outside BT.709 are, if the file does not"
+            " say its primaries, and so are overshoots of a sharpening filter. Write the"
+            " chromaticities, or clip the picture at 0."
+        )
+    notes = layer.notes if transfer is None else ()
+    return PictureFile(image=np.ascontiguousarray(image, np.float32), notes=notes)
+
+
+# --- Alpha -------------------------------------------------------------------------------------
+
+
+def colour_over(text: str) -> Array:
+    """Return the linear colour that a picture is put over: a name, or three numbers."""
+    if text in COLOURS:
+        return np.array(COLOURS[text])
+    try:
+        numbers = np.array([float(part) for part in text.split(",")])
+    except ValueError:
+        numbers = np.array([])
+    if numbers.shape != (3,) or not (np.isfinite(numbers).all() and (numbers >= 0).all()):
+        raise InputError(
+            f"over = {text} is not allowed: give {', '.join(COLOURS)}, or three linear numbers,"
+            " such as 0.5,0.5,0.5."
+        )
+    return numbers
+
+
+def _opaque(path: Path, image: Array, layer: Layer, over: str | None) -> Array:
+    """Return linear colours over the colour that was given; without alpha, unchanged."""
+    alpha = layer.alpha
+    if alpha is None or (alpha >= OPAQUE).all():
+        return image
+    if over is None:
+        count = int(np.count_nonzero(alpha < OPAQUE))
+        raise InputError(
+            f"{path}: {count} of {alpha.size} pixels have an alpha below 1. Give the colour behind"
+            " them, `over=black`, or write the picture without alpha."
+        )
+    alpha = np.clip(alpha, 0, 1)[..., None]
+    front = image if layer.is_premultiplied else image * alpha
+    shown: Array = front + (1 - alpha) * colour_over(over)
+    return shown
+
+
+# --- OpenEXR -----------------------------------------------------------------------------------
+
+
+def _exr(path: Path, name: str) -> Layer:
+    import OpenEXR  # loaded late: other pictures do not need it
+
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            parts = [part.name() for part in file.parts]
+            header = dict(file.header())
+            channels = {name: np.array(c.pixels) for name, c in file.channels().items()}
+    except Exception as error:  # the library raises many types for a file that is not EXR
+        raise InputError(f"{path}: not a readable EXR file: {error}.") from error
+    if len(parts) > 1:
+        raise InputError(
+            f"{path}: it has {len(parts)} parts, {', '.join(map(repr, parts))}. Save the picture"
+            " as a file of one part; several layers are allowed."
+        )
+    prefix = f"{name}." if name else ""
+    if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
+        raise _without_colours(path, name, channels)
+    colours = np.stack([channels[f"{prefix}{c}"].astype(float) for c in "RGB"], axis=-1)
+    alpha = channels.get(f"{prefix}A")
+    notes = []
+    data = np.array(header["dataWindow"]).tolist()
+    display = np.array(header["displayWindow"]).tolist()
+    if data != display:
+        colours = _in_window(path, colours, data, display)
+        if alpha is not None:
+            alpha = _in_window(path, alpha[..., None], data, display)[..., 0]
+        notes.append("its data window was put into its display window")
+    primaries = header.get("chromaticities")
+    if primaries is not None and not _are_same(primaries, CHROMATICITIES):
+        colours = _converted(path, colours, primaries)
+        notes.append(f"converted from {_named(primaries)} to BT.709")
+    return Layer(colours=colours, alpha=alpha, is_premultiplied=True, notes=tuple(notes))
+
+
+def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> InputError:
+    layers = sorted({name[:-2] for name in channels if name.endswith(".R")})
+    if layer and {*"RGB"} <= set(channels):
+        return InputError(f"{path}: it has R, G and B but no layer {layer!r}: give {path}.")
+    if not layers:
+        return InputError(
+            f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B."
+        )
+    where = f"no layer {layer!r}{suggestion(layer, layers)}" if layer else "no channel R"
+    return InputError(
+        f"{path}: it has {where}. Its layers are {', '.join(layers)}: give {path}:{layers[0]}."
+    )
+
+
+def _in_window(path: Path, values: Array, data: Any, display: Any) -> Array:
+    """Return values of a data window (h, w, C) in the display window (H, W, C), 0 around them."""
+    (left, top), (right, bottom) = display
+    (data_left, data_top), _ = data
+    width = right - left + 1
+    height = bottom - top + 1
+    whole = np.zeros((height, width, values.shape[2]))
+    # What lies outside the display window, such as overscan, is not seen.
+    down = data_top - top
+    right_by = data_left - left
+    seen = values[max(-down, 0) :, max(-right_by, 0) :]
+    shown = whole[max(down, 0) :, max(right_by, 0) :]
+    shown = shown[: seen.shape[0], : seen.shape[1]]
+    if not shown.size:
+        raise InputError(
+            f"{path}: its data window lies outside its display window, so nothing of it is seen."
+            " Save the picture again."
+        )
+    shown[...] = seen[: shown.shape[0], : shown.shape[1]]
+    return whole
+
+
+def _are_same(primaries: Any, others: Any) -> bool:
+    return bool(max(abs(np.subtract(primaries, others))) <= SAME_PRIMARIES)
+
+
+def _named(primaries: Any) -> str:
+    for name, known in PRIMARIES.items():
+        if _are_same(primaries, known):
+            return name
+    return f"the primaries and white ({', '.join(f'{value:.4g}' for value in primaries)})"
+
+
+def _converted(path: Path, colours: Array, primaries: Any) -> Array:
+    """Return linear colours with the primaries of BT.709; those outside it are clipped at 0.
+
+    Whites are adapted by Bradford's matrix, as ICC profiles do.
+    """
+    with np.printoptions():  # which colour-science changes
+        import colour  # loaded late: few pictures need it
+    from colour.adaptation import matrix_chromatic_adaptation_VonKries
+
+    red, green, blue, white = np.reshape(primaries, (4, 2))
+    area = np.linalg.det(np.stack([green - red, blue - red]))
+    if abs(area) < SAME_PRIMARIES or not (white > 0).all():
+        raise InputError(
+            f"{path}: its primaries and white ({', '.join(f'{v:.4g}' for v in primaries)}) span no"
+            " colours. Write the chromaticities of its colour space."
+        )
+    *our_primaries, our_white = np.array(BT709)
+    to_xyz = colour.normalised_primary_matrix(np.stack([red, green, blue]), white)
+    from_xyz = np.linalg.inv(colour.normalised_primary_matrix(np.stack(our_primaries), our_white))
+    adapted = matrix_chromatic_adaptation_VonKries(
+        colour.xy_to_XYZ(white), colour.xy_to_XYZ(our_white), transform="Bradford"
+    )
+    converted: Array = np.maximum(colours @ (from_xyz @ adapted @ to_xyz).T, 0)
+    return converted
+
+
+# --- Other files -------------------------------------------------------------------------------
+
+
+def _bitmap(path: Path, suffix: str) -> Layer:
+    """Read a file by Mitsuba's library, which keeps 16 bits."""
+    kind = suffix.removeprefix(".").upper()
+    try:
+        pixels = np.array(mi.Bitmap(str(path)))
+    except RuntimeError as error:
+        raise InputError(f"{path}: not a readable {kind} file: {error}.") from error
+    pixels = pixels[..., None] if pixels.ndim == 2 else pixels
+    if pixels.dtype.kind == "f":
+        return _layer(path, pixels.astype(float))
+    layer = _layer(path, pixels / float(np.iinfo(pixels.dtype).max))
+    transfer: Callable[[Array], Array] | None = from_srgb
+    gamma = None
+    if suffix == ".png":
+        with Image.open(path) as file:
+            gamma = None if "srgb" in file.info else file.info.get("gamma")
+    note = f"read as sRGB, as {kind} files are"
+    if gamma is not None and gamma > 0:
+        note = f"read with the gamma of its gAMA chunk, {gamma:g}"
+        if abs(gamma - 1) < SAME_PRIMARIES:
+            transfer = None
+        elif abs(gamma - GAMMA_OF_SRGB) >= SAME_PRIMARIES:
+            exponent = 1 / gamma
+
+            def transfer(values: Array) -> Array:
+                decoded: Array = values**exponent
+                return decoded
+
+    return Layer(colours=layer.colours, alpha=layer.alpha, transfer=transfer, notes=(note,))
+
+
+def _array(path: Path) -> Layer:
+    try:
+        values = np.load(path, allow_pickle=False)
+    except (ValueError, OSError, EOFError) as error:
+        raise InputError(f"{path}: not a readable NPY file: {error}.") from error
+    values = values[..., None] if values.ndim == 2 else values
+    if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or values.dtype.kind not in "fiu":
+        raise InputError(
+            f"{path}: an array of shape {values.shape} and type {values.dtype} is not a picture:"
+            " give numbers (H, W, 3), (H, W, 4) or (H, W)."
+        )
+    return _layer(path, values.astype(float))
+
+
+def _layer(path: Path, values: Array) -> Layer:
+    """Return channels (H, W, C), grey or RGB, each with or without alpha, as colours and alpha."""
+    if not values.size:
+        raise InputError(f"{path}: it has no pixels. Save the picture again.")
+    count = 3 if values.shape[2] > 2 else 1
+    rest = values[..., count:]
+    colours = np.broadcast_to(values[..., :count], (*values.shape[:2], 3))
+    return Layer(colours=colours, alpha=rest[..., 0] if rest.shape[2] else None)
+
+
+def _counted(wrong: NDArray[np.bool_]) -> str:
+    y, x = np.unravel_index(np.argmax(wrong), wrong.shape)
+    count = int(np.count_nonzero(wrong))
+    return f"{count} of {wrong.size} pixels, the first at (x, y) = ({x}, {y}), are"
