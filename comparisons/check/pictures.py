@@ -50,6 +50,9 @@ from fotismos.comparisons.check.moved import (
 )
 from fotismos.comparisons.departure.blocks import block_sums, ratio
 from fotismos.comparisons.departure.colour import Array
+from fotismos.comparisons.departure.criterion import Verdict, decide
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.noise import MARGIN, VisibleShare
 from fotismos.comparisons.pictures import require_one_size
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import VERSION, Amount, Record, Resolution, Share
@@ -158,6 +161,19 @@ class Means:
         return error
 
 
+def _weights(before: Repeats, after: Repeats) -> tuple[float, float]:
+    """Return the weights of both variances, by degrees of freedom: a single repeat has none."""
+    free = before.count + after.count - 2
+    return (before.count - 1) / free, (after.count - 1) / free
+
+
+def noise_of_difference(before: Repeats, after: Repeats) -> Array:
+    """Return the variance of the difference of both means, at each pixel."""
+    first, second = _weights(before, after)
+    pooled: Array = first * before.variance + second * after.variance
+    return (1.0 / before.count + 1.0 / after.count) * pooled
+
+
 def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
     """Return the means over the picture, and over its blocks.
 
@@ -165,11 +181,9 @@ def means(before: Repeats, after: Repeats) -> tuple[Means, Means]:
     """
     m = before.count
     n = after.count
-    # Weights by degrees of freedom: a single repeat has none.
-    first = (m - 1) / (m + n - 2)
-    second = (n - 1) / (m + n - 2)
+    first, second = _weights(before, after)
     d = after.mean - before.mean
-    noise = (1.0 / m + 1.0 / n) * (first * before.variance + second * after.variance)
+    noise = noise_of_difference(before, after)
     r = np.maximum(first * before.correlation + second * after.correlation, 1.0)
     # The channels' noise may be one.
     f = np.maximum(_total(_tiles(noise) > 0) * (m + n - 2) / 3.0, 1.0)
@@ -302,6 +316,76 @@ class SmallestChanges(Record):
     mean: Colour
     block: Colour
     noisiest: Colour
+
+
+# --- A tolerance ---------------------------------------------------------------------------------
+
+
+SURE_ERRORS = 3.0
+"""Standard errors of shares of pixels, to each side: a gate must not fail by chance."""
+
+
+class PictureGate(Record):
+    """Whether too many pixels of a picture differ visibly from its baseline.
+
+    Attributes
+    ----------
+    visible
+        The share of pixels above a ΔE2000, with an interval that holds the repeats' noise.
+    bound
+        The largest share that is allowed.
+    """
+
+    visible: VisibleShare
+    bound: Share
+    state: Verdict
+
+    @property
+    def sentence(self) -> str:
+        """What differs, what is allowed, and the result."""
+        share = self.visible
+        shown = f"{share.value:.2%}"
+        if share.low != share.high:
+            shown = f"{shown} ({share.low:.2%} to {share.high:.2%})"
+        results: dict[Verdict, str] = {
+            "pass": "it passes",
+            "fail": "it fails",
+            "undecided": "noise leaves it undecided, and more repeats decide",
+        }
+        return (
+            f"{shown} of the pixels differ by more than {LEADING.label} {share.threshold:g}, at"
+            f" most {self.bound:.2%} may: {results[self.state]}."
+        )
+
+
+def picture_gate(before: Repeats, after: Repeats, threshold: float, bound: float) -> PictureGate:
+    """Judge repeats by a tolerance: at most a share ``bound`` of the pixels above a threshold.
+
+    If a share p differs visibly, and noise alone lifts a share q above the threshold, a share
+    s = p + q (1 - p) is measured at most. So ``p >= (s - q) / (1 - q)``; q is known from noise that
+    is drawn with the repeats' variance, and widened for its error. As many differ at most as are
+    above the threshold with the noise added to their distance. Equal repeats have no noise. A
+    single picture does not show its own, and does not fail if the baseline has any.
+    """
+    require_one_size((before.mean, after.mean))
+    distances = LEADING(after.mean, before.mean)
+    size = distances.size
+    measured = float((distances > threshold).mean())
+    noise = noise_of_difference(before, after)
+    value = low = high = measured
+    if noise.any():
+        drawn = np.random.default_rng(0).normal(size=noise.shape) * np.sqrt(noise)
+        by_noise = LEADING(before.mean + MARGIN * drawn, before.mean)
+        lifted = float((by_noise > threshold).mean())
+        error = SURE_ERRORS * np.sqrt((measured * (1 - measured) + lifted * (1 - lifted)) / size)
+        kept = max(1 - lifted, 1 / size)
+        value = float(np.clip((measured - lifted) / kept, 0, 1))
+        low = float(np.clip((measured - lifted - error) / kept, 0, 1))
+        if after.count == 1:  # its noise is unknown, and skewed noise may lift more
+            low = 0.0
+        high = max(float((distances + by_noise > threshold).mean()), value)
+    visible = VisibleShare(threshold=threshold, value=value, low=low, high=high)
+    return PictureGate(visible=visible, bound=bound, state=decide([visible], threshold, bound))
 
 
 # --- What moved, and what could not be seen ------------------------------------------------------

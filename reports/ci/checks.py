@@ -1,6 +1,7 @@
 """Checking scenes against baselines, and writing baselines: one, or all of a command."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, Literal
@@ -10,7 +11,13 @@ from msgspec import Meta, field, structs
 from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.check.measurement import baseline_of, made_small, measure_scene
 from fotismos.comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
-from fotismos.comparisons.check.pictures import PictureCheck, SmallestChanges, check_pictures
+from fotismos.comparisons.check.pictures import (
+    PictureCheck,
+    PictureGate,
+    SmallestChanges,
+    check_pictures,
+    picture_gate,
+)
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.departure.blocks import averaged
@@ -37,6 +44,14 @@ Judging = Callable[..., tuple["CheckRecord", SceneView | Before | None]]
 
 LARGEST_ERROR = 2.0
 """ΔE2000 at which the map's colours end: changes are often hardly noticeable."""
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """At most the share ``bound`` of the pixels may differ by more than the ΔE2000 ``within``."""
+
+    within: float
+    bound: float
 
 
 class Change(Record):
@@ -74,6 +89,9 @@ class CheckRecord(Record, omit_defaults=True):
     ] = ()
     pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
     smallest_changes: SmallestChanges | None = None
+    gate: Annotated[
+        PictureGate | None, Meta(description="The tolerance that decided, in place of drift.")
+    ] = None
 
     @property
     def name(self) -> str:
@@ -88,7 +106,12 @@ class CheckRecord(Record, omit_defaults=True):
 
     @property
     def headline(self) -> str:
-        """What moved most, where, from what to what, and how much else; empty for nothing."""
+        """What moved most, where, from what to what, and how much else; empty for nothing.
+
+        If a tolerance decided, what differs visibly.
+        """
+        if self.gate is not None:
+            return self.gate.sentence
         if (most := self.largest) is None:
             return ""
         others = len(self.moved or ()) - 1
@@ -262,15 +285,27 @@ def _before(made: CheckRecord, before: baselines.Kept, after: baselines.Kept) ->
 # --- Pictures --------------------------------------------------------------------------------
 
 
-def examine_pictures(path: Path, pattern: str, level: float) -> tuple[CheckRecord, Before | None]:
-    """Check the pictures that match a pattern against their baseline."""
+def examine_pictures(
+    path: Path, pattern: str, level: float, tolerance: Tolerance | None = None
+) -> tuple[CheckRecord, Before | None]:
+    """Check pictures that match a pattern against their baseline, for drift or by a tolerance."""
     begin = perf_counter()
     baseline, before = pictures.read(path)
-    found = check_pictures(before, pictures.read_repeats(pattern, baseline.transfer), level)
-    if not found.moved:
-        return _of_pictures(path, pattern, status="passed", found=found, begin=begin), None
-    made = _of_pictures(path, pattern, status="failed", found=found, begin=begin)
-    made = structs.replace(made, passed=False, causes=(found.cause(),))
+    after = pictures.read_repeats(pattern, baseline.transfer)
+    found = check_pictures(before, after, level)
+    gate = None
+    has_failed = bool(found.moved)
+    if tolerance is not None:
+        gate = picture_gate(before, after, tolerance.within, tolerance.bound)
+        has_failed = gate.state != "pass"
+    status = "failed" if has_failed else "passed"
+    made = _of_pictures(path, pattern, status=status, found=found, begin=begin)
+    if gate is not None:
+        made = structs.replace(made, gate=gate, message=gate.sentence)
+    if not has_failed:
+        return made, None
+    causes = (found.cause(),) if found.moved else ()
+    made = structs.replace(made, passed=False, causes=causes)
     old = {"picture": baselines.small(before.mean), "blocks": found.blocks.before}
     return made, _before(made, old, {"picture": found.after.mean, "blocks": found.blocks.after})
 
@@ -316,16 +351,17 @@ def examine_all(
     seed: int | None,
     folder: Path,
     patterns: Mapping[Path, str],
+    tolerance: Tolerance | None = None,
 ) -> tuple[list[CheckRecord], list[SceneView], list[Before]]:
     """Check one baseline or a folder of them in a pool; the significance is shared.
 
     ``seed`` replaces the baselines' unless it is None; failures go to ``folder``; ``patterns``
-    name the new pictures of baselines.
+    name the new pictures of baselines, which a ``tolerance`` judges in place of drift.
     """
     paths = sorted({*baselines.find(path), *patterns})
     level = level_of_each(significance, len(paths))
     calls = [
-        (baseline, level, seed, folder / baseline.stem, patterns.get(baseline))
+        (baseline, level, seed, folder / baseline.stem, patterns.get(baseline), tolerance)
         for baseline in paths
     ]
     found = _each(pool, examine_one, calls)
@@ -401,11 +437,12 @@ def examine_one(
     seed: int | None,
     folder: Path,
     pattern: str | None,
+    tolerance: Tolerance | None = None,
     progress: Progress | None = None,
 ) -> tuple[CheckRecord, SceneView | Before | None]:
     """Check one baseline, of a scene or of the pictures that match a pattern."""
     if pattern is not None:
-        return examine_pictures(path, pattern, level)
+        return examine_pictures(path, pattern, level, tolerance)
     file = baselines.read(path)
     return examine(file, file.open(seed), level, folder, progress)
 

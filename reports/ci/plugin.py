@@ -8,6 +8,11 @@
     def test_nothing_moved(fotismos):
         assert fotismos.unchanged("scenes/lamp.xml")
 
+    def test_my_renderer(fotismos):
+        image = render()  # linear RGB, (H, W, 3)
+        assert fotismos.picture("hall", image)
+        assert fotismos.same(image, "references/hall.exr", within=2)
+
 A mark renders a test in other variants, one test for each::
 
     @pytest.mark.fotismos_variant("llvm_ad_rgb", "llvm_ad_spectral")
@@ -38,7 +43,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.getgroup("fotismos").addoption(
         "--fotismos-update",
         action="store_true",
-        help="write the baselines of `fotismos.unchanged` that are missing or moved",
+        help="write the baselines of `unchanged` and `picture` that are missing or moved",
     )
 
 

@@ -303,7 +303,11 @@ def outcome(checks: Sequence[CheckRecord], level: float) -> str:
     if written or "unchanged" in statuses:
         text = f"{written} of {count} baselines written"
     else:
-        text = f"{moved} of {count} moved" if moved else f"{count - errors} of {count} unmoved"
+        # A tolerance lets pictures move a little.
+        has_gates = any(made.gate for made in checks)
+        bad = "failed" if has_gates else "moved"
+        good = "passed" if has_gates else "unmoved"
+        text = f"{moved} of {count} {bad}" if moved else f"{count - errors} of {count} {good}"
         text += f" (significance {level:g} over all that was tested)"
     return text + (f"; {errors} could not be checked" if errors else "")
 

@@ -1,25 +1,39 @@
 """Assertions on a scene: how far it departs from physics, and that nothing moved."""
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
+import numpy as np
 
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import Case, Scene, open_case
 from fotismos.comparisons.check.measurement import PASSES, made_small, measure_scene
 from fotismos.comparisons.check.moved import LEVEL
+from fotismos.comparisons.check.pictures import (
+    PictureCheck,
+    Repeats,
+    check_pictures,
+    picture_gate,
+)
+from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, checked_threshold
+from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import in_file, known_as
 from fotismos.reference import records
+from fotismos.reference.rendering.renderer import require_finite
 from fotismos.reference.rendering.sums import student
 from fotismos.reference.scene.graph import set_variant
-from fotismos.reports.ci import baselines, checks, summary
+from fotismos.reports.ci import baselines, checks, pictures, summary
+from fotismos.reports.files import images
+
+Pictures = np.ndarray | Sequence[np.ndarray] | str | Path
+"""A linear picture (H, W, 3), several that differ by noise, a file, or a pattern of files."""
 
 
 class Departure(float):
@@ -159,6 +173,85 @@ class Fotismos:
                 warnings.warn(f"{path}: {result.message}", stacklevel=2)
         return True
 
+    def picture(
+        self,
+        name: str,
+        image: Pictures,
+        within: float | None = TOLERANCE,
+        max_visible: float = LIMIT,
+        significance: float = LEVEL,
+    ) -> bool:
+        """Return True; fail the test if a picture is not as its baseline, or has none.
+
+        ``image`` is a linear array (H, W, 3), or several that differ by their noise alone, or a
+        file, or a pattern of files, relative to the test's folder. It fails if more than
+        ``max_visible`` of the pixels differ by more than the ΔE2000 ``within``. With ``within``
+        None any drift fails that is more than noise, with the chance ``significance`` of an alarm
+        though nothing changed.
+        """
+        path = self.folder / f"{atomic.file_name(name, 'a baseline')}.json"
+        after = self._repeats(image)
+        if not path.exists():
+            if not self.update:
+                raise AssertionError(
+                    f"{path}: there is no such baseline. `pytest --fotismos-update` writes it."
+                )
+            pictures.write(path, _noiseless(after), None)
+            return True
+        _, before = pictures.read(path)
+        if within is None:
+            fault = _drift(check_pictures(before, after, significance))
+        else:
+            fault = _visible(before, after, within, max_visible)
+        if fault and self.update:
+            pictures.write(path, _noiseless(after), None)
+        elif fault:
+            raise AssertionError(f"{path}: {fault}\n{self._shown(name, before, after)}")
+        return True
+
+    def same(
+        self,
+        image: Pictures,
+        reference: Pictures,
+        within: float = TOLERANCE,
+        max_visible: float = LIMIT,
+    ) -> bool:
+        """Return True; fail the test if two pictures differ visibly; see :meth:`picture`."""
+        before = _noiseless(self._repeats(reference))
+        after = self._repeats(image)
+        if fault := _visible(before, after, within, max_visible):
+            raise AssertionError(f"{fault}\n{self._shown('same', before, after)}")
+        return True
+
+    def _repeats(self, image: Pictures) -> Repeats:
+        """Return pictures as repeats."""
+        if isinstance(image, (str, Path)):
+            beside = self.folder.parent / image
+            return pictures.read_repeats(str(beside), None)
+        arrays = [image] if isinstance(image, np.ndarray) else list(image)
+        for array in arrays:
+            if np.ndim(array) != 3 or np.shape(array)[2] != 3:
+                raise InputError(
+                    f"a picture of shape {np.shape(array)} is not allowed: give linear RGB,"
+                    " (height, width, 3)."
+                )
+            require_finite(np.asarray(array), "the picture")
+        return Repeats.of(arrays)
+
+    def _shown(self, name: str, before: Repeats, after: Repeats) -> str:
+        """Write both pictures and the map of their difference; return where they are."""
+        folder = self.pictures() / atomic.file_name(name, "a picture")
+        folder.mkdir(parents=True, exist_ok=True)
+        error = images.error_map(LEADING(after.mean, before.mean), LEADING.map_range[1])
+        panels = {
+            "before": images.tonemap(before.mean),
+            "now": images.tonemap(after.mean),
+            LEADING.name: error,
+        }
+        for panel, shown in panels.items():
+            (folder / f"{panel}.png").write_bytes(images.png(shown))
+        return f"pictures: {folder}"
+
     def _scene(self, scene: Scene) -> Scene:
         """Return a scene; a path relative to the test's folder, if there is such a file."""
         if not isinstance(scene, (str, Path)):
@@ -184,6 +277,22 @@ class Fotismos:
         file, _ = in_file(name) or ("", "")
         is_beside = file and (self.folder.parent / file).is_file()
         return options | {"heuristic": str(self.folder.parent / name) if is_beside else name}
+
+
+def _noiseless(repeats: Repeats) -> Repeats:
+    """Return a single picture as two that are equal, for one that has no noise to show."""
+    return replace(repeats, count=2) if repeats.count == 1 else repeats
+
+
+def _visible(before: Repeats, after: Repeats, within: float, max_visible: float) -> str:
+    """Return what differs visibly, as a sentence; empty if a tolerance allows it."""
+    gate = picture_gate(before, after, checked_threshold(within), max_visible)
+    return "" if gate.state == "pass" else gate.sentence
+
+
+def _drift(found: PictureCheck) -> str:
+    """Return what moved by more than noise, as a sentence; empty for nothing."""
+    return f"{len(found.moved)} means moved. {found.cause()}" if found.moved else ""
 
 
 def _open(scene: Scene, options: Mapping[str, Any], name: str | None = None) -> Case:

@@ -44,6 +44,19 @@ from fotismos.reports import jobs
     type=jobs.Within(0, 1, min_open=True, max_open=True),
     help="Chance of an alarm though nothing changed, over all that is tested.",
 )
+@click.option(
+    "--within",
+    type=float,
+    metavar="DE",
+    help="With --picture: judge by a tolerance in place of drift. Pixels differ visibly if ΔE2000"
+    " is above this.  [default: 2]",
+)
+@click.option(
+    "--max-visible",
+    type=jobs.percentage,
+    metavar="P%",
+    help="The share of the pixels that may differ visibly.  [default: 5%]",
+)
 @jobs.json_option
 @jobs.ci_options
 @jobs.output_option("out", "check")
@@ -61,6 +74,8 @@ def check(
     pictures: tuple[tuple[str, str], ...],
     images: bool,
     significance: float,
+    within: float | None,
+    max_visible: float | None,
     as_json: bool,
     junit: Path | None,
     summary: Path | None,
@@ -77,7 +92,9 @@ def check(
     exit code is 1, and OUTPUT/check/index.html shows what moved and where. If a baseline could not
     be checked, it is 2; the others are checked nevertheless.
 
-    With --picture nothing is rendered: repeats of pictures are compared with earlier ones.
+    With --picture nothing is rendered: repeats of pictures are compared with earlier ones. Repeats
+    of a renderer without noise are equal, and any change is a drift; --within and --max-visible
+    allow what nobody sees, such as another GPU's rounding.
 
     A scene or heuristic in Python is code, and so is a baseline that names one: it is executed.
 
@@ -88,6 +105,7 @@ def check(
       fotismos check baselines/cornell-box.json --update
       fotismos check baselines --update --picture hall='render_*.exr'
       fotismos check baselines --picture hall='new_*.exr'
+      fotismos check baselines --picture hall='new_*.png' --within 2 --max-visible 5%
     """  # noqa: D301 click reads the \b as: keep these lines
     # Only what the user gave: a default must not replace the baseline's option.
     changes = {
@@ -108,6 +126,12 @@ def check(
     if pictures and update and (others := [word for word in wanting if word != "--transfer"]):
         raise InputError(f"{', '.join(others)}: pictures are not rendered. Omit it, or --picture.")
     patterns = _places(baseline, pictures)
+    is_tolerant = within is not None or max_visible is not None
+    if is_tolerant and (update or not pictures):
+        raise InputError(
+            "--within, --max-visible: a tolerance judges new pictures. Give --picture, without"
+            " --update."
+        )
     inputs = list(baseline.glob("*")) if baseline.is_dir() else [baseline]
     code = jobs.work(
         "check",
@@ -119,6 +143,7 @@ def check(
         significance=significance,
         changes=changes,
         patterns=patterns,
+        tolerance=_tolerance(within, max_visible) if is_tolerant else None,
         inputs=inputs,
         output=output,
         junit=junit,
@@ -126,6 +151,17 @@ def check(
         as_json=as_json,
     )
     context.exit(code)
+
+
+def _tolerance(within: float | None, max_visible: float | None) -> Any:
+    """Return the tolerance of two options, of which one may be omitted."""
+    from fotismos.comparisons.departure import criterion  # loaded late: help needs no NumPy
+    from fotismos.reports.ci.checks import Tolerance
+
+    return Tolerance(
+        within=criterion.checked_threshold(criterion.TOLERANCE if within is None else within),
+        bound=criterion.LIMIT if max_visible is None else max_visible,
+    )
 
 
 def _places(baseline: Path, pictures: Sequence[tuple[str, str]]) -> dict[Path, str]:

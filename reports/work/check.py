@@ -9,7 +9,7 @@ import click
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.reference.records import to_json
 from fotismos.reports.ci import checks, summary
-from fotismos.reports.ci.checks import CheckRecord
+from fotismos.reports.ci.checks import CheckRecord, Tolerance
 from fotismos.reports.files import results
 from fotismos.reports.jobs import command_line
 from fotismos.reports.page import page
@@ -25,6 +25,7 @@ def run(
     significance: float,
     changes: Mapping[str, Any],
     patterns: Mapping[Path, str],
+    tolerance: Tolerance | None,
     inputs: Sequence[Path],
     output: Path,
     junit: Path | None,
@@ -52,6 +53,7 @@ def run(
             significance=significance,
             changes=changes,
             patterns=patterns,
+            tolerance=tolerance,
             output=output,
         )
     for outcome in outcomes:
@@ -79,6 +81,7 @@ def _examined(
     significance: float,
     changes: Mapping[str, Any],
     patterns: Mapping[Path, str],
+    tolerance: Tolerance | None,
     output: Path,
 ) -> tuple[list[CheckRecord], str]:
     """Check the baselines; return the outcomes, and the page if there is anything to see."""
@@ -90,6 +93,7 @@ def _examined(
             seed=changes.get("seed"),
             folder=folder,
             patterns=patterns,
+            tolerance=tolerance,
         )
         if not (views or moved):
             results.clear(folder, (results.PAGE, results.DETAILS))

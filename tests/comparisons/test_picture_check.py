@@ -1,6 +1,7 @@
 """Checks of pictures from any renderer tell noise from drift, by command and over many runs."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -9,7 +10,7 @@ import pytest
 from PIL import Image
 from scipy import ndimage, stats
 
-from fotismos.comparisons.check.pictures import Repeats, check_pictures
+from fotismos.comparisons.check.pictures import Repeats, check_pictures, picture_gate
 from tests.benchmarks import gates
 from tests.shared.outputs import write
 from tests.shared.schemas import schema
@@ -147,3 +148,116 @@ def test_a_change_is_still_caught_beside_noise_that_pixels_share():
     before = Repeats.of(0.4 + 0.02 * correlated("independent", rng) for _ in range(4))
     after = Repeats.of(0.404 + 0.02 * correlated("independent", rng) for _ in range(4))
     assert check_pictures(before, after, 0.01).moved
+
+
+# --- A tolerance ---------------------------------------------------------------------------------
+
+
+def of_gpu(path, share=0.0, error=0.0, seed=0):
+    """Write a picture without noise, as another GPU makes it: rounded otherwise, partly wrong."""
+    rng = np.random.default_rng(seed)
+    codes = np.linspace(90, 200, 64 * 48 * 3).reshape(48, 64, 3) + rng.integers(0, 2, (48, 64, 3))
+    wrong = np.arange(48 * 64).reshape(48, 64) < share * 48 * 64
+    Image.fromarray((codes + error * wrong[..., None]).astype(np.uint8)).save(path)
+
+
+@pytest.mark.guarantee(
+    "checks", "A tolerance lets another GPU's rounding pass, and fails at what is visible."
+)
+def test_a_tolerance_judges_what_is_visible_in_place_of_drift(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    of_gpu("hall0.png")
+    of_gpu("hall1.png")
+    assert run("check", "b", "--update", "--picture", "hall=hall?.png")[0] == 0
+    tolerant = ("--within", "2", "--max-visible", "5%")
+    for share, error, code in (
+        (0.0, 0, 0),
+        (0.04, 40, 0),
+        (0.06, 40, 1),
+        (1.0, 2, 0),
+        (1.0, 40, 1),
+    ):
+        of_gpu("new.png", share, error, seed=1)
+        words = ("check", "b", "--picture", "hall=new.png")
+        assert run(*words)[0] == 1  # any change is a drift
+        ended, printed, _ = run(*words, *tolerant)
+        assert ended == code, printed
+        assert ("0 of 1 passed" in printed or "1 of 1 passed" in printed) is (code == 0)
+        result, said, _ = run(*words, "--max-visible", "5", "--json")
+        (made,) = json.loads(said)["checks"]
+        assert (result, made["gate"]["state"]) == (code, "fail" if code else "pass")
+        if error != 2:
+            assert made["gate"]["visible"]["value"] == pytest.approx(share, abs=0.002)
+            assert made["gate"]["visible"]["low"] == made["gate"]["visible"]["high"]
+    assert "of the pixels differ by more than ΔE2000 2, at most 5.00% may: it fails." in printed
+    page = Path("out/check/index.html").read_text()
+    assert "ΔE2000 between them" in page
+    assert "it fails" in page
+
+
+def test_a_tolerance_takes_the_repeats_noise_off():
+    """Noise is visible in single pixels, and more repeats decide what they leave undecided."""
+    rng = np.random.default_rng(4)
+    grey = np.full((48, 64, 3), 0.2)
+
+    def repeats(count, level, noise):
+        for _ in range(count):
+            yield grey * level + noise * rng.normal(size=grey.shape)
+
+    for count, level, noise, allowed in (
+        (64, 1.0, 0.005, {"pass"}),
+        (64, 1.5, 0.005, {"fail"}),
+        (2, 1.0, 0.04, {"pass", "undecided"}),
+        (2, 1.5, 0.04, {"fail", "undecided"}),
+    ):
+        before = Repeats.of(repeats(count, 1.0, noise))
+        after = Repeats.of(repeats(count, level, noise))
+        found = picture_gate(before, after, 2.0, 0.05)
+        assert found.state in allowed, found
+        assert found.visible.low <= found.visible.value <= found.visible.high
+        if found.state == "undecided":
+            assert "more repeats decide" in found.sentence
+
+
+@pytest.mark.guarantee(
+    "checks", "A tolerance fails no unchanged picture, and passes none of which a tenth differs."
+)
+@pytest.mark.parametrize("noise", gates.NOISES)
+def test_a_tolerance_is_not_fooled_by_noise(noise):
+    """A tenth of the pixels is made a third brighter, which is ΔE2000 7 in the median."""
+    draw = gates.drawn(noise)
+    rng = np.random.default_rng(2)
+    wrong = np.ones((48, 64, 1, 1))
+    wrong[:, :7] = 1.35
+
+    def single(repeats, place):
+        shown = (getattr(repeats, name)[..., place] for name in ("mean", "variance", "correlation"))
+        return Repeats(repeats.count, *shown)
+
+    for count, new in ((2, 1), (2, 2), (4, 4), (8, 1)):
+        repeats = draw(rng, count + new)
+        before = Repeats.of(repeats[:count])
+        after = Repeats.of(repeats[count:])
+        changed = replace(after, mean=after.mean * wrong)
+        for place in range(0, gates.BATCH, 5):
+            same = picture_gate(single(before, place), single(after, place), 2.0, 0.05)
+            assert same.state != "fail", (count, new, same)
+            other = picture_gate(single(before, place), single(changed, place), 2.0, 0.05)
+            assert other.state != "pass", (count, new, other)
+
+
+def test_a_tolerance_that_judges_nothing_is_refused(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    of_gpu("hall0.png")
+    of_gpu("hall1.png")
+    picture = ("--picture", "hall=hall?.png")
+    assert run("check", "b", "--update", *picture)[0] == 0
+    for words, expected in (
+        (("--within", "2"), "Give --picture"),
+        (("--max-visible", "5", "--update", *picture), "without --update"),
+        (("--within", "2.1", *picture), "2.1 is not a threshold"),
+        (("--max-visible", "five", *picture), "'five' is not a percentage"),
+        (("--max-visible", "101", *picture), "'101' is not a percentage"),
+    ):
+        code, printed, messages = run("check", "b", *words)
+        assert (code, expected in printed + messages) == (2, True), messages

@@ -5,11 +5,13 @@ import os
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
-from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.errors import InputError, NonFiniteError
 from fotismos.reports.ci.testing import Departure, Fotismos
 from tests.shared import small_baselines
+from tests.shared.outputs import write
 from tests.shared.programs import ROOT, python
 from tests.shared.small_scene import PLAIN, SCENE
 
@@ -186,3 +188,70 @@ def test_a_baseline_stays_in_its_folder(fixtures, tmp_path):
         with pytest.raises(InputError, match="a file gets that name"):
             updated.unchanged("scenes/scene.xml", name=name, **SMALL)
     assert [path.name for path in tmp_path.iterdir()] == ["scenes"]
+
+
+# --- Pictures ---------------------------------------------------------------------------------
+
+RAMP = np.linspace(0.2, 0.8, 32 * 24 * 3).reshape(24, 32, 3)
+
+
+@pytest.mark.guarantee(
+    "checks", "In a test, a picture passes by a tolerance or by its noise, and fails with a map."
+)
+def test_a_picture_is_as_its_baseline_or_fails_with_a_map(fixtures, tmp_path):
+    plain, updated = fixtures
+    with pytest.raises(AssertionError, match=r"hall\.json: there is no such baseline"):
+        plain.picture("hall", RAMP)
+    assert updated.picture("hall", RAMP)
+    wrong = RAMP.copy()
+    wrong[:2] *= 1.5  # a twelfth of the pixels
+    assert plain.picture("hall", RAMP * 1.002)
+    assert plain.picture("hall", wrong, max_visible=0.1)
+    with pytest.raises(AssertionError, match=r"8\.33% of the pixels differ .* it fails"):
+        plain.picture("hall", wrong)
+    shown = {path.name for path in (tmp_path / "hall").iterdir()}
+    assert shown == {"before.png", "now.png", "dE2000.png"}
+    with pytest.raises(AssertionError, match=r"moved\. The whole picture moved by a constant"):
+        plain.picture("hall", RAMP * 1.002, within=None)
+    assert updated.picture("hall", wrong)
+    assert plain.picture("hall", wrong)
+
+
+def test_repeats_of_a_picture_may_differ_by_their_noise(fixtures):
+    plain, updated = fixtures
+    rng = np.random.default_rng(3)
+
+    def repeats(factor):
+        return [RAMP * factor + 0.02 * rng.normal(size=RAMP.shape) for _ in range(8)]
+
+    assert updated.picture("noisy", repeats(1.0), within=None)
+    assert plain.picture("noisy", repeats(1.0), within=None)
+    with pytest.raises(AssertionError, match="means moved"):
+        plain.picture("noisy", repeats(1.05), within=None)
+
+
+def test_two_pictures_are_the_same_or_fail(fixtures, tmp_path):
+    plain, _ = fixtures
+    write(tmp_path / "reference.exr", RAMP)
+    assert plain.same(RAMP, "reference.exr")
+    assert plain.same([RAMP, RAMP * 1.01], RAMP)
+    with pytest.raises(AssertionError, match=r"100\.00% of the pixels differ .*\n.*pictures: "):
+        plain.same(RAMP * 2, "reference.exr")
+    assert (tmp_path / "same/dE2000.png").is_file()
+
+
+def test_what_is_no_picture_is_refused_in_a_test(fixtures, tmp_path):
+    plain, updated = fixtures
+    assert updated.picture("hall", RAMP)
+    for image, error, message in (
+        (RAMP[..., 0], InputError, r"a picture of shape \(24, 32\) is not allowed"),
+        (RAMP[:3], InputError, "pictures of 32x3, 32x24"),
+        (np.where(RAMP > 0.7, np.nan, RAMP), NonFiniteError, "NaN"),
+        ("gone.exr", InputError, r"gone\.exr: no file matches"),
+    ):
+        with pytest.raises(error, match=message):
+            plain.picture("hall", image)
+    with pytest.raises(InputError, match=r"2\.1 is not a threshold"):
+        plain.same(RAMP, RAMP, within=2.1)
+    with pytest.raises(InputError, match="a file gets that name"):
+        updated.picture("../../esc", RAMP)
