@@ -182,7 +182,8 @@ def test_rows_chart_sentence_and_address_agree_about_prices(prices):
     assert centre("a") == pytest.approx(plot["x"] + plot["width"] * math.log10(2) / 3, abs=3)
     assert centre("b") == pytest.approx(plot["x"] + plot["width"] * math.log10(8) / 3, abs=3)
     points["a"].click()
-    assert page.evaluate("location.hash") == "#scene=a&t=3"
+    # The link names the scene; then the page adds its threshold.
+    page.wait_for_function("location.hash === '#scene=a&t=3'")
     command = page.locator(".scene:visible [data-command]").text_content()
     assert command.endswith("--within 3")
 

@@ -212,7 +212,7 @@ def test_bad_words_are_refused(run, tmp_path, monkeypatch):
         ("check", "nix.json", "--scene", "fig-8-6b"): "--scene.*--update",
         ("check", "nix.json", "--significance", "nan"): "range",
         ("compare", "fig-8-9", "--within", "2.1"): "2.1 is not a threshold",
-        ("compare", "fig-8-9", "--max-visible", "5"): "such as 5%",
+        ("compare", "fig-8-9", "--max-visible", "5 of 100"): "such as 5%",
         ("compare", "fig-8-9", "--max-visible", "101%"): "from 0% to 100%",
     }.items():
         code, _, messages = run(*words)
