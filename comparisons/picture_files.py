@@ -96,7 +96,8 @@ def read_file(word: str, transfer: str | None = None, over: str | None = None) -
         raise NonFiniteError(f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture.")
     decode = {"srgb": from_srgb, "linear": None}.get(transfer or "", layer.transfer)
     image = layer.colours if decode is None else decode(layer.colours)
-    image = _opaque(path, image, layer, over)
+    behind = None if over is None else colour_over(over)
+    image = _opaque(path, image, layer, behind)
     wrong = np.any(image > LARGEST_VALUE, axis=-1)
     if wrong.any():
         raise InputError(
@@ -133,12 +134,12 @@ def colour_over(text: str) -> Array:
     return numbers
 
 
-def _opaque(path: Path, image: Array, layer: Layer, over: str | None) -> Array:
-    """Return linear colours over the colour that was given; without alpha, unchanged."""
+def _opaque(path: Path, image: Array, layer: Layer, behind: Array | None) -> Array:
+    """Return linear colours over the colour behind them; without alpha, unchanged."""
     alpha = layer.alpha
     if alpha is None or (alpha >= OPAQUE).all():
         return image
-    if over is None:
+    if behind is None:
         count = int(np.count_nonzero(alpha < OPAQUE))
         raise InputError(
             f"{path}: {count} of {alpha.size} pixels have an alpha below 1. Give the colour behind"
@@ -146,7 +147,7 @@ def _opaque(path: Path, image: Array, layer: Layer, over: str | None) -> Array:
         )
     alpha = np.clip(alpha, 0, 1)[..., None]
     front = image if layer.is_premultiplied else image * alpha
-    shown: Array = front + (1 - alpha) * colour_over(over)
+    shown: Array = front + (1 - alpha) * behind
     return shown
 
 

@@ -285,6 +285,8 @@ class PictureBaseline(Record):
 
     Attributes
     ----------
+    transfer, over
+        How its files are read; null for what they say themselves.
     mean, error
         Mean linear RGB of the picture, and its standard errors.
     correlation
@@ -295,6 +297,7 @@ class PictureBaseline(Record):
     repeats: Annotated[int, Meta(ge=2)]
     resolution: Resolution
     transfer: Literal["linear", "srgb"] | None
+    over: str | None = None
     mean: Colour
     error: Errors
     correlation: Amount

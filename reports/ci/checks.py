@@ -291,7 +291,7 @@ def examine_pictures(
     """Check pictures that match a pattern against their baseline, for drift or by a tolerance."""
     begin = perf_counter()
     baseline, before = pictures.read(path)
-    after = pictures.read_repeats(pattern, baseline.transfer)
+    after = pictures.read_repeats(pattern, baseline.transfer, baseline.over)
     found = check_pictures(before, after, level)
     gate = None
     has_failed = bool(found.moved)
@@ -311,15 +311,22 @@ def examine_pictures(
 
 
 def update_pictures(
-    path: Path, pattern: str, transfer: Any, level: float, progress: Progress | None = None
+    path: Path,
+    pattern: str,
+    transfer: Any,
+    over: str | None,
+    level: float,
+    progress: Progress | None = None,
 ) -> tuple[CheckRecord, None]:
     """Write or replace the baseline of the pictures that match a pattern."""
     begin = perf_counter()
     status = "updated" if path.exists() else "created"
     if path.exists():
-        transfer = transfer or pictures.record_of(path).transfer
-    repeats = pictures.read_repeats(pattern, transfer)
-    pictures.write(path, repeats, transfer)
+        known = pictures.record_of(path)
+        transfer = transfer or known.transfer
+        over = over or known.over
+    repeats = pictures.read_repeats(pattern, transfer, over)
+    pictures.write(path, repeats, transfer, over)
     found = check_pictures(repeats, repeats, level)
     return _of_pictures(path, pattern, status=status, found=found, begin=begin), None
 
@@ -384,8 +391,8 @@ def update_all(
     baselines of pictures are written.
     """
     if patterns:
-        transfer = options.get("transfer")
-        shots = [(baseline, word, transfer, significance) for baseline, word in patterns.items()]
+        how = options.get("transfer"), options.get("over")
+        shots = [(baseline, word, *how, significance) for baseline, word in patterns.items()]
         return [made for made, _ in _each(pool, update_pictures, shots)]
     calls = [
         (baseline, scene, with_pictures, significance, options)

@@ -28,17 +28,22 @@ LONGEST = 2**15
 """Pixels of the longer side of a baseline that is read, at most."""
 
 
-def read_repeats(pattern: str, transfer: str | None) -> Repeats:
+def read_repeats(pattern: str, transfer: str | None, over: str | None = None) -> Repeats:
     """Read the repeats that match a pattern, ``render_*.exr`` or ``render_*.exr:LAYER``."""
     path, layer = picture_parts(pattern)
     found = [str(path)] if path.is_file() else sorted(glob(str(path), recursive=True))
     if not found:
         raise InputError(f"{pattern}: no file matches. Give repeats, such as 'render_*.exr'.")
     named = (f"{file}:{layer}" if layer else file for file in found)
-    return Repeats.of(pictures.read(word, transfer) for word in named)
+    return Repeats.of(pictures.read(word, transfer, over) for word in named)
 
 
-def write(path: Path, repeats: Repeats, transfer: Literal["linear", "srgb"] | None) -> None:
+def write(
+    path: Path,
+    repeats: Repeats,
+    transfer: Literal["linear", "srgb"] | None,
+    over: str | None = None,
+) -> None:
     """Write a baseline, and its EXR with the mean and variance of each pixel."""
     if repeats.count < 2:
         raise InputError(f"{path}: one picture does not show its noise. Give two repeats or more.")
@@ -49,6 +54,7 @@ def write(path: Path, repeats: Repeats, transfer: Literal["linear", "srgb"] | No
         repeats=repeats.count,
         resolution=(width, height),
         transfer=transfer,
+        over=over,
         mean=colour(whole.before[0, 0]),
         error=colour(whole.error[0, 0] / np.sqrt(2.0)),
         correlation=float(repeats.correlation),

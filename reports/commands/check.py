@@ -11,6 +11,9 @@ from fotismos.comparisons.atomic import file_name
 from fotismos.heuristic.errors import InputError
 from fotismos.reports import jobs
 
+READING = ("--transfer", "--over")
+"""Options that say how pictures are read; they are kept in their baseline."""
+
 
 @jobs.command()
 @click.argument("baseline", type=click.Path(path_type=Path), metavar="BASELINE")
@@ -63,6 +66,7 @@ from fotismos.reports import jobs
 @jobs.process_options
 @jobs.scene_options
 @jobs.option("transfer")
+@jobs.option("over")
 @jobs.verbosity_options
 @click.pass_context
 def check(
@@ -123,7 +127,7 @@ def check(
             f"{', '.join(wanting)}: a check renders its baseline's scene and options. Add --update"
             " to write another baseline."
         )
-    if pictures and update and (others := [word for word in wanting if word != "--transfer"]):
+    if pictures and update and (others := [word for word in wanting if word not in READING]):
         raise InputError(f"{', '.join(others)}: pictures are not rendered. Omit it, or --picture.")
     patterns = _places(baseline, pictures)
     is_tolerant = within is not None or max_visible is not None

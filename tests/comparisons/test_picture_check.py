@@ -95,6 +95,22 @@ def test_an_update_keeps_the_transfer_function(run, tmp_path, monkeypatch):
         assert json.loads(Path("b/wall.json").read_text())["transfer"] == "srgb"
 
 
+def test_a_check_puts_pictures_over_the_colour_of_their_baseline(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for number in range(2):
+        values = np.random.default_rng(number).integers(100, 120, (16, 16, 4), np.uint8)
+        Image.fromarray(values).save(f"{number}.png")
+    code, _, messages = run("check", "b", "--update", "--picture", "wall=?.png")
+    assert code == 2
+    assert "have an alpha below 1" in messages
+    for words in (("--over", "white"), ()):
+        assert run("check", "b", "--update", "--picture", "wall=?.png", *words)[0] == 0
+        made = json.loads(Path("b/wall.json").read_text())
+        assert made["over"] == "white"
+        assert min(made["mean"]) > 0.5  # of white, since the front is transparent and dark
+    assert run("check", "b", "--picture", "wall=?.png")[0] == 0
+
+
 QUICK = ("Gaussian, 10 %", "filtered gamma", "two values at 5 pixels")
 
 

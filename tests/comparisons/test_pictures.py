@@ -354,8 +354,9 @@ def test_what_is_no_picture_is_refused(rgb, tmp_path):
     with pytest.raises(InputError, match=r"64 of 64 pixels have an alpha below 1.*`over=black`"):
         pictures.read(str(path), "srgb")
     for over in ("red", "1,2", "1,2,-3", "1,2,nan"):
-        with pytest.raises(InputError, match=f"over = {over} is not allowed"):
-            pictures.read(str(path), over=over)
+        for word in (str(path), write(tmp_path / "opaque.exr", GREY)):
+            with pytest.raises(InputError, match=f"over = {over} is not allowed"):
+                pictures.read(word, over=over)
 
 
 def test_sizes_and_repeats_must_fit(rgb, tmp_path):
