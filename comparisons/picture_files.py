@@ -59,12 +59,14 @@ PRIMARIES = {
 class Layer:
     """What a file holds, as encoded in it: colours (H, W, 3), and alpha (H, W) if it has any.
 
-    ``transfer`` decodes the colours; None if they are linear.
+    ``transfer`` decodes the colours; None if they are linear. ``encoding`` says how that is known,
+    ``notes`` what else was done to them.
     """
 
     colours: Array
     alpha: Array | None = None
     transfer: Callable[[Array], Array] | None = None
+    encoding: str = ""
     is_premultiplied: bool = False
     notes: tuple[str, ...] = ()
 
@@ -111,8 +113,12 @@ def read_file(word: str, transfer: str | None = None, over: str | None = None) -
             " say its primaries, and so are overshoots of a sharpening filter. Write the"
             " chromaticities, or clip the picture at 0."
         )
-    notes = layer.notes if transfer is None else ()
-    return PictureFile(image=np.ascontiguousarray(image, np.float32), notes=notes)
+    encoding = layer.encoding if transfer is None else ""
+    alpha = "" if over is None else f"alpha over {over}"
+    return PictureFile(
+        image=np.ascontiguousarray(image, np.float32),
+        notes=tuple(filter(None, (encoding, *layer.notes, alpha))),
+    )
 
 
 # --- Alpha -------------------------------------------------------------------------------------
@@ -281,9 +287,9 @@ def _bitmap(path: Path, suffix: str) -> Layer:
     if suffix == ".png":
         with Image.open(path) as file:
             gamma = None if "srgb" in file.info else file.info.get("gamma")
-    note = f"read as sRGB, as {kind} files are"
+    encoding = f"read as sRGB, as {kind} files are"
     if gamma is not None and gamma > 0:
-        note = f"read with the gamma of its gAMA chunk, {gamma:g}"
+        encoding = f"read with the gamma of its gAMA chunk, {gamma:g}"
         if abs(gamma - 1) < SAME_PRIMARIES:
             transfer = None
         elif abs(gamma - GAMMA_OF_SRGB) >= SAME_PRIMARIES:
@@ -293,7 +299,7 @@ def _bitmap(path: Path, suffix: str) -> Layer:
                 decoded: Array = values**exponent
                 return decoded
 
-    return Layer(colours=layer.colours, alpha=layer.alpha, transfer=transfer, notes=(note,))
+    return Layer(colours=layer.colours, alpha=layer.alpha, transfer=transfer, encoding=encoding)
 
 
 def _array(path: Path) -> Layer:

@@ -25,7 +25,7 @@ from msgspec import structs
 from fotismos.comparisons.comparison import Images, PictureRecord
 from fotismos.comparisons.departure.colour import from_srgb, luminance, to_srgb
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import read_file
+from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.rendering.gbuffer import gbuffer
@@ -37,11 +37,12 @@ class PictureHalf:
     """Pictures (H, W, 3) as the passes of a heuristic half, one after another.
 
     Several are repeats, whose spread gives the noise; a single one serves for every pass. ``half``
-    is the renderer that they replace.
+    is the renderer that they replace; ``notes`` say how the files were read.
     """
 
-    def __init__(self, images: list[np.ndarray], half: Renderer) -> None:
-        self.images = images
+    def __init__(self, files: Sequence[PictureFile], half: Renderer) -> None:
+        self.images = [file.image for file in files]
+        self.notes = tuple(dict.fromkeys(note for file in files for note in file.notes))
         self.half = half
         self.variant = half.variant
         self.times: list[float] = []
@@ -59,29 +60,20 @@ class PictureHalf:
         return Times.of(self.times, 0.0)
 
 
-def read_all(options: Options) -> list[np.ndarray]:
+def read_all(options: Options) -> list[PictureFile]:
     """Return the pictures that options name: all of one size, and one or an even number."""
-    images = [read(word, options.transfer, options.over) for word in options.image]
-    require_one_size(images)
-    if len(images) > 1 and options.noise is not None:
+    files = [read_file(word, options.transfer, options.over) for word in options.image]
+    require_one_size(file.image for file in files)
+    if len(files) > 1 and options.noise is not None:
         raise InputError(
-            f"noise = {options.noise:g} and {len(images)} repeats: a noise target may need more"
+            f"noise = {options.noise:g} and {len(files)} repeats: a noise target may need more"
             " passes than there are pictures. Give `spp` instead of `noise`."
         )
-    if len(images) > 1 and len(images) % 2:
+    if len(files) > 1 and len(files) % 2:
         raise InputError(
-            f"{len(images)} repeats: give one, or an even number, whose halves give the noise."
+            f"{len(files)} repeats: give one, or an even number, whose halves give the noise."
         )
-    return images
-
-
-def notes(options: Options) -> tuple[str, ...]:
-    """Return how the pictures of options are read, in words, where the files do not say it."""
-    files = (read_file(word, options.transfer, options.over) for word in options.image)
-    found = [note for file in files for note in file.notes]
-    if options.over is not None:
-        found.append(f"alpha over {options.over}")
-    return tuple(dict.fromkeys(found))
+    return files
 
 
 def require_one_size(images: Iterable[np.ndarray]) -> None:
@@ -94,7 +86,7 @@ def require_one_size(images: Iterable[np.ndarray]) -> None:
 
 def at_size_of_pictures(source: Source, options: Options) -> Options:
     """Return options with the resolution of their pictures, which must be the film's in shape."""
-    height, width = read_all(options)[0].shape[:2]
+    height, width = read_all(options)[0].image.shape[:2]
     film_sides = film_size(source.parse(), options.sensor)
     film = options.resolution or film_sides
     if options.resolution and film != (width, height):
@@ -293,7 +285,7 @@ def picture_record(
     record = PictureRecord(
         files=files,
         transfer=options.transfer,
-        notes=notes(options),
+        notes=half.notes,
         repeats=len(files),
         shift=None if is_doubtful else place.shift,
         edges=place.correlation,

@@ -225,6 +225,6 @@ def _take_integrator(graph: Graph, settings: Settings) -> None:
 
 
 def _glows(graph: Graph) -> bool:
-    """Return whether a material has an emission coefficient."""
+    """Return whether a material's emission coefficient may be more than 0."""
     materials = graph.nodes(mi.ObjectType.BSDF, "phong")
-    return any("k_i" in graph.props(index) for index in materials)
+    return any(values.may_be_nonzero(graph.props(index).get("k_i", 0.0)) for index in materials)

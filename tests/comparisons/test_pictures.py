@@ -138,6 +138,7 @@ def test_other_primaries_are_converted_by_their_chromaticities(rgb, tmp_path, na
     assert np.abs(linear - expected).max() > 0.05
     np.testing.assert_allclose(found.image, np.maximum(expected, 0), atol=2e-3)
     assert found.notes == (f"converted from {name} to BT.709",)
+    assert picture_files.read_file(str(tmp_path / "x.exr"), "linear").notes == found.notes
 
 
 def test_a_data_window_is_put_into_its_display_window(rgb, tmp_path):
