@@ -28,6 +28,7 @@ Samples = Annotated[int, Meta(ge=2, le=LARGEST_SPP)]  # the noise needs at least
 Error = Annotated[float, Meta(gt=0, le=1000)]  # ΔE2000
 Side = Annotated[int, Meta(ge=1, le=2**31 - 1)]
 Fineness = Annotated[int, Meta(ge=1, le=512)]  # fotismos.heuristic.tessellation.FINEST
+VertexWeights = Literal["mean", "area", "angle"]  # fotismos.heuristic.normals.WEIGHTINGS
 Sensor = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Density = Annotated[float, Meta(ge=1, le=1000)]  # departure.colour.MOST_PIXELS
 
@@ -83,7 +84,7 @@ class Options(
               "the scene's own, else 16 for flat and gouraud"),
     ] = None  # fmt: skip
     vertex_weights: Annotated[
-        Literal["mean", "area", "angle"] | None,
+        VertexWeights | None,
         _help("How much a face counts in its vertices' normals (6.32 to 6.34); the shapes of the"
               " heuristic half become meshes with such normals.",
               "the scene's own, else a mesh's normals, or angle if it has none"),
@@ -180,12 +181,6 @@ class Options(
         return Interpolation(self.interpolation or "phong")
 
     @property
-    def has_meshes(self) -> bool:
-        """Whether the shapes of the heuristic half become meshes."""
-        is_phong = (self.interpolation or "phong") == "phong"
-        return not is_phong or bool(self.tessellation or self.vertex_weights)
-
-    @property
     def viewing(self) -> Viewing:
         """The viewing conditions."""
         # Loaded late: help needs no Mitsuba.
@@ -218,7 +213,7 @@ class OptionValues(TypedDict, total=False):
     heuristic: Any
     interpolation: Literal["flat", "gouraud", "phong"] | None
     tessellation: int | None
-    vertex_weights: Literal["mean", "area", "angle"] | None
+    vertex_weights: VertexWeights | None
     everything: bool
     pairing: Literal["literal", "matched"]
     define: Mapping[str, str]

@@ -210,9 +210,9 @@ class Prepared:
                 )
 
 
-def pair_for(source: Source, options: Options) -> Pair:
-    """Derive both halves of a scene as the options say, for the current variant."""
-    chosen = halves.PairOptions(
+def pair_options(options: Options) -> halves.PairOptions:
+    """Return how options derive the halves."""
+    return halves.PairOptions(
         convention=Convention(options.pairing),
         resolution=options.resolution,
         interpolation=options.polygon_shading,
@@ -222,7 +222,11 @@ def pair_for(source: Source, options: Options) -> Pair:
         sensor=options.sensor,
         heuristic=options.heuristic,
     )
-    return halves.pair(source, chosen)
+
+
+def pair_for(source: Source, options: Options) -> Pair:
+    """Derive both halves of a scene as the options say, for the current variant."""
+    return halves.pair(source, pair_options(options))
 
 
 def prepare(source: Source, options: Options | None = None) -> Prepared:

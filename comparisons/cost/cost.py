@@ -24,6 +24,7 @@ from fotismos.comparisons.cost.measure import (
     measure_at,
     measure_ladder,
     reduced,
+    requested,
 )
 from fotismos.comparisons.cost.methods import FULL_PLAN
 from fotismos.comparisons.departure.criterion import checked_threshold
@@ -31,7 +32,6 @@ from fotismos.comparisons.hybrids.attribution import find
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.price_record import Price
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.plan import Guard
 from fotismos.reference.records import VERSION, Pixels, Positive, Record, Resolution
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
@@ -128,7 +128,7 @@ def quick(
     alone: AbstractContextManager[Any],
 ) -> Study:
     """Study a compared scene with less effort, and predict for its own size; see :func:`cost`."""
-    whole = options.resolution or film_size(source.parse(), options.sensor)
+    whole = requested(source, options)
     small = options.changed(resolution=reduced(source, options, QUICK_WIDTH), spp=None)
     return cost(source, small, QUICK, progress, command, whole, causes=causes, alone=alone)
 
@@ -236,7 +236,7 @@ def choose(
     """
     checked_threshold(within)
     options = options or Options()
-    size = options.resolution or film_size(source.parse(), options.sensor)
+    size = requested(source, options)
     small = options.changed(resolution=None)
     progress = progress or (lambda *_: None)
     found = measure_ladder(source, small, effort=Effort(), progress=progress, at=options.resolution)

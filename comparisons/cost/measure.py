@@ -98,9 +98,14 @@ QUICK = Effort(rounds=3, largest=16, is_short=True)
 """For scenes of a report."""
 
 
+def requested(source: Source, options: Options) -> Size:
+    """Return the requested resolution, else that of the film."""
+    return options.resolution or film_size(source.parse(), options.sensor)
+
+
 def reduced(source: Source, options: Options, width: int) -> Size:
     """Return the requested resolution, else that of the film, reduced to a width."""
-    size = options.resolution or film_size(source.parse(), options.sensor)
+    size = requested(source, options)
     if size[0] <= width:
         return size
     return width, max(1, round(size[1] * width / size[0]))

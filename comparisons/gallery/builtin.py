@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from fotismos.heuristic.errors import InputError, suggestion
 
 if TYPE_CHECKING:  # names are listed without importing Mitsuba
+    from fotismos.comparisons.options import VertexWeights
     from fotismos.reference.scene.source import Source  # loaded late: names need no Mitsuba
 
 VIEWER_A = (-3, -3, 0)
@@ -40,7 +41,7 @@ class BuiltIn:
     heuristic_variant: str | None = None
     interpolation: str = "phong"
     tessellation: int | None = None
-    vertex_weights: Literal["mean", "area", "angle"] | None = None
+    vertex_weights: VertexWeights | None = None
 
     def source(self) -> Source:
         """Return the scene for :func:`fotismos.reference.pair`."""
@@ -64,6 +65,12 @@ def _scene(module: str, function: str, **values: Any) -> dict[str, Any]:
     maker = import_module(f"fotismos.comparisons.gallery.{module}")
     scene: dict[str, Any] = getattr(maker, function)(**values)
     return scene
+
+
+def _named(name: str, title: str, module: str = "scenes", **settings: Any) -> BuiltIn:
+    """Return the scene that the function of its name makes."""
+    make = partial(_scene, module, name.replace("-", "_"))
+    return BuiltIn(name, title, make, **settings)
 
 
 def _figure(name: str, title: str, lights: Any, viewer: Any, **coefficients: float) -> BuiltIn:
@@ -96,28 +103,18 @@ def _figures() -> Iterator[BuiltIn]:
 
     title = "The far lamp: as figure 8.6b, a hundred times as far; its light is as good as parallel"
     yield _figure("far-lamp", title, lights=FAR_LIGHT, viewer=VIEWER_A, k_d=levels["b"])
-    yield BuiltIn(
-        "emission",
-        "Equation 8.1: a ball that glows, and lights nothing in the model",
-        partial(_scene, "scenes", "emission"),
-    )
-    yield BuiltIn(
-        "mirror",
-        "Equation 8.7: a ball that mirrors a matt one",
-        partial(_scene, "scenes", "mirror"),
-    )
+    yield _named("emission", "Equation 8.1: a ball that glows, and lights nothing in the model")
+    yield _named("mirror", "Equation 8.7: a ball that mirrors a matt one")
 
 
 def _chapter_six() -> Iterator[BuiltIn]:
-    yield BuiltIn(
+    yield _named(
         "fall-offs",
         "Equation 6.1 and the text at 8.6: constant, linear, quadratic and clamped fall-off",
-        partial(_scene, "scenes", "fall_offs"),
     )
-    yield BuiltIn(
+    yield _named(
         "two-intensities",
         "Equations 6.6 and 6.8: an orange diffuse and a white specular intensity of one light",
-        partial(_scene, "scenes", "two_intensities"),
     )
     for m in (1.0, 40.0):
         title = f"Figure 6.5: a spot of {'small' if m < 10 else 'large'} exponent, m = {m:g}"
@@ -136,11 +133,9 @@ def _chapter_six() -> Iterator[BuiltIn]:
         interpolation="gouraud",
         tessellation=1,
     )
-
-    yield BuiltIn(
+    yield _named(
         "vertex-normals",
         "Equations 6.32 to 6.34: a block of twelve triangles; see it with other vertex weights",
-        partial(_scene, "scenes", "vertex_normals"),
         vertex_weights="mean",
     )
 
@@ -154,12 +149,10 @@ def _physical() -> Iterator[BuiltIn]:
          " spectra", True),
         ("cornell-box", "The Cornell box: a lamp, shadows and colour bleeding", False),
     ):  # fmt: skip
-        module = "spectra" if is_spectral else "scenes"
-        make = partial(_scene, module, name.replace("-", "_"))
-        yield BuiltIn(
-            name=name,
-            title=title,
-            make=make,
+        yield _named(
+            name,
+            title,
+            module="spectra" if is_spectral else "scenes",
             variant="llvm_ad_spectral" if is_spectral else "llvm_ad_rgb",
             heuristic_variant="llvm_ad_rgb" if is_spectral else None,
         )

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.blocks import averaged, ratio
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import Prepared, pair_for
+from fotismos.comparisons.prepared import Prepared, pair_for, pair_options
 from fotismos.heuristic.convention import Floats, Scene
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.pairing import lights
@@ -82,7 +82,7 @@ class Pairs:
         self.ready = ready
         self.heuristic_variant = options.heuristic_variant or ready.reference.variant
         self._source = source
-        self._known = {self._key(ready.reference.variant, options): ready.pair}
+        self._known = {(ready.reference.variant, pair_options(options)): ready.pair}
 
     def of(self, interpolation: Interpolation) -> Pair:
         """Return the pair with an interpolation and the requested tessellation, in this variant.
@@ -104,25 +104,17 @@ class Pairs:
         """
         options = self.options
         found = set(differences)
-        if options.has_meshes:
+        if pair_options(options).has_meshes:
             found.add(POLYGONS)
         if self.heuristic_variant != self.ready.reference.variant:
             found.add(SPECTRAL)
         return tuple(effect for effect in EFFECTS if effect in found)
 
     def _of(self, options: Options) -> Pair:
-        key = self._key(mi.variant(), options)
+        key = mi.variant(), pair_options(options)
         if key not in self._known:
             self._known[key] = pair_for(self._source, options)
         return self._known[key]
-
-    def _key(self, variant_name: str, options: Options) -> tuple[Any, ...]:
-        return (
-            variant_name,
-            options.polygon_shading,
-            options.tessellation,
-            options.vertex_weights,
-        )
 
 
 class HybridScenes:

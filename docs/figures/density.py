@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from docs.figures.model_figures import COLOURS, GROUND, STYLE
+from docs.figures.model_figures import COLOURS, GROUND, STYLE, quiet
 from fotismos.comparisons.cost import measure
 from fotismos.comparisons.cost.times import ratio
 from fotismos.comparisons.gallery import scenes
@@ -98,9 +98,7 @@ def chart(found: Sequence[Density]) -> Figure:
         time.set(xlabel="time per sample, sphere = 1")
         faces.yaxis.set_major_formatter("{x:g}")
         for axes in (faces, time):
-            axes.set_facecolor(GROUND)
-            axes.grid(alpha=0.25)
-            axes.spines[["top", "right"]].set_visible(False)
+            quiet(axes)
         faces.legend(frameon=False)
     return figure
 

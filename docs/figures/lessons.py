@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.comparison import Comparison, Images
-from fotismos.comparisons.departure.metrics import LEADING, METRICS
+from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.pixel_terms import LightTerms, PixelTerms
 from fotismos.comparisons.steps import with_terms
@@ -155,13 +155,16 @@ def picture(lesson: str) -> bytes:
     command = LESSONS[lesson][0].command
     shown = compared(command, PANEL, PANEL_SAMPLES).images
     panels = [
-        files.tonemap(shown.heuristic),
-        files.tonemap(shown.reference),
-        files.error_map(shown.maps[LEADING.name], METRICS[LEADING.name].map_range[1]),
+        panel.convert("RGB")
+        for panel in (
+            files.tonemap(shown.heuristic),
+            files.tonemap(shown.reference),
+            files.error_map(shown.maps[LEADING.name], LEADING.map_range[1]),
+        )
     ]
     width = len(panels) * (PANEL + GAP) - GAP
     strip = Image.new("RGB", (width, PANEL), "white")
-    for number, panel in enumerate(panel.convert("RGB") for panel in panels):
+    for number, panel in enumerate(panels):
         drawing = ImageDraw.Draw(panel)
         for pixel in LESSONS[lesson]:
             if pixel.command == command:

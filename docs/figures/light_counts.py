@@ -1,7 +1,7 @@
 """Time and error of flat, Gouraud and Phong shading over the number of lights, on three meshes.
 
 Chapter 6 interpolates to save time. What a lookup saves is the sum over the lights, so the saving
-grows with their number, and shrinks with that of the vertices.
+grows with their number.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from docs.figures.density import MARKS, near_sphere
-from docs.figures.model_figures import GROUND, STYLE
+from docs.figures.model_figures import GROUND, STYLE, quiet
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
@@ -84,8 +84,8 @@ def _of_count(count: int, fineness: Sequence[int], rounds: int) -> Iterator[Shad
             meshes.append((shading, n, renderer.scene.shapes()[0].face_count()))
     for renderer in renderers:
         warm(renderer)
-    for shown in passes(renderers, options.seed, rounds):
-        exact, *images = map(np.array, shown.images)
+    *_, last = passes(renderers, options.seed, rounds)
+    exact, *images = map(np.array, last.images)
     distances = LEADING.against(exact, sphere.counted, options.viewing)
     for (shading, n, faces), renderer, image in zip(meshes, renderers[1:], images, strict=True):
         yield ShadingCost(
@@ -130,9 +130,7 @@ def chart(found: Sequence[ShadingCost]) -> Figure:
             axes.xaxis.set_major_formatter("{x:g}")
             axes.set_xticks(COUNTS)
             axes.set_xticks([], minor=True)
-            axes.set_facecolor(GROUND)
-            axes.grid(alpha=0.25)
-            axes.spines[["top", "right"]].set_visible(False)
+            quiet(axes)
         handles, labels = error.get_legend_handles_labels()
         figure.legend(
             handles, labels, ncols=3, frameon=False, fontsize=7, loc="outside lower center"

@@ -128,6 +128,13 @@ def _legend(figure: Figure, width: float, height: float) -> None:
     figures.legend(figure, axes)
 
 
+def quiet(axes: Axes) -> None:
+    """Give axes the ground of the pages, a faint grid, and no frame."""
+    axes.set_facecolor(GROUND)
+    axes.grid(alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)
+
+
 def _panel(axes: Axes, title: str) -> None:
     axes.set(xlim=(-1.25, 1.25), ylim=(-0.4, 1.2), aspect="equal", title=title)
     axes.axis("off")

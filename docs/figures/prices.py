@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from docs.figures.accuracy import LARGER
-from docs.figures.model_figures import GROUND, STYLE
+from docs.figures.model_figures import GROUND, STYLE, quiet
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.comparison import ComparisonRecord
@@ -145,9 +145,7 @@ def chart(records: Sequence[ComparisonRecord]) -> Figure:
             xlabel="time of what looks right, over the textbook picture's",
             ylabel="pixels that differ without it (%)",
         )
-        axes.set_facecolor(GROUND)
-        axes.grid(alpha=0.25)
-        axes.spines[["top", "right"]].set_visible(False)
+        quiet(axes)
         axes.margins(x=0.14)
     return figure
 

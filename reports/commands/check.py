@@ -130,8 +130,7 @@ def check(
     if pictures and update and (others := [word for word in wanting if word not in READING]):
         raise InputError(f"{', '.join(others)}: pictures are not rendered. Omit it, or --picture.")
     patterns = _places(baseline, pictures)
-    is_tolerant = within is not None or max_visible is not None
-    if is_tolerant and (update or not pictures):
+    if (within, max_visible) != (None, None) and (update or not pictures):
         raise InputError(
             "--within, --max-visible: a tolerance judges new pictures. Give --picture, without"
             " --update."
@@ -147,7 +146,8 @@ def check(
         significance=significance,
         changes=changes,
         patterns=patterns,
-        tolerance=_tolerance(within, max_visible) if is_tolerant else None,
+        within=within,
+        max_visible=max_visible,
         inputs=inputs,
         output=output,
         junit=junit,
@@ -155,17 +155,6 @@ def check(
         as_json=as_json,
     )
     context.exit(code)
-
-
-def _tolerance(within: float | None, max_visible: float | None) -> Any:
-    """Return the tolerance of two options, of which one may be omitted."""
-    from fotismos.comparisons.departure import criterion  # loaded late: help needs no NumPy
-    from fotismos.reports.ci.checks import Tolerance
-
-    return Tolerance(
-        within=criterion.checked_threshold(criterion.TOLERANCE if within is None else within),
-        bound=criterion.LIMIT if max_visible is None else max_visible,
-    )
 
 
 def _places(baseline: Path, pictures: Sequence[tuple[str, str]]) -> dict[Path, str]:

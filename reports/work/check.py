@@ -6,6 +6,7 @@ from typing import Any
 
 import click
 
+from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, checked_threshold
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.reference.records import to_json
 from fotismos.reports.ci import checks, summary
@@ -25,7 +26,8 @@ def run(
     significance: float,
     changes: Mapping[str, Any],
     patterns: Mapping[Path, str],
-    tolerance: Tolerance | None,
+    within: float | None,
+    max_visible: float | None,
     inputs: Sequence[Path],
     output: Path,
     junit: Path | None,
@@ -53,7 +55,7 @@ def run(
             significance=significance,
             changes=changes,
             patterns=patterns,
-            tolerance=tolerance,
+            tolerance=_tolerance(within, max_visible),
             output=output,
         )
     for outcome in outcomes:
@@ -73,6 +75,16 @@ def run(
     elif code:
         click.echo(summary.outcome(outcomes, significance))
     return code
+
+
+def _tolerance(within: float | None, max_visible: float | None) -> Tolerance | None:
+    """Return the tolerance of two options, of which one may be omitted; None without both."""
+    if within is None and max_visible is None:
+        return None
+    return Tolerance(
+        within=checked_threshold(TOLERANCE if within is None else within),
+        bound=LIMIT if max_visible is None else max_visible,
+    )
 
 
 def _examined(

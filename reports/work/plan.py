@@ -10,14 +10,13 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.comparison import ComparisonRecord
 from fotismos.comparisons.cost.cost import Choice, choose
-from fotismos.comparisons.cost.measure import WIDTH, reduced
+from fotismos.comparisons.cost.measure import WIDTH, reduced, requested
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.comparisons.steps import steps
-from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.records import Record, to_json
 from fotismos.reports import verdict
 from fotismos.reports.terminal import cost_tables, plan_lines, progress
@@ -73,7 +72,7 @@ def priced(name: str, options: Options, within: float, progress: Any) -> Compari
     case = open_case(name, options)
     source = case.source
     options = case.options
-    width, height = options.resolution or film_size(source.parse(), options.sensor)
+    width, height = requested(source, options)
     if width * height > LARGEST:
         options = options.changed(resolution=reduced(source, options, WIDTH))
     return compare(source, options, progress, then=steps(options, why=True)).record

@@ -15,8 +15,8 @@ const AS_GIVEN = -1;
 const vectorOf = light => light.position ?? light.direction ?? [0, 0, 0];
 
 /**
- * A scene's numbers by name and owner. An owner is a light's place, or a material's among `names`;
- * 0 for what the scene has once.
+ * A scene's numbers by name and owner. The owner is the index of a light in `lights`, or that of a
+ * material's name in `names`. It is 0 for what a scene has only one of.
  */
 class Numbers {
   /** @param {Live} live @param {Points} points */
