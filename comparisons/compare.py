@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from threading import Thread
@@ -23,59 +23,28 @@ from fotismos.comparisons.comparison import (
     Comparison,
     ComparisonRecord,
     Deviations,
-    Images,
     NoiseTarget,
-    Significant,
     TimeSpent,
     versions,
 )
-from fotismos.comparisons.departure import marks, regions, statistics
-from fotismos.comparisons.departure.blocks import bands
-from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, leading_distance
+from fotismos.comparisons.departure.metrics import METRICS, leading_distance
+from fotismos.comparisons.estimates import Estimates, PassSums, measure, metrics_for
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
 from fotismos.comparisons.price_record import Price
 from fotismos.heuristic.errors import InstallationError
-from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.renderer import Progress, passes
-from fotismos.reference.rendering.sums import (
-    DEVIATION,
-    MEAN,
-    Accumulator,
-    DifferenceEstimate,
-    DifferenceSums,
-    add_difference,
-)
 from fotismos.reference.scene.source import Source, collect_messages, count_messages
 
 Step = Callable[[Comparison, Prepared, Progress | None], Comparison]
 """What adds to a comparison once it is measured, with what it was rendered with."""
-
-PERCENTILE = 95
-"""A noise target is for this percentile of the noise over the counted pixels."""
 
 COMPUTED_TWICE = 4096
 """Counted pixels at which colour-science computes differences, too; all if there are fewer."""
 
 DEVIATION_ALLOWED = 1e-3
 """Deviation from colour-science above which a record warns."""
-
-
-@dataclass(frozen=True)
-class Estimates:
-    """The passes of both halves and of their difference, and where they stopped (or None).
-
-    The halves have only means (H, W, 3) and the reference's standard error: the relevant
-    uncertainty is the difference's.
-    """
-
-    heuristic: np.ndarray
-    reference: np.ndarray
-    standard_error: np.ndarray
-    difference: DifferenceEstimate
-    passes: int
-    stop: NoiseTarget | None
 
 
 def compare(
@@ -167,35 +136,34 @@ def _render_and_measure(
     # The scene, both halves and the plan.
     ready = guarded(source, options)
     heuristic: Any = ready.heuristic  # a renderer, or pictures in its place
-    reference = ready.reference
-    guard = ready.guard
-    assert guard is not None
-    done("scene and pairing", ready.planning_seconds + guard.seconds)
-    stages |= {"planning": ready.planning_seconds, "guard": guard.seconds}
+    reference: Any = ready.reference
+    guard_seconds = ready.guard.seconds if ready.guard else 0.0
+    done("scene and pairing", ready.planning_seconds + guard_seconds)
+    stages |= {"planning": ready.planning_seconds, "guard": guard_seconds}
 
     # The passes, and their times.
-    estimates = render(ready, ready.counted, progress)
+    counted = ready.counted
+    estimates = render(ready, counted, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
     price = _price(ready, alone)
     done("timing")
 
     # The departure.
     _load()  # not beside the passes, whose times are compared
-    numbers, images = _measure(estimates, ready)
+    # A picture has noise of its own, whatever the plan is.
+    exact = ready.plan.exact and not options.has_pictures
+    numbers, images = measure(estimates, counted, options, ready.traced(), exact)
     caution = ready.caution() or ready.require_light(images.heuristic, images.reference)
     done("metrics")
     record = ComparisonRecord(
         scene=source.name,
         variant=reference.variant,
         heuristic_variant=heuristic.variant,
-        heuristic=f"picture {', '.join(options.image)}" if options.image else options.heuristic,
+        heuristic=options.first_half,
         interpolation=options.polygon_shading.value,
         seed=options.seed,
         resolution=images.counted.shape[::-1],
-        plan=ready.plan_record(estimates.passes),
-        viewing=options.viewing,
-        pixels=Pixels(counted=int(images.counted.sum()), total=images.counted.size),
-        regions=regions.find(images.maps[LEADING.name], images.counted),
+        plan=None if options.reference else ready.plan_record(estimates.passes),
         pairing=ready.pair.pairing,
         time=TimeSpent(
             heuristic=heuristic.pass_times(), reference=reference.pass_times(), stages=stages
@@ -214,8 +182,13 @@ def _render_and_measure(
     return Comparison(record=record, images=images), ready
 
 
-def _price(ready: Prepared, alone: AbstractContextManager[Any] | None) -> Price:
-    """Return the times per sample of both halves; the time of a picture is not known."""
+def _price(ready: Prepared, alone: AbstractContextManager[Any] | None) -> Price | None:
+    """Return the times per sample of both halves; of a picture the time is not known.
+
+    A reference that is a picture has no price.
+    """
+    if ready.options.reference:
+        return None
     reference = ready.reference
     if not ready.options.image:
         return timing.measure(
@@ -242,21 +215,16 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
     ``counted`` (H, W) are the pixels whose noise counts.
     """
     options = ready.options
-    distance = leading_distance(options.viewing, ready.metrics())
-    heuristic = Accumulator(MEAN)
-    reference = Accumulator(DEVIATION)
-    difference = DifferenceSums(counted)
-    sums = (heuristic, reference, difference)
-    done = 0
+    distance = leading_distance(options.viewing, metrics_for(options))
+    sums = PassSums(counted)
     reached = None
     loop = passes((ready.heuristic, ready.reference), options.seed, ready.passes, progress=progress)
     for rendered in loop:
-        add_difference(sums, rendered.images)
-        done = rendered.number + 1
+        sums.add(*rendered.images)
         # Else the images of this pass stay alongside the next ones.
         del rendered
-        if options.noise is not None and is_checked(done, ready.passes):
-            reached = noise_percentile(sums, counted, distance)
+        if options.noise is not None and is_checked(sums.passes, ready.passes):
+            reached = sums.noise_percentile(distance)
             if reached <= options.noise:
                 break
     loop.close()
@@ -269,15 +237,7 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
             stopped_by="target" if reached <= options.noise else "samples",
             limit_spp=ready.passes * ready.reference.pass_spp,
         )
-    # From here on images have single precision, like the files.
-    return Estimates(
-        heuristic=heuristic.mean(np.float32),
-        reference=reference.mean(np.float32),
-        standard_error=reference.standard_error(np.float32),
-        difference=difference.estimate(np.float32),
-        passes=done,
-        stop=stop,
-    )
+    return replace(sums.estimates(), stop=stop)
 
 
 def is_checked(done: int, passes: int) -> bool:
@@ -288,88 +248,3 @@ def is_checked(done: int, passes: int) -> bool:
     """
     power = 1 << (done.bit_length() - 1)
     return done >= passes or (done >= 4 and done in (power, power + power // 2))
-
-
-def noise_percentile(
-    sums: tuple[Accumulator, Accumulator, DifferenceSums],
-    counted: np.ndarray,
-    distance: Callable[[np.ndarray, np.ndarray], np.ndarray],
-) -> float:
-    """Predict the noise: 95th percentile of ΔE2000 between the reference and itself with noise.
-
-    The noise is that of the difference of the halves, in which shared noise cancels. ``distance``
-    is the leading metric's.
-    """
-    reference = sums[1].mean(np.float32)
-    noise = sums[2].noise(np.float32)
-    if not noise[counted].any():
-        return 0.0
-    distances = []
-    for rows in bands(len(counted)):
-        truth = reference[rows][counted[rows]].astype(np.float64)
-        distances.append(distance(truth + noise[rows][counted[rows]], truth))
-    return float(np.percentile(np.concatenate(distances), PERCENTILE))
-
-
-def _measure(estimates: Estimates, ready: Prepared) -> tuple[dict[str, Any], Images]:
-    """Compute fields of the record, and maps over the pixels that see a surface.
-
-    The relevant uncertainty is that of the difference, in which shared noise cancels.
-    """
-    surface = ready.traced()
-    options = ready.options
-    # A picture has noise of its own, whatever the plan is.
-    exact = ready.plan.exact and not options.image
-    test = estimates.heuristic
-    reference = estimates.reference
-    noise = estimates.difference.noise
-    counted = surface.hit
-    metrics = ready.metrics()
-    summaries = {}
-    maps = {}
-    for name, metric in metrics.items():
-        summaries[name], distances = statistics.summarise(
-            metric,
-            test,
-            reference=reference,
-            mask=counted,
-            viewing=options.viewing,
-            noise=noise,
-            grouped=estimates.difference.grouped,
-        )
-        if metric.drawn:
-            maps[name] = distances
-    ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(test, reference, counted)
-    found = marks.find(
-        estimates.difference, test, counted, leading_distance(options.viewing, metrics), exact=exact
-    )
-    error = maps[LEADING.name]
-    shapes, seen = regions.find_objects(
-        error, counted, owners=surface.shape, materials=surface.bsdf
-    )
-    materials, made_of = regions.find_objects(error, counted, surface.bsdf)
-    images = Images(
-        heuristic=test,
-        reference=reference,
-        reference_stderr=estimates.standard_error,
-        position=surface.position,
-        normal=surface.normal,
-        maps=maps,
-        significant=found.image,
-        counted=counted,
-        objects=seen,
-        materials=made_of,
-    )
-    numbers = {
-        "objects": shapes,
-        "materials": materials,
-        "metrics": summaries,
-        "log2_luminance": ratio,
-        "significant": Significant(
-            fraction=statistics.share(found.image[counted] == marks.MARKED),
-            undetermined=statistics.share(found.image[counted] == marks.UNDETERMINED),
-            level=marks.LEVEL,
-            certain=found.is_certain,
-        ),
-    }
-    return numbers, images

@@ -242,34 +242,51 @@ class Causes:
     visible: dict[tuple[str, ...], tuple[VisibleShare, ...]]
 
 
-class PictureRecord(Record):
-    """The pictures that replace the heuristic half.
+class PictureFiles(Record):
+    """The pictures that replace a half.
 
     Attributes
     ----------
+    digests
+        SHA-256 of the files, in hexadecimal digits.
     transfer
         Transfer function of their values, as stated; null if the files' own was taken.
     notes
         How the files were read, where they do not say it plainly.
+    repeats
+        Their number: the spread of several gives their noise.
+    """
+
+    files: tuple[str, ...]
+    digests: tuple[str, ...] = ()
+    transfer: str | None
+    notes: tuple[str, ...] = ()
+    repeats: Size
+
+
+class Agreement(Record):
+    """How pictures agree with the other half, and the mistakes that they seem to have.
+
+    Attributes
+    ----------
     shift
         Pixels by which their content is too far right and too low; null if their edges are
         uninformative.
     edges
         Correlation of their edges with the expected ones.
     ratio
-        Means of red, green and blue over those of the reference, which is clipped at display
-        white if they are.
+        How many times as strong red, green and blue are as in the other half: medians over
+        blocks of pixels that are lit, and not clipped.
+    mistakes
+        Mistakes that they seem to have, each with the number that mends it, and what is then left.
     odd
-        What is odd about them, in words, their position first.
+        What else is odd about them, in words.
     """
 
-    files: tuple[str, ...]
-    transfer: str | None
-    notes: tuple[str, ...] = ()
-    repeats: Size
     shift: tuple[float, float] | None
     edges: float
     ratio: tuple[float, float, float]
+    mistakes: tuple[str, ...] = ()
     odd: tuple[str, ...] = ()
 
 
@@ -291,17 +308,22 @@ class Deviations(Record):
 class ComparisonRecord(Record):
     """One scene by textbook shading (heuristic) and by physically based rendering (reference).
 
+    Pictures of other renderers may replace either half. What belongs to a scene is null where both
+    are pictures, and what belongs to the physical half, where that is one.
+
     Times are in seconds; linear values are in units of display white; every number is finite.
     """
 
-    scene: Annotated[str, Meta(description="Built-in name or path of the file, as given.")]
-    variant: Annotated[str, Meta(description="Mitsuba variant of the reference.")]
-    heuristic_variant: str
+    scene: Annotated[
+        str, Meta(description="Built-in name or path of the file, as given; else the picture's.")
+    ]
+    variant: Annotated[str | None, Meta(description="Mitsuba variant of the scene.")] = None
+    heuristic_variant: str | None = None
     heuristic: str
-    interpolation: Literal["flat", "gouraud", "phong"]
+    interpolation: Literal["flat", "gouraud", "phong"] | None = None
     seed: Annotated[Count, Meta(description="Seed of the run; each pass hashes its own from it.")]
     resolution: Resolution
-    plan: Plan
+    plan: Annotated[Plan | None, Meta(description="How the reference was rendered.")] = None
     viewing: Viewing
     metrics: Annotated[dict[str, Summary], Meta(description="The summary of each declared metric.")]
     log2_luminance: RatioSummary
@@ -318,22 +340,28 @@ class ComparisonRecord(Record):
     materials: Annotated[
         tuple[ObjectShare, ...], Meta(description="The same for their BSDFs.")
     ] = ()
-    pairing: Pairing
+    pairing: Pairing | None = None
     time: TimeSpent
-    price: Annotated[
-        Price | None, Meta(description="What it takes to look right; null in older records.")
-    ] = None
-    unrepresentable: tuple[Unrepresentable, ...]
-    integrator_given: Annotated[str | None, Meta(description="The scene's own integrator.")]
-    overridden: tuple[Override, ...]
-    warnings: tuple[str, ...]
+    price: Annotated[Price | None, Meta(description="What it takes to look right.")] = None
+    unrepresentable: tuple[Unrepresentable, ...] = ()
+    integrator_given: Annotated[str | None, Meta(description="The scene's own integrator.")] = None
+    overridden: tuple[Override, ...] = ()
+    warnings: tuple[str, ...] = ()
     versions: Versions
     command: Annotated[str, Meta(description="Repeats this comparison.")]
     caution: Annotated[
         str, Meta(description="Why the numbers may mean nothing; empty if there is no such doubt.")
     ] = ""
     noise_target: NoiseTarget | None = None
-    picture: PictureRecord | None = None
+    picture: Annotated[
+        PictureFiles | None, Meta(description="The pictures in place of the heuristic half.")
+    ] = None
+    reference_picture: Annotated[
+        PictureFiles | None, Meta(description="The pictures in place of the reference.")
+    ] = None
+    agreement: Annotated[
+        Agreement | None, Meta(description="How pictures agree with the other half.")
+    ] = None
     why: Annotated[
         Attribution | None,
         Meta(
@@ -353,19 +381,20 @@ class Images:
 
     ``maps`` are those of the perceptual metrics and ``log2_luminance``. ``objects`` and
     ``materials`` hold the index in the record of what each pixel sees, -1 for uncounted pixels.
+    Two pictures without a scene have neither these nor ``position`` and ``normal``.
     ``terms`` are those of 8.10 in the heuristic half, by layer, if it has any.
     """
 
     heuristic: np.ndarray
     reference: np.ndarray
     reference_stderr: np.ndarray
-    position: np.ndarray
-    normal: np.ndarray
     maps: dict[str, np.ndarray]
     significant: np.ndarray
     counted: np.ndarray
-    objects: np.ndarray
-    materials: np.ndarray
+    position: np.ndarray | None = None
+    normal: np.ndarray | None = None
+    objects: np.ndarray | None = None
+    materials: np.ndarray | None = None
     terms: dict[str, np.ndarray] = field(default_factory=dict)
 
 

@@ -5,7 +5,7 @@ The command line, the notebook, baselines and studies name them alike.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
@@ -101,11 +101,21 @@ class Options(
     image: Annotated[
         tuple[str, ...],
         _help("A picture of the scene (.exr, FILE.exr:LAYER, .png, .jpg, .hdr, .pfm, .npy) that"
-              " replaces the heuristic half; several are repeats, which show its noise."),
+              " replaces the heuristic half, or a pattern of several in quotes: repeats, which show"
+              " its noise."),
     ] = ()  # fmt: skip
+    reference: Annotated[
+        tuple[str, ...],
+        _help("A picture in place of the physical half, such as of another path tracer, or a"
+              " pattern of repeats; with --image, no scene is needed."),
+    ] = ()  # fmt: skip
+    mask: Annotated[
+        str | None,
+        _help("A picture that says which pixels count: those that are not black in it."),
+    ] = None
     transfer: Annotated[
         Literal["linear", "srgb"] | None,
-        _help("Transfer function of the picture.", "the file's own: sRGB for .png and .jpg"),
+        _help("Transfer function of the pictures.", "the file's own: sRGB for .png and .jpg"),
     ] = None
     over: Annotated[
         str | None,
@@ -154,15 +164,15 @@ class Options(
         return {k: list(v) if isinstance(v, tuple) else v for k, v in plain.items()}
 
     def command(self, verb: str, scene: str, **more: Any) -> str:
-        """Return the command that does the same with a scene again."""
-        arguments = [verb, scene]
+        """Return the command that does the same again, with a scene unless its name is empty."""
+        arguments = [verb, scene] if scene else [verb]
         for name, value in (msgspec.to_builtins(self) | more).items():
             option = f"--{name.replace('_', '-')}"
             if name == "define":
                 arguments += [word for entry in value.items() for word in ("-D", "=".join(entry))]
-            elif name == "image":
-                images = (value,) if isinstance(value, str) else value
-                arguments += [word for image in images for word in (option, image)]
+            elif name in ("image", "reference"):
+                files = (value,) if isinstance(value, str) else value
+                arguments += [word for file in files for word in (option, file)]
             elif value is True:
                 arguments.append(option)
             elif value not in (None, False):
@@ -171,6 +181,21 @@ class Options(
                     "x".join(map(str, value)) if name == "resolution" else str(value),
                 ]
         return program.command(*arguments)
+
+    @property
+    def has_pictures(self) -> bool:
+        """Whether pictures of other renderers replace a half."""
+        return bool(self.image or self.reference)
+
+    @property
+    def picture_files(self) -> tuple[str, ...]:
+        """The files of pictures and of the mask."""
+        return (*self.image, *self.reference, *((self.mask,) if self.mask else ()))
+
+    @property
+    def first_half(self) -> str:
+        """What the first half is, as records name it."""
+        return f"picture {', '.join(self.image)}" if self.image else self.heuristic
 
     @property
     def polygon_shading(self) -> Interpolation:
@@ -190,18 +215,19 @@ class Options(
         return DEFAULT_VIEWING if density is None else Viewing(pixels_per_degree=density)
 
     def require_model(self, what: str) -> None:
-        """Raise InputError if a picture replaces the heuristic half, which ``what`` renders."""
-        if self.image:
-            raise InputError(
-                f"{what} needs a heuristic to render, and {self.image[0]} is a picture. Omit the"
-                " image."
-            )
+        """Raise InputError if a picture replaces a half that ``what`` renders."""
+        for name in ("image", "reference"):
+            if files := getattr(self, name):
+                raise InputError(
+                    f"{what} renders both halves, and {files[0]} is a picture. Omit `{name}`."
+                )
 
 
 class OptionValues(TypedDict, total=False):
     """What :class:`Options` takes, so that editors complete it; each option says what it means.
 
-    ``heuristic`` may also be a function of a point, or a ``Heuristic``; ``image`` may be one name.
+    ``heuristic`` may also be a function of a point, or a ``Heuristic``. ``image`` and ``reference``
+    may be a name, a NumPy array (H, W, 3) of linear colours, or several of them.
     """
 
     variant: Variant | None
@@ -219,7 +245,9 @@ class OptionValues(TypedDict, total=False):
     define: Mapping[str, str]
     sensor: int
     allow_empty: bool
-    image: str | Sequence[str]
+    image: Any
+    reference: Any
+    mask: str | None
     transfer: Literal["linear", "srgb"] | None
     over: str | None
     pixels_per_degree: float | None
@@ -234,7 +262,7 @@ def _plain(name: str, value: Any) -> Any:
         return known_as(value)
     if name == "define":
         return {key: str(text) for key, text in dict(value or ()).items()}
-    if name == "image" and isinstance(value, str):
+    if name in ("image", "reference") and isinstance(value, str):
         return (value,)
     if isinstance(value, (list, tuple)):
         return tuple(_plain("", item) for item in value)

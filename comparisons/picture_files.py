@@ -13,11 +13,14 @@ File                   Read as
 
 ``transfer`` replaces the encoding. What a file did not say plainly is said in words. Where alpha is
 below 1, the picture is put over the colour ``over``: in EXR colours are premultiplied, in other
-files they are not.
+files they are not. Without that colour, these pixels do not count.
 """
 
-from collections.abc import Callable, Mapping
+import hashlib
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from glob import glob, has_magic
 from pathlib import Path
 from typing import Any
 
@@ -73,25 +76,74 @@ class Layer:
 
 @dataclass(frozen=True)
 class PictureFile:
-    """A picture, linear (H, W, 3) in float32, and how it was read, in words."""
+    """A picture, linear (H, W, 3) in float32, and how it was read, in words.
+
+    ``opaque`` (H, W) are the pixels without transparency, ``digest`` is the file's SHA-256. What
+    ``is_encoded`` ends at display white, as in a PNG.
+    """
 
     image: Array
+    opaque: NDArray[np.bool_]
+    digest: str
+    is_encoded: bool = False
     notes: tuple[str, ...] = ()
 
 
-def read_file(word: str, transfer: str | None = None, over: str | None = None) -> PictureFile:
-    """Return a picture; ``word`` is the path of a file, or ``FILE.exr:LAYER``."""
+def matching(patterns: Iterable[str]) -> tuple[str, ...]:
+    """Return the files that match patterns such as ``render_*.exr`` or ``render_*.exr:LAYER``.
+
+    A name of a file is a pattern that matches it; one that is not there is returned as it is.
+    """
+    files: list[str] = []
+    for pattern in patterns:
+        path, layer = picture_parts(pattern)
+        if path.is_file() or pattern in ARRAYS:
+            files.append(pattern)
+            continue
+        found = sorted(glob(str(path), recursive=True))
+        if not found and has_magic(str(path)):
+            raise InputError(
+                f"{pattern}: no file matches. Give repeats, such as 'render_*.exr' in quotes."
+            )
+        files += [f"{file}:{layer}" if layer else file for file in found or [str(path)]]
+    return tuple(files)
+
+
+ARRAYS: dict[str, np.ndarray] = {}
+"""Pictures of this process by names like those of files; see :func:`as_files`."""
+
+
+@contextmanager
+def as_files(arrays: Mapping[str, np.ndarray]) -> Iterator[None]:
+    """Let arrays (H, W, 3) be read by names like those of NumPy's files, within the block."""
+    ARRAYS.update(arrays)
+    try:
+        yield
+    finally:
+        for name in arrays:
+            del ARRAYS[name]
+
+
+def read_file(
+    word: str, transfer: str | None = None, over: str | None = None, is_mask: bool = False
+) -> PictureFile:
+    """Return a picture; ``word`` is the path of a file, or ``FILE.exr:LAYER``.
+
+    Where alpha is below 1, the picture is put over the colour ``over``. Without one, those pixels
+    do not count if alpha ``is_mask``, or else the picture is refused.
+    """
     path, layer_name = picture_parts(word)
-    if not path.is_file():
+    if word in ARRAYS:
+        layer = _layer(path, np.asarray(ARRAYS[word], float))
+    elif not path.is_file():
         fault = "it is not a regular file" if path.exists() else "there is no such file"
         raise InputError(f"{path}: {fault}. Give a {' or '.join(PICTURES)} picture.")
-    suffix = path.suffix.lower()
-    if suffix == ".exr":
+    elif path.suffix.lower() == ".exr":
         layer = _exr(path, layer_name)
-    elif suffix == ".npy":
+    elif path.suffix.lower() == ".npy":
         layer = _array(path)
     else:
-        layer = _bitmap(path, suffix)
+        layer = _bitmap(path, path.suffix.lower())
     # A NaN would pass the later tests: it is neither above nor below.
     wrong = np.asarray(~np.isfinite(layer.colours).all(axis=-1))
     if wrong.any():
@@ -99,7 +151,14 @@ def read_file(word: str, transfer: str | None = None, over: str | None = None) -
     decode = {"srgb": from_srgb, "linear": None}.get(transfer or "", layer.transfer)
     image = layer.colours if decode is None else decode(layer.colours)
     behind = None if over is None else colour_over(over)
-    image = _opaque(path, image, layer, behind)
+    opaque = np.ones(image.shape[:2], bool)
+    notes = [layer.encoding if transfer is None else "", *layer.notes]
+    if layer.alpha is not None and behind is None and is_mask:
+        opaque = layer.alpha >= OPAQUE
+        if not opaque.all():
+            notes.append(f"{np.count_nonzero(~opaque)} pixels with alpha below 1 do not count")
+    else:
+        image = _opaque(path, image, layer, behind)
     wrong = np.any(image > LARGEST_VALUE, axis=-1)
     if wrong.any():
         raise InputError(
@@ -113,11 +172,15 @@ def read_file(word: str, transfer: str | None = None, over: str | None = None) -
             " say its primaries, and so are overshoots of a sharpening filter. Write the"
             " chromaticities, or clip the picture at 0."
         )
-    encoding = layer.encoding if transfer is None else ""
-    alpha = "" if over is None else f"alpha over {over}"
+    if over is not None:
+        notes.append(f"alpha over {over}")
+    content = ARRAYS[word].tobytes() if word in ARRAYS else path.read_bytes()
     return PictureFile(
         image=np.ascontiguousarray(image, np.float32),
-        notes=tuple(filter(None, (encoding, *layer.notes, alpha))),
+        opaque=opaque,
+        digest=hashlib.sha256(content).hexdigest(),
+        is_encoded=bool(layer.encoding),
+        notes=tuple(filter(None, notes)),
     )
 
 

@@ -1,103 +1,222 @@
-"""Pictures of other renderers as the heuristic half, and what is odd in them.
+"""Pictures of other renderers as a half: read, repeated as passes, and what is odd in them.
 
-They are read by :mod:`fotismos.comparisons.picture_files`.
-
-The position is found by edges: a shift looks like wrong shading. Geometric edges, where the normal
-or the hit changes, are in any picture of the same scene, however it is shaded. The heuristic half
-mostly shares its edges too: it shows where light ends. The picture's edges are correlated with both
-at all shifts up to :data:`REACH`, and the better agreement counts; a parabola through the highest
-values gives the fraction of a pixel. A shift counts only if it improves the agreement by more than
-a shift of the reference itself, which is in its place: noise and shading explain that much. Each
-half of the repeats must show it, too.
+They are read by :mod:`fotismos.comparisons.picture_files`, placed by
+:mod:`fotismos.comparisons.alignment`, and doubted by
+:mod:`fotismos.comparisons.picture_mistakes`.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from functools import partial
-from itertools import permutations
-from math import pi
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from time import perf_counter
+from typing import Any
 
-import mitsuba as mi
 import numpy as np
 from msgspec import structs
+from numpy.typing import NDArray
 
-from fotismos.comparisons.comparison import Images, PictureRecord
-from fotismos.comparisons.departure.colour import from_srgb, luminance, to_srgb
+from fotismos.comparisons import alignment, picture_mistakes
+from fotismos.comparisons.comparison import Agreement, Comparison, Images, PictureFiles
+from fotismos.comparisons.departure.colour import Array
+from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
+from fotismos.comparisons.picture_mistakes import Names, NoisyImage
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.pairing.settings import film_size
-from fotismos.reference.rendering.gbuffer import gbuffer
-from fotismos.reference.rendering.renderer import Renderer, Times
-from fotismos.reference.scene.source import Source
+from fotismos.reference.rendering.renderer import Times
+
+SAME = 0.01
+"""ΔE2000 to which a picture equals the textbook half, away from edges."""
+
+FLAT = 0.1
+"""Largest edge, from 0 to 1, of a pixel away from edges."""
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """The pictures of a half, all of one size: their names, and how each was read.
+
+    ``transfer`` is the function that was stated for their values, None for the files' own.
+    """
+
+    names: tuple[str, ...]
+    files: tuple[PictureFile, ...]
+    transfer: str | None = None
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        height, width = self.files[0].image.shape[:2]
+        return width, height
+
+    @property
+    def passes(self) -> int | None:
+        """The most passes that they give, an even number; None for one, which shows no noise."""
+        count = len(self.files)
+        return None if count == 1 else count - count % 2
+
+    @property
+    def mean(self) -> Array:
+        """Their mean, (H, W, 3)."""
+        mean: Array = np.mean([file.image for file in self.files], axis=0)
+        return mean
+
+    @property
+    def two_halves(self) -> tuple[Array, Array] | None:
+        """The means of two halves, whose difference shows the noise; None for one picture."""
+        if len(self.files) == 1:
+            return None
+        images = [file.image for file in self.files]
+        return np.mean(images[0::2], axis=0), np.mean(images[1::2], axis=0)
+
+    @property
+    def opaque(self) -> NDArray[np.bool_]:
+        """Where all of them are opaque, (H, W)."""
+        opaque: NDArray[np.bool_] = np.all([file.opaque for file in self.files], axis=0)
+        return opaque
+
+    def record(self) -> PictureFiles:
+        """Return the record of the files."""
+        return PictureFiles(
+            files=self.names,
+            digests=tuple(file.digest for file in self.files),
+            transfer=self.transfer,
+            notes=tuple(dict.fromkeys(note for file in self.files for note in file.notes)),
+            repeats=len(self.files),
+        )
 
 
 class PictureHalf:
-    """Pictures (H, W, 3) as the passes of a heuristic half, one after another.
+    """Pictures as the passes of a half, one after another.
 
-    Several are repeats, whose spread gives the noise; a single one serves for every pass. ``half``
-    is the renderer that they replace; ``notes`` say how the files were read.
+    Several are repeats, whose spread gives the noise: each pass is the mean of one or more of them,
+    as many in all passes as possible. A single picture serves for every pass. ``replaced`` is the
+    renderer that they replace, whose variant is ``variant``.
     """
 
-    def __init__(self, files: Sequence[PictureFile], half: Renderer) -> None:
-        self.images = [file.image for file in files]
-        self.notes = tuple(dict.fromkeys(note for file in files for note in file.notes))
-        self.half = half
-        self.variant = half.variant
+    def __init__(
+        self, pictures: Pictures, passes: int, variant: str = "", replaced: Any = None
+    ) -> None:
+        self.pictures = pictures
+        self.variant = variant
+        self.replaced = replaced
+        self.pass_spp: int = replaced.pass_spp if replaced else 1
         self.times: list[float] = []
-        self.compilation = 0.0
+        images = [file.image for file in pictures.files]
+        count = min(passes, len(images))
+        self._means = [np.mean(images[number::count], axis=0) for number in range(count)]
 
-    def render(self, seed: int) -> mi.TensorXf:
-        """Return the next picture; the seed is ignored."""
+    def render(self, seed: int) -> np.ndarray:
+        """Return the next pass (H, W, 3); the seed is ignored."""
         begin = perf_counter()
-        image = mi.TensorXf(self.images[len(self.times) % len(self.images)])
+        image: np.ndarray = self._means[len(self.times) % len(self._means)]
         self.times.append(perf_counter() - begin)
         return image
 
     def pass_times(self) -> Times:
-        """Return the times of reading the pictures."""
+        """Return the times of the passes, which are read already."""
         return Times.of(self.times, 0.0)
 
 
-def read_all(options: Options) -> list[PictureFile]:
-    """Return the pictures that options name: all of one size, and one or an even number."""
-    files = [read_file(word, options.transfer, options.over) for word in options.image]
-    require_one_size(file.image for file in files)
-    if len(files) > 1 and options.noise is not None:
+# --- Reading -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class GivenPictures:
+    """The pictures that options name for either half, and for the pixels that count."""
+
+    image: Pictures | None
+    reference: Pictures | None
+    mask: NDArray[np.bool_] | None
+
+    @property
+    def halves(self) -> tuple[Pictures, ...]:
+        """Those of the halves."""
+        return tuple(half for half in (self.image, self.reference) if half is not None)
+
+    @property
+    def passes(self) -> int | None:
+        """The passes of both halves; None if each is one picture, or rendered."""
+        counts = [half.passes for half in self.halves if half.passes is not None]
+        return min(counts, default=None)
+
+    def where(self) -> NDArray[np.bool_]:
+        """Return the pixels (H, W) that count: in the mask, and opaque in all pictures."""
+        counted: NDArray[np.bool_] = np.all([half.opaque for half in self.halves], axis=0)
+        if self.mask is not None:
+            counted &= self.mask
+        if not counted.any():
+            raise InputError(
+                "no pixel counts: the mask is black, or the pictures are transparent, everywhere."
+                " Check the mask, or give the colour behind the pictures with `over`."
+            )
+        return counted
+
+
+def read_all(options: Options) -> GivenPictures:
+    """Return the pictures that options name: all of one size, repeats of different names."""
+    image = _read(options.image, options) if options.image else None
+    reference = _read(options.reference, options) if options.reference else None
+    mask = None
+    if options.mask is not None:
+        mask = np.any(read_file(options.mask, "linear", "black").image > 0, axis=-1)
+    given = GivenPictures(image=image, reference=reference, mask=mask)
+    if options.noise is not None and given.passes is not None:
         raise InputError(
-            f"noise = {options.noise:g} and {len(files)} repeats: a noise target may need more"
+            f"noise = {options.noise:g} and {given.passes} repeats: a noise target may need more"
             " passes than there are pictures. Give `spp` instead of `noise`."
         )
-    if len(files) > 1 and len(files) % 2:
+    require_one_size(file.image for half in given.halves for file in half.files)
+    if mask is not None and given.halves and mask.shape[::-1] != given.halves[0].size:
         raise InputError(
-            f"{len(files)} repeats: give one, or an even number, whose halves give the noise."
+            f"{options.mask}: the mask has {mask.shape[1]}x{mask.shape[0]} pixels, and the pictures"
+            f" {_by(given.halves[0].size)}. Give a mask of that size."
         )
-    return files
+    return given
+
+
+def _read(names: Sequence[str], options: Options) -> Pictures:
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        raise InputError(
+            f"{twice[0]} is given {names.count(twice[0])} times. Give each repeat once: they must"
+            " differ in their noise."
+        )
+    files = (read_file(name, options.transfer, options.over, is_mask=True) for name in names)
+    return Pictures(names=tuple(names), files=tuple(files), transfer=options.transfer)
 
 
 def require_one_size(images: Iterable[np.ndarray]) -> None:
     """Ensure that pictures are of one size."""
-    sizes = {image.shape[:2] for image in images}
+    sizes = sorted({(image.shape[1], image.shape[0]) for image in images})
     if len(sizes) > 1:
-        shown = ", ".join(f"{width}x{height}" for height, width in sorted(sizes))
-        raise InputError(f"pictures of {shown}: give repeats of one size.")
-
-
-def at_size_of_pictures(source: Source, options: Options) -> Options:
-    """Return options with the resolution of their pictures, which must be the film's in shape."""
-    height, width = read_all(options)[0].image.shape[:2]
-    film_sides = film_size(source.parse(), options.sensor)
-    film = options.resolution or film_sides
-    if options.resolution and film != (width, height):
+        (width, height), (wider, higher) = sizes[0], sizes[-1]
+        shown = ", ".join(map(_by, sizes))
+        larger = f"{wider / width:.3g} times as wide and {higher / height:.3g} times as high"
         raise InputError(
-            f"{options.image[0]}: it has {width}x{height} pixels, and"
-            f" `resolution={film[0]}x{film[1]}` is requested. Omit the option."
+            f"pictures of {shown}: {larger}. Give pictures of one size; none is scaled."
         )
-    if abs(width * film[1] - height * film[0]) > max(film):  # more than a pixel
+
+
+def _by(size: tuple[int, int]) -> str:
+    return f"{size[0]}x{size[1]}"
+
+
+def at_size_of_pictures(film: tuple[int, int], given: GivenPictures, options: Options) -> Options:
+    """Return options with the resolution of their pictures, which must be the film's in shape.
+
+    ``film`` is the width and height of the scene's film, in pixels.
+    """
+    pictures = given.halves[0]
+    width, height = pictures.size
+    name = pictures.names[0]
+    if options.resolution and options.resolution != (width, height):
         raise InputError(
-            f"{options.image[0]}: it has {width}x{height} pixels, an aspect ratio of"
-            f" {width / height:.4g}, and the scene's film {film[0]}x{film[1]},"
+            f"{name}: it has {width}x{height} pixels, and"
+            f" `resolution={_by(options.resolution)}` is requested. Omit the option."
+        )
+    if not options.resolution and abs(width * film[1] - height * film[0]) > max(film):
+        raise InputError(  # more than a pixel apart
+            f"{name}: it has {width}x{height} pixels, an aspect ratio of"
+            f" {width / height:.4g}, and the scene's film {_by(film)},"
             f" {film[0] / film[1]:.4g}. Render the picture with the scene's camera, or ignore the"
             f" film's size with `resolution={width}x{height}`."
         )
@@ -109,312 +228,129 @@ def read(word: str, transfer: str | None = None, over: str | None = None) -> np.
     return read_file(word, transfer, over).image
 
 
-# --- Position ----------------------------------------------------------------------------------
-
-TEMPLATE_SPP = 16
-"""Samples per pixel of the image whose edges are compared with a picture's."""
-
-REACH = 8
-FINER = 4
-"""Largest shift considered in pixels, at most a quarter of the picture's smaller side; and rays
-along each side of a pixel."""
-
-LEAST = 0.08
-"""Correlation below which edges are uninformative."""
-
-DOUBTFUL = 2.0
-"""A shift improves the agreement by more than this times what noise does."""
-AGREEMENT = 1.0
-"""Pixels by which the shifts of halves of the repeats may differ from that of all."""
+# --- What is odd -------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Place:
-    """Where a picture's content is.
+REFERENCE = Names(picture="The reference picture", other="the first half")
 
-    ``shift`` is by how many pixels (x, y) it is too far right and too low, None if its edges do not
-    show it; ``correlation`` is that of the edges there, and ``gain`` by how much it is larger than
-    without the shift.
+
+def with_records(
+    comparison: Comparison,
+    given: GivenPictures,
+    expected: Sequence[np.ndarray] = (),
+    textbook: np.ndarray | None = None,
+) -> Comparison:
+    """Return a comparison with the records of its pictures, and what is odd about them.
+
+    ``expected`` and ``textbook`` are as for :func:`agreement`.
     """
-
-    shift: tuple[float, float] | None
-    correlation: float
-    gain: float
-
-
-def geometry_edges(scene: mi.Scene, width: int, height: int) -> np.ndarray:
-    """Return how much the geometry changes at each pixel, (H, W)."""
-    surface = gbuffer(scene, (FINER * width, FINER * height))
-    layers = np.concatenate([surface.normal, surface.hit[..., None]], axis=-1)
-    # Means over the rays of a pixel, (H, W, 4).
-    return _edges(layers.reshape(height, FINER, width, FINER, 4).mean(axis=(1, 3)))
-
-
-def picture_edges(image: np.ndarray) -> np.ndarray:
-    """Return how much an image changes at each pixel, in stops, up to 1."""
-    light = np.maximum(luminance(image), 0)
-    least = 0.02 * np.percentile(light, 95) + 1e-6
-    return _edges(np.log2(light + least)[..., None])
-
-
-def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Place:
-    """Return the position of an image (H, W, 3), encoded in any way.
-
-    ``expected`` are maps (H, W) of edges that it may contain; the best agreement counts.
-    """
-    seen = picture_edges(image)
-    return max((_shift(edges, seen) for edges in expected), key=lambda place: place.correlation)
-
-
-def _edges(layers: np.ndarray) -> np.ndarray:
-    """Return the size of the gradient, on a scale that is 1/2 at 1/4 and ends at 1."""
-    size = np.sqrt((np.array(np.gradient(layers, axis=(0, 1))) ** 2).sum(axis=(0, -1)))
-    strength: np.ndarray = size / (size + 0.25)
-    return strength
-
-
-def _shift(edges: np.ndarray, seen: np.ndarray) -> Place:
-    reach = max(1, min(REACH, min(edges.shape) // 4))
-    shifts = range(-reach, reach + 1)
-    table = np.array([[_correlation(seen, edges, down=y, right=x) for x in shifts] for y in shifts])
-    y, x = map(int, np.unravel_index(np.argmax(table), table.shape))
-    highest = float(table[y, x])
-    gain = highest - float(table[reach, reach])
-    if highest < LEAST:
-        return Place(shift=None, correlation=highest, gain=gain)
-    down = y - reach + _vertex(table[:, x], y)
-    right = x - reach + _vertex(table[y], x)
-    return Place(shift=(float(right), float(down)), correlation=highest, gain=gain)
-
-
-def _correlation(seen: np.ndarray, edges: np.ndarray, down: int, right: int) -> float:
-    """Return the correlation of two maps where they overlap after a shift of the first."""
-    height, width = edges.shape
-    a = seen[max(down, 0) : height + down, max(right, 0) : width + right]
-    b = edges[max(-down, 0) : height - down, max(-right, 0) : width - right]
-    a = a - a.mean()
-    b = b - b.mean()
-    size = np.sqrt((a * a).sum() * (b * b).sum())
-    return float((a * b).sum() / size) if size > 0 else 0.0
-
-
-def _vertex(values: np.ndarray, peak: int) -> float:
-    """Return the offset of the vertex of a parabola through a maximum and its neighbours."""
-    if not 0 < peak < len(values) - 1:
-        return 0.0
-    before, top, after = values[peak - 1 : peak + 2]
-    bend = before - 2 * top + after
-    return 0.0 if bend >= 0 else float(0.5 * (before - after) / bend)
-
-
-# --- Encoding ----------------------------------------------------------------------------------
-
-
-CHANNELS = ("red", "green", "blue")
-
-
-MISREADINGS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-    "values look sRGB-encoded": from_srgb,
-    "values look decoded twice": to_srgb,
-    **{
-        f"channels look like {', '.join(CHANNELS[channel] for channel in order)}": partial(
-            np.take, indices=order, axis=-1
+    record = comparison.record
+    images = comparison.images
+    if given.image is not None:
+        found = agreement(given.image, images, expected, Names(), textbook)
+    else:
+        assert given.reference is not None
+        swapped = replace(
+            images,
+            heuristic=images.reference,
+            reference=images.heuristic,
+            reference_stderr=np.zeros_like(images.reference_stderr),
         )
-        for order in permutations(range(3))
-        if order != (0, 1, 2)
-    },
-}
-"""Mistakes in encoding colours: their symptoms, and their inverses."""
-
-TURNED = {
-    "upside down": lambda image: image[::-1],
-    "mirrored left to right": lambda image: image[:, ::-1],
-    "turned by 180 degrees": lambda image: image[::-1, ::-1],
-}
-
-CURES = {
-    "values look sRGB-encoded": ": give `transfer=srgb`, or write linear values",
-    "values look decoded twice": ": give `transfer=linear`",
-}
-
-NEAR_PI = 0.05
-"""Relative distance within which a level counts as a factor of pi."""
+        found = agreement(given.reference, swapped, expected, REFERENCE)
+    found = structs.replace(found, odd=(*_same_files(given), *found.odd, *_unknown_noise(given)))
+    record = structs.replace(
+        record,
+        picture=given.image and given.image.record(),
+        reference_picture=given.reference and given.reference.record(),
+        agreement=found,
+        warnings=(*found.mistakes, *found.odd, *record.warnings),
+    )
+    return replace(comparison, record=record)
 
 
-def factor_of_pi(level: float) -> str:
-    """Name the factor of pi that a level is close to; empty if none."""
-    if abs(level / pi - 1) < NEAR_PI:
-        return "a missing division by pi"
-    return "a division by pi too many" if abs(level * pi - 1) < NEAR_PI else ""
+def agreement(
+    pictures: Pictures,
+    images: Images,
+    expected: Sequence[np.ndarray],
+    names: Names,
+    textbook: np.ndarray | None = None,
+) -> Agreement:
+    """Return how pictures, the first of two images, agree with the other, and their mistakes.
 
-
-# --- Sentences ---------------------------------------------------------------------------------
-
-SHIFT = 0.5
-LEVEL = 2.0
-TINT = 0.05
-"""Smallest shift in pixels, factor of brightness, and relative difference of the channels' factors
-that are reported."""
-
-BLOCK = 8
-EVEN = 0.2
-"""A tint is the white's if it spreads by this share at most over blocks of this side in pixels."""
-
-BETTER = 0.5
-"""Largest share of the difference that a credible other reading of the values leaves."""
-
-
-def picture_record(
-    half: PictureHalf, scene: mi.Scene, options: Options, images: Images
-) -> PictureRecord:
-    """Return the record of the pictures that replace a heuristic half, with its warnings."""
-    shown = images.heuristic[images.counted]
-    reference = images.reference[images.counted]
-    template = np.array(half.half.sampled(TEMPLATE_SPP).render(0), float)
-    height, width = images.counted.shape
-    # Edges that it may contain: of the geometry, of the textbook half, of the reference.
-    expected = [geometry_edges(scene, width, height)]
-    expected += [picture_edges(image) for image in (template, images.reference)]
-    place = measure(np.mean(half.images, axis=0), expected)
-    # The reference is in its place: what a shift gains there, noise and shading make.
-    by_noise = measure(images.reference, expected[:2])
-    is_gain_of_noise = place.gain > 0 and place.gain <= DOUBTFUL * by_noise.gain
-    is_doubtful = is_gain_of_noise or not _halves_agree(half.images, expected, place)
-    files = options.image
-    ratio = ratios(shown, reference)
-    record = PictureRecord(
-        files=files,
-        transfer=options.transfer,
-        notes=half.notes,
-        repeats=len(files),
-        shift=None if is_doubtful else place.shift,
+    ``expected`` are maps (H, W) of edges that they may contain, besides those of the other image.
+    ``textbook`` is the textbook half that they replace, (H, W, 3).
+    """
+    picture = images.heuristic
+    other = images.reference
+    counted = images.counted
+    edges = [*expected, alignment.picture_edges(other)]
+    place = alignment.measure(pictures.mean, edges)
+    # The other half is in its place: what a shift gains there, noise and shading make.
+    by_noise = alignment.measure(other, expected) if expected else None
+    repeats = [file.image for file in pictures.files]
+    if alignment.is_doubtful(place, by_noise, repeats, edges):
+        place = alignment.Place(shift=None, correlation=place.correlation, gain=place.gain)
+    error = images.reference_stderr
+    mistakes = picture_mistakes.find(
+        NoisyImage(picture, pictures.two_halves),
+        NoisyImage(other, (other + error, other - error)),
+        counted,
+        place=place,
+        is_encoded=any(file.is_encoded for file in pictures.files),
+        names=names,
+    )
+    odd = []
+    if place.shift is None:
+        odd.append(f"{names.picture}'s edges do not show whether it is aligned.")
+    if textbook is not None and (equal := _equals(picture, textbook, counted)):
+        odd.append(equal)
+    return Agreement(
+        shift=place.shift,
         edges=place.correlation,
-        ratio=ratio,
+        ratio=picture_mistakes.ratios(picture, other, counted),
+        mistakes=tuple(mistakes),
+        odd=tuple(odd),
     )
-    odd = describe(record, images.heuristic, images.reference, images.counted)
-    return structs.replace(record, odd=tuple(odd))
 
 
-def _halves_agree(
-    repeats: Sequence[np.ndarray], expected: Sequence[np.ndarray], place: Place
-) -> bool:
-    """Return whether each half of the repeats (H, W, 3) shows the shift; True for one picture.
-
-    Shifts that noise makes differ from half to half.
-    """
-    if place.shift is None or len(repeats) == 1:
-        return True
-    for first in range(2):
-        shift = measure(np.mean(repeats[first::2], axis=0), expected).shift
-        if shift is None or np.abs(np.subtract(shift, place.shift)).max() > AGREEMENT:
-            return False
-    return True
-
-
-def ratios(picture: np.ndarray, reference: np.ndarray) -> tuple[float, float, float]:
-    """Return the means of a picture's channels over those of the reference, both (N, 3)."""
-    if picture.max() <= 1:  # clipped at display white, as a PNG is: a lamp would decide
-        reference = np.minimum(reference, 1)
-    least = 1e-6
-    red, green, blue = (picture.mean(axis=0) + least) / (reference.mean(axis=0) + least)
-    return float(red), float(green), float(blue)
-
-
-def describe(
-    record: PictureRecord, picture: np.ndarray, reference: np.ndarray, counted: np.ndarray
-) -> Iterator[str]:
-    """Yield what is odd about a picture: how it is read, else its position first.
-
-    Images are linear, (H, W, 3); ``counted`` (H, W) is where the scene has a surface.
-    """
-    if reading := _other_reading(picture, reference, counted):
-        yield f"The picture is misread. {reading}"
+def _same_files(given: GivenPictures) -> Iterator[str]:
+    """Yield which file of one half is also one of the other, byte for byte."""
+    if given.image is None or given.reference is None:
         return
-    if record.shift is None:
-        yield "The picture's edges do not show whether it is aligned with the scene's camera."
-    elif max(map(abs, record.shift)) >= SHIFT:
-        across = _in_pixels(record.shift[0], "to the right", "to the left")
-        down = _in_pixels(record.shift[1], "down", "up")
-        yield (
-            f"The picture's edges are shifted by {' and '.join(filter(None, (across, down)))},"
-            " which looks like wrong shading. Check the camera, the crop and the pixel centres"
-            " first."
-        )
-    if record.repeats == 1:
-        yield (
-            "The picture is one file, so its noise is unknown and counts as departure. Give"
-            " repeats of other seeds to separate the two."
-        )
-    level = float(np.mean(record.ratio))
-    if (mistake := factor_of_pi(level)) or not 1 / LEVEL < level < LEVEL:
-        yield (
-            f"The picture is {level:.3g} times as bright as the reference:"
-            f" {mistake or 'another exposure'}?"
-        )
-    yield from _white(picture, reference, counted)
+    ours = zip(given.image.files, given.image.names, strict=True)
+    theirs = list(zip(given.reference.files, given.reference.names, strict=True))
+    for file, name in ours:
+        for other, other_name in theirs:
+            if file.digest == other.digest:
+                yield f"{name} and {other_name} are the same file, byte for byte."
 
 
-def _in_pixels(shift: float, ahead: str, back: str) -> str:
-    """Return a shift in words, to half a pixel, which is what edges can tell; less is none."""
-    if abs(shift) < SHIFT:
+def _unknown_noise(given: GivenPictures) -> Iterator[str]:
+    """Yield which pictures do not show their noise, since there is one, or since all are equal."""
+    named = {"The picture": given.image, "The reference": given.reference}
+    single = [name for name, half in named.items() if half is not None and len(half.files) == 1]
+    if single:
+        subject = f"{single[0]} is" if len(single) == 1 else "Each picture is"
+        yield (
+            f"{subject} one file, so its noise is unknown and counts as a difference. Give repeats"
+            " of other seeds to separate the two."
+        )
+    for name, half in named.items():
+        if half is None or len(half.files) == 1:
+            continue
+        if len({file.digest for file in half.files}) == 1:
+            yield (
+                f"{name}'s repeats are the same file, byte for byte: if its renderer is random,"
+                " give each its own seed."
+            )
+
+
+def _equals(picture: np.ndarray, textbook: np.ndarray, counted: NDArray[np.bool_]) -> str:
+    """Return that a picture equals the textbook half, away from edges; empty if it does not."""
+    flat = counted & (alignment.picture_edges(textbook) < FLAT)
+    if not flat.any():
         return ""
-    size = round(abs(shift) / SHIFT) * SHIFT
-    return f"{size:g} pixel{'' if size == 1 else 's'} {ahead if shift > 0 else back}"
-
-
-def _white(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> Iterator[str]:
-    """Yield a tint that is the same everywhere; wrong shading varies over the picture."""
-    shown = _blocks(picture, counted)
-    expected = _blocks(reference, counted)
-    logs = np.log(shown / expected)
-    # Without the level of each block, the balance of its channels is left.
-    logs -= logs.mean(axis=1, keepdims=True)
-    tint = np.median(logs, axis=0)
-    spread = np.median(np.abs(logs - tint), axis=0).max()
-    if np.ptp(tint) > TINT and spread < EVEN * np.abs(tint).max():
-        relative = ", ".join(f"{value:.3g}" for value in np.exp(tint))
-        yield f"Its red, green and blue are relatively {relative} times as strong: another white?"
-
-
-def _blocks(image: np.ndarray, counted: np.ndarray) -> np.ndarray:
-    """Return the mean colours (B, 3) of blocks, over the pixels that count; never quite black."""
-    height = counted.shape[0] // BLOCK * BLOCK
-    width = counted.shape[1] // BLOCK * BLOCK
-    weighted = np.where(counted[..., None], image, 0)[:height, :width].astype(float)
-    sums = weighted.reshape(height // BLOCK, BLOCK, width // BLOCK, BLOCK, 3).sum(axis=(1, 3))
-    # Both images count the same pixels and only ratios are used, so sums serve as means.
-    sums = sums.reshape(-1, 3)
-    means: np.ndarray = np.maximum(sums, 1e-3 * max(sums.mean(), 1e-9))
-    return means
-
-
-def _other_reading(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> str:
-    """Describe the other reading of its values that brings the picture near the reference."""
-    plain = _distance(picture[counted], reference[counted])
-    if plain < 1e-3:
+    apart = float(LEADING(picture, textbook)[flat].mean())
+    if apart > SAME:
         return ""
-    readings = {
-        f"Its {misreading}{CURES.get(misreading, '')}.": undo
-        for misreading, undo in MISREADINGS.items()
-    }
-    readings |= {f"It looks {how}, or lit from the other side.": turn
-                 for how, turn in TURNED.items()}  # fmt: skip
-    distances = {
-        description: _distance(undo(picture)[counted], reference[counted])
-        for description, undo in readings.items()
-    }
-    description = min(distances, key=distances.__getitem__)
-    return description if distances[description] <= BETTER * plain else ""
-
-
-def _distance(image: np.ndarray, reference: np.ndarray) -> float:
-    """Return the relative RMS difference after the best factor on an image."""
-    image = np.asarray(image, float)
-    reference = np.asarray(reference, float)
-    # Clipped near display white, or highlights alone would decide.
-    image = np.minimum(image, 4 * image.mean() + 1e-9)
-    reference = np.minimum(reference, 4 * reference.mean() + 1e-9)
-    factor = np.sum(image * reference) / max(np.sum(image * image), 1e-30)
-    return float(
-        np.sqrt(np.mean((factor * image - reference) ** 2) / np.mean(reference**2 + 1e-12))
-    )
+    return f"The picture equals the textbook half to {LEADING.label} {SAME:g}, away from edges."

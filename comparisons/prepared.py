@@ -1,18 +1,17 @@
 """A scene made ready to be rendered: paired, planned, probed, with a renderer for each half."""
 
 import gc
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons.departure.metrics import METRICS, Metric
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
@@ -20,7 +19,7 @@ from fotismos.heuristic.heuristics import named
 from fotismos.reference.pairing import halves
 from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.pairing.halves import Pair
-from fotismos.reference.pairing.settings import Override
+from fotismos.reference.pairing.settings import Override, film_size
 from fotismos.reference.planning.guard import examine_plan
 from fotismos.reference.planning.plan import Guard, Plan, physical_integrator, plan
 from fotismos.reference.planning.rules import SAMPLED_AS_HIT, loses_light
@@ -35,6 +34,9 @@ from fotismos.reference.rendering.gbuffer import (
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
 from fotismos.reference.rendering.sampler import SAMPLER, STOCK_SAMPLER, with_sampler
 from fotismos.reference.scene.source import Source
+
+if TYPE_CHECKING:  # few comparisons have pictures
+    from fotismos.comparisons.pictures import GivenPictures
 
 WAVEFRONT = 2**24
 """Most samples of one pass, unless the image has more pixels: then one sample per pixel."""
@@ -75,7 +77,11 @@ def schedule(
 
 @dataclass(frozen=True)
 class Prepared:
-    """A scene that is ready to be rendered: its halves, its plan, and a renderer for each half."""
+    """A scene that is ready to be rendered: its halves, its plan, and a renderer for each half.
+
+    ``given`` are pictures of other renderers: a :class:`fotismos.comparisons.pictures.PictureHalf`
+    of them takes the part of a half's renderer.
+    """
 
     source: Source
     options: Options
@@ -87,6 +93,7 @@ class Prepared:
     passes: int
     planning_seconds: float
     guard: Guard | None = None
+    given: "GivenPictures | None" = None
 
     def traced(self) -> GBuffer:
         """Return what each pixel sees; traced at each call, since it takes much memory."""
@@ -94,20 +101,14 @@ class Prepared:
         dr.flush_malloc_cache()
         return surface
 
-    def metrics(self) -> Mapping[str, Metric]:
-        """Return the metrics, computed by colour-science if the options say so."""
-        if not self.options.colour_science:
-            return METRICS
-        from fotismos.comparisons.departure import definitions  # loaded late: it takes a second
-
-        return definitions.metrics()
-
     @cached_property
     def unpruned(self) -> Renderer | None:
         """Return what renders the physical half with everything simulated.
 
         None if its plan does so.
         """
+        if self.options.reference:
+            return None
         whole = self.plan.unpruned()
         if (whole.integrator, whole.max_depth) == (self.plan.integrator, self.plan.max_depth):
             return None
@@ -117,8 +118,9 @@ class Prepared:
 
     @cached_property
     def counted(self) -> np.ndarray:
-        """The pixels (H, W) that count: those that see a surface."""
-        return self.traced().hit
+        """The pixels (H, W) that count: those that see a surface, and that pictures do not hide."""
+        hit = self.traced().hit
+        return hit if self.given is None else hit & self.given.where()
 
     @property
     def overridden(self) -> tuple[Override, ...]:
@@ -144,6 +146,8 @@ class Prepared:
 
     def caution(self) -> str:
         """Return where no integrator of Mitsuba is right, in words; empty if there is none."""
+        if self.options.reference:
+            return ""
         if not (self.pair.hide_emitters and self.plan.integrator in ("volpath", "volpathmis")):
             return ""
         rays = centre_rays(self.scene, image_size(self.scene))
@@ -191,6 +195,8 @@ class Prepared:
     def warnings(self) -> Iterator[str]:
         """Yield what is odd about a scene: its pair, its plan, or how Mitsuba renders it."""
         yield from self.pair.warnings
+        if self.options.reference:  # Mitsuba does not render it
+            return
         if self.guard and self.guard.state == "disagreed":
             yield (
                 f"The plan changes the light: {self.guard.words}. So everything was simulated. A"
@@ -232,10 +238,14 @@ def pair_for(source: Source, options: Options) -> Pair:
 def prepare(source: Source, options: Options | None = None) -> Prepared:
     """Pair and plan a scene in the current variant, and make both halves ready to render."""
     options = options or Options()
-    if options.image:
+    given = None
+    if options.has_pictures or options.mask:
         from fotismos.comparisons import pictures  # loaded late: few comparisons have any
 
-        options = pictures.at_size_of_pictures(source, options)
+        given = pictures.read_all(options)
+        if given.halves:
+            film = film_size(source.parse(), options.sensor)
+            options = pictures.at_size_of_pictures(film, given, options)
     pair = pair_for(source, options)
     sampler = STOCK_SAMPLER if options.everything else SAMPLER
     physical = with_sampler(pair.physical, sampler).instantiate()
@@ -253,19 +263,26 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
     # Dr.Jit traces every live BSDF: those of finished scenes would slow this one.
     gc.collect()
     spp, passes = schedule(chosen, width * height, spp=options.spp, noise=options.noise)
-    if len(options.image) > 1:  # a pass for each repeat
-        spp = max(1, spp * passes // len(options.image))
-        passes = len(options.image)
+    if given is not None and given.passes is not None:  # a pass for each repeat
+        spp = max(1, spp * passes // given.passes)
+        passes = given.passes
+    heuristic: Any = _heuristic_renderer(source, pair, chosen=chosen, spp=spp, options=options)
+    reference: Any = Renderer(physical, integrator, pass_spp=spp, label="reference image")
+    if given is not None and given.image is not None:
+        heuristic = pictures.PictureHalf(given.image, passes, heuristic.variant, heuristic)
+    if given is not None and given.reference is not None:
+        reference = pictures.PictureHalf(given.reference, passes, mi.variant(), reference)
     return Prepared(
         source=source,
         options=options,
         pair=pair,
         plan=chosen,
         scene=physical,
-        heuristic=_heuristic_renderer(source, pair, chosen=chosen, spp=spp, options=options),
-        reference=Renderer(physical, integrator, pass_spp=spp, label="reference image"),
+        heuristic=heuristic,
+        reference=reference,
         passes=passes,
         planning_seconds=planning,
+        given=given,
     )
 
 
@@ -277,6 +294,11 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
     """
     options = options or Options()
     ready = prepare(source, options)
+    if options.reference:  # no plan is followed
+        ready = replace(ready, options=options)
+        if not options.allow_empty:
+            require_surface(ready.counted, source.name)
+        return ready
     width, height = image_size(ready.scene)
     samples = ready.reference.pass_spp * ready.passes * width * height
     hidden = ready.pair.hide_emitters
@@ -295,15 +317,10 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
 
 def _heuristic_renderer(
     source: Source, pair: Pair, chosen: Plan, spp: int, options: Options
-) -> Any:
+) -> Renderer:
     """Make the heuristic half ready to render, in its own variant if it has one."""
     with variant(options.heuristic_variant or mi.variant()):
         if options.heuristic_variant:
             pair = pair_for(source, options)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        renderer = Renderer(scene, None, pass_spp=spp, label="heuristic image")
-        if not options.image:
-            return renderer
-        from fotismos.comparisons import pictures  # loaded late: few comparisons have any
-
-        return pictures.PictureHalf(pictures.read_all(options), renderer)
+        return Renderer(scene, None, pass_spp=spp, label="heuristic image")

@@ -29,6 +29,7 @@ from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS, Pixelwise
 from fotismos.comparisons.departure.noise import USUAL, VisibleShare, shares_above
+from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.price_record import (
     MOST_SPP,
@@ -75,8 +76,9 @@ def with_price(comparison: Comparison, ready: Prepared, progress: Progress | Non
     begin = perf_counter()
     record = comparison.record
     price = record.price
-    assert price is not None
-    leading: Any = ready.metrics()[LEADING.name]
+    if price is None:  # of a reference that is a picture
+        return comparison
+    leading: Any = metrics_for(ready.options)[LEADING.name]
     causes = comparison.causes
     price = structs.replace(
         price,

@@ -9,6 +9,7 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
+import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons.compare import Step
@@ -17,13 +18,17 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.price import with_price
 from fotismos.heuristic import heuristics
+from fotismos.reference.rendering.gbuffer import gbuffer, image_size
 from fotismos.reference.rendering.renderer import Progress
+
+TEMPLATE_SPP = 16
+"""Samples per pixel of the textbook half whose edges and colours a picture may have."""
 
 
 def steps(options: Options, why: bool) -> list[Step]:
     """Return the steps for options; ``why`` traces the terms of 8.10, and finds causes."""
-    if options.image:  # no effect can be added to a picture
-        added: list[Step] = [with_picture, with_terms] if why else [with_picture]
+    if options.has_pictures:  # no effect can be added to a picture
+        added: list[Step] = [with_pictures, with_terms] if why else [with_pictures]
         return [*added, with_price]
     added = []
     if not heuristics.named(options.heuristic).is_builtin:
@@ -35,17 +40,23 @@ def steps(options: Options, why: bool) -> list[Step]:
     return [*added, with_price]
 
 
-def with_picture(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
+def with_pictures(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
     """Return a comparison with the record of its pictures, which it warns of first."""
-    from fotismos.comparisons import pictures  # see above
+    from fotismos.comparisons import alignment, pictures  # see above
 
-    record = comparison.record
+    given = ready.given
+    assert given is not None
+    # Edges that they may contain: of the geometry, and of the textbook half.
     half: Any = ready.heuristic
-    picture = pictures.picture_record(
-        half, ready.scene, options=ready.options, images=comparison.images
-    )
-    warnings = (*picture.odd, *record.warnings)
-    return replace(comparison, record=structs.replace(record, picture=picture, warnings=warnings))
+    width, height = image_size(ready.scene)
+    surface = gbuffer(ready.scene, (alignment.FINER * width, alignment.FINER * height))
+    expected = [alignment.geometry_edges(surface, width, height)]
+    textbook = None
+    if given.image is not None:
+        template = half.replaced.sampled(TEMPLATE_SPP).render(0)
+        textbook = np.array(template, float)
+        expected.append(alignment.picture_edges(textbook))
+    return pictures.with_records(comparison, given, expected, textbook)
 
 
 def with_mistakes(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:

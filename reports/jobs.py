@@ -98,6 +98,9 @@ scene_argument = click.argument("scene", metavar="SCENE", shell_complete=complet
 scenes_argument = click.argument(
     "scenes", nargs=-1, required=True, metavar="SCENE...", shell_complete=complete_scene
 )
+scenes_or_pictures_argument = click.argument(
+    "scenes", nargs=-1, metavar="[SCENE...]", shell_complete=complete_scene
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 
 
@@ -165,8 +168,11 @@ FIELDS = cast(inspect.StructType, inspect.type_info(Options)).fields
 METAVARS = {
     "heuristic": "NAME|FILE.py[:FUNCTION]|FILE.glsl", "noise": "DE", "tessellation": "N",
     "pixels_per_degree": "N", "resolution": "WxH", "define": "NAME=VALUE", "sensor": "N",
-    "image": "FILE",
+    "image": "FILE", "reference": "FILE", "mask": "FILE",
 }  # fmt: skip
+
+SHORT = {"image": "-t", "reference": "-r"}
+"""Short names of options, as other programs that compare pictures have them."""
 
 
 def option(name: str, command_default: str = "") -> Decorator:
@@ -180,13 +186,21 @@ def option(name: str, command_default: str = "") -> Decorator:
     default = command_default or (field.type.extra or {}).get("default")
     is_stated = default is None and isinstance(field.default, (int, str))
     return click.option(
-        *(("-D", name) if name == "define" else (f"--{name.replace('_', '-')}",)),
+        *_names(name),
         **_kind(field.type.type),
         default=field.default if is_stated else None,
         show_default=is_stated and not isinstance(field.default, bool),
         metavar=METAVARS.get(name),
         help=as_typed(description + (f" [default: {default}]" if default else "")),
     )
+
+
+def _names(name: str) -> tuple[str, ...]:
+    """Return how the command line calls an option."""
+    if name == "define":
+        return "-D", name
+    long = f"--{name.replace('_', '-')}"
+    return (SHORT[name], long) if name in SHORT else (long,)
 
 
 def _kind(kind: Any) -> dict[str, Any]:

@@ -18,6 +18,8 @@ from pathlib import Path
 from threading import RLock
 from typing import Any, ParamSpec, TypeVar, Unpack
 
+import numpy as np
+
 import fotismos.comparisons.compare
 from fotismos.comparisons.audit.checks import Audit, Kind
 from fotismos.comparisons.audit.checks import audit as examined
@@ -32,9 +34,11 @@ from fotismos.comparisons.departure.metrics import declare as declare_metric
 from fotismos.comparisons.fit.fit import fit as fit_parameters
 from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.options import Options, OptionValues
+from fotismos.comparisons.picture_files import as_files, matching
 from fotismos.comparisons.pixel_terms import PixelTerms
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.steps import steps
+from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic import user_shaders
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Heuristic
@@ -48,11 +52,14 @@ from fotismos.reports.charts import figures
 from fotismos.reports.ci import baselines, checks
 from fotismos.reports.ci.checks import CheckRecord
 from fotismos.reports.page import page
-from fotismos.reports.run.scene import view_of
+from fotismos.reports.run.scene_files import view_of
 from fotismos.reports.terminal.plan_lines import PlanReport, plan_report
 
 HEIGHT = 900
 """Height of the frame in pixels: the viewer with its controls fits a wide notebook."""
+
+PICTURED = ("image", "reference")
+"""Options that take pictures."""
 
 DENSITY = 130
 """Dots per inch of the picture for notebooks that cannot show the frame."""
@@ -116,24 +123,56 @@ class Shown:
 
 @_alone
 def compare(
-    scene: Scene, name: str | None = None, why: bool = True, **options: Unpack[OptionValues]
+    scene: Any = None,
+    name: str | None = None,
+    why: bool = True,
+    **options: Unpack[OptionValues],
 ) -> Shown:
     """Compare a scene as ``fotismos compare`` does.
 
     ``scene`` is a built-in name, the path of a file (.xml, .py), a dictionary for
     ``mitsuba.load_dict``, or a function that returns one; ``name`` replaces its name. ``options``
     are those of the command line, such as ``spp=64`` samples per pixel in all, or
-    ``resolution=(128, 128)`` pixels. ``why`` finds causes, which takes some seconds.
+    ``resolution=(128, 128)`` pixels. ``why`` finds causes, which takes some seconds. Pictures given
+    as ``image`` and ``reference`` may replace the halves: files, or arrays (H, W, 3) of linear
+    colours. With both, no scene is needed.
 
     Colours of the images are linear, in units of display white; times are in seconds. Raises
     `InputError` for a scene or an option that is not allowed, `NonFiniteError` for a NaN or an
     infinity in a rendering, and `InstallationError` if a library is missing.
     """
-    case = open_case(scene, Options.of(options), name)
-    comparison = fotismos.comparisons.compare.compare(
-        case.source, case.options, command=case.command(), then=steps(case.options, why)
-    )
+    values, arrays = _with_names(options)
+    with as_files(arrays):
+        chosen = Options.of(values)
+        files = {half: matching(getattr(chosen, half)) for half in PICTURED}
+        chosen = chosen.changed(**files)
+        if scene is None and chosen.image and chosen.reference:
+            comparison = compare_pictures(chosen, name or "picture")
+        else:
+            case = open_case(scene, chosen, name)
+            comparison = fotismos.comparisons.compare.compare(
+                case.source, case.options, command=case.command(), then=steps(case.options, why)
+            )
     return Shown(comparison, page.render([view_of(comparison)]))
+
+
+def _with_names(options: OptionValues) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return options in which arrays have names, and the arrays by these."""
+    values: dict[str, Any] = dict(options)
+    arrays: dict[str, Any] = {}
+    for half in PICTURED:
+        given = values.get(half)
+        several = [given] if isinstance(given, np.ndarray) else given
+        if not isinstance(several, (list, tuple)):
+            continue
+        names = []
+        for number, picture in enumerate(several, start=1):
+            name = f"{half} {number}.npy" if isinstance(picture, np.ndarray) else str(picture)
+            names.append(name)
+            if isinstance(picture, np.ndarray):
+                arrays[name] = picture
+        values[half] = names
+    return values, arrays
 
 
 @_alone

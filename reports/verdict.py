@@ -51,8 +51,8 @@ CHEAP = 1.5
 
 
 @dataclass(frozen=True)
-class Judged:
-    """The names of a first half.
+class HalfNames:
+    """The names of a half.
 
     ``subject`` begins a sentence, such as "Textbook shading"; ``title`` heads a row or column, such
     as "Textbook"; ``name`` stands within a sentence, such as "textbook".
@@ -63,14 +63,27 @@ class Judged:
     name: str
 
 
-def judged(record: ComparisonRecord) -> Judged:
+def judged(record: ComparisonRecord) -> HalfNames:
     """Return the names of a comparison's first half; a shader in a file is called as its file."""
     if record.picture:
-        return Judged("The picture", "Picture", "picture")
+        return HalfNames(subject="The picture", title="Picture", name="picture")
     if record.heuristic in TEXTBOOK:
-        return Judged("Textbook shading", "Textbook", "textbook")
+        return HalfNames(subject="Textbook shading", title="Textbook", name="textbook")
     name = Path(record.heuristic).name
-    return Judged(name, name, name)
+    return HalfNames(subject=name, title=name, name=name)
+
+
+def truth(record: ComparisonRecord) -> HalfNames:
+    """Return the names of a comparison's second half."""
+    if record.reference_picture:
+        return HalfNames(subject="Reference picture", title="Reference", name="reference")
+    return HalfNames(subject="Physical reference", title="Physical", name="physical")
+
+
+def is_noise_known(record: ComparisonRecord) -> bool:
+    """Return whether passes or repeats show the noise: two single pictures do not."""
+    halves = (record.picture, record.reference_picture)
+    return any(half is None or half.repeats > 1 for half in halves)
 
 
 # --- One scene -------------------------------------------------------------------------------
@@ -101,6 +114,8 @@ def missing(record: ComparisonRecord) -> dict[str, float]:
 
 def cause(record: ComparisonRecord) -> str:
     """Return why a scene differs, as a sentence; empty if that is unknown."""
+    if record.agreement:
+        return " ".join(record.agreement.mistakes)
     largest = list(missing(record))[:1]
     if MICROFACETS.label in largest and (albedo := _impossible_albedo(record)):
         amount = f"{number(albedo)} times the light that it receives"
@@ -110,7 +125,8 @@ def cause(record: ComparisonRecord) -> str:
 
 def _impossible_albedo(record: ComparisonRecord) -> float:
     """Return the largest albedo above 1 that a textbook material has; 0 if none has."""
-    wanted = [miss.wanted for miss in record.pairing.misses if "albedo" in miss.what]
+    misses = record.pairing.misses if record.pairing else ()
+    wanted = [miss.wanted for miss in misses if "albedo" in miss.what]
     return max([albedo for albedo in wanted if albedo > 1], default=0.0)
 
 
@@ -130,7 +146,8 @@ def sentence(
         case "pass":
             return "Exact, as far as can be seen." if lead.high <= EXACT else "Nothing to do."
         case "undecided":
-            more = "repeats of the picture" if record.picture else "samples (--spp, --noise)"
+            has_pictures = record.picture or record.reference_picture
+            more = "repeats of the pictures" if has_pictures else "samples (--spp, --noise)"
             if found.low > LIMIT:
                 doubt = (
                     f"Noise may explain it: {percent(found.value)} of the pixels differ, but no"
@@ -142,6 +159,8 @@ def sentence(
                     f" pixels differ, and {percent(LIMIT)} may. More {more} decide."
                 )
             return f"{doubt} {_samples_needed(record, threshold)}".strip()
+    if record.agreement and record.agreement.mistakes:
+        return ""
     if _brightness_suffices(record, threshold):
         factor = lead.after_exposure.exposure
         change = "Brightening" if factor > 1 else "Darkening"
@@ -349,12 +368,25 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
     (record,) = records
     if record.caution:
         return f"{record.scene}: {record.caution}"
+    if record.reference_picture:
+        return _difference(record, subject, threshold)
     if decisions["pass"]:
         return f"{subject} looks right in {record.scene}."
     if decisions["undecided"]:
         return f"{subject} may look right in {record.scene}."
     wrong = percent(share(record, threshold).value)
     return f"{subject} is visibly wrong in {wrong} of the pixels of {record.scene}."
+
+
+def _difference(record: ComparisonRecord, subject: str, threshold: float) -> str:
+    """Return how much a half differs from a reference that is a picture."""
+    match decision(record, threshold):
+        case "pass":
+            return f"{record.scene}: {subject} looks like the reference."
+        case "undecided":
+            return f"{record.scene}: {subject} may look like the reference."
+    wrong = percent(share(record, threshold).value)
+    return f"{record.scene}: {subject} differs visibly from the reference in {wrong} of the pixels."
 
 
 def most_missing(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> str:

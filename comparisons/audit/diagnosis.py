@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 
 from fotismos.comparisons.audit.subjects import shaded
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
-from fotismos.comparisons.pictures import MISREADINGS, factor_of_pi
+from fotismos.comparisons.picture_mistakes import MISREADINGS, factor_of_pi
 from fotismos.comparisons.textbook import clamped, dot, halfway, lobe, mirrored, unit
 from fotismos.heuristic import heuristics
 from fotismos.heuristic.heuristics import Heuristic

@@ -86,6 +86,7 @@ def find(
     distance: Distance,
     *,
     exact: bool = False,
+    is_random: bool = True,
     level: float = LEVEL,
 ) -> Marks:
     """Return marks (H, W): 1 where a difference is shown, 0.5 if undetermined, 0 elsewhere.
@@ -95,7 +96,9 @@ def find(
     ``difference`` is the test image (H, W, 3) less the reference, pass by pass. Pixels that are not
     ``counted`` (H, W) are 0. ``distance(test, reference) -> (N,)`` takes linear colours (N, 3), and
     is in the unit of `VISIBLE`. ``exact`` says that only the positions of camera rays are random,
-    and both images share them. ``level`` replaces `LEVEL`; blocks take the same share of it.
+    and both images share them; not ``is_random``, that both are single pictures, whose passes show
+    no noise: it is then taken to be independent in cells of a few pixels. ``level`` replaces
+    `LEVEL`; blocks take the same share of it.
     """
     test = np.asarray(test)
     counted = np.asarray(counted, bool)
@@ -112,6 +115,9 @@ def find(
     if exact:
         marks[beyond] = MARKED
         return Marks(image=marks, is_certain=bool(beyond.any()))
+    if not is_random:
+        marks[beyond] = UNDETERMINED
+        return Marks(image=marks, is_certain=_is_even(difference.mean, counted))
     if difference.passes < FEWEST:
         marks[counted] = UNDETERMINED
         return Marks(image=marks, is_certain=False)
@@ -132,6 +138,36 @@ def find(
         pixels = _Pixels.of(difference, around, rows, rest)
         marks[rows][rest[rows]] = UNDETERMINED * pixels.are_open(test[rows][rest[rows]], distance)
     return Marks(image=marks, is_certain=is_certain and bool(beyond.any()))
+
+
+CELL = 4
+CELLS = 4
+"""Side of the cells whose noise is taken to be independent, in pixels; and cells along a tile."""
+
+
+def _is_even(difference: Array, counted: Array) -> bool:
+    """Return whether a difference (H, W, 3) is alike over a tile somewhere, as noise is not.
+
+    Student's t of the means of a tile's cells, for all whole tiles and channels (Bonferroni).
+    """
+    from scipy.special import stdtrit  # scipy.stats takes a second to import
+
+    height, width = (side // (CELL * CELLS) for side in counted.shape)
+    if not height or not width:
+        return False
+    shape = (height, CELLS, CELL, width, CELLS, CELL)
+    rows = height * CELL * CELLS
+    columns = width * CELL * CELLS
+    inside = np.asarray(counted)[:rows, :columns].reshape(shape).all(axis=(1, 2, 4, 5))
+    values = np.asarray(difference, float)[:rows, :columns]
+    cells = values.reshape(*shape, 3).mean(axis=(2, 5))
+    tiles = cells.transpose(0, 2, 1, 3, 4).reshape(height, width, CELLS * CELLS, 3)[inside]
+    if not tiles.size:
+        return False
+    mean = np.abs(tiles.mean(axis=1))
+    error = tiles.std(axis=1, ddof=1) / CELLS
+    limit = float(stdtrit(CELLS * CELLS - 1, 1 - BLOCK_LEVEL / (2 * mean.size)))
+    return bool((mean > np.maximum(limit * error, ABSOLUTE_ROUNDING)).any())
 
 
 def _discoveries(chances: Array, rate: float) -> float:

@@ -48,6 +48,7 @@ from fotismos.comparisons.departure.noise import (
     without_noise,
 )
 from fotismos.comparisons.departure.regions import Region, find_objects
+from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.hybrids.hybrids import HybridImages, HybridScenes, Pairs, labels
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
@@ -126,7 +127,9 @@ def with_causes(
     begin = perf_counter()
     try:
         clean = comparison.images.reference, comparison.images.reference_stderr
-        both_halves = 2 * comparison.record.plan.spp * comparison.images.counted.size
+        plan = comparison.record.plan
+        assert plan is not None, "the reference was rendered"
+        both_halves = 2 * plan.spp * comparison.images.counted.size
         most_samples = max(PATIENCE * both_halves, AFFORDABLE)
         causes = find(ready, ready.source, ready.options, progress, clean, limit=most_samples)
     except FotismosError as error:
@@ -164,7 +167,7 @@ def find(
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
     surface = gbuffer(ready.scene, size)
     require_surface(surface.hit, source.name)
-    leading: Any = ready.metrics()[LEADING.name]
+    leading: Any = metrics_for(ready.options)[LEADING.name]
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
     reference = Renderer(

@@ -34,7 +34,7 @@ from fotismos.reports.ci import baselines, pictures
 from fotismos.reports.ci.baselines import BaselineFile
 from fotismos.reports.files import images, results
 from fotismos.reports.page.scene_view import Before, SceneView
-from fotismos.reports.run import scene
+from fotismos.reports.run import scene_files
 from fotismos.reports.terminal import progress
 
 RECORD = "check.json"
@@ -167,7 +167,7 @@ def examine(
     kept = file.pictures()
     found = _checked(file, case, level, progress)
     if folder is not None:
-        scene.remove(folder)
+        scene_files.remove(folder)
         results.clear(folder, (RECORD,))
     made = _record(file, "passed" if found.passed else "failed", found, begin)
     if found.passed:
@@ -180,7 +180,7 @@ def examine(
     # Checks usually pass, so a failure alone is compared in full.
     added = steps(case.options, why=False)
     comparison = compare(case.source, case.options, progress, case.command(), then=added)
-    view = scene.write(folder.parent, folder.name, comparison)
+    view = scene_files.write(folder.parent, folder.name, comparison)
     results.write(folder / RECORD, to_json(made))
     return made, structs.replace(view, before=_before(made, kept or {}, found.now.pictures))
 

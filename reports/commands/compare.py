@@ -5,17 +5,20 @@ from typing import Any
 
 import click
 
+from fotismos.comparisons.processes.pool import Pool
 from fotismos.reports import jobs
 
 
 @jobs.command()
-@jobs.scenes_argument
+@jobs.scenes_or_pictures_argument
 @jobs.output_option("out")
 @jobs.figures_option
 @jobs.fresh_option
 @jobs.process_options
 @jobs.scene_options
 @jobs.option("image")
+@jobs.option("reference")
+@jobs.option("mask")
 @jobs.option("transfer")
 @jobs.option("over")
 @jobs.verbosity_options
@@ -58,7 +61,8 @@ def compare(
     """Measure how far textbook shading is from physics, where, and whether it is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), or a Python file (.py) in
-    which `scene` is a dictionary or returns one. Writes OUTPUT/index.html and tables of all
+    which `scene` is a dictionary or returns one. Pictures of other renderers may replace either
+    half; with both, no scene is needed. Writes OUTPUT/index.html and tables of all
     scenes, and for each scene comparison.json, comparison.exr and pictures. If one scene fails,
     the others are still compared. An interrupted run keeps its finished scenes: the same command
     resumes it.
@@ -74,13 +78,25 @@ def compare(
       fotismos compare my_scenes/*.xml
       fotismos compare my_scene.xml --heuristic my_shader.py
       fotismos compare my_scene.xml --image theirs.exr
+      fotismos compare my_scene.xml --reference 'cycles_*.exr'
+      fotismos compare --reference 'theirs_*.exr' --image 'mine_*.exr' --max-visible 5%
       fotismos compare my_scenes/*.xml --max-visible 5% --summary summary.md
     """  # noqa: D301 click reads the \b as: keep these lines
-    if rendering["image"] and len(scenes) > 1:
-        raise click.UsageError("--image goes with one scene.")
+    are_pictures = bool(rendering["image"] and rendering["reference"])
+    if not scenes and not are_pictures:
+        raise click.UsageError(
+            "Missing argument 'SCENE...': give a scene, or two pictures, --reference and --image."
+        )
+    for option in ("image", "reference"):
+        if rendering[option] and len(scenes) > 1:
+            raise click.UsageError(f"--{option} goes with one scene.")
+    if scenes:
+        processes = jobs.pool(timeout, len(scenes), workers=workers, scheduler=scheduler)
+    else:
+        processes = Pool(0)  # two pictures run no user's code
     code = jobs.work(
         "compare",
-        jobs.pool(timeout, len(scenes), workers=workers, scheduler=scheduler),
+        processes,
         scenes=scenes,
         output=output,
         job=jobs.Job(

@@ -5,8 +5,8 @@ each file is replaced atomically. Nothing in a folder without the mark is overwr
 The output folder itself may hold files of others: its mark lists the files that fotismos wrote
 there, with digests, and nothing else in it is overwritten. One command at a time writes to a
 folder, and it tidies no folder that another one has locked. A scene's record is removed first and
-written last (:mod:`fotismos.reports.run.scene`): without it, the scene is unfinished, and begins
-again.
+written last (:mod:`fotismos.reports.run.scene_files`): without it, the scene is unfinished, and
+begins again.
 """
 
 import errno

@@ -42,6 +42,7 @@ if TYPE_CHECKING:  # few pages need these
     from fotismos.comparisons.hard_cases import HardCases
 
 TITLE = "Textbook shading against physically based rendering"
+PICTURES_TITLE = "A picture against a reference"
 
 SCRIPTS = (
     *HELP, "address", "overview", "images", "viewport", "drawing", "switches", "panels", "viewer",
@@ -77,7 +78,7 @@ class PageScene(SceneView):
 
 def render(
     views: Sequence[SceneView],
-    title: str = TITLE,
+    title: str = "",
     failures: Sequence[Failure] = (),
     state: str = "",
     threshold: float = TOLERANCE,
@@ -88,6 +89,7 @@ def render(
     `failures` are the scenes that could not be compared; `state` is a sentence on an unfinished
     run; `moved` are pictures without a scene that moved.
     """
+    page_title = title or title_of([view.record for view in views])
     taken: set[str] = set()
     usual = THRESHOLDS.index(threshold)
     records = [view.record for view in views]
@@ -116,7 +118,8 @@ def render(
     return rendered(
         "page.html.j2",
         SCRIPTS,
-        title=title,
+        title=page_title,
+        note=title,
         data=data,
         scenes=scenes,
         failures=failed,
@@ -125,13 +128,18 @@ def render(
         priced=[] if since or len(scenes) < 2 else scenes,
         charted=[scene for scene in scenes if scene.chart][:CHARTED],
         limit=LIMIT,
-        usual_title=TITLE,
         metrics=METRICS,
         leading=LEADING,
         details=DETAILS,
         state=state,
         moved=moved,
     )
+
+
+def title_of(records: Sequence[ComparisonRecord]) -> str:
+    """Return the title of a page of comparisons."""
+    are_pictures = bool(records) and all(record.pairing is None for record in records)
+    return PICTURES_TITLE if are_pictures else TITLE
 
 
 def details(
@@ -179,7 +187,7 @@ def _scene(view: SceneView, taken: set[str], usual: float) -> PageScene:
         cause=verdict.cause(record),
         advice=_runs(lambda t: verdict.sentence(record, cost, t)),
         prices=tuple(_digits(verdict.price_at(record, threshold)) for threshold in THRESHOLDS),
-        command=verdict.search(record, usual) if record.command else "",
+        command=verdict.search(record, usual) if record.command and record.plan else "",
     )
 
 
@@ -209,6 +217,9 @@ def _scene_data(scene: PageScene) -> dict[str, Any]:
         "height": record.resolution[1],
         "exposure": record.viewing.exposure,
         "judged": asdict(verdict.judged(record)),
+        "truth": asdict(verdict.truth(record)),
+        "arePictures": record.pairing is None,
+        "isNoiseKnown": verdict.is_noise_known(record),
         "mean": difference(record.metrics[LEADING.name].mean),
         "shares": scene.shares,
         "verdicts": scene.verdicts,

@@ -74,6 +74,7 @@ def environment() -> Environment:
     environment.filters.update(
         FORMS,
         judged=verdict.judged,
+        truth=verdict.truth,
         saving=verdict.saving,
         region_view=region_view,
         at=text_at,

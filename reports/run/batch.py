@@ -12,7 +12,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from fotismos.comparisons.case import is_script, name_of, picture_parts
+from fotismos.comparisons.case import is_script, picture_parts
 from fotismos.comparisons.comparison import machine, versions
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.options import Options
@@ -26,7 +26,7 @@ from fotismos.reports.files.results import FIGURES, START, TABLES, Failure, RunR
 from fotismos.reports.jobs import Job, command_line
 from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView
-from fotismos.reports.run import scene
+from fotismos.reports.run import scene_files
 from fotismos.reports.terminal import progress, tables
 from fotismos.reports.terminal.progress import Bar
 from fotismos.reports.terminal.words import as_typed, remark, tell, tell_where
@@ -125,16 +125,32 @@ class Batch:
                 self.next_page = perf_counter()  # the next scene tries again
 
 
+Comparing = Callable[..., tuple[SceneView, dict[str, float]]]
+"""A function that compares what a word names, and writes it to a place in a folder."""
+
+
+@dataclass(frozen=True)
+class Subjects:
+    """What a command compares: words that name it, the name and file of each, and how.
+
+    ``compare(word, folder, place, job, progress)`` returns the view and the seconds by stage.
+    """
+
+    words: tuple[str, ...]
+    files: tuple[tuple[str, Path | None], ...]
+    compare: Comparing
+
+
 def run(
     pool: Pool,
-    scenes: Sequence[str],
+    subjects: Subjects,
     folder: Path,
     job: Job,
     hard_cases: Task | None = None,
     on_page: Callable[[Path], object] | None = None,
     finish: Callable[[Path, Sequence[SceneView], Mapping[str, FotismosError]], None] | None = None,
 ) -> None:
-    """Compare scenes in a pool, and write the results of each, then the page and tables of all.
+    """Compare subjects in a pool, and write the results of each, then the page and tables of all.
 
     The task ``hard_cases`` returns them for the details, and the seconds that it took. ``on_page``
     is called with the page's path once it exists; ``finish`` at the end with the output folder, the
@@ -142,10 +158,11 @@ def run(
     """
     checked_threshold(job.within)
     # Before anything is written, since a placeholder may be unknown.
+    scenes = subjects.words
     options_by_scene = dict(zip(scenes, _options_for(job.options, scenes), strict=True))
     command = command_line()
     with results.hold(folder, command) as folder:
-        places = results.places(folder, scenes)
+        places = dict(zip(results.assigned(folder, subjects.files), scenes, strict=True))
         _require_inputs_apart(job.options, [folder / target for target in places])
         for name in (TABLES, FIGURES) if job.figures else (TABLES,):
             results.own(folder / name)
@@ -161,7 +178,7 @@ def run(
         try:
             with progress.shown(total=total) as bar:
                 stages = ("rendering", "causes") if job.with_causes else ("rendering",)
-                _compare(pool, batch, calls, bar, hard_cases, stages)
+                _compare(pool, batch, subjects.compare, calls, bar, hard_cases, stages)
         except KeyboardInterrupt:
             # No process may write while the results are put together.
             pool.end()
@@ -200,6 +217,7 @@ def _options_for(whole: Options, scenes: Sequence[str]) -> list[Options]:
 def _compare(
     pool: Pool,
     batch: Batch,
+    compare: Comparing,
     calls: Mapping[str, tuple[Any, ...]],
     bar: Bar,
     hard_cases: Task | None,
@@ -209,9 +227,9 @@ def _compare(
     tasks = [
         Task(
             name=target,
-            function=scene.compare,
+            function=compare,
             arguments=call,
-            progress=bar.of(name_of(call[0]), stages),
+            progress=bar.of(target, stages),
             ends_process=is_script(call[0]),
         )
         for target, call in calls.items()
@@ -229,7 +247,7 @@ def _compare(
         except FotismosError as error:
             batch.errors[task.name] = error
         else:
-            batch.views[task.name] = scene.with_fit(view, batch.folder / "fit" / task.name)
+            batch.views[task.name] = scene_files.with_fit(view, batch.folder / "fit" / task.name)
             for stage, seconds in spent.items():
                 batch.stages[stage] += seconds
             remark(tables.details(view.record))
@@ -240,7 +258,7 @@ def _compare(
 
 def _require_inputs_apart(options: Options, places: Sequence[Path]) -> None:
     """Refuse pictures in a folder whose files are about to be replaced."""
-    for word in options.image:
+    for word in options.picture_files:
         path, _ = picture_parts(word)
         if path.resolve().parent in [target.resolve() for target in places]:
             raise InputError(

@@ -2,51 +2,35 @@
 
 import hashlib
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import msgspec
-from msgspec import structs
-
-from fotismos.comparisons import atomic
-from fotismos.comparisons.case import Case, open_case, picture_parts
+from fotismos.comparisons.case import Case, file_of, name_of, open_case, picture_parts
 from fotismos.comparisons.compare import compare as compare_scene
-from fotismos.comparisons.comparison import (
-    CAUSES,
-    Comparison,
-    ComparisonRecord,
-    Images,
-    versions,
-)
-from fotismos.comparisons.departure.metrics import LEADING, METRICS, drawn
+from fotismos.comparisons.comparison import CAUSES, ComparisonRecord, versions
+from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.processes.pool import Turn
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic import program
 from fotismos.heuristic.heuristics import named
-from fotismos.reference.records import VERSION, Missing, Record, plain, to_json
+from fotismos.reference.records import VERSION, plain
 from fotismos.reference.scene.source import digest
-from fotismos.reports.files import images, results
+from fotismos.reports.files import results
 from fotismos.reports.jobs import Job
-from fotismos.reports.page import embedding
-from fotismos.reports.page.scene_view import LiveView, SceneView, TermsView
-
-if TYPE_CHECKING:  # few scenes have one
-    from fotismos.comparisons.cost.cost import Study
-
-RECORD = "comparison.json"
-PICTURE = "comparison.exr"
-VIEW = "view.json"
+from fotismos.reports.page.scene_view import SceneView
+from fotismos.reports.run import scene_files
+from fotismos.reports.run.batch import Subjects
 
 Seconds = dict[str, float]
 """Wall time by stage of a run."""
 
 
-class Finished(Record):
-    """The content of ``view.json``: the scene's part of the page, and a digest of each file."""
-
-    view: SceneView
-    digests: dict[str, str]
+def subjects(scenes: Sequence[str]) -> Subjects:
+    """Return what a command compares: scenes, as the user named them."""
+    files = tuple((name_of(word), file_of(word)) for word in scenes)
+    return Subjects(words=tuple(scenes), files=files, compare=compare)
 
 
 def compare(
@@ -58,7 +42,7 @@ def compare(
         # A finished scene is recognised by its key.
         case = open_case(name, job.options)
         key = key_of(case, job)
-        view = None if job.fresh else load(folder / target, key)
+        view = None if job.fresh else scene_files.load(folder / target, key)
         spent = {"finished scenes": perf_counter() - begin}
         if view is not None:
             return view, spent
@@ -103,7 +87,7 @@ def compare(
             from fotismos.reports.charts import figures
 
             figures.write_scene(folder / results.FIGURES, target, comparison)
-        view = write(folder, target, comparison, costs, key)
+        view = scene_files.write(folder, target, comparison, costs, key)
         return view, spent | {"files": perf_counter() - begin}
 
 
@@ -133,9 +117,7 @@ def key_of(case: Case, job: Job) -> str | None:
     code = named(case.options.heuristic).digest()
     if Path(case.word).suffix == ".py" or code is None:
         return None
-    files = []
-    if case.options.image:
-        files = [picture_parts(word)[0] for word in case.options.image]
+    files = [picture_parts(word)[0] for word in case.options.picture_files]
     parts: dict[str, Any] = {
         "record": VERSION,
         "metrics": list(METRICS),
@@ -148,159 +130,4 @@ def key_of(case: Case, job: Job) -> str | None:
         "pictures": [results.digest_of(path) for path in files if path.is_file()],
         "scene": digest(case.source),
     }
-    return _digest(json.dumps(parts, sort_keys=True).encode())
-
-
-def load(folder: Path, key: str | None) -> SceneView | None:
-    """Return the view of a finished scene; None if its key is another or a file was changed."""
-    if key is None:
-        return None
-    try:
-        # JSON has no bytes: pictures are text in it.
-        found = msgspec.convert(atomic.Entry(folder / VIEW, key).load(), Finished, builtin_types=())
-        current = {name: results.digest_of(folder / name) for name in found.digests}
-        if current != found.digests:
-            return None
-        view = found.view
-        if view.cost:
-            from fotismos.comparisons.cost.cost_record import (
-                Cost,  # loaded late: few scenes have costs
-            )
-
-            record = msgspec.convert(view.cost.record, Cost, builtin_types=())
-            view = structs.replace(view, cost=structs.replace(view.cost, record=record))
-        return view
-    except (msgspec.ValidationError, OSError):
-        return None
-
-
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
-
-
-# --- Files -----------------------------------------------------------------------------------
-
-
-def write(
-    folder: Path,
-    name: str,
-    comparison: Comparison,
-    costs: "Study | None" = None,
-    key: str | None = None,
-) -> SceneView:
-    """Write the files of one comparison to ``folder/name``, and return its part of the page.
-
-    The record is removed first and written last. Files of an earlier result that this one does not
-    have are deleted. With a key, :func:`load` finds the result.
-    """
-    target = folder / name
-    record = comparison.record
-    results.own(target)
-    # The view names the earlier files, and is about to go.
-    earlier = _files(target)
-    results.clear(target, (RECORD, VIEW))
-    view = view_of(comparison)
-    made = {
-        f"{picture}.png": png
-        for picture, png in images.pictures(comparison.images, record.viewing.exposure).items()
-    }
-    linked: tuple[str, ...] = (RECORD, PICTURE)
-    if costs:
-        from fotismos.reports.run import cost_files  # loaded late: for a handful of scenes
-
-        made |= cost_files.documents(costs)
-        linked = (*linked, "cost.json")
-        chart = cost_files.figure(costs.record)
-        view = structs.replace(view, chart=chart, cost=cost_files.view(costs))
-    view = structs.replace(view, files={file: f"{name}/{file}" for file in linked})
-    for file, content in made.items():
-        results.write(target / file, content)
-    images.write_exr(target / PICTURE, _layers(comparison.images), _header(record))
-    made[RECORD] = atomic.encoded(to_json(record))
-    digests = {file: _digest(content) for file, content in made.items()}
-    # The library writes this file, so its bytes are only on the disk.
-    digests[PICTURE] = results.digest_of(target / PICTURE)
-    results.clear(target, earlier - digests.keys())
-    finished = Finished(view=view, digests=digests)
-    # Written without a key, too: `_files` finds the names in it, but `load` never finds a result.
-    atomic.Entry(target / VIEW, key or "none").save(plain(finished))
-    results.write(target / RECORD, made[RECORD])
-    return view
-
-
-def remove(folder: Path) -> None:
-    """Delete the files of a result; a folder that is empty then goes with the command."""
-    results.clear(folder, (RECORD, VIEW, *_files(folder)))
-
-
-def view_of(comparison: Comparison) -> SceneView:
-    """Return a comparison's part of the page without links."""
-    record = comparison.record
-    shown = comparison.images
-    view = SceneView(
-        record=record,
-        thumbnails=images.thumbnails(shown, record.viewing.exposure),
-        embedded=embedding.embed(images.channels(_layers(shown)), shown.counted),
-    )
-    terms = comparison.terms
-    live = comparison.live
-    if isinstance(terms, Missing) and isinstance(live, Missing) and comparison.causes is None:
-        return structs.replace(
-            view, terms=TermsView(missing=terms.reason), live=LiveView(missing=live.reason)
-        )
-    from fotismos.reports.page import why_view  # loaded late: --no-why has none
-
-    return structs.replace(
-        view,
-        terms=why_view.terms_view(terms),
-        live=why_view.live_view(live),
-        why=why_view.causes_view(comparison),
-    )
-
-
-def with_fit(view: SceneView, folder: Path) -> SceneView:
-    """Return a view with what the record of a fit in a place says of its scene, if there is one."""
-    try:
-        fit = json.loads((folder / "fit.json").read_bytes())
-        mean = fit["fits"][fit["best"]]["departure"][LEADING.name]["after"]
-        found = (mean, *fit["resolution"])
-        is_same = fit["scene"] == view.record.scene
-    except (OSError, ValueError, LookupError, TypeError):
-        return view
-    if view.live and is_same:
-        return structs.replace(view, live=structs.replace(view.live, fit=found))
-    return view
-
-
-def _files(folder: Path) -> set[str]:
-    """Return the files of the result in a place, as far as its view names them."""
-    try:
-        digests = json.loads((folder / VIEW).read_bytes())["content"]["digests"]
-        return {name for name in digests if "/" not in name}
-    except (OSError, ValueError, KeyError, TypeError):
-        return set()
-
-
-def _layers(shown: Images) -> dict[str, Any]:
-    return {
-        "heuristic": shown.heuristic,
-        "reference": shown.reference,
-        "reference_stderr": shown.reference_stderr,
-        "P": shown.position,
-        "N": shown.normal,
-        **{name: shown.maps[name] for name in drawn()},
-        "significant": shown.significant,
-        **shown.terms,
-    }
-
-
-def _header(record: ComparisonRecord) -> dict[str, object]:
-    return {
-        "scene": record.scene,
-        "variant": record.variant,
-        "seed": record.seed,
-        "spp": record.plan.spp,
-        "passes": record.plan.passes,
-        "pairing": record.pairing.convention,
-        **{f"version {name}": version for name, version in record.versions.items()},
-    }
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

@@ -11,10 +11,12 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fotismos.comparisons.comparison import ComparisonRecord, NoiseTarget, PictureRecord
+from fotismos.comparisons.comparison import Agreement, ComparisonRecord, NoiseTarget, PictureFiles
 from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.heuristic.heuristics import PHONG
+from fotismos.reference.pairing.halves import Pairing
+from fotismos.reference.planning.plan import Plan
 from fotismos.reference.records import plain
 from fotismos.reports.files import results
 from fotismos.reports.terminal.words import number, percent, seconds, visible
@@ -127,8 +129,8 @@ def _row(cells: Sequence[str]) -> str:
 def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> Iterator[str]:
     """Yield a line for each scene: pixels that differ, departure, noise, shape, and times."""
     for record in records:
-        if record.picture:
-            yield from _picture(record, record.picture)
+        if record.agreement:
+            yield from _pictures(record, record.agreement)
     # A row for each scene, then what its columns mean.
     headings = "differ", f"mean {LEADING.label}", "noise", "shape", "time"
     rows: list[tuple[str, ...]] = [("scene", *headings)]
@@ -140,12 +142,13 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
                 record.scene,
                 percent(share_above(metric.visible, threshold).value),
                 *(number(mean) for mean in means),
-                "" if record.picture else time_ratio(record),
+                "" if record.agreement else time_ratio(record),
             )
         )
     yield from printed(rows, right=1)
     yield f"differ: above {LEADING.label} {threshold:g}; shape: the mean at the best exposure"
-    yield "time: what a sample of the physical half takes, over one of the textbook's"
+    if not all(record.agreement for record in records):
+        yield "time: what a sample of the physical half takes, over one of the textbook's"
     prices = [record.price for record in records if record.price and not record.picture]
     reasons = {price.reason for price in prices} - {""}
     yield from (f"time ?: {reason}" for reason in sorted(reasons))
@@ -159,7 +162,7 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
         if count := len(record.warnings):
             noun = "warning" if count == 1 else "warnings"
             yield f"{record.scene}: {count} {noun}, which -v and the page show"
-        guard = record.plan.guard
+        guard = record.plan and record.plan.guard
         if guard and guard.state == "disagreed":
             yield (
                 f"{record.scene}: a probe disagreed with the plan by {guard.departure:+.1%} of the"
@@ -174,34 +177,32 @@ def time_ratio(record: ComparisonRecord) -> str:
     return f"x {number(record.price.ratio.value)}"
 
 
-def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:
+def _pictures(record: ComparisonRecord, found: Agreement) -> Iterator[str]:
     """Yield a picture's shift, and what is odd about it: all numbers depend on that."""
-    shift = picture.shift
-    ratio = ", ".join(f"{value:.3g}" for value in picture.ratio)
+    ratio = ", ".join(f"{value:.3g}" for value in found.ratio)
+    shift = found.shift
     shifted = "not known" if shift is None else f"{shift[0]:+.1f}, {shift[1]:+.1f} pixels"
-    yield f"{record.scene}: {record.heuristic}"
-    yield f"shift {shifted}; red, green, blue {ratio} times the reference's"
-    yield from picture.notes
-    yield from picture.odd
+    if record.picture:
+        yield from _files(record.scene, "picture", record.picture)
+    if record.reference_picture:
+        yield from _files(record.scene, "reference", record.reference_picture)
+    other = "the reference's" if record.picture else f"those of {record.heuristic}"
+    yield f"shift {shifted}; red, green, blue {ratio} times {other}"
+    yield from found.mistakes
+    yield from found.odd
     yield ""
+
+
+def _files(scene: str, half: str, picture: PictureFiles) -> Iterator[str]:
+    yield f"{scene}: {half} {', '.join(picture.files)}"
+    yield from picture.notes
 
 
 def details(record: ComparisonRecord) -> Iterator[str]:
     """Yield the verbose lines of a scene: simulation, pairing, losses, warnings, times."""
-    plan = record.plan
-    pairing = record.pairing
-    yield (
-        f"{record.scene}: {plan.simulation}, {plan.spp} samples per pixel in {plan.passes} passes,"
-        f" {plan.sampler}"
-    )
-    for light in pairing.emitters:
-        note = f" ({light.note})" if light.note else ""
-        yield f"  {light.name}: {light.given} as {light.derived}{note}"
-    for material in pairing.bsdfs:
-        if material.note:
-            yield f"  {material.name}: {material.given} as {material.derived} ({material.note})"
-    for miss in pairing.misses:
-        yield f"  missed: {miss.what}, {miss.wanted:.3g} requested, {miss.reached:.3g} reached"
+    yield f"{record.scene}:{_simulation(record.plan) if record.plan else ''}"
+    if record.pairing:
+        yield from _pairing(record.pairing)
     for loss in record.unrepresentable:
         yield f"  lost: {loss.name} ({loss.plugin}): {loss.lost}; {loss.nearest}"
     for setting in record.overridden:
@@ -215,6 +216,22 @@ def details(record: ComparisonRecord) -> Iterator[str]:
     yield "  " + ", ".join(f"{name} {seconds(value)}" for name, value in stages.items())
 
 
+def _simulation(plan: Plan) -> str:
+    samples = f"{plan.spp} samples per pixel in {plan.passes} passes"
+    return f" {plan.simulation}, {samples}, {plan.sampler}"
+
+
+def _pairing(pairing: Pairing) -> Iterator[str]:
+    for light in pairing.emitters:
+        note = f" ({light.note})" if light.note else ""
+        yield f"  {light.name}: {light.given} as {light.derived}{note}"
+    for material in pairing.bsdfs:
+        if material.note:
+            yield f"  {material.name}: {material.given} as {material.derived} ({material.note})"
+    for miss in pairing.misses:
+        yield f"  missed: {miss.what}, {miss.wanted:.3g} requested, {miss.reached:.3g} reached"
+
+
 def _noise(record: ComparisonRecord, stop: NoiseTarget) -> str:
     """Return the noise that was reached, and what stopped the run."""
     asked = f"target {stop.target:g}"
@@ -222,7 +239,7 @@ def _noise(record: ComparisonRecord, stop: NoiseTarget) -> str:
         asked += f" not reached: stopped by the limit of {stop.limit_spp} samples per pixel"
     return (
         f"{record.scene}: 95 % of pixels have noise under {LEADING.label} = {stop.reached:.3g}"
-        f" after {record.plan.spp} samples per pixel ({asked})"
+        f" after {record.plan.spp if record.plan else 0} samples per pixel ({asked})"
     )
 
 

@@ -1,9 +1,12 @@
 """The work of ``fotismos compare``."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fotismos.comparisons.case import picture_parts
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.picture_files import matching
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.errors import FotismosError
 from fotismos.reports.jobs import Job, open_page
@@ -22,15 +25,19 @@ def run(
     summary_file: Path | None,
     is_opened: bool,
 ) -> int:
-    """Compare scenes, print the gates, write the files for CI, and return the exit code."""
+    """Compare scenes or pictures, print the gates, write files for CI, return the exit code."""
     on_page = open_page if is_opened else None
+    image = matching(job.options.image)
+    options = job.options.changed(image=image, reference=matching(job.options.reference))
+    job = replace(job, options=options)
+    subjects = _subjects(scenes, options)
     if max_visible is None and junit is None and summary_file is None:
-        batch.run(pool, scenes, output, job, on_page=on_page)
+        batch.run(pool, subjects, output, job, on_page=on_page)
         return 0
     from fotismos.reports.ci import summary  # loaded late: most comparisons need no CI
 
     shader = job.options.heuristic.partition(":")[0]  # FILE:NAME, or a name alone
-    pictures = [picture_parts(word)[0] for word in job.options.image]
+    pictures = [picture_parts(word)[0] for word in options.picture_files]
     summary.require_free(junit, summary_file, [*scenes, shader, *pictures])
     code = 0
 
@@ -54,5 +61,16 @@ def run(
             ),
         )
 
-    batch.run(pool, scenes, output, job, on_page=on_page, finish=finish)
+    batch.run(pool, subjects, output, job, on_page=on_page, finish=finish)
     return code
+
+
+def _subjects(scenes: Sequence[str], options: Options) -> batch.Subjects:
+    """Return what is compared: scenes, or two pictures without one."""
+    if scenes:
+        from fotismos.reports.run import scene  # loaded late: two pictures need no Mitsuba
+
+        return scene.subjects(scenes)
+    from fotismos.reports.run import pictures  # loaded late: most comparisons are of scenes
+
+    return pictures.subjects(options)

@@ -21,7 +21,7 @@ from fotismos.reference.rendering.gbuffer import ObjectIds
 from fotismos.reports.files import results
 from fotismos.reports.files.results import Failure, RunRecord
 from fotismos.reports.page import page
-from fotismos.reports.run import scene
+from fotismos.reports.run import scene_files
 from tests.shared import cost_records, records, term_grids
 
 WIDTH, HEIGHT = 48, 32
@@ -55,7 +55,7 @@ def report(tmp_path_factory):
         (EXACT, exact(), None),
     ):
         (place,) = results.assigned(folder, [(name, None)])
-        views.append(scene.write(folder, place, comparison, priced))
+        views.append(scene_files.write(folder, place, comparison, priced))
         found.records[name] = plain(comparison.record)
         with OpenEXR.File(str(folder / place / "comparison.exr"), separate_channels=True) as file:
             found.channels[name] = {key: c.pixels.copy() for key, c in file.channels().items()}

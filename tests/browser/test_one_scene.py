@@ -5,7 +5,7 @@ from playwright.sync_api import expect
 
 from fotismos.reports.notebook import HEIGHT, Shown
 from fotismos.reports.page import page
-from fotismos.reports.run import scene
+from fotismos.reports.run import scene_files
 from tests.browser.conftest import EXACT, exact
 
 SEEN = "document.documentElement.dataset.view"
@@ -14,7 +14,7 @@ SEEN = "document.documentElement.dataset.view"
 @pytest.fixture
 def alone():
     """The page's text."""
-    return page.render([scene.view_of(exact())])
+    return page.render([scene_files.view_of(exact())])
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from fotismos.reference.rendering.gbuffer import image_size, pixel_rays
 from fotismos.reference.rendering.renderer import variant
 from fotismos.reports.page.scene_view import LiveView
 from fotismos.reports.page.why_view import live_view
-from fotismos.reports.run import scene
+from fotismos.reports.run import scene_files
 from tests.shared import records
 from tests.shared.misplanned import scene as described
 from tests.shared.pages import codes
@@ -96,7 +96,7 @@ def test_what_a_fit_reached_stands_beside(tmp_path):
     view = records.view(records.data(), live=LiveView())
     fits = [{"departure": {"dE2000": {"after": mean}}} for mean in (3.0, 2.5)]
     fit = {"scene": "fig-8-9", "best": 1, "fits": fits, "resolution": [96, 48]}
-    assert scene.with_fit(view, tmp_path).live.fit is None
+    assert scene_files.with_fit(view, tmp_path).live.fit is None
     for content, expected in (
         (fit, (2.5, 96, 48)),
         (fit | {"scene": "another"}, None),
@@ -104,6 +104,6 @@ def test_what_a_fit_reached_stands_beside(tmp_path):
         ([], None),
     ):
         (tmp_path / "fit.json").write_text(json.dumps(content))
-        assert scene.with_fit(view, tmp_path).live.fit == expected
+        assert scene_files.with_fit(view, tmp_path).live.fit == expected
     (tmp_path / "fit.json").write_text("{")
-    assert scene.with_fit(view, tmp_path).live.fit is None
+    assert scene_files.with_fit(view, tmp_path).live.fit is None

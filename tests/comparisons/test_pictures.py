@@ -13,16 +13,17 @@ import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from fotismos.comparisons import picture_files, pictures
+from fotismos.comparisons import alignment, picture_files, picture_mistakes, pictures
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import PictureRecord
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.picture_mistakes import Names, NoisyImage
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic.errors import InputError, NonFiniteError
+from fotismos.reference.rendering.gbuffer import gbuffer
 from tests.shared.outputs import write
 
 SIDE = 64
@@ -40,8 +41,9 @@ def cornell():
     case = open_case("cornell-box", Options(resolution=(SIDE, SIDE), spp=512))
     ready = prepare(case.source, case.options)
     images = [np.array(half.render(5), float) for half in (ready.reference, ready.heuristic)]
-    edges = pictures.geometry_edges(ready.scene, SIDE, SIDE)
-    return images[0], images[1], [edges, pictures.picture_edges(images[1])], ready.counted
+    surface = gbuffer(ready.scene, (alignment.FINER * SIDE, alignment.FINER * SIDE))
+    edges = alignment.geometry_edges(surface, SIDE, SIDE)
+    return images[0], images[1], [edges, alignment.picture_edges(images[1])], ready.counted
 
 
 # --- The same departure --------------------------------------------------------------------------
@@ -67,10 +69,10 @@ def test_a_picture_of_another_run_has_its_departure(run, tmp_path, monkeypatch):
         assert second["metrics"][name]["mean"] == pytest.approx(own, rel=1e-6)
     assert second["picture"]["files"] == [file]
     assert second["heuristic"] == f"picture {file}"
-    assert max(map(abs, second["picture"]["shift"])) < 0.3
+    assert max(map(abs, second["agreement"]["shift"])) < 0.3
     assert file in second["command"]
     page = (tmp_path / "theirs/index.html").read_text()
-    assert "Its content is moved by" in page
+    assert "The content of the picture is moved by" in page
 
 
 def test_a_png_is_read_to_its_bits_by_its_transfer_function(rgb, tmp_path):
@@ -205,22 +207,22 @@ def test_repeats_tell_the_pictures_noise(rgb, tmp_path):
 def test_shifts_are_measured_to_a_fraction_of_a_pixel(cornell):
     reference, kernel, expected, _ = cornell
     for x, y in ((-3, 0), (-1, 1), (0, -2), (1, 1), (2, -2)):
-        shift = pictures.measure(np.roll(reference, (y, x), (0, 1)), expected).shift
+        shift = alignment.measure(np.roll(reference, (y, x), (0, 1)), expected).shift
         assert shift == pytest.approx((x, y), abs=0.35)
     for part in (0.25, 0.5, 0.75):
         moved = (1 - part) * kernel + part * np.roll(kernel, 1, 1)
-        shift = pictures.measure(moved, expected).shift
+        shift = alignment.measure(moved, expected).shift
         assert shift == pytest.approx((part, 0), abs=0.2)
 
 
 def test_a_shift_that_only_half_of_the_repeats_show_is_none(cornell):
     reference, _, expected, _ = cornell
     moved = np.roll(reference, 3, 1)
-    place = pictures.measure(moved, expected)
+    place = alignment.measure(moved, expected)
     assert place.shift == pytest.approx((3, 0), abs=0.35)
-    assert pictures._halves_agree([moved] * 4, expected, place)
-    assert pictures._halves_agree([moved], expected, place)
-    assert not pictures._halves_agree([moved, reference] * 2, expected, place)
+    assert not alignment.is_doubtful(place, None, [moved] * 4, expected)
+    assert not alignment.is_doubtful(place, None, [moved], expected)
+    assert alignment.is_doubtful(place, None, [moved, reference] * 2, expected)
 
 
 @pytest.mark.parametrize("scene", ["plastic-spheres", "narrow-band-lamp", "fig-8-9"])
@@ -230,24 +232,20 @@ def test_a_right_picture_that_is_shifted_is_said_to_be_shifted_by_that_alone(rgb
     for x, y, words in ((2, 0, "2 pixels to the right,"), (0, -1, "1 pixel up,")):
         moved = np.roll(image, (y, x), (0, 1))
         record = picture_of(scene, write(tmp_path / "x.exr", moved), resolution=(SIDE, SIDE))
-        (sentence,) = [odd for odd in record.picture.odd if "shifted" in odd]
+        (sentence,) = record.agreement.mistakes
         assert f"are shifted by {words}" in sentence
-        assert record.picture.shift == pytest.approx((x, y), abs=0.25)
+        assert record.agreement.shift == pytest.approx((x, y), abs=0.25)
 
 
 # --- What is odd, in words -----------------------------------------------------------------------
 
 
-def odd(picture, cornell):
-    """Return what is said of a picture of two repeats."""
+def mistakes(picture, cornell):
+    """Return what is said of a picture."""
     reference, _, expected, counted = cornell
-    place = pictures.measure(picture, expected)
-    shift, edges = place.shift, place.correlation
-    record = PictureRecord(
-        files=("x", "y"), transfer=None, repeats=2, shift=shift, edges=edges,
-        ratio=pictures.ratios(picture[counted], reference[counted]),
-    )  # fmt: skip
-    return list(pictures.describe(record, picture, reference, counted))
+    place = alignment.measure(picture, expected)
+    sides = NoisyImage(picture), NoisyImage(reference)
+    return list(picture_mistakes.find(*sides, counted, place, False, Names()))
 
 
 ODD = {
@@ -270,18 +268,23 @@ ODD = {
 def test_mistakes_in_a_picture_are_named(rgb, tmp_path, cornell):
     """And nothing of the reference of another seed, or the kernel, whose shading alone is wrong."""
     for name, (spoil, message) in ODD.items():
-        words = odd(spoil(cornell[0]), cornell)
+        words = mistakes(spoil(cornell[0]), cornell)
         assert any(re.search(message, each) for each in words), (name, words)
-    assert odd(cornell[0], cornell) == odd(cornell[1], cornell) == []
+    assert mistakes(cornell[0], cornell) == mistakes(cornell[1], cornell) == []
     record = picture_of("cornell-box", write(tmp_path / "x.exr", cornell[0] * np.pi))
-    assert any("a missing division by pi" in each for each in record.picture.odd)
-    assert record.warnings[: len(record.picture.odd)] == record.picture.odd
+    (mistake,) = record.agreement.mistakes
+    assert "a missing division by pi" in mistake
+    assert record.warnings[0] == mistake
 
 
 def test_a_lamp_that_a_picture_clips_does_not_count_as_exposure():
-    reference = np.array([[0.2, 0.3, 0.4], [40.0, 30.0, 20.0]])
-    assert pictures.ratios(reference.clip(0, 1), reference) == (1, 1, 1)
-    assert pictures.ratios(2 * reference, reference) == pytest.approx((2, 2, 2))
+    reference = np.full((32, 32, 3), (0.2, 0.3, 0.4))
+    reference[8:24, 8:32] = 40.0
+    counted = np.ones((32, 32), bool)
+    found = picture_mistakes.ratios(reference.clip(0, 1), reference, counted)
+    assert found == pytest.approx((1, 1, 1))
+    found = picture_mistakes.ratios(2 * reference, reference, counted)
+    assert found == pytest.approx((2, 2, 2), rel=0.01)
 
 
 # --- Bad input -----------------------------------------------------------------------------------
@@ -368,8 +371,8 @@ def test_sizes_and_repeats_must_fit(rgb, tmp_path):
     for files, more, message in (
         (sized(8, 12, "wide"), {}, "12x8 pixels, an aspect ratio of 1.5, and the .* film .*x.*, 1"),
         (eight, {"resolution": (16, 16)}, "8x8 pixels, and `resolution=16x16` is requested"),
-        ((eight, nine), {}, "pictures of 8x8, 9x9: give repeats of one size"),
-        ((eight, other, eight), {}, "3 repeats: give one, or an even number"),
+        ((eight, nine), {}, "pictures of 8x8, 9x9: 1.12 times as wide and 1.12 times as high"),
+        ((eight, other, eight), {}, r"8.exr is given 2 times. Give each repeat once"),
         ((eight, other), {"noise": 1.0, "spp": None}, r"noise = 1 and 2 repeats: .* Give `spp`"),
     ):
         with pytest.raises(InputError, match=message):

@@ -13,7 +13,7 @@ from fotismos.reference.rendering.renderer import passes, variant
 from fotismos.reports.files import results
 from fotismos.reports.page import page
 from fotismos.reports.page.why_view import terms_view
-from fotismos.reports.run.scene import view_of, write
+from fotismos.reports.run.scene_files import view_of, write
 from tests.shared import records
 from tests.shared.oracle import unit
 from tests.shared.pages import codes

@@ -14,7 +14,7 @@ from fotismos.comparisons.cost.cost_record import Point
 from fotismos.reports.charts import cost_charts
 from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView
-from fotismos.reports.run import cost_files, scene
+from fotismos.reports.run import cost_files, scene_files
 from fotismos.reports.terminal import cost_tables
 from fotismos.reports.terminal.words import seconds
 from tests.browser.conftest import noisy
@@ -129,7 +129,7 @@ def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_c
 
 
 def test_the_map_of_effects_tells_halves_none_and_what_does_not_count():
-    found = scene.view_of(cost_records.explained(noisy())).why.effects
+    found = scene_files.view_of(cost_records.explained(noisy())).why.effects
     assert found.names == cost_records.EFFECTS
     assert len(set(found.colours)) == 3
     rows = [found.map[start : start + 12] for start in range(0, 96, 12)]
@@ -140,15 +140,15 @@ def test_the_map_of_effects_tells_halves_none_and_what_does_not_count():
 
 def test_a_comparison_with_its_study_replaces_an_earlier_one_as_a_whole(tmp_path, study):
     comparison = noisy()
-    scene.write(tmp_path, "scene", comparison, study)
+    scene_files.write(tmp_path, "scene", comparison, study)
     files = {path.name for path in (tmp_path / "scene").glob("cost*")}
     assert {"cost.json", "cost.svg", "cost-method-full-plan.png"} <= files
     methods = {name: study.methods[name] for name in ("Phong kernel",)}
     other = replace(study, record=structs.replace(study.record, seed=8), methods=methods)
-    scene.write(tmp_path, "scene", comparison, other)
+    scene_files.write(tmp_path, "scene", comparison, other)
     assert json.loads((tmp_path / "scene" / "cost.json").read_text())["seed"] == 8
     assert not (tmp_path / "scene" / "cost-method-full-plan.png").exists()
-    scene.write(tmp_path, "scene", comparison)
+    scene_files.write(tmp_path, "scene", comparison)
     assert not list((tmp_path / "scene").glob("cost*"))
 
 

@@ -14,7 +14,7 @@ from fotismos.comparisons import atomic
 from fotismos.comparisons.study import running
 from fotismos.heuristic.errors import InputError, OutputError
 from fotismos.reports.files import results
-from fotismos.reports.run import scene
+from fotismos.reports.run import scene_files
 from tests.shared import records
 from tests.shared.programs import ROOT
 from tests.shared.small_scene import SCENE
@@ -73,18 +73,18 @@ def comparison():
 
 
 def test_a_view_is_found_again_unless_anything_is_damaged(comparison, tmp_path):
-    view = scene.write(results.own(tmp_path), "a", comparison, key="key")
+    view = scene_files.write(results.own(tmp_path), "a", comparison, key="key")
     place, file = tmp_path / "a", tmp_path / "a/view.json"
-    assert scene.load(place, "key") == view
-    assert scene.load(place, "another") is scene.load(place, None) is None
+    assert scene_files.load(place, "key") == view
+    assert scene_files.load(place, "another") is scene_files.load(place, None) is None
     text = file.read_text()
     cuts = (text[:size] for size in range(0, len(text), len(text) // 20))
     for broken in ("", "[]", "{}", text.replace("digests", "digest"), *cuts):
         file.write_text(broken)
-        assert scene.load(place, "key") is None
+        assert scene_files.load(place, "key") is None
     file.write_text(text)
     (place / "comparison.exr").unlink()
-    assert scene.load(place, "key") is None
+    assert scene_files.load(place, "key") is None
 
 
 class EndedError(Exception):
@@ -94,7 +94,7 @@ class EndedError(Exception):
 def test_the_record_is_removed_first_and_written_last(comparison, tmp_path, monkeypatch):
     """Whichever writing is the last one, an unfinished scene has no record."""
     folder, replace, count = results.own(tmp_path), Path.replace, 0
-    scene.write(folder, "a", comparison)
+    scene_files.write(folder, "a", comparison)
 
     def stopping(path, target):
         nonlocal count
@@ -109,14 +109,14 @@ def test_the_record_is_removed_first_and_written_last(comparison, tmp_path, monk
         with monkeypatch.context() as patched:
             patched.setattr(Path, "replace", stopping)
             try:
-                scene.write(folder, "a", comparison, key="key")
+                scene_files.write(folder, "a", comparison, key="key")
             except EndedError:
                 assert not (folder / "a/comparison.json").exists()
-                assert scene.load(folder / "a", "key") is None
+                assert scene_files.load(folder / "a", "key") is None
             else:
                 break
     assert moment > 8
-    assert scene.load(folder / "a", "key")
+    assert scene_files.load(folder / "a", "key")
 
 
 # --- Whose it is -----------------------------------------------------------------------------

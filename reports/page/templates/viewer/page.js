@@ -23,6 +23,9 @@
  * @property {number} height
  * @property {number} exposure
  * @property {{subject: string, title: string, name: string}} judged   the names of the first half
+ * @property {{subject: string, title: string, name: string}} truth   those of the second half
+ * @property {boolean} arePictures    whether there is no scene
+ * @property {boolean} isNoiseKnown   whether passes or repeats show it
  * @property {string} mean       of ΔE2000
  * @property {number[]} shares   of the pixels that differ visibly, by threshold
  * @property {string} verdicts   a letter by threshold: p(ass), f(ail) or u(ndecided)

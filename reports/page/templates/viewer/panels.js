@@ -46,6 +46,10 @@ class Panels {
   show() {
     this.inspect();
     const { shown: painter, added, view, scene } = this.viewer;
+    const hasCauses = Boolean(scene.effects) || scene.regions.some(region => region.effect);
+    for (const part of this.elements)
+      for (const row of /** @type {NodeListOf<HTMLElement>} */ (part.querySelectorAll("tr.cause")))
+        row.hidden = !hasCauses && scene.arePictures;
     const box = this.viewer.box();
     const key = JSON.stringify([scene.id, view.t, box, view.on]);
     if (!painter || this.key === key) return;
@@ -129,7 +133,11 @@ class Panels {
       reference_hex: seen(physical),
       dE2000: differenceText(painter.differences[place]),
       log2_luminance: `${significant(painter.ratio(place), 2)} stops`,
-      standard_error: added ? UNKNOWN : significant(VALUES[codes.standard_error[place]], 2),
+      standard_error: added
+        ? UNKNOWN
+        : scene.isNoiseKnown
+          ? significant(VALUES[codes.standard_error[place]], 2)
+          : "not known",
       significant: !(flags & COUNTED) ? "not counted" : added ? UNKNOWN : marked,
     };
     for (const cell of /** @type {NodeListOf<HTMLElement>} */ (

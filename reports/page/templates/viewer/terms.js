@@ -74,7 +74,7 @@ class TermsPanel {
     const error = VALUES[painter.images.codes.standard_error[own]];
     rows.push(
       termRow(
-        "physical",
+        scene.truth.name,
         `± ${significant(error, 2)} in its noisiest channel`,
         painter.colour("reference", own).map(value => significant(value)),
         "sum",

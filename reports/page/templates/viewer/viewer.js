@@ -141,7 +141,7 @@ class Viewer {
           },
         ]
       : [];
-    const physical = { picture: painter.rendering("reference", view.ev), title: "physical" };
+    const physical = { picture: painter.rendering("reference", view.ev), title: scene.truth.name };
     const kind = map.kind === "difference" ? "error" : map.title;
     const error = {
       picture: shown.picture("map", `${map.name} ${view.t}`, shown.colours(map, view.t)),
@@ -164,6 +164,8 @@ class Viewer {
       `${scene.name}: ${contents.map(one => one.title).join(", ")}. Press ? for the keys.`,
     );
     this.part("[data-part=numbers]").textContent = this.numbers(added);
+    for (const heading of document.querySelectorAll("[data-truth]"))
+      heading.textContent = scene.truth.title;
     for (const one of document.querySelectorAll("[data-judged]"))
       one.textContent = `${scene.judged.title}${added ? " +" : ""}`;
     this.switches?.show(view.on);

@@ -1,0 +1,136 @@
+"""Where a picture's content is, by its edges: a shift looks like wrong shading.
+
+Geometric edges, where the normal or the hit changes, are in any picture of the same scene, however
+it is shaded. The other half mostly shares its edges too: it shows where light ends. The picture's
+edges are correlated with both at all shifts up to :data:`REACH`, and the better agreement counts; a
+parabola through the highest values gives the fraction of a pixel. A shift counts only if it
+improves the agreement by more than a shift of the other half itself, which is in its place: noise
+and shading explain that much. Each half of the repeats must show it, too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fotismos.comparisons.departure.colour import luminance
+
+if TYPE_CHECKING:  # two pictures have no scene
+    from fotismos.reference.rendering.gbuffer import GBuffer
+
+REACH = 8
+FINER = 4
+"""Largest shift considered in pixels, at most a quarter of the picture's smaller side; and rays
+along each side of a pixel."""
+
+LEAST = 0.08
+"""Correlation below which edges are uninformative."""
+
+DOUBTFUL = 2.0
+"""A shift improves the agreement by more than this times what noise does."""
+AGREEMENT = 1.0
+"""Pixels by which the shifts of halves of the repeats may differ from that of all."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a picture's content is.
+
+    ``shift`` is by how many pixels (x, y) it is too far right and too low, None if its edges do not
+    show it; ``correlation`` is that of the edges there, and ``gain`` by how much it is larger than
+    without the shift.
+    """
+
+    shift: tuple[float, float] | None
+    correlation: float
+    gain: float
+
+
+def geometry_edges(surface: "GBuffer", width: int, height: int) -> np.ndarray:
+    """Return how much the geometry changes at each pixel, (H, W).
+
+    ``surface`` has :data:`FINER` rays along each side of a pixel.
+    """
+    layers = np.concatenate([surface.normal, surface.hit[..., None]], axis=-1)
+    # Means over the rays of a pixel, (H, W, 4).
+    return _edges(layers.reshape(height, FINER, width, FINER, 4).mean(axis=(1, 3)))
+
+
+def picture_edges(image: np.ndarray) -> np.ndarray:
+    """Return how much an image changes at each pixel, in stops, up to 1."""
+    light = np.maximum(luminance(image), 0)
+    least = 0.02 * np.percentile(light, 95) + 1e-6
+    return _edges(np.log2(light + least)[..., None])
+
+
+def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Place:
+    """Return the position of an image (H, W, 3), encoded in any way.
+
+    ``expected`` are maps (H, W) of edges that it may contain; the best agreement counts.
+    """
+    seen = picture_edges(image)
+    return max((_shift(edges, seen) for edges in expected), key=lambda place: place.correlation)
+
+
+def _edges(layers: np.ndarray) -> np.ndarray:
+    """Return the size of the gradient, on a scale that is 1/2 at 1/4 and ends at 1."""
+    size = np.sqrt((np.array(np.gradient(layers, axis=(0, 1))) ** 2).sum(axis=(0, -1)))
+    strength: np.ndarray = size / (size + 0.25)
+    return strength
+
+
+def _shift(edges: np.ndarray, seen: np.ndarray) -> Place:
+    reach = max(1, min(REACH, min(edges.shape) // 4))
+    shifts = range(-reach, reach + 1)
+    table = np.array([[_correlation(seen, edges, down=y, right=x) for x in shifts] for y in shifts])
+    y, x = map(int, np.unravel_index(np.argmax(table), table.shape))
+    highest = float(table[y, x])
+    gain = highest - float(table[reach, reach])
+    if highest < LEAST:
+        return Place(shift=None, correlation=highest, gain=gain)
+    down = y - reach + _vertex(table[:, x], y)
+    right = x - reach + _vertex(table[y], x)
+    return Place(shift=(float(right), float(down)), correlation=highest, gain=gain)
+
+
+def _correlation(seen: np.ndarray, edges: np.ndarray, down: int, right: int) -> float:
+    """Return the correlation of two maps where they overlap after a shift of the first."""
+    height, width = edges.shape
+    a = seen[max(down, 0) : height + down, max(right, 0) : width + right]
+    b = edges[max(-down, 0) : height - down, max(-right, 0) : width - right]
+    a = a - a.mean()
+    b = b - b.mean()
+    size = np.sqrt((a * a).sum() * (b * b).sum())
+    return float((a * b).sum() / size) if size > 0 else 0.0
+
+
+def _vertex(values: np.ndarray, peak: int) -> float:
+    """Return the offset of the vertex of a parabola through a maximum and its neighbours."""
+    if not 0 < peak < len(values) - 1:
+        return 0.0
+    before, top, after = values[peak - 1 : peak + 2]
+    bend = before - 2 * top + after
+    return 0.0 if bend >= 0 else float(0.5 * (before - after) / bend)
+
+
+def is_doubtful(
+    place: Place,
+    by_noise: Place | None,
+    repeats: Sequence[np.ndarray],
+    expected: Sequence[np.ndarray],
+) -> bool:
+    """Return whether noise may make a shift.
+
+    ``by_noise`` is where the other half seems to be, which is in its place. Shifts that noise makes
+    also differ from half to half of the repeats (H, W, 3).
+    """
+    if by_noise is not None and 0 < place.gain <= DOUBTFUL * by_noise.gain:
+        return True
+    if place.shift is None or len(repeats) == 1:
+        return False
+    for first in range(2):
+        shift = measure(np.mean(repeats[first::2], axis=0), expected).shift
+        if shift is None or np.abs(np.subtract(shift, place.shift)).max() > AGREEMENT:
+            return True
+    return False

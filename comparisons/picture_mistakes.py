@@ -1,0 +1,531 @@
+"""Mistakes that pictures often have, named with the number that mends each, and what is left.
+
+A picture is compared with the other half: the reference, or the textbook half if the picture is the
+reference. A mistake is named where mending it removes the departure, which wrong shading does not:
+it varies over a picture. Colours are compared as means of blocks, in which noise and edges matter
+little.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from itertools import permutations
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from fotismos.comparisons import alignment
+from fotismos.comparisons.departure.blocks import block_sums
+from fotismos.comparisons.departure.colour import Array, from_srgb, to_srgb
+from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.departure.metrics import LEADING
+
+Mending = Callable[[Array], Array]
+"""A function from a picture (H, W, 3) to the one without a mistake."""
+
+BLOCK = 8
+"""Side of the blocks whose means are compared, in pixels."""
+
+LIT = 0.02
+"""Blocks darker than this times the median tell no ratio."""
+
+CLIPPED = 0.99
+"""From here on the values of a picture that ends at display white may be clipped."""
+
+HIGHLIGHTS = 95
+"""Percentile of the values, above which they do not count for readings."""
+
+BETTER = 0.5
+"""Largest share of the difference that a credible other reading of the values leaves."""
+
+EXPLAINED = 0.25
+"""Largest share of the departure that a credible change of colours leaves."""
+
+SIMPLER = 1.25
+"""Times the departure that the best change leaves, which a simpler one may leave."""
+
+SLIGHT = 0.03
+"""Share of the departure in which two changes do not differ."""
+
+FEWEST = 8
+CONTRAST = 0.5
+LEAST_POWER = 0.1
+"""Blocks, and their range in powers of e, from which a power follows; and the smallest power."""
+
+NOTICED = 0.3
+"""ΔE2000 of the blocks, below which nothing needs a reason."""
+
+LEVEL = 2.0
+TINT = 0.05
+"""Factor of brightness, and relative difference of the channels' factors, that are named even if
+they explain little."""
+
+EVEN = 0.2
+"""A tint is the white's if it spreads by this share at most over the blocks."""
+
+NEAR_PI = 0.05
+"""Relative distance within which a level counts as a factor of pi."""
+
+SHIFT = 0.5
+"""Smallest shift in pixels that is named, and the steps in which it is."""
+
+PLATEAU = 0.005
+"""Share of the pixels that end at one value where a picture is clipped."""
+
+ZOOMS = 1.25 ** np.linspace(-1.0, 1.0, 41)
+"""Sizes of the content, relative to the other half's, that are tried."""
+
+OTHER_SIZE = 0.02
+"""Smallest relative change of size that is named."""
+
+ZOOMED = 0.1
+"""By how much the correlation of edges grows at another size, at least, that is named."""
+
+SMALL = 160
+"""Pixels of the longer side at which sizes are tried."""
+
+
+@dataclass(frozen=True)
+class Names:
+    """How sentences call a picture, at their beginning, and the other half."""
+
+    picture: str = "The picture"
+    other: str = "the reference"
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """A mistake that a picture seems to have, as a sentence, and what mends it."""
+
+    sentence: str
+    mend: Mending
+
+
+@dataclass(frozen=True)
+class NoisyImage:
+    """An image (H, W, 3), and two halves of its repeats, whose difference shows its noise."""
+
+    mean: Array
+    halves: tuple[Array, Array] | None = None
+
+    def noise(self, mend: Mending) -> Array | float:
+        """Return how far noise moves the pixels of the mended image, in ΔE2000, (H, W)."""
+        if self.halves is None:
+            return 0.0
+        first, second = self.halves
+        # The halves are twice as far apart as their mean is from the truth.
+        apart: Array = LEADING(mend(first), mend(second)) / 2
+        return apart
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Mean colours (B, 3) of blocks of pixels: of a picture, and of the other half."""
+
+    picture: Array
+    other: Array
+
+    @classmethod
+    def of(cls, picture: Array, other: Array, counted: NDArray[np.bool_]) -> "Blocks":
+        """Average over the pixels that count, in whole blocks if there are any."""
+        weights = block_sums(counted.astype(float), BLOCK)[..., None]
+        full = (weights[..., 0] >= 0.5 * weights.max()) & (weights[..., 0] > 0)
+        means = [
+            (block_sums(np.where(counted[..., None], image, 0.0), BLOCK) / np.maximum(weights, 1))[
+                full
+            ]
+            for image in (picture, other)
+        ]
+        return cls(picture=means[0], other=means[1])
+
+    def departure(self) -> float:
+        """Return the mean ΔE2000 of the blocks."""
+        return float(LEADING(self.picture, self.other).mean()) if self.picture.size else 0.0
+
+
+def find(
+    picture: NoisyImage,
+    other: NoisyImage,
+    counted: NDArray[np.bool_],
+    place: alignment.Place,
+    is_encoded: bool,
+    names: Names,
+) -> Iterator[str]:
+    """Yield the mistakes of a picture in words, each mended before the next one is looked for.
+
+    Images are linear; ``counted`` (H, W) are the pixels that count. ``is_encoded`` says that the
+    file ends at display white, as a PNG does.
+    """
+    truth = other.mean
+    mends: list[Mending] = []
+
+    def mended(image: Array) -> Array:
+        for mend in mends:
+            image = mend(image)
+        return image
+
+    def candidates() -> Iterator[Mistake | None]:
+        reading = _other_reading(picture.mean, truth, counted, names)
+        change = _change_of_colours(picture.mean, truth, counted, names)
+        if reading and not _explains_more(change, reading, picture.mean, truth, counted):
+            yield reading  # where its content is, is not known then
+        else:
+            yield _moved(picture.mean, truth, place, names)
+        yield _change_of_colours(mended(picture.mean), truth, counted, names)
+        if not is_encoded:
+            yield _clipped(mended(picture.mean), truth, counted, names)
+
+    for mistake in candidates():
+        if mistake is None:
+            continue
+        mends.append(mistake.mend)
+        apart = LEADING(mended(picture.mean), truth)
+        noise = np.hypot(picture.noise(mended), other.noise(lambda image: image))
+        without_noise = np.sqrt(np.maximum(apart**2 - noise**2, 0.0))
+        left = 100 * float(np.mean(without_noise[counted] > TOLERANCE))
+        yield f"{mistake.sentence} After that, {left:.2g} % of the pixels differ visibly."
+
+
+def _explains_more(
+    change: Mistake | None,
+    reading: Mistake,
+    picture: Array,
+    other: Array,
+    counted: NDArray[np.bool_],
+) -> bool:
+    """Return whether a change of colours leaves less than a reading, at its best brightness."""
+    if change is None:
+        return False
+    read = reading.mend(picture)
+    read = read / _level(np.array(ratios(read, other, counted)))
+    left = Blocks.of(read, other, counted).departure()
+    return Blocks.of(change.mend(picture), other, counted).departure() < left
+
+
+# --- Readings of the values --------------------------------------------------------------------
+
+CHANNELS = ("red", "green", "blue")
+
+MISREADINGS: dict[str, Mending] = {
+    "values look sRGB-encoded": from_srgb,
+    "values look decoded twice": to_srgb,
+    **{
+        f"channels look like {', '.join(CHANNELS[channel] for channel in order)}": partial(
+            np.take, indices=order, axis=-1
+        )
+        for order in permutations(range(3))
+        if order != (0, 1, 2)
+    },
+}
+"""Mistakes in encoding colours: their symptoms, and their inverses."""
+
+CURES = {
+    "values look sRGB-encoded": ": give `transfer=srgb`, or write linear values",
+    "values look decoded twice": ": give `transfer=linear`",
+}
+
+TURNED: dict[str, Mending] = {
+    "upside down": lambda image: image[::-1],
+    "mirrored left to right": lambda image: image[:, ::-1],
+    "turned by 180 degrees": lambda image: image[::-1, ::-1],
+}
+
+
+def _other_reading(
+    picture: Array, other: Array, counted: NDArray[np.bool_], names: Names
+) -> Mistake | None:
+    """Return the other reading of its values that brings a picture near the other half."""
+    plain = _distance(picture[counted], other[counted])
+    if plain < 1e-3:
+        return None
+    readings = {
+        f"Its {misreading}{CURES.get(misreading, '')}.": undo
+        for misreading, undo in MISREADINGS.items()
+    }
+    readings |= {
+        f"It looks {how}, or lit from the other side.": turn for how, turn in TURNED.items()
+    }
+    distances = {
+        symptom: _distance(undo(picture)[counted], other[counted])
+        for symptom, undo in readings.items()
+    }
+    symptom = min(distances, key=distances.__getitem__)
+    if distances[symptom] > BETTER * plain:
+        return None
+    return Mistake(sentence=f"{names.picture} is misread. {symptom}", mend=readings[symptom])
+
+
+def _distance(image: Array, other: Array) -> float:
+    """Return the relative RMS difference after the best factor on an image."""
+    # Clipped, or highlights would decide: at the same share of the pixels, which no curve changes.
+    image = np.minimum(image, np.percentile(image, HIGHLIGHTS))
+    other = np.minimum(other, np.percentile(other, HIGHLIGHTS))
+    factor = np.sum(image * other) / max(np.sum(image * image), 1e-30)
+    return float(np.sqrt(np.mean((factor * image - other) ** 2) / np.mean(other**2 + 1e-12)))
+
+
+# --- Position ----------------------------------------------------------------------------------
+
+
+def _moved(picture: Array, other: Array, place: alignment.Place, names: Names) -> Mistake | None:
+    """Return a shift or another size of the content; None if it is in its place."""
+    zoom = _zoom(picture, other)
+    if zoom is not None:
+        return Mistake(
+            sentence=(
+                f"{names.picture}'s content is {zoom:.3g} times as large as in {names.other}. Check"
+                " the field of view and the crop first."
+            ),
+            mend=lambda image: _zoomed(image, 1 / zoom),
+        )
+    shift = place.shift
+    if shift is not None and max(map(abs, shift)) >= SHIFT:
+        right, down = (round(amount / SHIFT) * SHIFT for amount in shift)
+        across = _in_pixels(right, "to the right", "to the left")
+        along = _in_pixels(down, "down", "up")
+        amount = " and ".join(filter(None, (across, along)))
+        return Mistake(
+            sentence=(
+                f"{names.picture}'s edges are shifted by {amount}, which looks like wrong shading."
+                " Check the camera, the crop and the pixel centres first."
+            ),
+            mend=lambda image: _shifted(image, right=-right, down=-down),
+        )
+    return None
+
+
+def _in_pixels(shift: float, ahead: str, back: str) -> str:
+    """Return a shift in words; none if it is 0."""
+    if not shift:
+        return ""
+    size = abs(shift)
+    return f"{size:g} pixel{'' if size == 1 else 's'} {ahead if shift > 0 else back}"
+
+
+def _shifted(picture: Array, right: float, down: float) -> Array:
+    """Return a picture whose content is moved; its edges repeat beyond them."""
+    from scipy import ndimage  # loaded late: few pictures are shifted
+
+    moved: Array = ndimage.shift(picture, (down, right, 0), order=1, mode="nearest")
+    return moved
+
+
+def _zoom(picture: Array, other: Array) -> float | None:
+    """Return how much larger a picture's content is; None if no other size agrees far better."""
+    height, width = picture.shape[:2]
+    scale = min(1.0, SMALL / max(height, width))
+    size = (max(1, round(scale * width)), max(1, round(scale * height)))
+    expected = alignment.picture_edges(_resized(other, size))
+    agreement = [
+        _best_correlation(
+            alignment.picture_edges(_resized(_zoomed(picture, 1 / zoom), size)), expected
+        )
+        for zoom in ZOOMS
+    ]
+    best = int(np.argmax(agreement))
+    unchanged = agreement[len(ZOOMS) // 2]
+    is_other = best not in (0, len(ZOOMS) - 1) and abs(ZOOMS[best] - 1) > OTHER_SIZE
+    if not is_other or agreement[best] < unchanged + ZOOMED:
+        return None
+    return float(ZOOMS[best])
+
+
+def _best_correlation(seen: Array, expected: Array) -> float:
+    """Return the highest correlation of two maps (H, W) over all cyclic shifts."""
+    a = seen - seen.mean()
+    b = expected - expected.mean()
+    size = np.sqrt((a * a).sum() * (b * b).sum())
+    if not size:
+        return 0.0
+    products = np.fft.irfft2(np.fft.rfft2(a) * np.conj(np.fft.rfft2(b)), a.shape)
+    return float(products.max() / size)
+
+
+def _resized(picture: Array, size: tuple[int, int]) -> Array:
+    planes = [Image.fromarray(picture[..., c].astype(np.float32)) for c in range(3)]
+    small = [plane.resize(size, Image.Resampling.BOX) for plane in planes]
+    return np.stack([np.asarray(plane, float) for plane in small], axis=-1)
+
+
+def _zoomed(picture: Array, zoom: float) -> Array:
+    """Return a picture whose content is larger by a factor, about its centre."""
+    height, width = picture.shape[:2]
+    half_width = width / (2 * zoom)
+    half_height = height / (2 * zoom)
+    box = (
+        width / 2 - half_width,
+        height / 2 - half_height,
+        width / 2 + half_width,
+        height / 2 + half_height,
+    )
+    planes = []
+    for c in range(3):
+        plane = Image.fromarray(picture[..., c].astype(np.float32))
+        affine = (1 / zoom, 0, box[0], 0, 1 / zoom, box[1])
+        planes.append(
+            plane.transform(
+                (width, height), Image.Transform.AFFINE, affine, Image.Resampling.BILINEAR
+            )
+        )
+    return np.stack([np.asarray(plane, float) for plane in planes], axis=-1)
+
+
+# --- Colours -----------------------------------------------------------------------------------
+
+
+def ratios(picture: Array, other: Array, counted: NDArray[np.bool_]) -> tuple[float, float, float]:
+    """Return how many times as strong a picture's red, green and blue are as the other half's.
+
+    They are medians over blocks that are lit in both, and not clipped.
+    """
+    blocks = Blocks.of(picture, other, counted)
+    lit = _lit(blocks)
+    # Colours outside BT.709 have negative values.
+    shown = np.maximum(blocks.picture[lit], 0.0)
+    truth = np.maximum(blocks.other[lit], 0.0)
+    if not truth.any():
+        return 1.0, 1.0, 1.0
+    least = 1e-3 * float(np.median(truth.max(axis=1)))
+    red, green, blue = np.median((shown + least) / (truth + least), axis=0)
+    return float(red), float(green), float(blue)
+
+
+def _lit(blocks: Blocks) -> NDArray[np.bool_]:
+    """Return the blocks that tell a ratio."""
+    lit: NDArray[np.bool_] = np.ones(len(blocks.picture), bool)
+    for colours in (blocks.picture, blocks.other):
+        light = colours.mean(axis=1)
+        # The median, since a lamp would raise the mean.
+        lit &= light > LIT * np.median(light[light > 0]) if (light > 0).any() else False
+    if blocks.picture.size and blocks.picture.max() <= 1.0:
+        free = lit & (blocks.picture.max(axis=1) < CLIPPED)
+        lit = free if free.any() else lit
+    return lit
+
+
+def factor_of_pi(level: float) -> str:
+    """Name the factor of pi that a level is close to; empty if none."""
+    if abs(level / pi - 1) < NEAR_PI:
+        return "a missing division by pi"
+    return "a division by pi too many" if abs(level * pi - 1) < NEAR_PI else ""
+
+
+def _change_of_colours(
+    picture: Array, other: Array, counted: NDArray[np.bool_], names: Names
+) -> Mistake | None:
+    """Return the simplest change of colours that explains a picture; None if none does."""
+    blocks = Blocks.of(picture, other, counted)
+    before = blocks.departure()
+    if before < NOTICED:
+        return None
+    ratio = np.array(ratios(picture, other, counted))
+    changes = _changes(blocks, ratio, names)
+    left = {
+        kind: Blocks.of(change.mend(picture), other, counted).departure()
+        for kind, change in changes.items()
+    }
+    allowed = SIMPLER * min(left.values()) + SLIGHT * before
+    # The first of them is the simplest.
+    chosen = next(kind for kind, departure in left.items() if departure <= allowed)
+    if left[chosen] <= EXPLAINED * before:
+        return changes[chosen]
+    # A large factor, or a white that is the same everywhere, is named though more is wrong.
+    level = _level(ratio)
+    if factor_of_pi(level) or not 1 / LEVEL < level < LEVEL:
+        return changes["level"]
+    return changes.get("white") if _is_even_tint(blocks) else None
+
+
+def _level(ratio: Array) -> float:
+    """Return the factor of brightness among the factors of the channels."""
+    return float(np.exp(np.log(ratio).mean()))
+
+
+def _changes(blocks: Blocks, ratio: Array, names: Names) -> dict[str, Mistake]:
+    """Return changes of colours by their kind, the simplest first."""
+    level = _level(ratio)
+    reason = factor_of_pi(level) or "another exposure"
+    changes = {
+        "level": Mistake(
+            sentence=f"{names.picture} is {level:.3g} times as bright as {names.other}: {reason}?",
+            mend=lambda image: image / level,
+        )
+    }
+    tint = ratio / level
+    if np.ptp(np.log(tint)) > TINT:
+        relative = ", ".join(f"{value:.3g}" for value in tint)
+        brighter = "" if abs(level - 1) < TINT else f", and it is {level:.3g} times as bright"
+        changes["white"] = Mistake(
+            sentence=(
+                f"{names.picture}'s red, green and blue are relatively {relative} times as"
+                f" strong{brighter}: another white?"
+            ),
+            mend=lambda image: image / ratio,
+        )
+    offset = float(np.median((blocks.picture - blocks.other).mean(axis=1)))
+    side = "high" if offset > 0 else "low"
+    changes["offset"] = Mistake(
+        sentence=f"{names.picture}'s values are all {abs(offset):.3g} too {side}.",
+        mend=lambda image: np.maximum(image - offset, 0.0),
+    )
+    if power := _power(blocks, names):
+        changes["power"] = power
+    return changes
+
+
+def _power(blocks: Blocks, names: Names) -> Mistake | None:
+    """Return the power and factor that lead from the other half to a picture, by least squares."""
+    lit = _lit(blocks)
+    shown = np.log(np.maximum(blocks.picture[lit], 1e-9)).mean(axis=1)
+    truth = np.log(np.maximum(blocks.other[lit], 1e-9)).mean(axis=1)
+    if len(shown) < FEWEST or np.ptp(truth) < CONTRAST:
+        return None
+    slope, start = np.polyfit(truth, shown, 1)
+    power = float(slope)
+    scale = float(np.exp(start))
+    if not LEAST_POWER < power < 1 / LEAST_POWER:
+        return None
+    factor = "" if abs(scale - 1) < TINT else f" and multiplied by {scale:.3g}"
+    gamma = max(power, 1 / power)
+    return Mistake(
+        sentence=(
+            f"{names.picture}'s values look raised to the power {power:.3g}{factor}: a gamma of"
+            f" {gamma:.3g}?"
+        ),
+        mend=lambda image: (np.maximum(image, 0.0) / scale) ** (1 / power),
+    )
+
+
+def _is_even_tint(blocks: Blocks) -> bool:
+    """Return whether a tint is the same everywhere; wrong shading varies over the picture."""
+    least = 1e-3 * max(float(blocks.other.mean()), 1e-9)
+    logs = np.log(np.maximum(blocks.picture, least) / np.maximum(blocks.other, least))
+    # Without the level of each block, the balance of its channels is left.
+    logs -= logs.mean(axis=1, keepdims=True)
+    tint = np.median(logs, axis=0)
+    spread = np.median(np.abs(logs - tint), axis=0).max()
+    return bool(np.ptp(tint) > TINT and spread < EVEN * np.abs(tint).max())
+
+
+def _clipped(
+    picture: Array, other: Array, counted: NDArray[np.bool_], names: Names
+) -> Mistake | None:
+    """Return where a picture ends at one value, and the other half does not."""
+    largest = float(picture[counted].max(initial=0.0))
+    at_end = (picture >= (1 - 1e-4) * largest).any(axis=-1) & counted
+    brighter = at_end & (other.max(axis=-1) > (1 + TINT) * largest)
+    share = brighter.sum() / max(counted.sum(), 1)
+    if share < PLATEAU or brighter.sum() < 0.5 * at_end.sum():
+        return None
+    beyond = other.max(axis=-1)[brighter]
+    if beyond.std() < TINT * beyond.mean():  # a lamp, say: it is one value in both
+        return None
+    return Mistake(
+        sentence=(
+            f"{names.picture}'s values end at {largest:.3g}, where {names.other} is brighter in"
+            f" {100 * share:.2g} % of the pixels: clipped?"
+        ),
+        mend=lambda image: np.where(brighter[..., None], other, image),
+    )

@@ -1,0 +1,72 @@
+"""Comparing two pictures without a scene: neither has a plan, a price, effects or terms."""
+
+from time import perf_counter
+
+import numpy as np
+
+from fotismos.comparisons import pictures
+from fotismos.comparisons.comparison import Comparison, ComparisonRecord, TimeSpent, versions
+from fotismos.comparisons.estimates import PassSums, measure
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.errors import InputError
+
+FEWEST = 2
+"""Passes of two single pictures, which are equal."""
+
+BLACK = 1e-5
+"""Display-linear: a picture with no brighter pixel is black, and no difference is seen in it."""
+
+
+def compare_pictures(options: Options, name: str, command: str = "") -> Comparison:
+    """Compare the pictures that options name: ``image`` with ``reference``.
+
+    Both may be repeats, whose spread gives their noise. ``name`` is that of the comparison, and
+    ``command`` repeats it. Raises `InputError` if a picture cannot be read, if they differ in size,
+    or if both are black.
+    """
+    stages: dict[str, float] = {}
+    begin = perf_counter()
+    given = pictures.read_all(options)
+    if given.image is None or given.reference is None:
+        raise InputError("two pictures are needed: give `image` and `reference`.")
+    stages["reading"] = perf_counter() - begin
+
+    begin = perf_counter()
+    counted = given.where()
+    passes = given.passes or FEWEST
+    first = pictures.PictureHalf(given.image, passes)
+    second = pictures.PictureHalf(given.reference, passes)
+    sums = PassSums(counted)
+    for number in range(passes):
+        sums.add(first.render(number), second.render(number))
+    estimates = sums.estimates()
+    numbers, images = measure(estimates, counted, options, is_random=given.passes is not None)
+    stages["metrics"] = perf_counter() - begin
+
+    record = ComparisonRecord(
+        scene=name,
+        heuristic=options.first_half,
+        seed=options.seed,
+        resolution=given.image.size,
+        time=TimeSpent(heuristic=first.pass_times(), reference=second.pass_times(), stages=stages),
+        versions=versions(),
+        command=command,
+        caution=_caution(images.heuristic[counted], images.reference[counted], options),
+        **numbers,
+    )
+    return pictures.with_records(Comparison(record=record, images=images), given)
+
+
+def _caution(image: np.ndarray, reference: np.ndarray, options: Options) -> str:
+    """Return what makes the difference of two pictures (N, 3) meaningless; often empty."""
+    black = [bool(np.abs(values).max() < BLACK) for values in (image, reference)]
+    if all(black) and not options.allow_empty:
+        raise InputError(
+            f"both pictures are black: no pixel that counts is brighter than {BLACK} of display"
+            " white. Check the files, or allow it with `allow_empty`."
+        )
+    if any(black):
+        return f"The {'picture' if black[0] else 'reference'} is black."
+    if all(np.ptp(values, axis=0).max() == 0 for values in (image, reference)):
+        return "Each picture is one colour, so nothing shows whether they belong together."
+    return ""

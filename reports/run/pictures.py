@@ -1,0 +1,38 @@
+"""Two pictures of a command: compared and written."""
+
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from fotismos.comparisons.case import picture_parts
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.two_pictures import compare_pictures
+from fotismos.reports.files import results
+from fotismos.reports.jobs import Job
+from fotismos.reports.page.scene_view import SceneView
+from fotismos.reports.run import scene_files
+from fotismos.reports.run.batch import Subjects
+
+
+def subjects(options: Options) -> Subjects:
+    """Return what a command compares: two pictures, named after the first one."""
+    path, _ = picture_parts(options.image[0])
+    return Subjects(words=(path.stem,), files=((path.stem, path),), compare=compare)
+
+
+def compare(
+    word: str, folder: Path, target: str, job: Job, progress: Any
+) -> tuple[SceneView, dict[str, float]]:
+    """Compare the pictures of a job, and write their files to ``folder/target``."""
+    begin = perf_counter()
+    comparison = compare_pictures(
+        job.options, name=word, command=job.options.command("compare", "")
+    )
+    seconds = {"pictures": perf_counter() - begin}
+    begin = perf_counter()
+    if job.figures:
+        from fotismos.reports.charts import figures  # loaded late: few pages have any
+
+        figures.write_scene(folder / results.FIGURES, target, comparison)
+    view = scene_files.write(folder, target, comparison)
+    return view, seconds | {"files": perf_counter() - begin}
