@@ -50,9 +50,11 @@ SLIGHT = 0.03
 """Share of the departure in which two changes do not differ."""
 
 FEWEST = 8
+SLOPES = 400
 CONTRAST = 0.5
 LEAST_POWER = 0.1
-"""Blocks, and their range in powers of e, from which a power follows; and the smallest power."""
+"""Blocks from which a power follows, at least and at most; their range in powers of e, and the
+smallest power."""
 
 NOTICED = 0.3
 """ΔE2000 of the blocks, below which nothing needs a reason."""
@@ -174,8 +176,8 @@ def find(
         else:
             yield _moved(picture.mean, truth, place, names)
         yield _change_of_colours(mended(picture.mean), truth, counted, names)
-        if not is_encoded:
-            yield _clipped(mended(picture.mean), truth, counted, names)
+        if not is_encoded and not mends:
+            yield _clipped(picture.mean, truth, counted, names)
 
     for mistake in candidates():
         if mistake is None:
@@ -195,13 +197,16 @@ def _explains_more(
     other: Array,
     counted: NDArray[np.bool_],
 ) -> bool:
-    """Return whether a change of colours leaves less than a reading, at its best brightness."""
+    """Return whether a change of colours leaves far less than a reading does, at its best level."""
     if change is None:
         return False
     read = reading.mend(picture)
-    read = read / _level(np.array(ratios(read, other, counted)))
-    left = Blocks.of(read, other, counted).departure()
-    return Blocks.of(change.mend(picture), other, counted).departure() < left
+    blocks = Blocks.of(read, other, counted)
+    # The medians of the light: dark blocks are the most distorted by a wrong reading.
+    light = max(float(np.median(blocks.picture.mean(axis=1))), 1e-9)
+    factor = float(np.median(blocks.other.mean(axis=1))) / light
+    left = Blocks.of(read * factor, other, counted).departure()
+    return Blocks.of(change.mend(picture), other, counted).departure() < BETTER * left
 
 
 # --- Readings of the values --------------------------------------------------------------------
@@ -317,13 +322,13 @@ def _zoom(picture: Array, other: Array) -> float | None:
     height, width = picture.shape[:2]
     scale = min(1.0, SMALL / max(height, width))
     size = (max(1, round(scale * width)), max(1, round(scale * height)))
-    expected = alignment.picture_edges(_resized(other, size))
-    agreement = [
-        _best_correlation(
-            alignment.picture_edges(_resized(_zoomed(picture, 1 / zoom), size)), expected
-        )
-        for zoom in ZOOMS
-    ]
+    agreement = []
+    for zoom in ZOOMS:
+        # The smaller one is enlarged, since nothing is known beyond its edges.
+        shown = picture if zoom > 1 else _zoomed(picture, 1 / zoom)
+        expected = _zoomed(other, zoom) if zoom > 1 else other
+        edges = [alignment.picture_edges(_resized(image, size)) for image in (shown, expected)]
+        agreement.append(_best_correlation(edges[0], edges[1]))
     best = int(np.argmax(agreement))
     unchanged = agreement[len(ZOOMS) // 2]
     is_other = best not in (0, len(ZOOMS) - 1) and abs(ZOOMS[best] - 1) > OTHER_SIZE
@@ -476,15 +481,19 @@ def _changes(blocks: Blocks, ratio: Array, names: Names) -> dict[str, Mistake]:
 
 
 def _power(blocks: Blocks, names: Names) -> Mistake | None:
-    """Return the power and factor that lead from the other half to a picture, by least squares."""
+    """Return the power and the factor that lead from the other half to a picture."""
     lit = _lit(blocks)
     shown = np.log(np.maximum(blocks.picture[lit], 1e-9)).mean(axis=1)
     truth = np.log(np.maximum(blocks.other[lit], 1e-9)).mean(axis=1)
     if len(shown) < FEWEST or np.ptp(truth) < CONTRAST:
         return None
-    slope, start = np.polyfit(truth, shown, 1)
-    power = float(slope)
-    scale = float(np.exp(start))
+    # Theil and Sen: the median of the slopes of pairs, to which blocks with edges do not matter.
+    some = np.random.default_rng(0).permutation(len(shown))[:SLOPES]
+    run = np.subtract.outer(truth[some], truth[some])
+    rise = np.subtract.outer(shown[some], shown[some])
+    far = run > CONTRAST / 2
+    power = float(np.median(rise[far] / run[far]))
+    scale = float(np.exp(np.median(shown - power * truth)))
     if not LEAST_POWER < power < 1 / LEAST_POWER:
         return None
     factor = "" if abs(scale - 1) < TINT else f" and multiplied by {scale:.3g}"

@@ -254,7 +254,9 @@ ODD = {
     "exposure": (lambda image: image * 5, "times as bright as the reference: another exposure"),
     "white": (lambda image: image * [1, 0.9, 0.8], "another white"),
     "gamma": (to_srgb, "sRGB-encoded: give `transfer=srgb`"),
-    "gamma twice": (lambda image: image.clip(0) ** 2.2, "decoded twice"),
+    "gamma twice": (lambda image: from_srgb(image.clip(0, 1)), "decoded twice"),
+    "power": (lambda image: image.clip(0) ** 1.7, r"raised to the power 1\.[67]\d?"),
+    "offset": (lambda image: image + 0.04, r"values are all 0\.0[34]\d* too high"),
     "red and blue": (lambda image: image[..., ::-1], "channels look like blue, green, red"),
     "channels turned": (lambda image: np.roll(image, 1, 2), "channels look like green, blue, red"),
     "one pixel": (lambda image: np.roll(image, 1, 1), r"shifted by 1 pixels? to the right, which"),
@@ -264,7 +266,7 @@ ODD = {
 }
 
 
-@pytest.mark.guarantee("runs", "Each of twelve mistakes in how a picture was made is named.")
+@pytest.mark.guarantee("runs", "Each of fourteen mistakes in how a picture was made is named.")
 def test_mistakes_in_a_picture_are_named(rgb, tmp_path, cornell):
     """And nothing of the reference of another seed, or the kernel, whose shading alone is wrong."""
     for name, (spoil, message) in ODD.items():
