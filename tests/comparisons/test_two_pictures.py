@@ -1,0 +1,222 @@
+"""Two pictures without a scene, and a picture in place of a scene's reference."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import fotismos
+from fotismos.comparisons import pictures
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.picture_files import as_files, read_file
+from fotismos.comparisons.two_pictures import compare_pictures
+from fotismos.heuristic.errors import InputError
+
+SIDE = 64
+
+
+def landscape(seed=0, side=SIDE):
+    """Return a picture of soft patches and hard boxes, (side, side, 3)."""
+    random = np.random.default_rng(seed)
+    y, x = np.mgrid[0:side, 0:side] / side
+    image = np.stack([0.3 + 0.2 * np.sin(k * x + y) for k in (3, 4, 5)], axis=-1)
+    for _ in range(6):
+        left, top = random.integers(0, side - 20, 2)
+        image[top : top + 16, left : left + 16] = random.uniform(0.05, 0.9, 3)
+    return image
+
+
+def noisy(image, count, seed=1, size=0.1):
+    random = np.random.default_rng(seed)
+    factors = (1 + size * random.normal(size=image.shape) for _ in range(count))
+    return [image * factor.clip(0) for factor in factors]
+
+
+def record_of(image, reference, **options):
+    """Return the record of two lists of arrays."""
+    given = {"image": image, "reference": reference}
+    arrays = {f"{half} {i}.npy": array for half in given for i, array in enumerate(given[half])}
+    words = {half: tuple(name for name in arrays if name.startswith(half)) for half in given}
+    with as_files(arrays):
+        return compare_pictures(Options(**words, **options), "x").record
+
+
+@pytest.mark.guarantee("runs", "Two pictures without a scene have no plan, price, effects, terms.")
+def test_two_files_are_compared_without_a_scene(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    image = landscape()
+    np.save("theirs.npy", image)
+    np.save("mine.npy", 1.5 * image)
+    code, said, _ = run("compare", "-r", "theirs.npy", "-t", "mine.npy", "--figures")
+    assert code == 0
+    assert "The picture is 1.5 times as bright as the reference" in said
+    assert "After that, 0 % of the pixels differ visibly." in said
+    record = json.loads((tmp_path / "out/mine/comparison.json").read_text())
+    assert record["scene"] == "mine"
+    absent = ("plan", "pairing", "price", "why", "variant", "integrator_given")
+    assert [record[name] for name in absent] == [None] * len(absent)
+    assert record["objects"] == record["materials"] == []
+    assert record["picture"]["files"] == ["mine.npy"]
+    assert len(record["picture"]["digests"][0]) == 64
+    page = (tmp_path / "out/index.html").read_text()
+    assert "<h3>Plan</h3>" not in page
+    assert "Pairing:" not in page
+    # The command of the record does the same again.
+    words = record["command"].split(" compare ")[1].split()
+    assert run("compare", *words, "-o", "again")[0] == 0
+    again = json.loads((tmp_path / "again/mine/comparison.json").read_text())
+    assert again["metrics"] == record["metrics"]
+
+
+def test_two_pictures_are_a_gate(run, tmp_path, monkeypatch):
+    """A tenth of the pixels changed fails at 5 %, and passes at 20 %."""
+    monkeypatch.chdir(tmp_path)
+    image = landscape()
+    changed = image.copy()
+    changed[:6] *= 3
+    np.save("a.npy", image)
+    np.save("b.npy", changed)
+    words = ("compare", "--reference", "a.npy", "--image", "b.npy", "--max-visible")
+    assert run(*words, 5)[0] == 1
+    assert run(*words, "20%")[0] == 0
+    assert run(*words, 0, "--within", 10)[0] == 1
+    np.save("b.npy", image)
+    code, said, _ = run(*words, 0)
+    assert code == 0
+    assert "a.npy are the same file, byte for byte" in said
+
+
+@pytest.mark.parametrize(("first", "second"), [(8, 8), (8, 6), (3, 2), (5, 1), (1, 4)])
+def test_repeats_of_any_number_give_the_noise(first, second):
+    """The floor is that of the noise of both means; all repeats count in the mean."""
+    image = landscape()
+    record = record_of(noisy(image, first, 1), noisy(image, second, 2))
+    error = 0.1 * np.sqrt((1 / first if first > 1 else 0) + (1 / second if second > 1 else 0))
+    floors = [
+        float(LEADING(image * (1 + error * draw), image).mean())
+        for draw in np.random.default_rng(5).normal(size=(8, *image.shape))
+    ]
+    found = record.metrics["dE2000"].noise_floor
+    assert found == pytest.approx(np.mean(floors), rel=0.25)
+    assert record.picture.repeats == first
+    assert any("one file" in words for words in record.warnings) == (1 in (first, second))
+
+
+def test_every_repeat_counts_in_the_mean():
+    images = [np.full((16, 16, 3), value) for value in (0.1, 0.2, 0.6)]
+    with as_files({f"{i}.npy": image for i, image in enumerate(images)}):
+        files = tuple(read_file(f"{i}.npy") for i in range(3))
+    given = pictures.Pictures(names=("a", "b", "c"), files=files)
+    for count in (2, 3):
+        half = pictures.PictureHalf(given, count)
+        passes = [half.render(number)[0, 0, 0] for number in range(count)]
+        parts = [images[number::count] for number in range(count)]
+        assert passes == pytest.approx([np.mean([i[0, 0, 0] for i in part]) for part in parts])
+
+
+def test_single_pictures_tell_a_difference_from_noise():
+    """A change that is alike over a tile is certain; noise of each pixel is not, however large."""
+    image = landscape()
+    apart = record_of([1.3 * image], [image])
+    assert apart.significant.certain
+    for seed in range(20):
+        first, second = noisy(image, 2, seed, 0.3)
+        record = record_of([first], [second])
+        assert record.metrics["dE2000"].mean > 3
+        assert not record.significant.certain
+    assert any("noise is unknown" in words for words in record.warnings)
+
+
+def test_a_mask_and_alpha_say_which_pixels_count(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    image = landscape()
+    changed = image.copy()
+    changed[:, :32] *= 3
+    mask = np.zeros((SIDE, SIDE), np.uint8)
+    mask[:, 32:] = 255
+    Image.fromarray(mask).save("mask.png")
+    np.save("a.npy", image)
+    np.save("b.npy", changed)
+    np.save("alpha.npy", np.concatenate([changed, mask[..., None] / 255.0], axis=-1))
+    words = ("compare", "-r", "a.npy", "--max-visible", 0)
+    assert run(*words, "-t", "b.npy")[0] == 1
+    assert run(*words, "-t", "b.npy", "--mask", "mask.png", "-o", "masked")[0] == 0
+    assert run(*words, "-t", "alpha.npy", "-o", "alpha")[0] == 0
+    record = json.loads((tmp_path / "masked/b/comparison.json").read_text())
+    assert record["pixels"] == {"counted": SIDE * SIDE // 2, "total": SIDE * SIDE}
+    assert run(*words, "-t", "alpha.npy", "--over", "black", "-o", "over")[0] == 1
+
+
+GREY = np.full((8, 8, 3), 0.5)
+BAD = (
+    ({"image": [GREY], "reference": [np.full((8, 16, 3), 0.5)]}, {}, "8x8, 16x8: 2 times as wide"),
+    ({"image": [0 * GREY], "reference": [0 * GREY]}, {}, "both pictures are black"),
+    ({"image": [GREY], "reference": []}, {}, "two pictures are needed"),
+    ({"image": [GREY], "reference": [GREY]}, {"mask": "none.png"}, "none.png: there is no such"),
+)
+
+
+@pytest.mark.parametrize(("given", "options", "message"), BAD)
+def test_what_cannot_be_compared_is_refused(given, options, message):
+    with pytest.raises(InputError, match=message):
+        record_of(**given, **options)
+
+
+def test_doubtful_pictures_are_cautioned():
+    assert "The picture is black" in record_of([0 * GREY], [GREY]).caution
+    assert "one colour" in record_of([GREY], [0.3 * GREY]).caution
+
+
+def test_commands_without_a_scene_or_pictures_say_what_is_missing(run):
+    for words in (("compare",), ("compare", "-t", "a.npy"), ("compare", "-r", "a.npy")):
+        code, _, error = run(*words)
+        assert code == 2
+        assert "give a scene, or two pictures, --reference and --image" in " ".join(error.split())
+
+
+# --- A picture in place of the reference ---------------------------------------------------------
+
+
+@pytest.mark.guarantee("runs", "A picture may replace the reference of a scene.")
+def test_a_picture_replaces_the_reference_of_a_scene(run, tmp_path, monkeypatch):
+    """The reference of an earlier run, given as a picture, is as far as it was there."""
+    monkeypatch.chdir(tmp_path)
+    words = ("compare", "plastic-spheres", "--spp", 16, "--resolution", "64x48")
+    assert run(*words, "--no-why", "-o", "own")[0] == 0
+    own = json.loads((tmp_path / "own/plastic-spheres/comparison.json").read_text())
+    file = "own/plastic-spheres/comparison.exr:reference"
+    code, said, _ = run(*words, "--reference", file)
+    assert code == 0
+    assert "Textbook shading differs visibly from the reference in" in said
+    record = json.loads((tmp_path / "out/plastic-spheres/comparison.json").read_text())
+    found, expected = (each["metrics"]["dE2000"]["mean"] for each in (record, own))
+    assert found == pytest.approx(expected, rel=1e-3)
+    assert record["plan"] is record["price"] is record["picture"] is None
+    assert record["objects"] == own["objects"] != []
+    assert record["reference_picture"]["files"] == [file]
+    assert max(map(abs, record["agreement"]["shift"])) < 0.3
+
+
+def test_a_picture_that_equals_the_textbook_half_is_said_to(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ("compare", "fig-8-9", "--spp", 16, "--resolution", "64x64", "--no-why")
+    assert run(*words, "-o", "own")[0] == 0
+    file = "own/fig-8-9/comparison.exr:heuristic"
+    said = run(*words, "--image", file)[1]
+    assert "The picture equals the textbook half to ΔE2000 0.01, away from edges." in said
+    brighter = 1.05 * pictures.read(file)
+    np.save("brighter.npy", brighter)
+    assert "equals the textbook" not in run(*words, "--image", "brighter.npy")[1]
+
+
+def test_a_notebook_compares_arrays():
+    image = landscape()
+    shown = fotismos.compare(image=1.5 * image, reference=noisy(image, 4, size=0.02))
+    record = shown.comparison.record
+    assert record.picture.files == ("image 1.npy",)
+    assert record.reference_picture.repeats == 4
+    assert "1.5 times as bright" in repr(shown)
+    with pytest.raises(InputError, match="a scene of type NoneType"):
+        fotismos.compare(image=image)
