@@ -26,10 +26,10 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fotismos.comparisons.case import PICTURES, picture_parts
 from fotismos.comparisons.departure.colour import BT709, CHROMATICITIES, Array, from_srgb
+from fotismos.comparisons.names import PICTURES, picture_parts
 from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
-from fotismos.reference.rendering.renderer import LARGEST_VALUE
+from fotismos.reference.rendering.finite import LARGEST_VALUE
 
 SAME_PRIMARIES = 2e-3
 """Largest difference of chromaticities that are the same: some files round them."""

@@ -28,8 +28,9 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
+from fotismos.reference.records import Times
 from fotismos.reference.rendering.gbuffer import gbuffer
-from fotismos.reference.rendering.renderer import Renderer, Times
+from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.scene.source import Source
 
 

@@ -7,7 +7,6 @@ from typing import Literal
 import numpy as np
 
 from fotismos.comparisons import pictures
-from fotismos.comparisons.case import picture_parts
 from fotismos.comparisons.check.measurement import LINEAR_ROUNDING, laid_out
 from fotismos.comparisons.check.pictures import (
     SIDE,
@@ -17,6 +16,7 @@ from fotismos.comparisons.check.pictures import (
     colour,
     means,
 )
+from fotismos.comparisons.names import picture_parts
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError
 from fotismos.reference import records

@@ -12,21 +12,19 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from fotismos.comparisons.case import is_script, name_of, picture_parts
 from fotismos.comparisons.comparison import machine, versions
 from fotismos.comparisons.departure.criterion import checked_threshold
+from fotismos.comparisons.names import is_script, name_of, picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import FotismosError, InputError, InstallationError, OutputError
 from fotismos.reference.records import to_json
-from fotismos.reference.scene.source import placeholders
 from fotismos.reports import verdict
 from fotismos.reports.files import results
 from fotismos.reports.files.results import FIGURES, START, TABLES, Failure, RunRecord
 from fotismos.reports.jobs import Job, command_line
 from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView
-from fotismos.reports.run import scene
 from fotismos.reports.terminal import progress, tables
 from fotismos.reports.terminal.progress import Bar
 from fotismos.reports.terminal.words import as_typed, remark, tell, tell_where
@@ -185,6 +183,8 @@ def _options_for(whole: Options, scenes: Sequence[str]) -> list[Options]:
     """Return the options for each scene: with values only for the placeholders that it has."""
     if len(scenes) == 1 or not whole.define:
         return [whole] * len(scenes)
+    from fotismos.reference.scene.source import placeholders  # loaded late: it loads Mitsuba
+
     known = (placeholders(Path(scene)) for scene in scenes)
     by_scene = [
         {key: value for key, value in whole.define.items() if key in names} for names in known
@@ -206,6 +206,8 @@ def _compare(
     stages: tuple[str, ...],
 ) -> None:
     """Collect the views and errors of scenes, and the hard cases."""
+    from fotismos.reports.run import scene  # loaded late: it loads Mitsuba
+
     tasks = [
         Task(
             name=target,

@@ -10,7 +10,7 @@ import msgspec
 from msgspec import structs
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.case import Case, open_case, picture_parts
+from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.compare import compare as compare_scene
 from fotismos.comparisons.comparison import (
     CAUSES,
@@ -20,6 +20,7 @@ from fotismos.comparisons.comparison import (
     versions,
 )
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, drawn
+from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.processes.pool import Turn
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic import program

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fotismos.comparisons.case import picture_parts
+from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.errors import FotismosError
 from fotismos.reports.jobs import Job, open_page
