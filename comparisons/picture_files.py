@@ -280,8 +280,8 @@ MODES = ("L", "LA", "RGB", "RGBA", "I;16")
 def _bitmap(path: Path, suffix: str) -> Layer:
     """Read a file by Pillow, or by Mitsuba, which also reads HDR, PFM and 16 bits of colours."""
     kind = suffix.removeprefix(".").upper()
-    with path.open("rb") as file:
-        header = file.read(PNG_HEADER)
+    with path.open("rb") as stream:
+        header = stream.read(PNG_HEADER)
     is_deep = suffix == ".png" and header[24:25] == b"\x10" and header[25:26] != b"\0"
     is_for_mitsuba = is_deep or suffix in (".hdr", ".pfm")
     try:
