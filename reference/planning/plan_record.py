@@ -147,15 +147,14 @@ class Plan(Record):
 
     def omissions(self) -> tuple[str, ...]:
         """Return what the plan leaves out by proof, as nouns."""
-        # Loaded late, like the names of coefficients below: to read a plan needs no Mitsuba.
-        from fotismos.reference.planning.rules import RULES
+        from fotismos.reference.planning.rules import RULES  # loaded late: it loads Mitsuba
 
         applied = {result.name for result in self.rules if result.applies}
         return tuple(rule.omits for rule in RULES if rule.name in applied)
 
     def unpruned(self, rule: str = "asked", evidence: str = "pruning is off") -> "Plan":
         """Return the plan that prunes nothing, Mitsuba's default, and the reason for it."""
-        from fotismos.heuristic.materials import COEFFICIENTS
+        from fotismos.heuristic.materials import COEFFICIENTS  # loaded late: it loads Dr.Jit
 
         return Plan(
             effects=tuple(effect.decision(True, rule, evidence) for effect in EFFECTS),
