@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from drjit.llvm import Float64
 
 from fotismos.comparisons.departure import arrays
 from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, cam16ucs_unclipped, itp, lab
@@ -70,6 +71,32 @@ def test_spaces_are_the_same_by_either(both, space):
         compiled, plain = both(space, image, DEFAULT_VIEWING)
         assert compiled.shape == plain.shape == image.shape
         np.testing.assert_allclose(plain, compiled, rtol=1e-9, atol=1e-9)
+
+
+def test_each_function_is_the_same_for_either_kind_of_array():
+    values = np.array([-3.0, -0.5, -0.0, 0.0, 0.25, 1.0, 7.0])
+    others = values[::-1] + 0.1
+    sizes = np.abs(values)
+    for function, *arguments in (
+        (arrays.absolute, values),
+        (arrays.arctan2, values, others),
+        (arrays.cbrt, sizes),
+        (arrays.clip, values, 0.0, 1.0),
+        (arrays.cos, values),
+        (arrays.exp, values),
+        (arrays.hypot, values, others),
+        (arrays.log, sizes + 1.0),
+        (arrays.maximum, values, others),
+        (arrays.minimum, values, 0.5),
+        (arrays.power, sizes, 0.42),
+        (arrays.sin, values),
+        (arrays.sqrt, sizes),
+        (arrays.square, values),
+        (arrays.with_sign, sizes, values),
+        (arrays.with_sign, 360.0, values),
+    ):
+        compiled = [Float64(each) if isinstance(each, np.ndarray) else each for each in arguments]
+        np.testing.assert_allclose(function(*arguments), function(*compiled), rtol=1e-14, atol=0)
 
 
 def test_numpy_takes_blocks_of_any_number_of_pixels(both, monkeypatch):
