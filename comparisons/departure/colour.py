@@ -233,7 +233,7 @@ def delta_e_00(first: Colours, second: Colours) -> Numbers:
     total = h1 + h2
     # Tolerate rounding for opposite hues, 180 apart; beyond, the difference jumps.
     wide = arrays.absolute(turn) > 180.0 + 1e-9
-    turn = arrays.select(wide, turn - arrays.with_sign(360.0, turn), turn)
+    turn = arrays.select(wide, turn - arrays.select(turn < 0.0, -360.0, 360.0), turn)
     turn = arrays.select(has_hues, turn, 0.0)
     middle = total + arrays.select(wide, arrays.select(total < 360.0, 360.0, -360.0), 0.0)
     hue = arrays.select(has_hues, middle / 2.0, total)

@@ -93,7 +93,6 @@ def test_each_function_is_the_same_for_either_kind_of_array():
         (arrays.sqrt, sizes),
         (arrays.square, values),
         (arrays.with_sign, sizes, values),
-        (arrays.with_sign, 360.0, values),
     ):
         compiled = [Float64(each) if isinstance(each, np.ndarray) else each for each in arguments]
         np.testing.assert_allclose(function(*arguments), function(*compiled), rtol=1e-14, atol=0)
