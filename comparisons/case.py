@@ -5,21 +5,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from fotismos.comparisons import atomic
 from fotismos.comparisons.gallery.builtin import builtin
+from fotismos.comparisons.names import file_of
 from fotismos.comparisons.options import Options
-from fotismos.heuristic import program
-from fotismos.heuristic.errors import InputError, suggestion
+from fotismos.heuristic.errors import InputError
 from fotismos.reference.planning.plan import wants_spectra
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Script, Source
 
 RGB = "llvm_ad_rgb"
 SPECTRAL = "llvm_ad_spectral"
-
-SUFFIXES = (".xml", ".py")
-"""Suffixes of scene files: Mitsuba's, and Python's."""
-PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".hdr", ".pfm", ".npy")
 
 Scene = str | Path | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
 
@@ -97,40 +92,6 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
     return _complete(Source(own_name, scene), options, own_name)
 
 
-def file_of(scene: str | Path) -> Path | None:
-    """Return the path of a scene file, None for a built-in scene."""
-    path = Path(scene)
-    # A folder may have the name of a built-in scene; only a scene's suffix always means a file.
-    if not str(scene) or (path.suffix not in SUFFIXES and (path.is_dir() or not path.exists())):
-        return None
-    if not path.is_file():
-        siblings = map(str, path.parent.glob("*")) if path.parent.is_dir() else ()
-        raise InputError(
-            f"{scene}: there is no such file{suggestion(str(scene), siblings)}. Give a Mitsuba"
-            " scene (.xml), a Python file that makes one (.py), or the name of a built-in scene"
-            f" (listed by `{program.command('scenes')}`)."
-        )
-    try:
-        str(path.resolve()).encode()
-    except UnicodeEncodeError as error:
-        raise InputError(
-            f"{atomic.printable(path.resolve())}: Mitsuba cannot open this name, which is not in"
-            " UTF-8. Rename the file, or its folder."
-        ) from error
-    return path
-
-
-def is_script(scene: str | Path) -> bool:
-    """Return whether opening a scene runs a user's code, which may change the process."""
-    return Path(scene).suffix == ".py"
-
-
-def name_of(scene: str | Path) -> str:
-    """Return a scene's name, without reading the scene."""
-    path = file_of(scene)
-    return builtin(str(scene)).name if path is None else path.stem
-
-
 def _complete(source: Source, options: Options, word: str) -> Case:
     """Choose a scene's variant, and complete the options from it."""
     # A scene can be read in a variant only, and tells which it wants once it is read.
@@ -139,14 +100,3 @@ def _complete(source: Source, options: Options, word: str) -> Case:
     set_variant(variant)
     interpolation = options.interpolation or "phong"
     return Case(source, options.changed(variant=variant, interpolation=interpolation), word)
-
-
-def picture_parts(word: str) -> tuple[Path, str]:
-    """Return the file and the layer that a word names."""
-    # A path may hold colons: one separates a layer only after a picture's suffix.
-    file, _, layer = word.rpartition(":")
-    if file.lower().endswith(PICTURES):
-        return Path(file), layer
-    if not word.lower().endswith(PICTURES):
-        raise InputError(f"{word}: pictures are {' or '.join(PICTURES)} files. Convert it to EXR.")
-    return Path(word), ""

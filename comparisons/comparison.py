@@ -9,7 +9,6 @@ from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-import drjit as dr
 import msgspec
 import numpy as np
 from msgspec import Meta, structs
@@ -23,10 +22,8 @@ from fotismos.comparisons.price_record import Price
 from fotismos.comparisons.processes.pool import cores
 from fotismos.heuristic import __version__
 from fotismos.heuristic.convention import Floats
-from fotismos.reference.pairing.factors import Unrepresentable
-from fotismos.reference.pairing.halves import Pairing
-from fotismos.reference.pairing.settings import Override
-from fotismos.reference.planning.plan import Plan
+from fotismos.reference.pairing.pairing_record import Override, Pairing, Unrepresentable
+from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.records import (
     VERSION,
     Amount,
@@ -40,22 +37,29 @@ from fotismos.reference.records import (
     Resolution,
     Share,
     Size,
+    Times,
     Versions,
 )
-from fotismos.reference.rendering.renderer import Times
 
 if TYPE_CHECKING:
     from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
 
 
+PICTURE_LIBRARIES = ("numpy", "colour-science", "OpenEXR", "pillow")
+"""What a comparison of two pictures depends on."""
+
 LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
+"""What a comparison of a scene depends on."""
 
 
-def versions() -> dict[str, str]:
-    """Return the versions that a result depends on."""
+def versions(libraries: Iterable[str] = LIBRARIES) -> dict[str, str]:
+    """Return the versions that a result depends on, and with Dr.Jit LLVM's."""
     numbers = {"fotismos": __version__, "python": platform.python_version()}
-    numbers |= {library: metadata.version(library) for library in LIBRARIES}
-    numbers["LLVM"] = ".".join(map(str, dr.detail.llvm_version()))
+    numbers |= {library: metadata.version(library) for library in libraries}
+    if "drjit" in numbers:
+        import drjit as dr  # loaded late: two pictures are compared without it
+
+        numbers["LLVM"] = ".".join(map(str, dr.detail.llvm_version()))
     return numbers
 
 

@@ -24,15 +24,14 @@ from glob import glob, has_magic
 from pathlib import Path
 from typing import Any
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fotismos.comparisons.case import PICTURES, picture_parts
 from fotismos.comparisons.departure.colour import BT709, CHROMATICITIES, Array, from_srgb
-from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
-from fotismos.reference.rendering.renderer import LARGEST_VALUE
+from fotismos.comparisons.names import PICTURES, picture_parts
+from fotismos.heuristic.errors import InputError, InstallationError, NonFiniteError, suggestion
+from fotismos.reference.rendering.finite import LARGEST_VALUE
 
 SAME_PRIMARIES = 2e-3
 """Largest difference of chromaticities that are the same: some files round them."""
@@ -334,12 +333,23 @@ def _converted(path: Path, colours: Array, primaries: Any) -> Array:
 # --- Other files -------------------------------------------------------------------------------
 
 
+PNG_HEADER = 26
+"""Bytes that a PNG file begins with; the last two are its bit depth and its kind of colours."""
+
+MODES = ("L", "LA", "RGB", "RGBA", "I;16")
+"""What Pillow calls the pixels that are read as they are."""
+
+
 def _bitmap(path: Path, suffix: str) -> Layer:
-    """Read a file by Mitsuba's library, which keeps 16 bits."""
+    """Read a file by Pillow, or by Mitsuba, which also reads HDR, PFM and 16 bits of colours."""
     kind = suffix.removeprefix(".").upper()
+    with path.open("rb") as stream:
+        header = stream.read(PNG_HEADER)
+    is_deep = suffix == ".png" and header[24:25] == b"\x10" and header[25:26] != b"\0"
+    is_for_mitsuba = is_deep or suffix in (".hdr", ".pfm")
     try:
-        pixels = np.array(mi.Bitmap(str(path)))
-    except RuntimeError as error:
+        pixels = _by_mitsuba(path, kind) if is_for_mitsuba else _by_pillow(path)
+    except (OSError, RuntimeError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise InputError(f"{path}: not a readable {kind} file: {error}.") from error
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
     if pixels.dtype.kind == "f":
@@ -363,6 +373,30 @@ def _bitmap(path: Path, suffix: str) -> Layer:
                 return decoded
 
     return Layer(colours=layer.colours, alpha=layer.alpha, transfer=transfer, encoding=encoding)
+
+
+def _by_pillow(path: Path) -> NDArray[Any]:
+    with Image.open(path) as file:
+        if file.has_transparency_data and file.mode not in MODES[1::2]:
+            return np.array(file.convert("RGBA"))
+        if file.mode in ("1", "P"):
+            return np.array(file.convert("L" if file.mode == "1" else "RGB"))
+        if file.mode not in MODES:
+            raise InputError(f"{path}: its colours are {file.mode}. Save it as RGB.")
+        return np.array(file)
+
+
+def _by_mitsuba(path: Path, kind: str) -> NDArray[Any]:
+    try:
+        import fotismos.reference.scene  # noqa: F401  loaded late: few pictures need Mitsuba
+    except ImportError as error:
+        raise InstallationError(
+            f"{path}: Mitsuba reads such {kind} files, and cannot be loaded: {error}. Convert it to"
+            " EXR, or install Mitsuba."
+        ) from error
+    import mitsuba as mi
+
+    return np.array(mi.Bitmap(str(path)))
 
 
 def _array(path: Path) -> Layer:

@@ -22,7 +22,7 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.comparisons.picture_mistakes import Names, NoisyImage
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.rendering.renderer import Times
+from fotismos.reference.records import Times
 
 SAME = 0.01
 """ΔE2000 to which a picture equals the textbook half, away from edges."""

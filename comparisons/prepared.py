@@ -19,9 +19,11 @@ from fotismos.heuristic.heuristics import named
 from fotismos.reference.pairing import halves
 from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.pairing.halves import Pair
-from fotismos.reference.pairing.settings import Override, film_size
+from fotismos.reference.pairing.pairing_record import Override
+from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.guard import examine_plan
-from fotismos.reference.planning.plan import Guard, Plan, physical_integrator, plan
+from fotismos.reference.planning.plan import physical_integrator, plan
+from fotismos.reference.planning.plan_record import Guard, Plan
 from fotismos.reference.planning.rules import SAMPLED_AS_HIT, loses_light
 from fotismos.reference.rendering.direct import is_behind_two_lamps
 from fotismos.reference.rendering.gbuffer import (
@@ -31,8 +33,9 @@ from fotismos.reference.rendering.gbuffer import (
     image_size,
     require_surface,
 )
+from fotismos.reference.rendering.integrators import SAMPLER, STOCK_SAMPLER
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
-from fotismos.reference.rendering.sampler import SAMPLER, STOCK_SAMPLER, with_sampler
+from fotismos.reference.rendering.sampler import with_sampler
 from fotismos.reference.scene.source import Source
 
 if TYPE_CHECKING:  # few comparisons have pictures

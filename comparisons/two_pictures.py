@@ -5,7 +5,13 @@ from time import perf_counter
 import numpy as np
 
 from fotismos.comparisons import pictures
-from fotismos.comparisons.comparison import Comparison, ComparisonRecord, TimeSpent, versions
+from fotismos.comparisons.comparison import (
+    PICTURE_LIBRARIES,
+    Comparison,
+    ComparisonRecord,
+    TimeSpent,
+    versions,
+)
 from fotismos.comparisons.estimates import PassSums, measure
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.errors import InputError
@@ -49,7 +55,7 @@ def compare_pictures(options: Options, name: str, command: str = "") -> Comparis
         seed=options.seed,
         resolution=given.image.size,
         time=TimeSpent(heuristic=first.pass_times(), reference=second.pass_times(), stages=stages),
-        versions=versions(),
+        versions=versions(PICTURE_LIBRARIES),
         command=command,
         caution=_caution(images.heuristic[counted], images.reference[counted], options),
         **numbers,

@@ -70,7 +70,7 @@ def configure() -> None:
     library = None if os.environ.get(VARIABLE) else find_wheel()
     if library is None:
         return
-    if "drjit" not in sys.modules:
+    if sys.modules.get("drjit") is None:
         os.environ[VARIABLE] = str(library)
     elif not _is_usable(_version()):
         warnings.warn(f"The first kernel will fail. {_TOO_EARLY}", RuntimeWarning, stacklevel=2)

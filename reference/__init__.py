@@ -3,21 +3,37 @@
 if __name__ == "reference":
     raise ImportError("write `import fotismos.reference` in place of `import reference`")
 
-from fotismos.heuristic import llvm  # isort: skip  it finds LLVM before Mitsuba loads Dr.Jit
+from importlib import import_module
+from typing import TYPE_CHECKING
 
-import mitsuba as mi
+if TYPE_CHECKING:
+    from fotismos.reference.pairing.factors import Convention
+    from fotismos.reference.pairing.halves import Pair, PairOptions, pair
+    from fotismos.reference.planning.plan import plan
+    from fotismos.reference.planning.plan_record import Plan
+    from fotismos.reference.records import Times
+    from fotismos.reference.rendering.sums import Estimate
+    from fotismos.reference.scene.source import Source
 
-if mi.variant() is None:
-    llvm.check()
-    mi.set_variant("llvm_ad_rgb")  # Mitsuba has no names before a variant is chosen
-
-from fotismos.reference.pairing.factors import Convention
-from fotismos.reference.pairing.halves import Pair, PairOptions, pair
-from fotismos.reference.planning.plan import Plan, plan
-from fotismos.reference.rendering.renderer import Times
-from fotismos.reference.rendering.sums import Estimate
-from fotismos.reference.scene.source import Source
+HOMES = {
+    "Convention": "fotismos.reference.pairing.factors",
+    "Estimate": "fotismos.reference.rendering.sums",
+    "Pair": "fotismos.reference.pairing.halves",
+    "PairOptions": "fotismos.reference.pairing.halves",
+    "Plan": "fotismos.reference.planning.plan_record",
+    "Source": "fotismos.reference.scene.source",
+    "Times": "fotismos.reference.records",
+    "pair": "fotismos.reference.pairing.halves",
+    "plan": "fotismos.reference.planning.plan",
+}
+"""Where names come from when they are asked for: records need no Mitsuba."""
 
 __all__ = [
     "Convention", "Estimate", "Pair", "PairOptions", "Plan", "Source", "Times", "pair", "plan",
 ]  # fmt: skip
+
+
+def __getattr__(name: str) -> object:
+    if name not in HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(HOMES[name]), name)

@@ -6,7 +6,9 @@ in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, 
 """
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import median
 from typing import Annotated, Any, TypeVar, dataclass_transform
 
 import msgspec
@@ -69,6 +71,37 @@ class Machine(Record):
     processor: str
     cores: Size
     system: str
+
+
+class Times(Record):
+    """Wall times of one rendering in seconds, evaluated and synchronised.
+
+    Attributes
+    ----------
+    median_s
+        Median time per pass, once compiled.
+    first_s
+        The first pass, with compilation.
+    compile_s
+        Code generation and back end: almost nothing for kernels in Dr.Jit's cache on disk.
+    """
+
+    median_s: Amount
+    passes: Size
+    first_s: Amount
+    total_s: Amount
+    compile_s: Amount | None
+
+    @classmethod
+    def of(cls, passes: Sequence[float], compilation: float) -> "Times":
+        """Return the times of some passes; the median is of those after the first, if any."""
+        return cls(
+            median_s=median(passes[1:] or passes),
+            passes=len(passes),
+            first_s=passes[0],
+            total_s=sum(passes),
+            compile_s=compilation,
+        )
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import pytest
 
+from fotismos.comparisons.departure import arrays
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic import plugins
 from fotismos.reference.rendering import direct
@@ -42,6 +43,13 @@ def rgb():
 def spectral():
     """The variant llvm_ad_spectral, with the project's plugins."""
     yield from in_variant("llvm_ad_spectral")
+
+
+@pytest.fixture(params=["Dr.Jit", "NumPy"])
+def computed_by(request, monkeypatch):
+    """Compute formulas of colours by Dr.Jit, and by NumPy, as where no scene is loaded."""
+    monkeypatch.setattr(arrays, "is_compiled", lambda: request.param == "Dr.Jit")
+    return request.param
 
 
 WHY = next(option for option in compare.params if option.name == "with_causes")

@@ -32,7 +32,7 @@ from fotismos.comparisons.hybrids.attribution import find
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.price_record import Price
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.planning.plan import Guard
+from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import VERSION, Pixels, Positive, Record, Resolution
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
 from fotismos.reference.scene.source import Source

@@ -7,7 +7,7 @@ from msgspec import Meta
 from fotismos.comparisons.comparison import Contribution, MeanError
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.heuristic.heuristics import Interpolation
-from fotismos.reference.planning.plan import Guard
+from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import (
     VERSION,
     Amount,

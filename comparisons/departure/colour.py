@@ -1,9 +1,8 @@
-"""Colour: viewing conditions, nearly uniform spaces and differences, compiled by Dr.Jit.
+"""Colour: viewing conditions, nearly uniform spaces and differences.
 
 Images are linear light with the sRGB primaries (ITU-R BT.709, D65); 1.0 is display white.
-colour-science defines the formulas, and tests require agreement to 1e-4 of a colour difference. In
-NumPy they take as long as rendering, here a tenth (512 x 512 pixels, ΔE2000: 14 against 133 ms of
-processor time).
+colour-science defines the formulas, and tests require agreement to 1e-4 of a colour difference.
+Dr.Jit or NumPy computes them (:mod:`fotismos.comparisons.departure.arrays`).
 
 Sources: CIE 15:2018 (L*a*b*), ITU-R BT.2100-2 (ICtCp), Li et al., Color Res. Appl. 42(6), 2017
 (CAM16), Sharma, Wu and Dalal, Color Res. Appl. 30(1), 2005 (CIE DE2000).
@@ -13,20 +12,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from math import cos, exp, inf, pi, radians, sin
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
-import drjit as dr
 import numpy as np
-from drjit.llvm import Array3f, Array3f64, Float32, Float64
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
+from fotismos.comparisons.departure import arrays
+from fotismos.comparisons.departure.arrays import Colours, Formula, Numbers
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Positive, Record
 
 Array = NDArray[np.float64]
-Colour = TypeVar("Colour", Array3f, Array3f64)
-Formula = Callable[[Array3f64], Array3f64]
 
 PQ_PEAK = 10_000.0
 """ITU-R BT.2100: the largest luminance that the PQ curve encodes, cd/m²."""
@@ -143,11 +140,15 @@ def rgb_to_xyz(primaries: tuple[tuple[float, float], ...]) -> Array:
     return colours * np.linalg.solve(colours, white)
 
 
-def xyz_to_lab(xyz: Colour, white: Sequence[float]) -> Colour:
+def xyz_to_lab(xyz: Colours, white: Sequence[float]) -> Colours:
     """Return CIE L*a*b* of XYZ relative to a white: ``L* = 116 f(Y/Y_n) − 16``."""
-    ratio = xyz / type(xyz)(*map(float, white))
-    x, y, z = dr.select(ratio > _EPSILON, dr.cbrt(ratio), _SLOPE * ratio + 16 / 116)
-    return type(xyz)(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
+    ratios = (value / float(of_white) for value, of_white in zip(xyz, white, strict=True))
+    x, y, z = map(_compressed, ratios)
+    return arrays.colours(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
+
+
+def _compressed(ratio: Numbers) -> Numbers:
+    return arrays.select(ratio > _EPSILON, arrays.cbrt(ratio), _SLOPE * ratio + 16 / 116)
 
 
 def _to_cam16ucs(viewing: Viewing, largest: float = 1.0) -> Formula:
@@ -173,51 +174,57 @@ def _to_cam16ucs(viewing: Viewing, largest: float = 1.0) -> Formula:
         1.0 / achromatic, _C * (1.48 + n**0.5), 50_000.0 / 13.0 * _N_C * induction,
         (1.64 - 0.29**n) ** 0.73 * level**0.25,
     )  # fmt: skip
-    sensitivity = Array3f64(*map(opaque, gain * level / 100.0))
-    scales = tuple(map(opaque, numbers))
-    return lambda rgb: _cam16ucs(times(_M16, 100.0 * shown(rgb)) * sensitivity, *scales)
+    sensitivity = tuple(map(arrays.constant, gain * level / 100.0))
+    scales = tuple(map(arrays.constant, numbers))
+
+    def convert(rgb: Colours) -> Colours:
+        cones = times(_M16, 100.0 * shown(rgb))
+        adapted = (cone * factor for cone, factor in zip(cones, sensitivity, strict=True))
+        return _cam16ucs(arrays.colours(*adapted), *scales)
+
+    return convert
 
 
 def _cam16ucs(
-    cones: Array3f64, dimming: Float64, exponent: Float64, chromatic: Float64, level: Float64
-) -> Array3f64:
+    cones: Colours, dimming: Numbers, exponent: Numbers, chromatic: Numbers, level: Numbers
+) -> Colours:
     """Return J'a'b' of adapted cone responses, in the order of Li et al.
 
     The 0.1 that CAM16 adds to each response cancels except in the denominator of ``t``.
     """
-    power = dr.power(dr.abs(cones), 0.42)
-    red, green, blue = dr.mulsign(400.0 * power / (power + 27.13), cones)
+    power = arrays.power(arrays.absolute(cones), 0.42)
+    red, green, blue = arrays.with_sign(400.0 * power / (power + 27.13), cones)
     a = red - (12.0 * green - blue) / 11.0
     b = (red + green - 2.0 * blue) / 9.0
     light = 2.0 * red + green + 0.05 * blue
     j = _signed_power(light * dimming, exponent)
-    size = dr.sqrt(a * a + b * b)
+    size = arrays.sqrt(a * a + b * b)
     # Grey has no hue, and 0 / 0 would be NaN; its chroma of 0 hides the one chosen.
     has_hue = size > 0.0
-    cosine = dr.select(has_hue, a / size, 1.0)
-    sine = dr.select(has_hue, b / size, 0.0)
+    cosine = arrays.select(has_hue, a / size, 1.0)
+    sine = arrays.select(has_hue, b / size, 0.0)
     # `(cos(h + 2) + 3.8) / 4`, by the sum of angles: the angle itself is not needed.
     eccentricity = (cos(2.0) * cosine - sin(2.0) * sine + 3.8) / 4.0
     t = chromatic * eccentricity * size / (red + green + 1.05 * blue + 0.305)
     colourfulness = _signed_power(t, 0.9) * _signed_power(j, 0.5) * level
     # CAM16-UCS: J and M compressed, with M along the hue.
-    shown = dr.log(1.0 + 0.0228 * colourfulness) / 0.0228
-    return Array3f64(170.0 * j / (1.0 + 0.7 * j), shown * cosine, shown * sine)
+    shown = arrays.log(1.0 + 0.0228 * colourfulness) / 0.0228
+    return arrays.colours(170.0 * j / (1.0 + 0.7 * j), shown * cosine, shown * sine)
 
 
-def _signed_power(base: Float64, exponent: float | Float64) -> Float64:
-    return dr.mulsign(dr.power(dr.abs(base), exponent), base)
+def _signed_power(base: Numbers, exponent: float | Numbers) -> Numbers:
+    return arrays.with_sign(arrays.power(arrays.absolute(base), exponent), base)
 
 
-def delta_e_00(first: Array3f64, second: Array3f64) -> Float64:
+def delta_e_00(first: Colours, second: Colours) -> Numbers:
     """Return ΔE00 between CIE L*a*b* colours, with k_L = k_C = k_H = 1."""
-    chroma = [dr.sqrt(a * a + b * b) for _, a, b in (first, second)]
+    chroma = [arrays.sqrt(a * a + b * b) for _, a, b in (first, second)]
     # 1 + G, by which a is stretched near the neutral axis.
     stretch = 1.5 - 0.5 * _saturation((chroma[0] + chroma[1]) / 2.0)
     (l1, a1, b1) = first
     (l2, a2, b2) = second
-    c1 = dr.sqrt(dr.square(a1 * stretch) + b1 * b1)
-    c2 = dr.sqrt(dr.square(a2 * stretch) + b2 * b2)
+    c1 = arrays.sqrt(arrays.square(a1 * stretch) + b1 * b1)
+    c2 = arrays.sqrt(arrays.square(a2 * stretch) + b2 * b2)
     h1 = _hue(a1 * stretch, b1)
     h2 = _hue(a2 * stretch, b2)
     # The hue of a grey is 0 here: if one colour is grey, `total` is the hue of the other.
@@ -225,11 +232,11 @@ def delta_e_00(first: Array3f64, second: Array3f64) -> Float64:
     turn = h2 - h1
     total = h1 + h2
     # Tolerate rounding for opposite hues, 180 apart; beyond, the difference jumps.
-    wide = dr.abs(turn) > 180.0 + 1e-9
-    turn = dr.select(wide, turn - dr.mulsign(Float64(360.0), turn), turn)
-    turn = dr.select(has_hues, turn, 0.0)
-    middle = total + dr.select(wide, dr.select(total < 360.0, 360.0, -360.0), 0.0)
-    hue = dr.select(has_hues, middle / 2.0, total)
+    wide = arrays.absolute(turn) > 180.0 + 1e-9
+    turn = arrays.select(wide, turn - arrays.select(turn < 0.0, -360.0, 360.0), turn)
+    turn = arrays.select(has_hues, turn, 0.0)
+    middle = total + arrays.select(wide, arrays.select(total < 360.0, 360.0, -360.0), 0.0)
+    hue = arrays.select(has_hues, middle / 2.0, total)
     # Differences over their weights S_L, S_C and S_H, and the rotation R_T in the blue.
     lightness = (l1 + l2) / 2.0
     mean = (c1 + c2) / 2.0
@@ -240,56 +247,48 @@ def delta_e_00(first: Array3f64, second: Array3f64) -> Float64:
         + 0.32 * _cosine(3.0 * hue + 6.0)
         - 0.20 * _cosine(4.0 * hue - 63.0)
     )
-    off = dr.square(lightness - 50.0)
-    delta_l = (l2 - l1) / (1.0 + 0.015 * off / dr.sqrt(20.0 + off))
+    off = arrays.square(lightness - 50.0)
+    delta_l = (l2 - l1) / (1.0 + 0.015 * off / arrays.sqrt(20.0 + off))
     delta_c = (c2 - c1) / (1.0 + 0.045 * mean)
-    delta_h = 2.0 * dr.sqrt(c1 * c2) * dr.sin(radians(0.5) * turn) / (1.0 + 0.015 * mean * t)
-    rotation = dr.sin(radians(60.0) * dr.exp(-dr.square((hue - 275.0) / 25.0)))
+    chord = 2.0 * arrays.sqrt(c1 * c2) * arrays.sin(radians(0.5) * turn)
+    delta_h = chord / (1.0 + 0.015 * mean * t)
+    rotation = arrays.sin(radians(60.0) * arrays.exp(-arrays.square((hue - 275.0) / 25.0)))
     rotation *= -2.0 * _saturation(mean)
     squares = delta_l * delta_l + delta_c * delta_c + delta_h * delta_h
-    return dr.sqrt(dr.maximum(squares + rotation * delta_c * delta_h, 0.0))
+    return arrays.sqrt(arrays.maximum(squares + rotation * delta_c * delta_h, 0.0))
 
 
-def _saturation(chroma: Float64) -> Float64:
+def _saturation(chroma: Numbers) -> Numbers:
     """Return ``√(C⁷ / (C⁷ + 25⁷))``."""
     ratio = chroma / 25.0
-    seventh = dr.square(ratio * ratio * ratio) * ratio
-    return dr.sqrt(seventh / (seventh + 1.0))
+    seventh = arrays.square(ratio * ratio * ratio) * ratio
+    return arrays.sqrt(seventh / (seventh + 1.0))
 
 
-def _hue(a: Float64, b: Float64) -> Float64:
+def _hue(a: Numbers, b: Numbers) -> Numbers:
     """Return the hue angle in degrees, 0 to 360."""
-    angle = dr.atan2(b, a) * (180.0 / pi)
-    return dr.select(angle < 0.0, angle + 360.0, angle)
+    angle = arrays.arctan2(b, a) * (180.0 / pi)
+    return arrays.select(angle < 0.0, angle + 360.0, angle)
 
 
-def _cosine(degrees: Float64) -> Float64:
-    return dr.cos(radians(1.0) * degrees)
+def _cosine(degrees: Numbers) -> Numbers:
+    return arrays.cos(radians(1.0) * degrees)
 
 
-def times(matrix: Array, vector: Colour) -> Colour:
+def times(matrix: Array, vector: Colours) -> Colours:
     """Return matrix times vector; the matrix becomes part of the kernel."""
     x, y, z = vector
-    return type(vector)(*(a * x + b * y + c * z for a, b, c in matrix.tolist()))
-
-
-def opaque(value: float) -> Float64:
-    """Return a number as an input of the kernel, not a constant in it."""
-    return dr.opaque(Float64, float(value))
+    return arrays.colours(*(a * x + b * y + c * z for a, b, c in matrix.tolist()))
 
 
 # --- Arrays ---
-#
-# Results are copies, not views of Dr.Jit's memory: Dr.Jit gives back an array that was made of such
-# a view in a thread that has Python's lock and waits for Dr.Jit's, while a rendering has the latter
-# and waits for the former.
 
 
 @dataclass(frozen=True)
 class Space:
-    """A colour space as a compiled formula.
+    """A colour space as a formula.
 
-    ``formula(viewing)`` returns a function of Dr.Jit colours. A call converts linear RGB (..., 3).
+    ``formula(viewing)`` returns a function of colours. A call converts linear RGB (..., 3).
     """
 
     formula: Callable[[Viewing], Formula]
@@ -298,36 +297,29 @@ class Space:
         rgb = np.asarray(rgb)
         if not rgb.size:
             return np.zeros(rgb.shape)
-        return np.array(dr.ravel(self.formula(viewing)(_colours(rgb)))).reshape(rgb.shape)
+        return arrays.computed(self.formula(viewing), rgb)
 
 
 @dataclass(frozen=True)
 class Distance:
-    """A distance of two Dr.Jit colours as a compiled formula. A call takes arrays (..., 3)."""
+    """A distance of two colours as a formula. A call takes arrays (..., 3)."""
 
-    formula: Callable[[Array3f64, Array3f64], Float64]
+    formula: Formula
 
     def __call__(self, a: ArrayLike, b: ArrayLike) -> Array:
         a = np.asarray(a)
         b = np.asarray(b)
         if not a.size:
             return np.zeros(a.shape[:-1])
-        return np.array(self.formula(_colours(a), _colours(b))).reshape(a.shape[:-1])
-
-
-def _colours(pixels: Array) -> Array3f64:
-    """Return pixels (..., 3) as Dr.Jit colours; single precision is widened within kernels."""
-    if pixels.dtype == np.float32:
-        return Array3f64(dr.unravel(Array3f, Float32(np.ascontiguousarray(pixels).ravel())))
-    return dr.unravel(Array3f64, Float64(np.ascontiguousarray(pixels, np.float64).ravel()))
+        return arrays.computed(self.formula, a, b)
 
 
 def _displayed(viewing: Viewing, white: float = 1.0) -> Formula:
     """Return a function from linear RGB to the XYZ that a display shows; Y of white is 1."""
-    exposure = opaque(viewing.exposure)
-    largest = opaque(white)
+    exposure = arrays.constant(viewing.exposure)
+    largest = arrays.constant(white)
     matrix = rgb_to_xyz(BT709)
-    return lambda rgb: times(matrix, dr.clip(rgb * exposure, 0.0, largest))
+    return lambda rgb: times(matrix, arrays.clip(rgb * exposure, 0.0, largest))
 
 
 @Space
@@ -342,15 +334,15 @@ def lab(viewing: Viewing) -> Formula:
 def itp(viewing: Viewing) -> Formula:
     """720 · (I, T, P) of linear RGB, whose Euclidean distance is ΔE_ITP."""
     matrix = np.linalg.inv(rgb_to_xyz(BT2020)) @ rgb_to_xyz(BT709)
-    level = opaque(viewing.exposure * viewing.white_luminance)
-    # BT.2124 halves the second coordinate: T = C_T / 2.
-    scale = Array3f64(720.0, 360.0, 720.0)
+    level = arrays.constant(viewing.exposure * viewing.white_luminance)
 
-    def convert(rgb: Array3f64) -> Array3f64:
-        absolute = dr.clip(times(matrix, rgb) * level, 0.0, PQ_PEAK)
-        power = dr.power(times(_LMS, absolute) / PQ_PEAK, _PQ_M1)
-        encoded = dr.power((_PQ_C1 + _PQ_C2 * power) / (1.0 + _PQ_C3 * power), _PQ_M2)
-        return scale * times(_ICTCP, encoded)
+    def convert(rgb: Colours) -> Colours:
+        absolute = arrays.clip(times(matrix, rgb) * level, 0.0, PQ_PEAK)
+        power = arrays.power(times(_LMS, absolute) / PQ_PEAK, _PQ_M1)
+        encoded = arrays.power((_PQ_C1 + _PQ_C2 * power) / (1.0 + _PQ_C3 * power), _PQ_M2)
+        intensity, tritan, protan = times(_ICTCP, encoded)
+        # BT.2124 halves the second coordinate: T = C_T / 2.
+        return arrays.colours(720.0 * intensity, 360.0 * tritan, 720.0 * protan)
 
     return convert
 
@@ -367,8 +359,8 @@ linear = Space(lambda viewing: lambda rgb: rgb)
 ciede2000 = Distance(delta_e_00)
 """ΔE00 between CIE L*a*b* colours, with k_L = k_C = k_H = 1."""
 
-euclidean = Distance(lambda a, b: dr.norm(a - b))
+euclidean = Distance(lambda a, b: arrays.sqrt(arrays.squared_norm(a - b)))
 """The distance between points."""
 
-root_mean_square = Distance(lambda a, b: dr.sqrt(dr.squared_norm(a - b) / 3.0))
+root_mean_square = Distance(lambda a, b: arrays.sqrt(arrays.squared_norm(a - b) / 3.0))
 """The root mean square difference of three values."""

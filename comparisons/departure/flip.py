@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from functools import lru_cache, partial
 from math import ceil, pi, sqrt
 
-import drjit as dr
 import numpy as np
-from drjit.llvm import Array3f, Float32
 from numpy.typing import NDArray
 
+from fotismos.comparisons.departure import arrays
+from fotismos.comparisons.departure.arrays import Colours, Numbers
 from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.colour import (
     Array,
@@ -31,9 +31,9 @@ from fotismos.comparisons.departure.colour import (
 )
 
 Plane = NDArray[np.float32]
-Curve = Callable[[Array3f], Array3f]
+Curve = Callable[[Colours], Colours]
 Blurs = tuple[tuple[np.float32, Plane], ...]
-Seen = tuple[Array3f, Float32, Float32]
+Seen = tuple[Colours, Numbers, Numbers]
 
 SHOWN = 2.118872
 """Luminance that the tone curve of HDR-FLIP (ACES, by Narkowicz) shows as 0.85."""
@@ -81,7 +81,7 @@ def ldr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
     Images are exposed, then clipped to [0, 1]. Equal images are 0 apart, black and white 0.967,
     green and blue 1. It is symmetric.
     """
-    return _flip(test, reference, viewing=viewing, curves=[lambda light: dr.minimum(light, 1.0)])
+    return _flip(test, reference, viewing=viewing, curves=[_clipped])
 
 
 def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
@@ -93,7 +93,8 @@ def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
     start, stop = exposures(_exposed(reference, viewing))
     factors = 2.0 ** np.linspace(start, stop, max(2, ceil(stop - start)))
     # Factors are inputs of the kernel, so that all exposures share one.
-    curves = [partial(_toned, factor=dr.opaque(Float32, factor)) for factor in factors.tolist()]
+    inputs = [arrays.constant(factor, is_single=True) for factor in factors.tolist()]
+    curves = [partial(_toned, factor=factor) for factor in inputs]
     return _flip(test, reference, viewing=viewing, curves=curves)
 
 
@@ -137,16 +138,19 @@ def _exposed(image: Array, viewing: Viewing) -> Array:
     return np.clip(exposed, 0.0, LARGEST, out=exposed)
 
 
-def _light(image: Array, viewing: Viewing) -> Array3f:
-    shown = _exposed(image, viewing).astype(np.float32)
-    return dr.unravel(Array3f, Float32(shown.ravel()))
+def _light(image: Array, viewing: Viewing) -> Colours:
+    return arrays.single(_exposed(image, viewing))
 
 
-def _toned(light: Array3f, factor: Float32) -> Array3f:
+def _clipped(light: Colours) -> Colours:
+    return arrays.minimum(light, 1.0)
+
+
+def _toned(light: Colours, factor: Numbers) -> Colours:
     """Return what the tone curve makes of light after an exposure."""
     x = light * factor
     a, b, c, d, e = _ACES
-    return dr.minimum(x * (a * x + b) / (x * (c * x + d) + e), 1.0)
+    return arrays.minimum(x * (a * x + b) / (x * (c * x + d) + e), 1.0)
 
 
 @dataclass(frozen=True)
@@ -184,14 +188,14 @@ class _Eye:
             point=_band(point),
         )
 
-    def seen(self, rgb: Array3f, height: int) -> Seen:
+    def seen(self, rgb: Colours, height: int) -> Seen:
         """Return the blurred colours, the slope and the curvature of lightness, without margins.
 
         The displayed colours ``rgb`` are of ``height`` rows, 2 reach of them margins.
         """
         channels = times(_OPPONENT, rgb)
-        dr.eval(channels)
-        planes = [channel.numpy().reshape(height, -1) for channel in channels]
+        arrays.evaluate(channels)
+        planes = [np.asarray(channel).reshape(height, -1) for channel in channels]
         blurred = [
             np.sum([share * _across(_down(plane, band), band) for share, band in parts], axis=0)
             for plane, parts in zip(planes, self.blurs, strict=True)
@@ -199,16 +203,16 @@ class _Eye:
         # Detectors along one axis, smooth along the other: two for edges and two for points.
         light = planes[0]
         smooth = _down(planes[0], self.smooth)
-        slope = dr.hypot(
-            _values(_across(smooth, self.edge)),
-            _values(_across(_down(light, self.edge), self.smooth)),
+        slope = arrays.hypot(
+            arrays.single_numbers(_across(smooth, self.edge)),
+            arrays.single_numbers(_across(_down(light, self.edge), self.smooth)),
         )
-        curvature = dr.hypot(
-            _values(_across(smooth, self.point)),
-            _values(_across(_down(light, self.point), self.smooth)),
+        curvature = arrays.hypot(
+            arrays.single_numbers(_across(smooth, self.point)),
+            arrays.single_numbers(_across(_down(light, self.point), self.smooth)),
         )
-        result = _hunted(Array3f(*map(_values, blurred))), slope, curvature
-        dr.eval(result)
+        result = _hunted(arrays.colours(*map(arrays.single_numbers, blurred))), slope, curvature
+        arrays.evaluate(*result)
         return result
 
 
@@ -260,45 +264,42 @@ def _across(image: Plane, band: Plane) -> Plane:
     return _down(image.T, band).T
 
 
-def _values(plane: Plane) -> Float32:
-    return Float32(plane.ravel())
-
-
 def _error(truth: Seen, shown: Seen) -> Plane:
     """Return FLIP (N,) of what is seen of two images."""
     first, edge, point = truth
     second, other_edge, other_point = shown
-    slope = dr.abs(edge - other_edge)
-    curvature = dr.abs(point - other_point)
+    slope = arrays.absolute(edge - other_edge)
+    curvature = arrays.absolute(point - other_point)
     # `√(max / √2)`: the difference of two slopes is at most √2.
-    feature = sqrt(sqrt(0.5)) * dr.sqrt(dr.maximum(slope, curvature))
+    feature = sqrt(sqrt(0.5)) * arrays.sqrt(arrays.maximum(slope, curvature))
     colour = _redistributed(_apart(first, second))
     # Equal colours are 0 apart, whatever the power.
-    return np.array(dr.select(colour > 0.0, dr.power(colour, 1.0 - feature), 0.0))
+    return np.array(arrays.select(colour > 0.0, arrays.power(colour, 1.0 - feature), 0.0))
 
 
-def _hunted(opponent: Array3f) -> Array3f:
+def _hunted(opponent: Colours) -> Colours:
     """Return CIE L*a*b* of blurred opponent colours, chroma scaled by lightness (Hunt)."""
-    rgb = dr.clip(times(_FROM_OPPONENT, opponent), 0.0, 1.0)
+    rgb = arrays.clip(times(_FROM_OPPONENT, opponent), 0.0, 1.0)
     lightness, a, b = xyz_to_lab(times(_XYZ, rgb), _XYZ.sum(axis=1))
-    return Array3f(lightness, 0.01 * lightness * a, 0.01 * lightness * b)
+    return arrays.colours(lightness, 0.01 * lightness * a, 0.01 * lightness * b)
 
 
-def _apart(first: Array3f, second: Array3f) -> Float32:
+def _apart(first: Colours, second: Colours) -> Numbers:
     """Return the compressed HyAB distance."""
-    delta = first - second
-    return dr.power(dr.abs(delta.x) + dr.hypot(delta.y, delta.z), _POWER)
+    lightness, a, b = first - second
+    return arrays.power(arrays.absolute(lightness) + arrays.hypot(a, b), _POWER)
 
 
 @lru_cache(maxsize=1)
 def _largest() -> float:
     """Return the distance of green and blue."""
-    green = Array3f(_OPPONENT.T[1].tolist())
-    blue = Array3f(_OPPONENT.T[2].tolist())
+    # NumPy's arrays (3, 1), so that it is the same whoever computes.
+    green = _OPPONENT[:, 1:2]
+    blue = _OPPONENT[:, 2:3]
     return float(_apart(_hunted(green), _hunted(blue))[0])
 
 
-def _redistributed(distance: Float32) -> Float32:
+def _redistributed(distance: Numbers) -> Numbers:
     knee = _KNEE * _largest()
     above = _KNEE_SHOWN + (distance - knee) * ((1.0 - _KNEE_SHOWN) / (_largest() - knee))
-    return dr.select(distance < knee, distance * (_KNEE_SHOWN / knee), above)
+    return arrays.select(distance < knee, distance * (_KNEE_SHOWN / knee), above)

@@ -51,7 +51,7 @@ from fotismos.comparisons.departure.blocks import (
     spread_out,
 )
 from fotismos.comparisons.departure.colour import Array
-from fotismos.reference.rendering.renderer import require_finite
+from fotismos.reference.rendering.finite import require_finite
 from fotismos.reference.rendering.sums import BLOCK, DifferenceEstimate
 
 LEVEL = 0.05

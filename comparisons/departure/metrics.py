@@ -59,7 +59,7 @@ from fotismos.comparisons.departure.flip import hdr_flip, ldr_flip
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.declared import Declared
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.rendering.renderer import require_finite
+from fotismos.reference.rendering.finite import require_finite
 
 LOG2_EPSILON = 1e-4
 """Added to both luminances of `log2_luminance_ratio`; 1.0 is display white."""

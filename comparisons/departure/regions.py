@@ -10,8 +10,10 @@ Every counted pixel belongs to the first surface that the ray through its centre
 of all shapes add up to 1, as do the shares of all materials.
 """
 
+from __future__ import annotations
+
 from operator import itemgetter
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from msgspec import Meta
@@ -20,7 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 from fotismos.comparisons.departure.blocks import block_sums
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Amount, Count, Record, Share, Size
-from fotismos.reference.rendering.gbuffer import ObjectIds
+
+if TYPE_CHECKING:  # pictures have no objects, and need no Mitsuba
+    from fotismos.reference.rendering.gbuffer import ObjectIds
 
 CELLS = 48
 """Cells along the longer side of the image."""

@@ -37,7 +37,8 @@ from fotismos.reference.planning.effects import (
     ReplacedEffect,
 )
 from fotismos.reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
-from fotismos.reference.planning.plan import Plan, physical_integrator
+from fotismos.reference.planning.plan import physical_integrator
+from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.rendering import direct
 from fotismos.reference.rendering.gbuffer import image_size, resize
 from fotismos.reference.rendering.renderer import Renderer, Stream, passes, variant

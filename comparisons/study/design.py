@@ -46,7 +46,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.case import SUFFIXES
+from fotismos.comparisons.names import SUFFIXES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.study.scenes import (
     PHONG,

@@ -18,8 +18,9 @@ import numpy as np
 import pyarrow as pa
 
 from fotismos.comparisons.atomic import Entry
-from fotismos.comparisons.case import RGB, is_script, open_case
+from fotismos.comparisons.case import RGB, open_case
 from fotismos.comparisons.comparison import versions
+from fotismos.comparisons.names import is_script
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.comparisons.study import dataset, scenes
@@ -31,7 +32,8 @@ from fotismos.heuristic.errors import FotismosError, InputError, unknown
 from fotismos.heuristic.heuristics import named
 from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.planning.effects import EFFECTS, PRUNED
-from fotismos.reference.planning.plan import Plan, physical_integrator
+from fotismos.reference.planning.plan import physical_integrator
+from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.rendering import direct
 from fotismos.reference.rendering.renderer import Progress, Renderer, passes
 from fotismos.reference.rendering.sums import Accumulator

@@ -24,7 +24,8 @@ from fotismos.comparisons.audit.subjects import shaded
 from fotismos.heuristic import heuristics
 from fotismos.heuristic.lights import DirectionalLight
 from fotismos.reference.pairing.albedo import RoughPlastic, to_phong, to_roughplastic
-from fotismos.reference.pairing.factors import Convention, Miss, Phong
+from fotismos.reference.pairing.factors import Convention, Phong
+from fotismos.reference.pairing.pairing_record import Miss
 
 Point: TypeAlias = dict[str, float]
 """Values by parameter."""

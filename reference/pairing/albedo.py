@@ -32,15 +32,16 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+import fotismos.reference.scene  # noqa: F401  it gives Mitsuba a variant
 from fotismos.heuristic.terms import normalisation
 from fotismos.reference.pairing.factors import (
     Convention,
-    Miss,
     Phong,
     alpha_of,
     exponent_of,
     specular_albedo,
 )
+from fotismos.reference.pairing.pairing_record import Miss
 
 NODES = 96
 

@@ -13,7 +13,8 @@ from typing import Any
 import mitsuba as mi
 
 from fotismos.heuristic.materials import COEFFICIENTS, SMALLEST_ALPHA
-from fotismos.reference.pairing.factors import Convention, Miss, Phong, Replacements
+from fotismos.reference.pairing.factors import Convention, Phong, Replacements
+from fotismos.reference.pairing.pairing_record import Miss
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph, properties
 

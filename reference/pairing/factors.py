@@ -34,14 +34,18 @@ diffuse surface: a constant environment sends it the irradiance ``pi L``, of whi
 from dataclasses import dataclass, field
 from enum import Enum
 from math import sqrt
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from msgspec import Meta
 
 from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
 from fotismos.heuristic.terms import normalisation
-from fotismos.reference.records import Record
+from fotismos.reference.pairing.pairing_record import (
+    BsdfPair,
+    EmitterPair,
+    Miss,
+    Unrepresentable,
+)
 
 INTENSITY_FACTOR = 1 / IRRADIANCE_PER_INTENSITY
 """``I_p / E`` and ``I_p0 / I``: the factor of all rows above."""
@@ -75,44 +79,6 @@ class Phong:
     n: float
     form: str = "phong"
     normalised: bool = False
-
-
-class Miss(Record):
-    """A quantity that no partner reaches."""
-
-    what: str
-    wanted: float
-    reached: float
-
-
-class BsdfPair(Record):
-    """A BSDF and its partner; grey colours are one value. The note says what is odd."""
-
-    name: str
-    given: str
-    derived: str
-    parameters: dict[str, Any]
-    note: str = ""
-
-
-class EmitterPair(Record):
-    """A light and its partner, and the factor between their intensities."""
-
-    name: str
-    given: str
-    derived: str
-    factor: float
-    exact: bool
-    note: str = ""
-
-
-class Unrepresentable(Record):
-    """Something that the heuristic model cannot represent; compared nevertheless."""
-
-    name: Annotated[str, Meta(description="Id, or place in the file.")]
-    plugin: str
-    lost: str
-    nearest: Annotated[str, Meta(description="What replaces it, and by which rule.")]
 
 
 @dataclass

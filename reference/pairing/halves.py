@@ -17,16 +17,12 @@ from fotismos.heuristic.heuristics import PHONG, Interpolation, named
 from fotismos.heuristic.plugins import register
 from fotismos.reference.pairing import bsdfs, emitters
 from fotismos.reference.pairing.factors import (
-    BsdfPair,
     Convention,
-    EmitterPair,
-    Miss,
     Replacements,
-    Unrepresentable,
     specular_albedo,
 )
-from fotismos.reference.pairing.settings import Override, Settings, complete
-from fotismos.reference.records import Record
+from fotismos.reference.pairing.pairing_record import Override, Pairing, Unrepresentable
+from fotismos.reference.pairing.settings import Settings, complete
 from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.scene.graph import Graph, properties
 from fotismos.reference.scene.source import Source
@@ -35,15 +31,6 @@ BSDF = mi.ObjectType.BSDF
 INTEGRATOR = mi.ObjectType.Integrator
 MEDIUM = mi.ObjectType.Medium
 SHAPE = mi.ObjectType.Shape
-
-
-class Pairing(Record):
-    """How heuristic and physical materials and lights correspond."""
-
-    convention: str
-    bsdfs: tuple[BsdfPair, ...]
-    emitters: tuple[EmitterPair, ...]
-    misses: tuple[Miss, ...]
 
 
 @dataclass(frozen=True)

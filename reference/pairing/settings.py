@@ -8,7 +8,8 @@ import mitsuba as mi
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.lights import INTENSITIES
 from fotismos.reference.pairing import bsdfs, lights
-from fotismos.reference.records import Record
+from fotismos.reference.pairing.pairing_record import Override
+from fotismos.reference.rendering.integrators import PATHS
 from fotismos.reference.scene import checks, values
 from fotismos.reference.scene.graph import Graph, Reference, properties
 
@@ -18,21 +19,10 @@ SAMPLER = mi.ObjectType.Sampler
 SENSOR = mi.ObjectType.Sensor
 SHAPE = mi.ObjectType.Shape
 
-PATHS = ("path", "volpath", "volpathmis")
-"""Integrators with the same light as the reference: all paths up to a length."""
-
 PIXEL_FORMATS = ("luminance", "luminance_alpha", "rgb", "rgba", "xyz", "xyza")
 """Pixel formats of Mitsuba's films."""
 
 FILM_SIZES = ("width", "height", "crop_width", "crop_height", "crop_offset_x", "crop_offset_y")
-
-
-class Override(Record):
-    """A setting of the scene that is not used, and what is used instead."""
-
-    what: str
-    given: str
-    used: str
 
 
 @dataclass

@@ -1,45 +1,31 @@
 """The effects of light, each declared once, in the order of :data:`EFFECTS`.
 
 Whatever lists effects reads that tuple: plans, hybrids, attribution, parts of a departure, steps of
-a study, charts and pages.
+a study, charts and pages. Their rules and sites are in
+:mod:`fotismos.reference.planning.effect_rules`, which is loaded when a scene is planned: words and
+colours need no Mitsuba.
 """
 
+from __future__ import annotations
+
+import pkgutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mitsuba as mi
+from fotismos.reference.planning.decisions import Decision, RuleResult
 
-from fotismos.heuristic.heuristics import Interpolation
-from fotismos.reference.pairing import lights
-from fotismos.reference.pairing.bsdfs import WRAPPERS, is_mirror
-from fotismos.reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
-from fotismos.reference.planning.rules import NO_SECOND_REFLECTION, NO_SHADOWS, PruningRule
-from fotismos.reference.records import Record
-from fotismos.reference.scene.graph import Graph, graft
+if TYPE_CHECKING:
+    import mitsuba as mi
 
+    from fotismos.reference.planning.facts import Facts
+    from fotismos.reference.scene.graph import Graph
 
-class Decision(Record):
-    """Whether a scene calls for an effect, and why.
+    Rule = Callable[[Facts], tuple[bool, str]]
+    """Whether a scene needs an effect, and the evidence."""
 
-    Attributes
-    ----------
-    rule
-        The kind of reason, and the reason: ``structural`` follows from the scene's structure,
-        ``simulated`` means that a premise of leaving it out is not known to hold, ``asked`` that
-        pruning is off, ``guard`` that a probe disagreed with the plan.
-    """
-
-    name: str
-    called_for: bool
-    rule: str
-
-
-Rule = Callable[[Facts], tuple[bool, str]]
-"""Whether a scene needs an effect, and the evidence."""
-
-Sites = Callable[[Facts], Sequence[Any]]
-"""The nodes or keys of the physical half's graph that have an effect."""
+    Sites = Callable[[Facts], Sequence[Any]]
+    """The nodes or keys of the physical half's graph that have an effect."""
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -88,21 +74,22 @@ class Effect:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class PrunedEffect(Effect):
-    """An effect that the integrator leaves out if the rule ``pruning`` allows it.
+    """An effect that the integrator leaves out if a rule of pruning applies.
 
-    ``without`` are the parameters of `direct_all` that do so. ``is_alike(facts)``: both halves
-    treat it alike. ``step`` is what it changes in an image, in words.
+    ``pruning(facts)`` checks that rule, ``without`` are the parameters of `direct_all` that leave
+    the effect out. ``is_alike(facts)``: both halves treat it alike. ``step`` is what it changes in
+    an image, in words.
     """
 
     rule: Rule = lambda facts: (False, "")
-    pruning: PruningRule
+    pruning: Callable[[Facts], RuleResult]
     without: dict[str, Any]
     is_alike: Callable[[Facts], bool]
     step: str
 
     def decide(self, facts: Facts) -> Decision:
         """Apply the rule of pruning."""
-        result = self.pruning.check(facts)
+        result = self.pruning(facts)
         kind = "structural" if result.applies else "simulated"
         return self.decision(not result.applies, kind, result.evidence)
 
@@ -133,26 +120,23 @@ class GlowingEffect(ReplacedEffect):
     emission: Callable[[mi.Properties, Facts], dict[str, Any]]
 
 
+def _late(name: str, **given: Any) -> Callable[..., Any]:
+    """Return a function of this folder, ``module:name``, which is loaded at its first call."""
+
+    def call(*arguments: Any) -> Any:
+        return pkgutil.resolve_name(f"{__package__}.{name}")(*arguments, **given)
+
+    return call
+
+
 # --- Terms of the heuristic kernel -----------------------------------------------------------
-
-
-def _coefficient(name: str) -> Callable[[Facts], tuple[bool, str]]:
-    def rule(facts: Facts) -> tuple[bool, str]:
-        present = name in facts.kernel_terms
-        where = "not 0 in some material" if present else "0 in every material"
-        if name == "k_s" and any(map(is_mirror, facts.materials)):
-            where += ", mirrors aside: the kernel traces no rays"
-        return present, f"{name} is {where}"
-
-    return rule
-
 
 EMISSION = Effect(
     label="emission",
     heuristic="k_i (8.1)",
     reference="area emitters, seen",
     cost="an addition",
-    rule=_coefficient("k_i"),
+    rule=_late("effect_rules:has_coefficient", coefficient="k_i"),
 )
 
 AMBIENT = Effect(
@@ -160,9 +144,7 @@ AMBIENT = Effect(
     heuristic="I_a k_a (8.2)",
     reference="see environment",
     cost="an addition",
-    rule=lambda facts: (
-        _coefficient("k_a")(facts) if "ambient" in facts.kernel else (False, "no ambient light")
-    ),
+    rule=_late("effect_rules:has_ambient"),
 )
 
 DIFFUSE = Effect(
@@ -170,7 +152,7 @@ DIFFUSE = Effect(
     heuristic="k_d (N.L) (8.5)",
     reference="diffuse, or roughplastic's base",
     cost="a scalar product",
-    rule=_coefficient("k_d"),
+    rule=_late("effect_rules:has_coefficient", coefficient="k_d"),
 )
 
 SPECULAR = Effect(
@@ -178,7 +160,7 @@ SPECULAR = Effect(
     heuristic="k_s (R.V)^n (8.9)",
     reference="roughplastic's coat",
     cost="a vector and a power",
-    rule=_coefficient("k_s"),
+    rule=_late("effect_rules:has_coefficient", coefficient="k_s"),
 )
 
 POLYGONS = Effect(
@@ -186,10 +168,7 @@ POLYGONS = Effect(
     heuristic="flat, Gouraud (6.35-6.38)",
     reference="none",
     cost="a sum per vertex or face, then a lookup: saves time with many lights",
-    rule=lambda facts: (
-        facts.interpolation is not Interpolation.PHONG,
-        f"interpolation {facts.interpolation.value}",
-    ),
+    rule=_late("effect_rules:is_interpolated"),
     colour="#f0e442",
 )
 
@@ -199,19 +178,12 @@ SPECTRAL = Effect(
     heuristic="as many values as given (8.11)",
     reference="wavelengths",
     cost="samples, 4 values each",
-    rule=lambda facts: (mi.is_spectral, f"variant {mi.variant()}"),
+    rule=_late("effect_rules:is_spectral"),
     colour="#882255",
     sampled=True,
 )
 
-
 # --- Lights that differ in form: intensities, fall-off, cone, extent, surroundings -----------
-
-
-def _of_two_intensities(facts: Facts) -> list[str]:
-    lost = facts.pair.unrepresentable
-    return [light.name for light in lost if light.lost == lights.SECOND_INTENSITY]
-
 
 ONE_INTENSITY = Effect(
     label="one intensity",
@@ -219,113 +191,20 @@ ONE_INTENSITY = Effect(
     heuristic="L_d and L_s (6.6, 6.8)",
     reference="one",
     cost="nothing",
-    rule=lambda facts: (
-        bool(names := _of_two_intensities(facts)),
-        f"lights of two intensities: {', '.join(names) or 'none'}",
-    ),
+    rule=_late("effect_rules:has_two_intensities"),
     colour="#332288",
-    sites=_of_two_intensities,
+    sites=_late("effect_rules:lights_of_two_intensities"),
 )
-
-
-def _inexact_lights(with_cone: bool) -> Callable[[Facts], list[str]]:
-    """Find the keys of the scene's lights whose two forms differ by cone, or only by fall-off.
-
-    A spot's attenuation goes with its cone: Mitsuba has no spot with another fall-off. An even cone
-    (``m = 0``) is the same in both forms.
-    """
-
-    def has_cone(graph: Graph, index: int) -> bool:
-        is_spot = lights.of(graph.plugin(index)).has("cutoff")
-        return is_spot and graph.props(index).get("exponent", 0.0) != 0
-
-    def sites(facts: Facts) -> list[str]:
-        heuristic = facts.pair.heuristic
-        physical = dict(facts.pair.physical.children(0, EMITTER))
-        inexact = {light.name for light in facts.pair.pairing.emitters if not light.exact}
-        return [
-            key
-            for key, index in heuristic.children(0, EMITTER)
-            if key in physical
-            and lights.of(heuristic.plugin(index)).has("attenuation")
-            and has_cone(heuristic, index) is with_cone
-            and heuristic.label(index) in inexact
-        ]
-
-    return sites
-
-
-def _put_lights(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
-    emitters = dict(facts.pair.heuristic.children(0, EMITTER))
-    for key in keys:
-        graph.attach(0, key, graft(graph, facts.pair.heuristic, emitters[key]))
-
-
-def _attenuated(facts: Facts) -> tuple[bool, str]:
-    """Distance attenuation: any point or spot whose ``f_att`` depends on the distance."""
-    graph = facts.pair.heuristic
-    for index in graph.nodes(EMITTER):
-        props = graph.props(index)
-        is_even = (props.get("k1", 0.0), props.get("k2", 0.0)) == (0.0, 0.0)
-        if lights.of(graph.plugin(index)).has("attenuation") and not is_even:
-            return True, f"{graph.label(index)} falls off with distance"
-    return False, "no light of the heuristic half falls off with distance"
-
-
-def _coned(facts: Facts) -> tuple[bool, str]:
-    halves = facts.pair.heuristic, facts.pair.physical
-    plugins = (half.plugin(index) for half in halves for index in half.nodes(EMITTER))
-    return any(lights.of(plugin).has("cutoff") for plugin in plugins), facts.light_kinds
-
-
-def _shining(facts: Facts) -> list[int]:
-    graph = facts.pair.physical
-    return [shape for shape in graph.nodes(SHAPE) if graph.children(shape, EMITTER)]
-
-
-def _put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
-    for shape in shapes:
-        for key, _ in graph.children(shape, EMITTER):
-            graph.detach(shape, key)
-            if facts.pair.hide_emitters:
-                graph.remove(shape)
-    # The lights that only the heuristic half has are those in place of shapes.
-    before = dict(facts.pair.physical.children(0, EMITTER))
-    emitters = facts.pair.heuristic.children(0, EMITTER)
-    _put_lights(graph, facts, [key for key, _ in emitters if key not in before])
-
-
-def _surroundings(facts: Facts) -> list[str]:
-    graph = facts.pair.physical
-    children = graph.children(0, EMITTER)
-    return [key for key, index in children if not lights.of(graph.plugin(index)).exact]
-
-
-def _surrounded(facts: Facts) -> tuple[bool, str]:
-    kinds = (light.kind for light in facts.lights if light.shape is None)
-    return any(lights.of(kind).surrounds for kind in kinds), facts.light_kinds
-
-
-def _detach(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
-    for key in keys:
-        graph.detach(0, key)
-
-
-def _ambient_light(phong: mi.Properties, facts: Facts) -> dict[str, Any]:
-    if "k_a" not in phong or "ambient" not in facts.kernel:
-        return {}
-    return {"k_a": phong["k_a"], "ambient": facts.kernel["ambient"]}
-
 
 ATTENUATION = ReplacedEffect(
     label="distance attenuation",
     heuristic="f_att (6.1, 8.6)",
     reference="1 / d^2",
     cost="a division per light",
-    rule=_attenuated,
+    rule=_late("effect_rules:is_attenuated"),
     colour="#d55e00",
-    sites=_inexact_lights(with_cone=False),
-    put=_put_lights,
+    sites=_late("effect_rules:inexact_lights", with_cone=False),
+    put=_late("effect_rules:put_lights"),
 )
 
 CONE = ReplacedEffect(
@@ -333,10 +212,10 @@ CONE = ReplacedEffect(
     heuristic="6.2-6.4",
     reference="spot",
     cost="a comparison and a power per light",
-    rule=_coned,
+    rule=_late("effect_rules:has_cone"),
     colour="#999933",
-    sites=_inexact_lights(with_cone=True),
-    put=_put_lights,
+    sites=_late("effect_rules:inexact_lights", with_cone=True),
+    put=_late("effect_rules:put_lights"),
 )
 
 EXTENDED = GlowingEffect(
@@ -347,9 +226,9 @@ EXTENDED = GlowingEffect(
     rule=lambda facts: (len(facts.lamps) > 0, facts.light_kinds),
     colour="#56b4e9",
     sampled=True,
-    sites=_shining,
-    put=_put_far_lights,
-    emission=lambda phong, facts: {"k_i": phong["k_i"]} if "k_i" in phong else {},
+    sites=_late("effect_rules:shining_shapes"),
+    put=_late("effect_rules:put_far_lights"),
+    emission=_late("effect_rules:own_light"),
 )
 
 ENVIRONMENT = GlowingEffect(
@@ -358,62 +237,25 @@ ENVIRONMENT = GlowingEffect(
     heuristic="ambient light",
     reference="light from everywhere",
     cost="samples, or a table",
-    rule=_surrounded,
+    rule=_late("effect_rules:is_surrounded"),
     colour="#009e73",
     sampled=True,
-    sites=_surroundings,
-    put=_detach,
-    emission=_ambient_light,
+    sites=_late("effect_rules:surroundings"),
+    put=_late("effect_rules:detach"),
+    emission=_late("effect_rules:ambient_light"),
 )
 
-
 # --- Surfaces that differ in form: reflection and transmission -------------------------------
-
-
-def _inexact_surfaces(opaque: bool) -> Callable[[Facts], list[int]]:
-    """Find the opaque shapes, or the others, whose two BSDFs differ; diffuse ones do not."""
-
-    def sites(facts: Facts) -> list[int]:
-        graph = facts.pair.physical
-        surfaces = []
-        for shape in graph.nodes(SHAPE):
-            shape_facts = facts.by_name.get(graph.props(shape).id())
-            for _, bsdf in graph.children(shape, BSDF):
-                inner = [child for _, child in graph.children(bsdf, BSDF)] or [bsdf]
-                is_exact = all(graph.plugin(index) == "diffuse" for index in inner)
-                if not is_exact and (shape_facts is None or shape_facts.opaque) is opaque:
-                    surfaces.append(shape)
-        return surfaces
-
-    return sites
-
-
-def _put_materials(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
-    """Give shapes the materials of the heuristic half; shared materials stay shared."""
-    replaced: dict[int, int] = {}
-    for shape in shapes:
-        ((key, _),) = graph.children(shape, BSDF)
-        ((_, phong),) = facts.pair.heuristic.children(shape, BSDF)
-        if phong not in replaced:
-            replaced[phong] = graft(graph, facts.pair.heuristic, phong)
-        graph.attach(shape, key, replaced[phong])
-
-
-def _reflected(facts: Facts) -> tuple[bool, str]:
-    graph = facts.pair.physical
-    plugins = {graph.plugin(index) for index in graph.nodes(BSDF)}
-    return bool(plugins - {"diffuse", "null", *WRAPPERS}), f"BSDFs: {', '.join(sorted(plugins))}"
-
 
 MICROFACETS = ReplacedEffect(
     label="microfacets and Fresnel",
     heuristic="none",
     reference="roughplastic",
     cost="a BSDF evaluation per light",
-    rule=_reflected,
+    rule=_late("effect_rules:is_reflected"),
     colour="#cc79a7",
-    sites=_inexact_surfaces(opaque=True),
-    put=_put_materials,
+    sites=_late("effect_rules:inexact_surfaces", opaque=True),
+    put=_late("effect_rules:put_materials"),
 )
 
 TRANSMISSION = ReplacedEffect(
@@ -427,10 +269,9 @@ TRANSMISSION = ReplacedEffect(
     ),
     undecided=True,
     colour="#44aa99",
-    sites=_inexact_surfaces(opaque=False),
-    put=_put_materials,
+    sites=_late("effect_rules:inexact_surfaces", opaque=False),
+    put=_late("effect_rules:put_materials"),
 )
-
 
 # --- Obstacles of light ----------------------------------------------------------------------
 
@@ -439,7 +280,7 @@ OCCLUSION = PrunedEffect(
     heuristic="none, or if requested",
     reference="shadow rays",
     cost="a ray per light",
-    pruning=NO_SHADOWS,
+    pruning=_late("rules:NO_SHADOWS.check"),
     colour="#0072b2",
     is_alike=lambda facts: facts.has_shadows,
     # A sample of the BSDF would hit what hides a light.
@@ -452,7 +293,7 @@ INTERREFLECTION = PrunedEffect(
     heuristic="none",
     reference="paths",
     cost="samples, two rays per reflection",
-    pruning=NO_SECOND_REFLECTION,
+    pruning=_late("rules:NO_SECOND_REFLECTION.check"),
     colour="#e69f00",
     is_alike=lambda facts: facts.pair.max_depth == 2,
     without={"max_depth": 2},

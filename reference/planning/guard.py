@@ -22,7 +22,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from fotismos.reference.planning.plan import Guard, Plan, physical_integrator
+from fotismos.reference.planning.plan import physical_integrator
+from fotismos.reference.planning.plan_record import Guard, Plan
 from fotismos.reference.rendering.renderer import Stream, pass_seed
 
 SHARE = 0.02

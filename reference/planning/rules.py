@@ -13,6 +13,7 @@ import numpy as np
 
 from fotismos.reference.pairing import lights
 from fotismos.reference.pairing.halves import Pair
+from fotismos.reference.planning.decisions import RuleResult
 from fotismos.reference.planning.facts import (
     BSDF,
     EMITTER,
@@ -22,7 +23,6 @@ from fotismos.reference.planning.facts import (
     LightFacts,
     ShapeFacts,
 )
-from fotismos.reference.records import Record
 
 FAR = 1e6
 """Start of the shadow of a directional light, in multiples of the scene's size."""
@@ -40,27 +40,6 @@ class Premise:
 
     sentence: str
     against: Callable[[Facts], str | None]
-
-
-class RuleResult(Record):
-    """Whether a rule of pruning applies to a scene.
-
-    Attributes
-    ----------
-    name
-        What is done when it applies.
-    applies
-        Whether all its premises are known to hold.
-    premise
-        The first premise not known to hold; empty if it applies.
-    evidence
-        What is absent, or what contradicts the premise.
-    """
-
-    name: str
-    applies: bool
-    premise: str
-    evidence: str
 
 
 @dataclass(frozen=True)

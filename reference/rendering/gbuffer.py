@@ -9,6 +9,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+import fotismos.reference.scene  # noqa: F401  it gives Mitsuba a variant
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
 

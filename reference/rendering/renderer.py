@@ -14,7 +14,6 @@ from copy import copy
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
-from statistics import median
 from time import perf_counter, process_time
 from types import CodeType, FunctionType
 from typing import Any
@@ -24,8 +23,9 @@ import mitsuba as mi
 import numpy as np
 
 from fotismos.heuristic.convention import Scene
-from fotismos.heuristic.errors import FotismosError, InputError, NonFiniteError
-from fotismos.reference.records import Amount, Record, Size
+from fotismos.heuristic.errors import FotismosError, InputError
+from fotismos.reference.records import Times
+from fotismos.reference.rendering.finite import LARGEST_VALUE, require_finite, wrong_pixels
 from fotismos.reference.rendering.gbuffer import image_size, resize
 
 LOGGER = logging.getLogger(__name__)
@@ -44,42 +44,8 @@ BASE = 200 * 2**20
 WARM = 2
 """Images before those that are timed: the first traces and compiles, the second warms caches."""
 
-LARGEST_VALUE = 1e18
-"""In units of display white: squares of differences must not overflow in single precision."""
-
 ROUNDING = 1e-5
 """A value below 0 by less than this is a rounding error, in units of display white."""
-
-
-class Times(Record):
-    """Wall times of one rendering in seconds, evaluated and synchronised.
-
-    Attributes
-    ----------
-    median_s
-        Median time per pass, once compiled.
-    first_s
-        The first pass, with compilation.
-    compile_s
-        Code generation and back end: almost nothing for kernels in Dr.Jit's cache on disk.
-    """
-
-    median_s: Amount
-    passes: Size
-    first_s: Amount
-    total_s: Amount
-    compile_s: Amount | None
-
-    @classmethod
-    def of(cls, passes: Sequence[float], compilation: float) -> "Times":
-        """Return the times of some passes; the median is of those after the first, if any."""
-        return cls(
-            median_s=median(passes[1:] or passes),
-            passes=len(passes),
-            first_s=passes[0],
-            total_s=sum(passes),
-            compile_s=compilation,
-        )
 
 
 class Renderer:
@@ -155,17 +121,19 @@ class Renderer:
         if not dr.all(dr.abs(image.array) <= LARGEST_VALUE):
             pixels = np.array(image)
             require_finite(pixels, layer)
+            wrong = wrong_pixels(pixels, np.abs(pixels) <= LARGEST_VALUE, "too bright")
             raise InputError(
-                f"{layer}: {_wrong(pixels, np.abs(pixels) <= LARGEST_VALUE, 'too bright')}. At most"
-                f" {LARGEST_VALUE:g} is allowed: divide all lights by the same number."
+                f"{layer}: {wrong}. At most {LARGEST_VALUE:g} is allowed: divide all lights by the"
+                " same number."
             )
         if self._is_users and dr.any(image.array < -ROUNDING):
             plugin = self.scene.sensors()[0].film().rfilter().class_name()
             if any(kind in plugin for kind in ("Box", "Tent", "Gaussian")):  # no negative lobes
                 pixels = np.array(image)
+                wrong = wrong_pixels(pixels, pixels >= -ROUNDING, "negative")
                 raise InputError(
-                    f"{layer}: {_wrong(pixels, pixels >= -ROUNDING, 'negative')}. Light must be 0"
-                    " or more: clamp what can be negative, such as drjit.maximum(cosine, 0)."
+                    f"{layer}: {wrong}. Light must be 0 or more: clamp what can be negative, such"
+                    " as drjit.maximum(cosine, 0)."
                 )
         return image
 
@@ -351,25 +319,6 @@ def _images(renderers: Sequence[Renderer], seed: int, backwards: bool) -> tuple[
                 if renderer.variant == name:
                     images[index] = renderer.render(seed)
     return tuple(images[index] for index in range(len(renderers)))
-
-
-def require_finite(image: np.ndarray, layer: str) -> None:
-    """Raise `NonFiniteError` if an image (H, W) or (H, W, C) holds a NaN or an infinity."""
-    if not np.isfinite(image).all():
-        raise NonFiniteError(
-            f"{layer}: {_wrong(image, np.isfinite(image), 'NaN or infinite')}. Look at the surface"
-            " and the lights seen there: an infinite light or a degenerate mesh is the usual cause."
-        )
-
-
-def _wrong(image: Any, right: Any, what: str) -> str:
-    """Return how many pixels are wrong, and the first as (x, y), in reading order from top left."""
-    wrong = ~right if right.ndim == 2 else ~right.all(axis=-1)
-    pixel = np.unravel_index(np.argmax(wrong), wrong.shape)
-    return (
-        f"{np.count_nonzero(wrong)} of {wrong.size} pixels are {what}, the first at (x, y) ="
-        f" ({', '.join(str(index) for index in reversed(pixel))}): {np.asarray(image)[pixel]}"
-    )
 
 
 def require_memory(name: str, width: int, height: int) -> None:

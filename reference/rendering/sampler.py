@@ -26,11 +26,8 @@ import drjit as dr
 import mitsuba as mi
 
 from fotismos.heuristic.convention import Array, Mask
+from fotismos.reference.rendering.integrators import SAMPLER
 from fotismos.reference.scene.graph import Graph, properties
-
-SAMPLER = "rotated_multijitter"
-STOCK_SAMPLER = "independent"
-"""The sampler of Mitsuba's examples."""
 
 _ALONG = 0x68BC21EB
 _ACROSS = 0x02E5BE93

@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from math import hypot
 from typing import Any
 
-import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -83,10 +81,69 @@ class DifferenceEstimate(Estimate):
     grouped: Grouped
 
 
+class NumPyDoubles:
+    """Doubles of NumPy."""
+
+    def doubles(self, image: Any) -> Array:
+        """Return the values of an image (H, W, 3), (3 H W,)."""
+        return np.asarray(image, np.float64).ravel()
+
+    def zeros(self, size: int) -> Array:
+        """Return zeros (size,)."""
+        return np.zeros(size)
+
+    def number(self, value: int) -> Any:
+        """Return a number as a factor of doubles."""
+        return float(value)
+
+    def index(self, places: np.ndarray) -> Any:
+        """Return places (P,) in an image as an index of its doubles."""
+        return places
+
+    def gather(self, values: Array, index: Any) -> np.ndarray:
+        """Return the doubles (P,) at an index."""
+        kept: np.ndarray = values[index]
+        return kept
+
+    def evaluate(self, sums: dict[str, Array]) -> None:
+        """Compute sums that are not yet."""
+
+
+class DrJitDoubles(NumPyDoubles):
+    """Doubles of Dr.Jit: for passes that it rendered, NumPy would take as long as the rendering."""
+
+    def __init__(self) -> None:
+        import drjit as dr  # loaded late: sums of pictures need neither
+        import mitsuba as mi
+
+        self._dr = dr
+        self._mi = mi
+
+    def doubles(self, image: Any) -> Array:
+        tensor = image if self._dr.is_tensor_v(image) else self._mi.TensorXd(image)
+        return self._mi.Float64(tensor.array)
+
+    def zeros(self, size: int) -> Array:
+        return self._dr.zeros(self._mi.Float64, size)
+
+    def number(self, value: int) -> Any:
+        # An input of the kernel, so that all passes share one.
+        return self._dr.opaque(self._mi.Float64, value)
+
+    def index(self, places: np.ndarray) -> Any:
+        return self._mi.UInt32(places.astype(np.uint32))
+
+    def gather(self, values: Array, index: Any) -> np.ndarray:
+        return np.array(self._dr.gather(self._mi.Float64, values, index))
+
+    def evaluate(self, sums: dict[str, Array]) -> None:
+        self._dr.eval(sums)
+
+
 class Accumulator:
     """Running sums of passes, for an :class:`Estimate`; or fewer, for a mean and its error.
 
-    They are Dr.Jit arrays of double precision: NumPy would take as long as the rendering.
+    The first pass decides who computes: NumPy if it is made of NumPy's arrays, else Dr.Jit.
     """
 
     def __init__(self, moments: Sequence[str] = NOISE) -> None:
@@ -94,33 +151,38 @@ class Accumulator:
         self._moments = tuple(moments)
         self._shape = ()
         self._sums: dict[str, Array] = {}
+        self._by = NumPyDoubles()
 
     def add(self, image: Any, less: Any = None) -> None:
-        """Add a pass: a tensor (H, W, 3), less another one if given."""
-        value = _doubles(image) if less is None else _doubles(image) - _doubles(less)
-        self._shape = tuple(image.shape)
+        """Add a pass: a tensor or array (H, W, 3), less another one if given."""
+        given = (image,) if less is None else (image, less)
+        if self.count == 0 and not all(isinstance(each, np.ndarray) for each in given):
+            self._by = DrJitDoubles()
+        value = self._by.doubles(image)
+        if less is not None:
+            value = value - self._by.doubles(less)
         if self.count == 0:
-            self._sums = {name: dr.zeros(mi.Float64, len(value)) for name in self._moments}
+            self._shape = tuple(image.shape)
+            self._sums = {name: self._by.zeros(len(value)) for name in self._moments}
         self.count += 1
         self._add(value, self._sums)
-        dr.eval(self._sums)
+        self._by.evaluate(self._sums)
 
     def _add(self, value: Array, sums: dict[str, Array]) -> None:
         count = self.count
         step = value - sums["mean"]
-        # Opaque counts, so that all passes share one kernel.
-        share = step / dr.opaque(mi.Float64, count)
+        share = step / self._by.number(count)
         if "cubes" in sums:
             # The update of a third central moment by one value (Pébay 2008, equation 2.8) takes the
             # old mean and squares.
-            cubic = dr.opaque(mi.Float64, (count - 1) * (count - 2))
+            cubic = self._by.number((count - 1) * (count - 2))
             sums["cubes"] += share * (share * step * cubic - 3 * sums["squares"])
         sums["mean"] += share
         if "squares" in sums:
             # Welford's update takes the step from the old mean and from the new one.
             sums["squares"] += step * (value - sums["mean"])
         if "signed" in sums:
-            sums["signed"] += value * dr.opaque(mi.Float64, 1 if count % 2 else -1)
+            sums["signed"] += value * self._by.number(1 if count % 2 else -1)
 
     def _array(self, name: str) -> np.ndarray:
         return np.array(self._sums[name]).reshape(self._shape)
@@ -160,14 +222,15 @@ class DifferenceSums(Accumulator):
         super().__init__((*NOISE, "cubes"))
         self._sample = sample(counted)
         # Places of the sampled channels in the flat image, (P, 3).
-        flat = 3 * self._sample[0][:, None] + np.arange(3)
-        self._index = mi.UInt32(flat.ravel().astype(np.uint32))
-        self._groups = np.zeros((GROUPS, flat.size))
+        self._places = (3 * self._sample[0][:, None] + np.arange(3)).ravel()
+        self._index: Any = None
+        self._groups = np.zeros((GROUPS, self._places.size))
 
     def _add(self, value: Array, sums: dict[str, Array]) -> None:
-        if len(self._index):
-            kept = dr.gather(mi.Float64, value, self._index)
-            self._groups[(self.count - 1) % GROUPS] += np.array(kept)
+        if self._places.size:
+            if self._index is None:
+                self._index = self._by.index(self._places)
+            self._groups[(self.count - 1) % GROUPS] += self._by.gather(value, self._index)
         super()._add(value, sums)
 
     def estimate(self, dtype: type = float) -> DifferenceEstimate:
@@ -224,11 +287,6 @@ def add_difference(sums: Sequence[Accumulator], images: Any) -> None:
     sums[0].add(heuristic)
     sums[1].add(reference)
     sums[2].add(heuristic, reference)
-
-
-def _doubles(image: Any) -> Array:
-    """Return the values of a tensor or array (H, W, 3) as doubles."""
-    return mi.Float64((image if dr.is_tensor_v(image) else mi.TensorXd(image)).array)
 
 
 LEVEL = 0.95

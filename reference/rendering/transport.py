@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import drjit as dr
 
+import fotismos.reference.scene  # noqa: F401  it gives Mitsuba a variant
 from fotismos.heuristic.convention import Colour, Interaction, Mask, Scene
 
 

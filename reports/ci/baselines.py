@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from fotismos.comparisons import atomic
 from fotismos.comparisons.atomic import content, require_regular
-from fotismos.comparisons.case import SUFFIXES, Case, file_of, is_script, open_case
+from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.check.measurement import HALVES, Baseline, read_baseline
 from fotismos.comparisons.departure.blocks import averaged, shrunk
+from fotismos.comparisons.names import SUFFIXES, file_of, is_script
 from fotismos.comparisons.options import Options
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError

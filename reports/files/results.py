@@ -29,7 +29,7 @@ from filelock import FileLock, Timeout
 from msgspec import Meta
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.case import file_of, name_of
+from fotismos.comparisons.names import file_of, name_of
 from fotismos.heuristic.errors import InputError, OutputError
 from fotismos.reference.records import VERSION, Machine, Record, Versions
 

@@ -12,14 +12,13 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from fotismos.comparisons.case import is_script, picture_parts
-from fotismos.comparisons.comparison import machine, versions
+from fotismos.comparisons.comparison import LIBRARIES, machine, versions
 from fotismos.comparisons.departure.criterion import checked_threshold
+from fotismos.comparisons.names import is_script, picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import FotismosError, InputError, InstallationError, OutputError
 from fotismos.reference.records import to_json
-from fotismos.reference.scene.source import placeholders
 from fotismos.reports import verdict
 from fotismos.reports.files import results
 from fotismos.reports.files.results import FIGURES, START, TABLES, Failure, RunRecord
@@ -54,6 +53,7 @@ class Batch:
     on_page: Callable[[Path], object] | None
     command: str
     within: float
+    libraries: Sequence[str] = LIBRARIES
     stages: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     views: dict[str, SceneView] = field(default_factory=dict)
     errors: dict[str, FotismosError] = field(default_factory=dict)
@@ -88,7 +88,7 @@ class Batch:
             stages=dict(self.stages) | {"other": max(0.0, other)},
             failures=tuple(self.failures()),
             machine=machine(),
-            versions=versions(),
+            versions=versions(self.libraries),
         )
 
     def write_page(self, is_interrupted: bool = False, run: RunRecord | None = None) -> None:
@@ -134,11 +134,13 @@ class Subjects:
     """What a command compares: words that name it, the name and file of each, and how.
 
     ``compare(word, folder, place, job, progress)`` returns the view and the seconds by stage.
+    ``libraries`` are those that the results depend on.
     """
 
     words: tuple[str, ...]
     files: tuple[tuple[str, Path | None], ...]
     compare: Comparing
+    libraries: Sequence[str] = LIBRARIES
 
 
 def run(
@@ -167,7 +169,12 @@ def run(
         for name in (TABLES, FIGURES) if job.figures else (TABLES,):
             results.own(folder / name)
         batch = Batch(
-            folder=folder, places=places, on_page=on_page, command=command, within=job.within
+            folder=folder,
+            places=places,
+            on_page=on_page,
+            command=command,
+            within=job.within,
+            libraries=subjects.libraries,
         )
         batch.stages["start-up"] = perf_counter() - START
         calls = {
@@ -202,6 +209,8 @@ def _options_for(whole: Options, scenes: Sequence[str]) -> list[Options]:
     """Return the options for each scene: with values only for the placeholders that it has."""
     if len(scenes) == 1 or not whole.define:
         return [whole] * len(scenes)
+    from fotismos.reference.scene.source import placeholders  # loaded late: it loads Mitsuba
+
     known = (placeholders(Path(scene)) for scene in scenes)
     by_scene = [
         {key: value for key, value in whole.define.items() if key in names} for names in known

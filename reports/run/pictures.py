@@ -4,7 +4,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from fotismos.comparisons.case import picture_parts
+from fotismos.comparisons.comparison import PICTURE_LIBRARIES
+from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.reports.files import results
@@ -17,7 +18,12 @@ from fotismos.reports.run.batch import Subjects
 def subjects(options: Options) -> Subjects:
     """Return what a command compares: two pictures, named after the first one."""
     path, _ = picture_parts(options.image[0])
-    return Subjects(words=(path.stem,), files=((path.stem, path),), compare=compare)
+    return Subjects(
+        words=(path.stem,),
+        files=((path.stem, path),),
+        compare=compare,
+        libraries=PICTURE_LIBRARIES,
+    )
 
 
 def compare(

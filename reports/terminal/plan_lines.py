@@ -7,8 +7,9 @@ from collections.abc import Iterator, Sequence
 from msgspec.structs import asdict
 
 from fotismos.comparisons.prepared import Prepared
-from fotismos.reference.planning.effects import Decision, labelled
-from fotismos.reference.planning.plan import Plan
+from fotismos.reference.planning.decisions import Decision
+from fotismos.reference.planning.effects import labelled
+from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.records import VERSION, Amount, Record
 from fotismos.reports.terminal.tables import printed
 

@@ -14,9 +14,9 @@ from rich.text import Text
 from fotismos.comparisons.comparison import Agreement, ComparisonRecord, NoiseTarget, PictureFiles
 from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.heuristic.heuristics import PHONG
-from fotismos.reference.pairing.halves import Pairing
-from fotismos.reference.planning.plan import Plan
+from fotismos.comparisons.options import Options
+from fotismos.reference.pairing.pairing_record import Pairing
+from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.records import plain
 from fotismos.reports.files import results
 from fotismos.reports.terminal.words import number, percent, seconds, visible
@@ -154,7 +154,7 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
     yield from (f"time ?: {reason}" for reason in sorted(reasons))
     # What is special about single scenes.
     for record in records:
-        if record.heuristic != PHONG.name and not record.picture:
+        if record.heuristic != Options().heuristic and not record.picture:
             yield f"{record.scene}: heuristic {record.heuristic}"
             yield from record.mistakes
         if record.noise_target:

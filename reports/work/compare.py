@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fotismos.comparisons.case import picture_parts
+from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import matching
 from fotismos.comparisons.processes.pool import Pool

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from fotismos.comparisons.case import file_of, is_script, name_of
+from fotismos.comparisons.names import file_of, is_script, name_of
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.reports.files import results
 from fotismos.reports.jobs import command_line

@@ -8,6 +8,7 @@ from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Viewing
 from fotismos.comparisons.departure.flip import LARGEST, MOST_STOPS, exposures, hdr_flip, ldr_flip
 from fotismos.comparisons.departure.metrics import METRICS
 
+pytestmark = pytest.mark.usefixtures("computed_by")
 FLIPS = pytest.mark.parametrize("name", ["ldr_flip", "hdr_flip"])
 SIZE = (11, 13, 3)
 

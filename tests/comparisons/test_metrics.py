@@ -23,9 +23,10 @@ from fotismos.comparisons.departure.statistics import (
 )
 from fotismos.heuristic.errors import InputError, InstallationError, NonFiniteError
 from fotismos.reference.records import plain
-from fotismos.reference.rendering.renderer import require_finite
+from fotismos.reference.rendering.finite import require_finite
 from fotismos.reports.work import doctor
 
+pytestmark = pytest.mark.usefixtures("computed_by")
 ALL = pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS.keys())
 POINTWISE = pytest.mark.parametrize(
     "metric", [m for m in METRICS.values() if isinstance(m, Pixelwise)], ids=lambda m: m.name

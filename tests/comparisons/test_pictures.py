@@ -88,6 +88,39 @@ def test_a_png_is_read_to_its_bits_by_its_transfer_function(rgb, tmp_path):
         np.testing.assert_allclose(decoded, from_srgb(codes / (2**bits - 1)), atol=1e-6)
 
 
+def test_every_kind_of_png_is_read_as_mitsubas_library_does(rgb, tmp_path):
+    """Grey, colours and palettes, with alpha, with a transparent colour, of 1, 8 and 16 bits."""
+    rng = np.random.default_rng(5)
+    codes = rng.integers(0, 256, (6, 9, 4), dtype=np.uint8)
+    whole = Image.fromarray(codes)
+    for name, mode, more in (
+        ("one", "1", {}),
+        ("palette", "P", {}),
+        ("clear palette", "P", {"transparency": 3}),
+        ("grey", "L", {}),
+        ("clear grey", "L", {"transparency": 3}),
+        ("grey alpha", "LA", {}),
+        ("colours", "RGB", {}),
+        ("clear colour", "RGB", {"transparency": tuple(codes[0, 0, :3].tolist())}),
+        ("alpha", "RGBA", {}),
+    ):
+        whole.convert(mode).save(tmp_path / f"{name}.png", **more)
+    for channels in (1, 2, 3, 4):
+        deep = rng.integers(0, 2**16, (6, 9, channels), dtype=np.uint16)
+        mi.Bitmap(deep).write(str(tmp_path / f"{channels} of 16 bits.png"))
+    whole.convert("L").save(tmp_path / "grey.jpg")
+    files = sorted(tmp_path.iterdir())
+    for path in files:
+        pixels = np.array(mi.Bitmap(str(path)))
+        values = np.atleast_3d(pixels / float(np.iinfo(pixels.dtype).max))
+        count = 3 if values.shape[2] > 2 else 1
+        alpha = values[..., count:] if values.shape[2] > count else np.ones((6, 9, 1))
+        expected = np.broadcast_to(values[..., :count] * alpha + 1 - alpha, (6, 9, 3))
+        found = pictures.read(str(path), "linear", over="white")
+        np.testing.assert_allclose(found, expected, atol=1e-6, err_msg=path.name)
+    assert len(files) == 14
+
+
 def test_files_say_how_they_are_encoded(rgb, tmp_path):
     """By a chunk of a PNG, or by what its kind of file usually is; `transfer` decides otherwise."""
     codes = np.full((4, 4, 3), 128, np.uint8)
@@ -353,9 +386,14 @@ def test_what_is_no_picture_is_refused(rgb, tmp_path):
         with pytest.raises(InputError, match=f"{name}: it is not a regular file. Give a .exr or"):
             pictures.read(str(tmp_path / name), "srgb")
     path = tmp_path / "x.png"
-    path.write_bytes(b"no picture")
-    with pytest.raises(InputError, match=r"x.png: not a readable PNG file"):
-        pictures.read(str(path), "srgb")
+    Image.fromarray(np.arange(768, dtype=np.uint8).reshape(16, 16, 3)).save(path)
+    for content in (b"no picture", b"", path.read_bytes()[:-40], path.read_bytes()[:30]):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=r"x.png: not a readable PNG file"):
+            pictures.read(str(path), "srgb")
+    Image.new("CMYK", (4, 4)).save(tmp_path / "x.jpg")
+    with pytest.raises(InputError, match=r"x.jpg: its colours are CMYK. Save it as RGB"):
+        pictures.read(str(tmp_path / "x.jpg"))
     Image.fromarray(np.full((8, 8, 4), 128, np.uint8)).save(path)
     with pytest.raises(InputError, match=r"64 of 64 pixels have an alpha below 1.*`over=black`"):
         pictures.read(str(path), "srgb")

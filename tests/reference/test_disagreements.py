@@ -7,7 +7,7 @@ from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
 from fotismos.reference.planning.facts import Facts
 from fotismos.reference.planning.rules import LIGHT_BY_LIGHT
-from fotismos.reference.rendering import direct
+from fotismos.reference.rendering.integrators import RR_DEPTH
 from fotismos.reference.scene.source import Source
 from fotismos.reports import verdict
 from tests.shared.misplanned import BLACK, DIFFUSE, TWO_SIDED, lamp, octahedron, scene
@@ -180,11 +180,11 @@ def test_the_depth_of_russian_roulette_is_the_one_used(rgb):
     lamps = {"lamp": lamp((0, -3, 0)), "second": lamp((0, -3, 2))}
     floor = {"type": "rectangle", "to_world": moved((0, 0, -1), 4), "bsdf": DIFFUSE}
     wall = {"type": "rectangle", "to_world": look_at((0, 1, 0), (0, -4, 0)), "bsdf": DIFFUSE}
-    for given, entry in ((5, ("5", str(direct.RR_DEPTH))), (direct.RR_DEPTH, None)):
+    for given, entry in ((5, ("5", str(RR_DEPTH))), (RR_DEPTH, None)):
         integrator = {"type": "path", "rr_depth": given}
         described = scene(integrator=integrator, floor=floor, wall=wall, **lamps)
         record = compare(Source("a test", described), Options(spp=16)).record
-        assert (record.plan.integrator, record.plan.rr_depth) == ("direct_all", direct.RR_DEPTH)
+        assert (record.plan.integrator, record.plan.rr_depth) == ("direct_all", RR_DEPTH)
         overridden = {one.what: (one.given, one.used) for one in record.overridden}
         assert overridden.get("rr_depth") == entry
 

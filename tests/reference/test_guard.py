@@ -7,7 +7,7 @@ from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
 from fotismos.reference.planning import guard
-from fotismos.reference.planning.plan import Guard
+from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.scene.source import Source
 from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView

@@ -6,7 +6,6 @@ import pytest
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.reference.planning.effects import NO_SECOND_REFLECTION, NO_SHADOWS
 from fotismos.reference.planning.facts import Facts, Form
 from fotismos.reference.planning.rules import (
     CONVEX,
@@ -14,6 +13,8 @@ from fotismos.reference.planning.rules import (
     LIGHT_BY_LIGHT,
     MOST_SHAPES,
     NO_MEDIUM,
+    NO_SECOND_REFLECTION,
+    NO_SHADOWS,
     OPAQUE,
     SEEN_FROM_OUTSIDE,
     STILL,

@@ -9,7 +9,8 @@ from scipy import stats
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
-from fotismos.reference.rendering.sampler import SAMPLER, cells, register
+from fotismos.reference.rendering.integrators import SAMPLER
+from fotismos.reference.rendering.sampler import cells, register
 from tests.shared.parts import camera
 
 COUNTS = (1, 2, 3, 4, 7, 16, 48, 64)

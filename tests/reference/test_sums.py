@@ -1,4 +1,4 @@
-"""Sums of passes against NumPy: means, errors, noise and third moments."""
+"""Sums of passes, by Dr.Jit and by NumPy, against NumPy's own statistics of all passes at once."""
 
 import mitsuba as mi
 import numpy as np
@@ -15,17 +15,26 @@ from fotismos.reference.rendering.sums import (
 SIZE = (24, 17)
 
 
-def total_of(images, kind=mi.TensorXd, **options):
+KINDS = ("TensorXd", "ndarray")
+
+
+def passed(kind, image):
+    """An image as a pass of a kind."""
+    return image if kind == "ndarray" else getattr(mi, kind)(image)
+
+
+def total_of(images, kind, **options):
     total = Accumulator(**options)
     for image in images:
-        total.add(kind(image))
+        total.add(passed(kind, image))
     return total
 
 
+@pytest.mark.parametrize("kind", ["TensorXf", "ndarray"])
 @pytest.mark.parametrize("passes", [2, 3, 16])
-def test_running_sums_are_numpys_mean_and_deviation(rgb, passes):
+def test_running_sums_are_numpys_mean_and_deviation(rgb, passes, kind):
     images = np.random.default_rng(passes).exponential(size=(passes, 5, 7, 3)).astype(np.float32)
-    found, images = total_of(images, mi.TensorXf).estimate(), images.astype(float)
+    found, images = total_of(images, kind).estimate(), images.astype(float)
     np.testing.assert_allclose(found.mean, images.mean(axis=0), rtol=1e-12)
     error = images.std(axis=0, ddof=1) / np.sqrt(passes)
     np.testing.assert_allclose(found.standard_error, error, rtol=1e-9)
@@ -34,23 +43,25 @@ def test_running_sums_are_numpys_mean_and_deviation(rgb, passes):
     assert found.passes == passes
 
 
-def test_small_noise_on_a_large_level_is_kept(rgb):
+@pytest.mark.parametrize("kind", KINDS)
+def test_small_noise_on_a_large_level_is_kept(rgb, kind):
     """A sum of squares less the square of the sum would lose it."""
     images = 1e4 + np.random.default_rng(1).normal(size=(50, 4, 4, 3)) * 1e-3
     error = images.std(axis=0, ddof=1) / np.sqrt(50)
-    found = total_of(images, moments=DEVIATION).standard_error()
+    found = total_of(images, kind, moments=DEVIATION).standard_error()
     np.testing.assert_allclose(found, error, rtol=1e-6)
 
 
+@pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("scale", [1e-15, 1.0, 1e10])
-def test_the_sums_of_halves_are_those_of_their_difference(rgb, scale):
+def test_the_sums_of_halves_are_those_of_their_difference(rgb, scale, kind):
     """However dim or bright; and a difference without noise has none."""
     counted = np.ones(SIZE, bool)
     images = scale * np.random.default_rng(1).exponential(size=(2, 16, *SIZE, 3)) ** 2
     for passes, is_noisy in ((images, True), (np.repeat(images[:, :1], 6, axis=1), False)):
         sums = Accumulator(MEAN), Accumulator(DEVIATION), DifferenceSums(counted)
         for pair in zip(*passes, strict=True):
-            add_difference(sums, [mi.TensorXd(image) for image in pair])
+            add_difference(sums, [passed(kind, image) for image in pair])
         difference, found = passes[0] - passes[1], sums[2].estimate()
         count = len(difference)
         np.testing.assert_allclose(
@@ -64,3 +75,18 @@ def test_the_sums_of_halves_are_those_of_their_difference(rgb, scale):
         assert found.noise.any() == is_noisy
         groups = found.grouped.means.reshape(-1, *SIZE, 3)
         np.testing.assert_allclose(groups[0], difference[::8].mean(axis=0))
+
+
+def test_passes_are_left_as_they_are_and_may_be_of_both_kinds(rgb):
+    images = np.random.default_rng(2).exponential(size=(2, 4, *SIZE, 3))
+    before = images.copy()
+    found = []
+    for kinds in (("ndarray", "ndarray"), ("ndarray", "TensorXd"), ("TensorXd", "ndarray")):
+        sums = Accumulator(MEAN), Accumulator(DEVIATION), DifferenceSums(np.eye(*SIZE) > 0)
+        for pair in zip(*images, strict=True):
+            add_difference(sums, [passed(*each) for each in zip(kinds, pair, strict=True)])
+        found.append(sums[2].estimate())
+    np.testing.assert_array_equal(images, before)
+    for other in found[1:]:
+        np.testing.assert_allclose(other.third, found[0].third, rtol=1e-9, atol=1e-15)
+        np.testing.assert_allclose(other.grouped.means, found[0].grouped.means, rtol=1e-12)

@@ -11,7 +11,7 @@ from random import Random
 import jsonschema
 import pytest
 
-from fotismos.comparisons.case import file_of
+from fotismos.comparisons.names import file_of
 from tests.shared.outputs import results
 from tests.shared.programs import ROOT
 from tests.shared.schemas import schema

@@ -1,7 +1,8 @@
 """Small scenes that rules of pruning without premises get wrong, by 1 % to everything."""
 
 from fotismos.reference.pairing.probe import AlbedoTable
-from fotismos.reference.planning.rules import PruningRule, RuleResult
+from fotismos.reference.planning.decisions import RuleResult
+from fotismos.reference.planning.rules import PruningRule
 from tests.shared.parts import camera, moved
 
 DIFFUSE = {"type": "diffuse", "reflectance": 0.7}

@@ -1,0 +1,195 @@
+"""The rules and sites of effects, which :mod:`fotismos.reference.planning.effects` names.
+
+A rule returns whether a scene needs an effect, and the evidence. Sites are the nodes or keys of the
+physical half's graph that have it; ``put`` functions replace them in a copy of that graph by what
+the heuristic half has.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import mitsuba as mi
+
+from fotismos.heuristic.heuristics import Interpolation
+from fotismos.reference.pairing import lights
+from fotismos.reference.pairing.bsdfs import WRAPPERS, is_mirror
+from fotismos.reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
+from fotismos.reference.scene.graph import Graph, graft
+
+# --- Terms of the heuristic kernel -----------------------------------------------------------
+
+
+def has_coefficient(facts: Facts, coefficient: str) -> tuple[bool, str]:
+    """Whether a material has a coefficient that is not 0."""
+    present = coefficient in facts.kernel_terms
+    where = "not 0 in some material" if present else "0 in every material"
+    if coefficient == "k_s" and any(map(is_mirror, facts.materials)):
+        where += ", mirrors aside: the kernel traces no rays"
+    return present, f"{coefficient} is {where}"
+
+
+def has_ambient(facts: Facts) -> tuple[bool, str]:
+    """Whether there is ambient light, and a material that reflects it."""
+    if "ambient" not in facts.kernel:
+        return False, "no ambient light"
+    return has_coefficient(facts, "k_a")
+
+
+def is_interpolated(facts: Facts) -> tuple[bool, str]:
+    """Whether colours are interpolated over polygons, or constant."""
+    interpolation = facts.interpolation
+    return interpolation is not Interpolation.PHONG, f"interpolation {interpolation.value}"
+
+
+def is_spectral(facts: Facts) -> tuple[bool, str]:
+    """Whether light has wavelengths."""
+    return mi.is_spectral, f"variant {mi.variant()}"
+
+
+# --- Lights that differ in form --------------------------------------------------------------
+
+
+def lights_of_two_intensities(facts: Facts) -> list[str]:
+    """Find the lights whose specular intensity is lost."""
+    lost = facts.pair.unrepresentable
+    return [light.name for light in lost if light.lost == lights.SECOND_INTENSITY]
+
+
+def has_two_intensities(facts: Facts) -> tuple[bool, str]:
+    """Whether a light has two intensities."""
+    names = lights_of_two_intensities(facts)
+    return bool(names), f"lights of two intensities: {', '.join(names) or 'none'}"
+
+
+def inexact_lights(facts: Facts, with_cone: bool) -> list[str]:
+    """Find the keys of the scene's lights whose two forms differ by cone, or only by fall-off.
+
+    A spot's attenuation goes with its cone: Mitsuba has no spot with another fall-off. An even cone
+    (``m = 0``) is the same in both forms.
+    """
+
+    def has_uneven_cone(graph: Graph, index: int) -> bool:
+        is_spot = lights.of(graph.plugin(index)).has("cutoff")
+        return is_spot and graph.props(index).get("exponent", 0.0) != 0
+
+    heuristic = facts.pair.heuristic
+    physical = dict(facts.pair.physical.children(0, EMITTER))
+    inexact = {light.name for light in facts.pair.pairing.emitters if not light.exact}
+    return [
+        key
+        for key, index in heuristic.children(0, EMITTER)
+        if key in physical
+        and lights.of(heuristic.plugin(index)).has("attenuation")
+        and has_uneven_cone(heuristic, index) is with_cone
+        and heuristic.label(index) in inexact
+    ]
+
+
+def put_lights(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
+    """Put the heuristic half's lights into a graph."""
+    emitters = dict(facts.pair.heuristic.children(0, EMITTER))
+    for key in keys:
+        graph.attach(0, key, graft(graph, facts.pair.heuristic, emitters[key]))
+
+
+def is_attenuated(facts: Facts) -> tuple[bool, str]:
+    """Distance attenuation: any point or spot whose ``f_att`` depends on the distance."""
+    graph = facts.pair.heuristic
+    for index in graph.nodes(EMITTER):
+        props = graph.props(index)
+        is_even = (props.get("k1", 0.0), props.get("k2", 0.0)) == (0.0, 0.0)
+        if lights.of(graph.plugin(index)).has("attenuation") and not is_even:
+            return True, f"{graph.label(index)} falls off with distance"
+    return False, "no light of the heuristic half falls off with distance"
+
+
+def has_cone(facts: Facts) -> tuple[bool, str]:
+    """Whether a light of either half has a cone."""
+    halves = facts.pair.heuristic, facts.pair.physical
+    plugins = (half.plugin(index) for half in halves for index in half.nodes(EMITTER))
+    return any(lights.of(plugin).has("cutoff") for plugin in plugins), facts.light_kinds
+
+
+def shining_shapes(facts: Facts) -> list[int]:
+    """Find the shapes that shine."""
+    graph = facts.pair.physical
+    return [shape for shape in graph.nodes(SHAPE) if graph.children(shape, EMITTER)]
+
+
+def put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
+    """Put the heuristic half's lights into a graph, in place of shapes that shine."""
+    for shape in shapes:
+        for key, _ in graph.children(shape, EMITTER):
+            graph.detach(shape, key)
+            if facts.pair.hide_emitters:
+                graph.remove(shape)
+    # The lights that only the heuristic half has are those in place of shapes.
+    before = dict(facts.pair.physical.children(0, EMITTER))
+    emitters = facts.pair.heuristic.children(0, EMITTER)
+    put_lights(graph, facts, [key for key, _ in emitters if key not in before])
+
+
+def own_light(phong: mi.Properties, facts: Facts) -> dict[str, Any]:
+    """Return the light of a heuristic material itself."""
+    return {"k_i": phong["k_i"]} if "k_i" in phong else {}
+
+
+def surroundings(facts: Facts) -> list[str]:
+    """Find the keys of lights that shine from everywhere."""
+    graph = facts.pair.physical
+    children = graph.children(0, EMITTER)
+    return [key for key, index in children if not lights.of(graph.plugin(index)).exact]
+
+
+def is_surrounded(facts: Facts) -> tuple[bool, str]:
+    """Whether a light shines from everywhere."""
+    kinds = (light.kind for light in facts.lights if light.shape is None)
+    return any(lights.of(kind).surrounds for kind in kinds), facts.light_kinds
+
+
+def detach(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
+    """Remove lights from a graph."""
+    for key in keys:
+        graph.detach(0, key)
+
+
+def ambient_light(phong: mi.Properties, facts: Facts) -> dict[str, Any]:
+    """Return the ambient light that a heuristic material reflects."""
+    if "k_a" not in phong or "ambient" not in facts.kernel:
+        return {}
+    return {"k_a": phong["k_a"], "ambient": facts.kernel["ambient"]}
+
+
+# --- Surfaces that differ in form ------------------------------------------------------------
+
+
+def inexact_surfaces(facts: Facts, opaque: bool) -> list[int]:
+    """Find the opaque shapes, or the others, whose two BSDFs differ; diffuse ones do not."""
+    graph = facts.pair.physical
+    surfaces = []
+    for shape in graph.nodes(SHAPE):
+        shape_facts = facts.by_name.get(graph.props(shape).id())
+        for _, bsdf in graph.children(shape, BSDF):
+            inner = [child for _, child in graph.children(bsdf, BSDF)] or [bsdf]
+            is_exact = all(graph.plugin(index) == "diffuse" for index in inner)
+            if not is_exact and (shape_facts is None or shape_facts.opaque) is opaque:
+                surfaces.append(shape)
+    return surfaces
+
+
+def put_materials(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
+    """Give shapes the materials of the heuristic half; shared materials stay shared."""
+    replaced: dict[int, int] = {}
+    for shape in shapes:
+        ((key, _),) = graph.children(shape, BSDF)
+        ((_, phong),) = facts.pair.heuristic.children(shape, BSDF)
+        if phong not in replaced:
+            replaced[phong] = graft(graph, facts.pair.heuristic, phong)
+        graph.attach(shape, key, replaced[phong])
+
+
+def is_reflected(facts: Facts) -> tuple[bool, str]:
+    """Whether a BSDF is more than diffuse."""
+    graph = facts.pair.physical
+    plugins = {graph.plugin(index) for index in graph.nodes(BSDF)}
+    return bool(plugins - {"diffuse", "null", *WRAPPERS}), f"BSDFs: {', '.join(sorted(plugins))}"

@@ -1,0 +1,135 @@
+"""What compares two pictures, records and shows it loads neither Mitsuba nor Dr.Jit nor LLVM."""
+
+import json
+
+import mitsuba as mi
+import numpy as np
+
+from tests.shared import records
+from tests.shared.programs import python
+from tests.shared.two_pictures import measured
+
+MODULES = (
+    "fotismos",
+    "fotismos.comparisons.comparison",
+    "fotismos.comparisons.departure.arrays",
+    "fotismos.comparisons.departure.blocks",
+    "fotismos.comparisons.departure.colour",
+    "fotismos.comparisons.departure.criterion",
+    "fotismos.comparisons.departure.definitions",
+    "fotismos.comparisons.departure.flip",
+    "fotismos.comparisons.departure.marks",
+    "fotismos.comparisons.departure.metrics",
+    "fotismos.comparisons.departure.noise",
+    "fotismos.comparisons.departure.regions",
+    "fotismos.comparisons.departure.statistics",
+    "fotismos.comparisons.names",
+    "fotismos.comparisons.options",
+    "fotismos.comparisons.picture_files",
+    "fotismos.comparisons.price_record",
+    "fotismos.reference",
+    "fotismos.reference.pairing.pairing_record",
+    "fotismos.reference.planning.decisions",
+    "fotismos.reference.planning.effects",
+    "fotismos.reference.planning.plan_record",
+    "fotismos.reference.records",
+    "fotismos.reference.rendering.finite",
+    "fotismos.reference.rendering.integrators",
+    "fotismos.reference.rendering.sums",
+    "fotismos.reports.charts.theme",
+    "fotismos.reports.cli",
+    "fotismos.reports.files.images",
+    "fotismos.reports.files.results",
+    "fotismos.reports.glossary",
+    "fotismos.reports.jobs",
+    "fotismos.reports.page.embedding",
+    "fotismos.reports.page.page",
+    "fotismos.reports.page.scene_view",
+    "fotismos.reports.run.batch",
+    "fotismos.reports.terminal.tables",
+    "fotismos.reports.verdict",
+)
+
+WITHOUT = """
+import sys
+sys.modules["mitsuba"] = None
+sys.modules["drjit"] = None
+"""
+
+IMPORTED = (
+    WITHOUT
+    + """
+from importlib import import_module
+for name in sys.argv[1:]:
+    import_module(name)
+print(open("/proc/self/maps").read().count("libLLVM"))
+"""
+)
+
+COMPARED = (
+    WITHOUT
+    + """
+import json
+from pathlib import Path
+import numpy as np
+from fotismos.comparisons.comparison import PICTURE_LIBRARIES, machine, versions
+from fotismos.comparisons.departure.metrics import drawn
+from fotismos.comparisons.departure.statistics import summarise_log2_luminance
+from fotismos.comparisons.picture_files import read_file
+from fotismos.reference.records import plain, to_json
+from fotismos.reports import verdict
+from fotismos.reports.files import images
+from fotismos.reports.page import embedding, page
+from fotismos.reports.terminal import tables
+from tests.shared import records
+from tests.shared.two_pictures import measured, passes
+
+test, reference, _ = passes()
+images.write_exr(Path("x.exr"), {"rgb": test[0]}, {})
+read = read_file("x.exr:rgb").image
+counted = np.ones(read.shape[:2], bool)
+layers = {"heuristic": read, "reference": reference[0], "reference_stderr": 0 * read}
+layers |= {name: metric(read, reference[0]) for name, metric in drawn().items()}
+layers["significant"] = counted
+embedded = embedding.embed(images.channels(layers), counted)
+record = records.record()
+html = page.render([records.view(json.loads(to_json(record)), embedded=embedded)])
+found = measured()
+found["read"] = float(np.abs(read - test[0]).max())
+found["log2"] = summarise_log2_luminance(test[0], reference[0], counted)[0].mean
+found["said"] = [verdict.about(record), *tables.summary([record]), html.count("page-data")]
+found["versions"] = sorted(versions(PICTURE_LIBRARIES))
+found["loaded"] = sorted(name for name in sys.modules if name.startswith(("mitsuba", "drjit")))
+print(json.dumps(plain(found)))
+"""
+)
+
+
+def test_modules_for_two_pictures_are_imported_without_mitsuba():
+    done = python("-c", IMPORTED, *MODULES)
+    assert done.stdout == "0\n", done.stderr
+
+
+def test_two_pictures_are_measured_recorded_and_shown_without_mitsuba(rgb, tmp_path):
+    done = python("-c", COMPARED, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    expected = measured(mi.TensorXd)
+    assert expected["marked"][2] > 0
+    for name, numbers in expected.items():
+        is_single = name.endswith("flip")
+        np.testing.assert_allclose(
+            found[name], numbers, rtol=1e-4 if is_single else 1e-6, atol=1e-5, err_msg=name
+        )
+    assert found["read"] < 1e-3  # the file has half precision
+    assert found["loaded"] == ["drjit", "mitsuba"]  # which are None
+    assert found["versions"] == [
+        "OpenEXR",
+        "colour-science",
+        "fotismos",
+        "numpy",
+        "pillow",
+        "python",
+    ]
+    assert records.record().scene in found["said"][0]
+    assert found["said"][-1] > 0
