@@ -276,7 +276,8 @@ def _distance(image: Array, other: Array) -> float:
 
 def _moved(picture: Array, other: Array, place: alignment.Place, names: Names) -> Mistake | None:
     """Return a shift or another size of the content; None if it is in its place."""
-    zoom = _zoom(picture, other)
+    # Where edges agree nearly wholly, no other size can agree far better.
+    zoom = _zoom(picture, other) if place.correlation < 1 - ZOOMED else None
     if zoom is not None:
         return Mistake(
             sentence=(

@@ -31,6 +31,7 @@ from docs.figures import (
     renderers,
     rooms,
     schemes,
+    two_pictures,
 )
 from docs.figures.from_tests import ROOT, fact
 from docs.website import build
@@ -101,6 +102,7 @@ def main(words: Sequence[str]) -> None:
     _renderers()
     _audits()
     _lessons()
+    _pictures()
     _notebook()
 
 
@@ -112,6 +114,13 @@ def replace(page: str, part: str, lines: Iterable[str]) -> None:
     head, rest = text.split(begin)
     _, tail = rest.split(end)
     atomic.write(path, "\n".join([head + begin, "", *lines, "", end + tail]))
+
+
+def _pictures() -> None:
+    """Make the picture of two pictures, and its sentences."""
+    comparison = two_pictures.made()
+    atomic.write(DOCS / "pictures.webp", two_pictures.picture(comparison))
+    replace("pictures.md", "two pictures", two_pictures.lines(comparison))
 
 
 def marks(part: str) -> tuple[str, str]:

@@ -42,7 +42,7 @@ def write_scene(folder: Path, name: str, comparison: Comparison) -> None:
 
 
 def strip(comparison: Comparison) -> Figure:
-    """Return heuristic, reference and the map of the error with its colour bar, side by side."""
+    """Return both halves and the map of the error with its colour bar, side by side."""
     shown = comparison.images
     metric = LEADING
     exposure = comparison.record.viewing.exposure
@@ -51,8 +51,9 @@ def strip(comparison: Comparison) -> Figure:
     heading = f"{metric.label}: mean {number(summary.mean)}"
     if summary.noise_floor:
         heading += f" (noise {number(summary.noise_floor)})"
+    first = "picture" if comparison.record.picture else "heuristic"
     panels = {
-        "heuristic": images.tonemap(shown.heuristic, exposure),
+        first: images.tonemap(shown.heuristic, exposure),
         "reference": images.tonemap(shown.reference, exposure),
         heading: images.error_map(shown.maps[metric.name], high),
     }
