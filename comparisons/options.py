@@ -160,7 +160,7 @@ class Options(
             option = f"--{name.replace('_', '-')}"
             if name == "define":
                 arguments += [word for entry in value.items() for word in ("-D", "=".join(entry))]
-            elif name == "image":
+            elif name in ("image", "picture"):
                 images = (value,) if isinstance(value, str) else value
                 arguments += [word for image in images for word in (option, image)]
             elif value is True:

@@ -18,6 +18,7 @@ files they are not.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from glob import glob
 from pathlib import Path
 from typing import Any
 
@@ -77,6 +78,15 @@ class PictureFile:
 
     image: Array
     notes: tuple[str, ...] = ()
+
+
+def matching(pattern: str) -> list[str]:
+    """Return the words for pictures that a pattern names, ``render_*.exr`` or ``*.exr:LAYER``."""
+    path, layer = picture_parts(pattern)
+    found = [str(path)] if path.is_file() else sorted(glob(str(path), recursive=True))
+    if not found:
+        raise InputError(f"{pattern}: no file matches. Give repeats, such as 'render_*.exr'.")
+    return [f"{file}:{layer}" if layer else file for file in found]
 
 
 def read_file(word: str, transfer: str | None = None, over: str | None = None) -> PictureFile:

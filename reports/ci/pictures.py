@@ -1,13 +1,11 @@
 """Baselines of pictures as files, and repeats that match a pattern."""
 
-from glob import glob
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from fotismos.comparisons import pictures
-from fotismos.comparisons.case import picture_parts
 from fotismos.comparisons.check.measurement import LINEAR_ROUNDING, laid_out
 from fotismos.comparisons.check.pictures import (
     SIDE,
@@ -17,6 +15,7 @@ from fotismos.comparisons.check.pictures import (
     colour,
     means,
 )
+from fotismos.comparisons.picture_files import matching
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError
 from fotismos.reference import records
@@ -30,12 +29,7 @@ LONGEST = 2**15
 
 def read_repeats(pattern: str, transfer: str | None, over: str | None = None) -> Repeats:
     """Read the repeats that match a pattern, ``render_*.exr`` or ``render_*.exr:LAYER``."""
-    path, layer = picture_parts(pattern)
-    found = [str(path)] if path.is_file() else sorted(glob(str(path), recursive=True))
-    if not found:
-        raise InputError(f"{pattern}: no file matches. Give repeats, such as 'render_*.exr'.")
-    named = (f"{file}:{layer}" if layer else file for file in found)
-    return Repeats.of(pictures.read(word, transfer, over) for word in named)
+    return Repeats.of(pictures.read(word, transfer, over) for word in matching(pattern))
 
 
 def write(
