@@ -162,6 +162,8 @@ class EngineSetting(FrontPoint):
         The shares of a picture's pixels above thresholds.
     passes_at
         The smallest of these thresholds at which it passes; null if it passes at none.
+    p95
+        The ΔE2000 that 5 % of the pixels exceed, with the reference's noise.
     ratio
         Its time over that of the textbook kernel on the same machine, if that is given.
     picture
@@ -170,6 +172,7 @@ class EngineSetting(FrontPoint):
 
     visible: tuple[VisibleShare, ...]
     passes_at: Positive | None
+    p95: Amount
     ratio: Positive | None = None
     picture: PictureRecord
 

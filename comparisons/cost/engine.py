@@ -120,6 +120,7 @@ def _setting(setting: Repeated, times: EngineTimes, found: Measurements) -> Engi
         error=MeanError(value=error.value, low=max(error.low, 0.0), high=error.high),
         visible=visible,
         passes_at=min(passing, default=None),
+        p95=float(np.mean([one.p95 for one in summaries])),
         ratio=None if times.kernel_s is None else seconds / times.kernel_s,
         picture=pictures.picture_record(
             pictures.PictureHalf(setting.files, found.ready.heuristic),

@@ -132,7 +132,11 @@ def judgements(engine: Engine) -> Iterator[str]:
 
 def _passing(setting: EngineSetting) -> str:
     if setting.passes_at is None:
-        return f"does not pass at {LEADING.label} {parameter(setting.visible[-1].threshold)}"
+        most = parameter(setting.visible[-1].threshold)
+        return (
+            f"does not pass at {LEADING.label} {most}, as 5 % of its pixels exceed"
+            f" {number(setting.p95)}"
+        )
     return f"passes at {LEADING.label} {parameter(setting.passes_at)}"
 
 
@@ -142,13 +146,14 @@ def _rivals(setting: EngineSetting, engine: Engine) -> str:
     winners = [other for other in others if beats(other, setting)]
     if winners:
         best = min(winners, key=lambda other: other.error.value)
-        speed = "is faster" if is_below(best.seconds, setting.seconds) else "takes as long"
+        if not is_below(best.seconds, setting.seconds):
+            return f"{best.method} takes as long and is better"
         is_better = is_below(best.error, setting.error)
-        return f"{best.method} {speed} and is {'better' if is_better else 'no worse'}"
+        return f"{best.method} is faster and {'better' if is_better else 'no worse'}"
     # What is better without beating it takes longer.
     better = [other.seconds.value for other in others if is_below(other.error, setting.error)]
     if not better:
-        return "nothing else that is given does better"
+        return "nothing given does better"
     return f"nothing given under {given_time(min(better))} does better"
 
 
