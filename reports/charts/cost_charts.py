@@ -18,7 +18,8 @@ HEIGHT = 380
 """Pixels of the plot, without the names to its right."""
 
 LABEL_GAP = 15
-"""Least distance of two names, in pixels."""
+LONGEST_NAME = 220
+"""Least distance of two names, and the length at which one is cut, in pixels."""
 
 LEAST_ERROR = 1e-3
 """ΔE2000; smaller errors are drawn at the lower border, since a logarithmic axis has no 0."""
@@ -192,7 +193,7 @@ def _names_beside(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
     leading: Spec = {"color": "#9a9a9a", "strokeWidth": 0.7, "opacity": 0.6, "xOffset": 6}
     return [
         chart.mark_rule(**leading).encode(x2=alt.value(WIDTH + 10), y2="beside"),
-        chart.mark_text(align="left", fontSize=12).encode(
+        chart.mark_text(align="left", fontSize=12, limit=LONGEST_NAME).encode(
             x=alt.value(WIDTH + 14), y=beside, text="method:N"
         ),
     ]

@@ -172,6 +172,11 @@ def test_the_right_picture_passes_at_the_smallest_threshold_and_a_changed_one_do
         assert share.high > 0.05
     added = changes.error.value - error.value
     assert added == pytest.approx(changes.p95 / 10, rel=0.5)
+    # In between, noise decides: what may be above 5 % does not pass.
+    few = judged(found, tmp_path, {"few": [changed(right, found.ready.counted, 0.04, by=0.02)]})
+    sure = [share.threshold for share in few["few"].visible if share.high <= 0.05]
+    assert few["few"].passes_at == sure[0]
+    assert few["few"].visible[0].value < 0.05 < few["few"].visible[0].high
     for setting in settings.values():
         assert setting.picture.repeats == 1
         assert any(odd.startswith(SINGLE) for odd in setting.picture.odd)
