@@ -28,7 +28,9 @@ from fotismos.reports import jobs
     " 6.3ms=low_*.exr'. Several files are repeats, which show its noise.",
 )
 @click.option("--machine", metavar="TEXT", help="The machine that took these times.")
-@click.option("--kernel-time", metavar="TIME", help="What the textbook kernel takes there.")
+@click.option(
+    "--kernel-time", metavar="TIME", help="What the textbook kernel takes there, for ratios."
+)
 @jobs.option("transfer")
 @jobs.option("over")
 @jobs.json_option
@@ -52,8 +54,8 @@ def cost(
     cost.json, cost.svg and pictures to OUTPUT/cost/SCENE. Without --resolution the film is reduced
     to a width of 128 pixels; --spp gives the largest count of samples per pixel, 64 if omitted.
 
-    With --picture, settings of another renderer have a front of their own: their times are given,
-    and their size becomes the study's. Only --kernel-time relates them to other methods.
+    With --picture, settings of another renderer have a front of their own: their times are given.
+    The size of the pictures becomes that of the study.
 
     \b
     Examples:
