@@ -129,7 +129,7 @@ def cost(
         engine=judged,
     )
     shown = {setting.given.name: setting.images[0] for setting in settings}
-    return Study(made, found.images, found.reference.mean, shown)
+    return Study(record=made, methods=found.images, reference=found.reference.mean, settings=shown)
 
 
 def quick(
