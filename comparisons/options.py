@@ -170,7 +170,7 @@ class Options(
             option = f"--{name.replace('_', '-')}"
             if name == "define":
                 arguments += [word for entry in value.items() for word in ("-D", "=".join(entry))]
-            elif name in ("image", "reference"):
+            elif name in ("image", "reference", "picture"):
                 files = (value,) if isinstance(value, str) else value
                 arguments += [word for file in files for word in (option, file)]
             elif value is True:

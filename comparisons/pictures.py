@@ -257,7 +257,7 @@ def with_records(
             reference_stderr=np.zeros_like(images.reference_stderr),
         )
         found = agreement(given.reference, swapped, expected, REFERENCE)
-    found = structs.replace(found, odd=(*_same_files(given), *found.odd, *_unknown_noise(given)))
+    found = structs.replace(found, odd=(*_same_files(given), *found.odd, *unknown_noise(given)))
     record = structs.replace(
         record,
         picture=given.image and given.image.record(),
@@ -325,7 +325,7 @@ def _same_files(given: GivenPictures) -> Iterator[str]:
                 yield f"{name} and {other_name} are the same file, byte for byte."
 
 
-def _unknown_noise(given: GivenPictures) -> Iterator[str]:
+def unknown_noise(given: GivenPictures) -> Iterator[str]:
     """Yield which pictures do not show their noise, since there is one, or since all are equal."""
     named = {"The picture": given.image, "The reference": given.reference}
     single = [name for name, half in named.items() if half is not None and len(half.files) == 1]

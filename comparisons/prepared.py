@@ -12,6 +12,7 @@ import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
+from fotismos.comparisons import alignment
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
@@ -103,6 +104,12 @@ class Prepared:
         surface = gbuffer(self.scene, image_size(self.scene))
         dr.flush_malloc_cache()
         return surface
+
+    def geometry_edges(self) -> np.ndarray:
+        """Return how much the geometry changes at each pixel, (H, W)."""
+        width, height = image_size(self.scene)
+        fine = (alignment.FINER * width, alignment.FINER * height)
+        return alignment.geometry_edges(gbuffer(self.scene, fine), width, height)
 
     @cached_property
     def unpruned(self) -> Renderer | None:

@@ -18,7 +18,6 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.price import with_price
 from fotismos.heuristic import heuristics
-from fotismos.reference.rendering.gbuffer import gbuffer, image_size
 from fotismos.reference.rendering.renderer import Progress
 
 TEMPLATE_SPP = 16
@@ -47,14 +46,11 @@ def with_pictures(comparison: Comparison, ready: Prepared, progress: Progress | 
     given = ready.given
     assert given is not None
     # Edges that they may contain: of the geometry, and of the textbook half.
-    half: Any = ready.heuristic
-    width, height = image_size(ready.scene)
-    surface = gbuffer(ready.scene, (alignment.FINER * width, alignment.FINER * height))
-    expected = [alignment.geometry_edges(surface, width, height)]
+    expected = [ready.geometry_edges()]
     textbook = None
     if given.image is not None:
-        template = half.replaced.sampled(TEMPLATE_SPP).render(0)
-        textbook = np.array(template, float)
+        half: Any = ready.heuristic
+        textbook = np.array(half.replaced.sampled(TEMPLATE_SPP).render(0), float)
         expected.append(alignment.picture_edges(textbook))
     return pictures.with_records(comparison, given, expected, textbook)
 

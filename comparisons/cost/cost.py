@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import drjit as dr
@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons.comparison import Causes, machine, versions
-from fotismos.comparisons.cost import times
+from fotismos.comparisons.cost import engine, times
 from fotismos.comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
 from fotismos.comparisons.cost.front import Reach, at_size, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import (
@@ -27,6 +27,7 @@ from fotismos.comparisons.cost.measure import (
     requested,
 )
 from fotismos.comparisons.cost.methods import FULL_PLAN
+from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.hybrids.attribution import find
 from fotismos.comparisons.options import Options
@@ -45,12 +46,14 @@ SPP = 64
 class Study:
     """Results of a study: its record, ``cost.json``, and its images.
 
-    ``methods`` are ``{method: (H, W, 3)}``, one rendering with the most samples of each.
+    ``methods`` are ``{method: (H, W, 3)}``, one rendering with the most samples of each;
+    ``settings`` are the given pictures, by the names of an engine's settings.
     """
 
     record: Cost
     methods: Mapping[str, np.ndarray]
     reference: np.ndarray
+    settings: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 def cost(
@@ -63,6 +66,7 @@ def cost(
     is_measured: bool = False,
     causes: Causes | None = None,
     alone: AbstractContextManager[Any] | None = None,
+    engine_times: EngineTimes | None = None,
 ) -> Study:
     """Study what accuracy costs on one scene, in the current variant.
 
@@ -71,11 +75,17 @@ def cost(
     :func:`fotismos.comparisons.cost.measure.measure_ladder` for an omitted resolution,
     ``options.spp`` and ``alone``. ``at`` is a size to predict for: times follow from overhead and
     time per sample, while errors are not predicted. If ``is_measured``, methods also
-    render there. ``causes`` are those of the scene, if known.
+    render there. ``causes`` are those of the scene, if known. With ``engine_times``, pictures of
+    another renderer are judged, too, and their size becomes that of the study.
     """
     progress = progress or (lambda *_: None)
     options = options or Options()
     effort = effort or Effort()
+    # Before anything is rendered: pictures may be refused.
+    settings: tuple[engine.Repeated, ...] = ()
+    if engine_times:
+        settings = engine.read(engine_times, options)
+        options = engine.at_their_size(source, options, settings)
     if at:
         size = options.resolution or reduced(source, options.changed(resolution=at), WIDTH)
         require(source.name, at, size, is_measured)
@@ -87,6 +97,7 @@ def cost(
     predicted = at_size(found.points, found.methods, at) if at else ()
     measured = measure_at(found, at, progress) if at and is_measured else ()
     ladder.forget()  # its scenes would slow later work
+    judged = engine.judged(settings, engine_times, found) if engine_times else None
     known = causes or find(ready, source, options, progress, most=found.size[0])
     made = Cost(
         scene=source.name,
@@ -115,8 +126,10 @@ def cost(
         predicted=fronted(predicted),
         measured=measured,
         left_out=ladder.left_out,
+        engine=judged,
     )
-    return Study(made, found.images, found.reference.mean)
+    shown = {setting.given.name: setting.images[0] for setting in settings}
+    return Study(record=made, methods=found.images, reference=found.reference.mean, settings=shown)
 
 
 def quick(

@@ -4,8 +4,9 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from fotismos.comparisons.comparison import Contribution, MeanError
+from fotismos.comparisons.comparison import Agreement, Contribution, MeanError, PictureFiles
 from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import (
@@ -107,34 +108,92 @@ class TimedMethod(Method):
         )
 
 
-class Point(Record):
-    """A method at one sample count.
+class FrontPoint(Record):
+    """A time and an error, of which a front is made.
 
     Attributes
     ----------
-    method, spp
-        Name of the method, and samples per pixel.
+    method
+        Name of the method, or of an engine's setting.
     seconds
-        Wall time of one image, by the method's overhead and time per sample.
+        Wall time of one image.
     error
         Mean ΔE2000 of one image to the reference.
-    tolerance
-        The ΔE2000 that at most 5 % of an image's pixels exceed: the method passes at this
-        tolerance and at larger ones.
     front
         Whether no other point is clearly faster or clearly more accurate without being clearly
         worse in the other.
     ties
-        Other methods of the front whose time and error are both too close to call.
+        Others of the front whose time and error are both too close to call.
     """
 
     method: str
-    spp: Size
     seconds: Interval
     error: MeanError
-    tolerance: MeanError
     front: bool = False
     ties: tuple[str, ...] = ()
+
+
+class Point(FrontPoint):
+    """A method at one sample count; its time follows from overhead and time per sample.
+
+    Attributes
+    ----------
+    spp
+        Samples per pixel.
+    tolerance
+        The ΔE2000 that at most 5 % of an image's pixels exceed: the method passes at this
+        tolerance and at larger ones.
+    """
+
+    spp: Size
+    tolerance: MeanError
+
+
+class EngineSetting(FrontPoint):
+    """A setting of another renderer, whose picture and time are given.
+
+    Its front is that of the given settings alone: their times are of another machine. Its error is
+    that of one picture, without the reference's noise; the interval holds that noise, and the
+    spread of repeats.
+
+    Attributes
+    ----------
+    visible
+        The shares of a picture's pixels above thresholds.
+    passes_at
+        The smallest of these thresholds at which it passes; null if it passes at none.
+    p95
+        The ΔE2000 that 5 % of the pixels exceed, with the reference's noise.
+    ratio
+        Its time over that of the textbook kernel on the same machine, if that is given.
+    picture, agreement
+        Its files, and what is odd about them.
+    """
+
+    visible: tuple[VisibleShare, ...]
+    passes_at: Positive | None
+    p95: Amount
+    ratio: Positive | None = None
+    picture: PictureFiles
+    agreement: Agreement
+
+
+class Engine(Record):
+    """Settings of another renderer, and what their times are of.
+
+    Attributes
+    ----------
+    settings
+        The settings, in the order in which they were given.
+    machine
+        The machine of their times, in the user's words; empty if it is not known.
+    kernel_s
+        Seconds that the textbook kernel takes there, if given.
+    """
+
+    settings: tuple[EngineSetting, ...]
+    machine: str = ""
+    kernel_s: Positive | None = None
 
 
 class Converged(Record):
@@ -199,6 +258,8 @@ class Cost(Record):
         A larger size, what is predicted there, and what was measured there.
     left_out
         Methods that the scene does not allow, and why.
+    engine
+        Pictures of another renderer with their times, both given.
     """
 
     record_version: int = VERSION
@@ -230,6 +291,7 @@ class Cost(Record):
     predicted: tuple[Point, ...] = ()
     measured: tuple[Point, ...] = ()
     left_out: dict[str, str]
+    engine: Engine | None = None
 
     @property
     def is_busy(self) -> bool:

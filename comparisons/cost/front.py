@@ -7,11 +7,14 @@ is too close to call.
 
 from collections.abc import Sequence
 from math import ceil, sqrt
+from typing import TypeVar
 
 from msgspec import structs
 
-from fotismos.comparisons.cost.cost_record import Point, TimedMethod
+from fotismos.comparisons.cost.cost_record import FrontPoint, Point, TimedMethod
 from fotismos.reference.records import Interval, Record
+
+OnFront = TypeVar("OnFront", bound=FrontPoint)
 
 
 def is_below(first: Interval, other: Interval) -> bool:
@@ -19,7 +22,7 @@ def is_below(first: Interval, other: Interval) -> bool:
     return first.high < other.low
 
 
-def beats(first: Point, other: Point) -> bool:
+def beats(first: FrontPoint, other: FrontPoint) -> bool:
     """Return whether a point is clearly faster or more accurate, and not clearly the opposite."""
     faster = is_below(first.seconds, other.seconds)
     better = is_below(first.error, other.error)
@@ -28,11 +31,11 @@ def beats(first: Point, other: Point) -> bool:
     return (faster and not worse) or (better and not slower)
 
 
-def fronted(points: Sequence[Point]) -> tuple[Point, ...]:
+def fronted(points: Sequence[OnFront]) -> tuple[OnFront, ...]:
     """Return the points, of which those that none beats are on the front, with their ties."""
     front = [point for point in points if not any(beats(other, point) for other in points)]
 
-    def ties(point: Point) -> tuple[str, ...]:
+    def ties(point: FrontPoint) -> tuple[str, ...]:
         same = (
             other.method
             for other in front
@@ -46,7 +49,7 @@ def fronted(points: Sequence[Point]) -> tuple[Point, ...]:
     )
 
 
-def _differ(first: Point, other: Point) -> bool:
+def _differ(first: FrontPoint, other: FrontPoint) -> bool:
     pairs = ((first.seconds, other.seconds), (first.error, other.error))
     return any(is_below(a, b) or is_below(b, a) for a, b in pairs)
 

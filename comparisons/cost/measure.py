@@ -41,7 +41,12 @@ from fotismos.reference.rendering.renderer import (
     passes,
     warm,
 )
-from fotismos.reference.rendering.sums import Accumulator, Estimate
+from fotismos.reference.rendering.sums import (
+    Accumulator,
+    DifferenceEstimate,
+    DifferenceSums,
+    Estimate,
+)
 from fotismos.reference.scene.source import Source
 
 Size = tuple[int, int]
@@ -131,7 +136,8 @@ class Measurements:
     """A measured ladder: the options and effort used, methods and points.
 
     ``lines`` are ``{method or step: its times}``; ``images`` are ``{method: (H, W, 3)}``, one
-    rendering with the most samples of each; ``size`` is that of the images.
+    rendering with the most samples of each; ``size`` is that of the images. ``reference.grouped``
+    holds groups of its passes, of which no other image is taken off.
     """
 
     options: Options
@@ -139,7 +145,7 @@ class Measurements:
     ready: Prepared
     ladder: Ladder
     size: Size
-    reference: Estimate
+    reference: DifferenceEstimate
     converged: Converged
     methods: tuple[TimedMethod, ...]
     points: tuple[Point, ...]
@@ -170,7 +176,9 @@ def measure_ladder(
         effort = replace(effort, largest=options.spp)
     # The scene, its converged reference, and the ladder.
     ready = guarded(source, options.changed(spp=None, allow_empty=False))
-    reference = converged(ready, options.seed, progress)
+    total = DifferenceSums(ready.counted)
+    converged(ready, options.seed, progress, total=total)
+    reference = total.estimate()
     judge = judge_by(reference, ready.counted, options.viewing)
     ladder = Ladder(source, options, ready=ready, is_short=effort.is_short)
     size = image_size(ready.scene)
@@ -238,13 +246,17 @@ def _reference_spp(size: Size) -> int:
 
 
 def converged(
-    ready: Prepared, seed: int, progress: Progress | None, size: Size | None = None
+    ready: Prepared,
+    seed: int,
+    progress: Progress | None,
+    size: Size | None = None,
+    total: Accumulator | None = None,
 ) -> Estimate:
-    """Render the reference, with seeds that no method has."""
+    """Render the reference into a sum, with seeds that no method has."""
     integrator = ready.reference.integrator
     spp = _reference_spp(size or image_size(ready.scene))
     renderer = Renderer(ready.scene, integrator, pass_spp=spp, label="reference image", size=size)
-    total = Accumulator()
+    total = total or Accumulator()
     count = max(REFERENCE_PASSES, ready.plan.passes)
     stream = Stream.OTHER_SIDE
     for rendered in passes(

@@ -11,13 +11,15 @@ from scipy.optimize import isotonic_regression
 from fotismos.comparisons.cost.cost_record import Cost
 from fotismos.reports.charts.theme import FAINT, Spec
 from fotismos.reports.charts.vega import specification
+from fotismos.reports.terminal.cost_tables import stated
 
 WIDTH = 560
 HEIGHT = 380
 """Pixels of the plot, without the names to its right."""
 
 LABEL_GAP = 15
-"""Least distance of two names, in pixels."""
+LONGEST_NAME = 220
+"""Least distance of two names, and the length at which one is cut, in pixels."""
 
 LEAST_ERROR = 1e-3
 """ΔE2000; smaller errors are drawn at the lower border, since a logarithmic axis has no 0."""
@@ -26,6 +28,7 @@ MARKS = {
     "kernel": ("#c8601d", "square"),
     "phong BSDF": ("#8a74c9", "triangle-up"),
     "physical": ("#2f7fc1", "circle"),
+    "given": ("#2c9a6a", "diamond"),
 }
 """Colour and shape of each family; shapes tell families apart without colour.
 Both are visible on light and dark grounds."""
@@ -81,15 +84,19 @@ def reading(record: Cost) -> list[str]:
     """Return how to read the chart of error against time, in lines."""
     sampled = any(method.monte_carlo for method in record.methods)
     slope = "dashed: slope −1/2, plain Monte Carlo; " if sampled else ""
-    return [
+    lines = [
         "filled: front (nothing else is clearly faster or better); bars: 95 % intervals of times",
         f"{slope}dotted: noise of the reference itself",
     ]
+    if record.engine:
+        lines.append(f"diamonds: given pictures, {stated(record.engine)}")
+    return lines
 
 
 def _rows(record: Cost) -> list[dict[str, Any]]:
     methods = {method.name: method for method in record.methods}
-    return [
+    settings = record.engine.settings if record.engine else ()
+    measured = [
         {
             "method": point.method,
             "family": methods[point.method].family,
@@ -103,6 +110,21 @@ def _rows(record: Cost) -> list[dict[str, Any]]:
         }
         for point in record.points
     ]
+    # Given times have no interval.
+    given = [
+        {
+            "method": setting.method,
+            "family": "given",
+            "sampled": False,
+            "time": 1e3 * setting.seconds.value,
+            "fastest": 1e3 * setting.seconds.low,
+            "slowest": 1e3 * setting.seconds.high,
+            "error": setting.error.value,
+            "front": setting.front,
+        }
+        for setting in settings
+    ]
+    return [*measured, *given]
 
 
 def _by_family(channel: Callable[..., Any], column: int) -> Any:
@@ -171,7 +193,7 @@ def _names_beside(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
     leading: Spec = {"color": "#9a9a9a", "strokeWidth": 0.7, "opacity": 0.6, "xOffset": 6}
     return [
         chart.mark_rule(**leading).encode(x2=alt.value(WIDTH + 10), y2="beside"),
-        chart.mark_text(align="left", fontSize=12).encode(
+        chart.mark_text(align="left", fontSize=12, limit=LONGEST_NAME).encode(
             x=alt.value(WIDTH + 14), y=beside, text="method:N"
         ),
     ]

@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.heuristic.errors import InputError
 from fotismos.reports import jobs
 
@@ -18,6 +19,20 @@ from fotismos.reports import jobs
 @click.option("--rounds", type=click.IntRange(2), help="Timed repeats of each method. [default: 7]")
 @click.option("--at", type=jobs.resolution, metavar="WxH", help="Predict the times at this size.")
 @click.option("--measure", "is_measured", is_flag=True, help="With --at: measure at it, too.")
+@click.option(
+    "--picture",
+    "pictures",
+    multiple=True,
+    metavar="'NAME @ TIME=PATTERN'",
+    help="A setting of another renderer: its picture and the time of it, such as 'PCSS low @"
+    " 6.3ms=low_*.exr'. Several files are repeats, which show its noise.",
+)
+@click.option("--machine", metavar="TEXT", help="The machine that took these times.")
+@click.option(
+    "--kernel-time", metavar="TIME", help="What the textbook kernel takes there, for ratios."
+)
+@jobs.option("transfer")
+@jobs.option("over")
 @jobs.json_option
 def cost(
     scene: str,
@@ -25,6 +40,9 @@ def cost(
     rounds: int | None,
     at: tuple[int, int] | None,
     is_measured: bool,
+    pictures: tuple[str, ...],
+    machine: str | None,
+    kernel_time: str | None,
     as_json: bool,
     timeout: float,
     **rendering: Any,
@@ -36,14 +54,22 @@ def cost(
     cost.json, cost.svg and pictures to OUTPUT/cost/SCENE. Without --resolution the film is reduced
     to a width of 128 pixels; --spp gives the largest count of samples per pixel, 64 if omitted.
 
+    With --picture, settings of another renderer have a front of their own: their times are given.
+    The size of the pictures becomes that of the study.
+
     \b
     Examples:
       fotismos cost cornell-box
       fotismos cost my_scene.xml --resolution 256x256 --rounds 11
       fotismos cost cornell-box --at 1920x1080
+      fotismos cost hall.xml --picture 'PCSS low @ 6.3ms=low_*.exr' --machine 'RTX 3060'
     """  # noqa: D301 click reads the \b as: keep these lines
     if is_measured and at is None:
         raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
+    engine = EngineTimes.of(pictures, machine, kernel_time)
+    for name in ("transfer", "over"):
+        if engine is None and rendering[name] is not None:
+            raise InputError(f"--{name}: it says how pictures are read. Give --picture.")
     jobs.work(
         "cost",
         jobs.pool(timeout),
@@ -53,5 +79,6 @@ def cost(
         rounds=rounds,
         at=at,
         is_measured=is_measured,
+        engine=engine,
         as_json=as_json,
     )

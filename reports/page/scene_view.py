@@ -65,13 +65,26 @@ class LiveView(TermsView):
     fit: tuple[float, int, int] | None = None
 
 
+class EngineView(Record):
+    """A page's sentences on an engine's settings, and their shares above the usual threshold.
+
+    ``judgements`` are one for each, ``stated`` says what their times are of, and ``odd`` what is
+    odd about the pictures.
+    """
+
+    judgements: tuple[str, ...]
+    stated: str
+    odd: tuple[str, ...]
+    shares: tuple[Any, ...]
+
+
 class CostView(Record):
     """A page's data of a study.
 
     ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, whose type few pages need
     to load. ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are
     sentences on its sums and on the machine, ``answer`` one on the cheapest method that looks
-    right; ``colours`` are those of the effects.
+    right; ``colours`` are those of the effects; ``engine`` is None without given pictures.
     """
 
     record: Any
@@ -80,6 +93,7 @@ class CostView(Record):
     busy: str
     answer: str
     colours: tuple[str, ...]
+    engine: EngineView | None = None
 
 
 class Before(Record):

@@ -17,7 +17,14 @@ from fotismos.comparisons.departure.regions import Region
 from fotismos.reference.records import plain
 from fotismos.reports import verdict
 from fotismos.reports.files import images
-from fotismos.reports.terminal.words import difference, number, parameter, percent, seconds
+from fotismos.reports.terminal.words import (
+    difference,
+    given_time,
+    number,
+    parameter,
+    percent,
+    seconds,
+)
 
 TEMPLATES = Path(__file__).parent / "templates"
 
@@ -30,7 +37,9 @@ REGION_SIZE = 420
 """Approximate screen pixels of a region that is opened from its link."""
 
 #: How values are printed, by the names of forms.
-FORMS = {form.__name__: form for form in (number, difference, parameter, seconds, percent)}
+FORMS = {
+    form.__name__: form for form in (number, difference, parameter, seconds, given_time, percent)
+}
 
 #: Runs before anything is drawn: content that needs scripts is shown only if they run.
 #: A page in a notebook's frame begins with the viewer.

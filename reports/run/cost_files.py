@@ -6,13 +6,22 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from fotismos.comparisons.departure.criterion import share_above
 from fotismos.reference import records
 from fotismos.reports import glossary
 from fotismos.reports.charts import cost_charts, theme, vega
 from fotismos.reports.files import images, results
-from fotismos.reports.page.scene_view import CostView
+from fotismos.reports.page.scene_view import CostView, EngineView
 from fotismos.reports.page.templating import HELP, rendered
-from fotismos.reports.terminal.cost_tables import answer, busy, closure, together
+from fotismos.reports.terminal.cost_tables import (
+    answer,
+    busy,
+    closure,
+    judgements,
+    oddities,
+    stated,
+    together,
+)
 
 if TYPE_CHECKING:
     from fotismos.comparisons.cost.cost import Study
@@ -25,6 +34,10 @@ def documents(study: Study) -> dict[str, bytes]:
     """Return the named files of a study: charts, and pictures of methods with its exposure."""
     record = study.record
     pictures = {f"cost-method-{_plain(name)}": image for name, image in study.methods.items()}
+    # A name may be anything: files have numbers.
+    pictures |= {
+        f"cost-picture-{number}": image for number, image in enumerate(study.settings.values(), 1)
+    }
     pictures["cost-reference"] = study.reference
     made = {
         f"{name}.png": images.png(images.tonemap(image, exposure=record.viewing.exposure))
@@ -72,13 +85,22 @@ def view(study: Study) -> CostView:
     record = study.record
     exposure = record.viewing.exposure
     effects = record.attribution.effects
+    engine = None
+    if record.engine:
+        engine = EngineView(
+            judgements=tuple(judgements(record.engine)),
+            stated=stated(record.engine),
+            odd=tuple(oddities(record.engine)),
+            shares=tuple(share_above(one.visible) for one in record.engine.settings),
+        )
     said = [together(record), closure(record)] if effects else []
     return CostView(
         record=record,
         images={
             name: images.webp(images.tonemap(image, exposure))
-            for name, image in study.methods.items()
+            for name, image in {**study.methods, **study.settings}.items()
         },
+        engine=engine,
         said=re.sub(r"(?<!\d)-(?=\d)", "−", " ".join(said)),
         busy=busy(record) if record.is_busy else "",
         answer=answer(record),

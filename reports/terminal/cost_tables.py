@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
-from fotismos.comparisons.cost.front import Reach, reach, sufficient
-from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.cost.front import Reach, beats, is_below, reach, sufficient
+from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.reports.glossary import meanings
 from fotismos.reports.terminal.tables import printed
-from fotismos.reports.terminal.words import number, parameter, seconds
+from fotismos.reports.terminal.words import given_time, number, parameter, percent, seconds
 
 if TYPE_CHECKING:
     from fotismos.comparisons.cost.cost import Choice
-    from fotismos.comparisons.cost.cost_record import Cost, Point
+    from fotismos.comparisons.cost.cost_record import Cost, Engine, EngineSetting, Point
     from fotismos.reference.records import Interval
 
 Rows: TypeAlias = Iterator[Sequence[str]]
@@ -28,6 +28,8 @@ def lines(record: Cost) -> Iterator[str]:
     reference = record.reference
     size = sized(record.resolution)
     yield answer(record)
+    if record.engine:
+        yield from judgements(record.engine)
     yield ""
     yield (
         f"{record.scene}, {size}, {record.rounds} rounds with {record.threads} threads on"
@@ -53,6 +55,9 @@ def lines(record: Cost) -> Iterator[str]:
     yield from _explained(method.name for method in record.methods if method.family == "physical")
     for name, reason in record.left_out.items():
         yield f"left out: {name}: {reason}"
+    if record.engine:
+        yield from _section(f"Given pictures: {stated(record.engine)}", _settings(record.engine))
+        yield from oddities(record.engine)
     # Errors, and what each effect contributes.
     yield from _section(f"Error and time of one image at {size}", _points(record.points))
     if record.attribution.effects:
@@ -118,6 +123,54 @@ def answer(record: Cost) -> str:
         return f"{sentence}."
     outcome = "looks right, too" if kernel.tolerance.high <= TOLERANCE else "fails"
     return f"{sentence}; the textbook kernel takes {seconds(kernel.seconds.value)} and {outcome}."
+
+
+def judgements(engine: Engine) -> Iterator[str]:
+    """Yield for each setting where it passes, and which other setting does better."""
+    return (f"{one.method} {_passing(one)}; {_rivals(one, engine)}." for one in engine.settings)
+
+
+def _passing(setting: EngineSetting) -> str:
+    if setting.passes_at is None:
+        most = parameter(setting.visible[-1].threshold)
+        return (
+            f"does not pass at {LEADING.label} {most}, as 5 % of its pixels exceed"
+            f" {number(setting.p95)}"
+        )
+    return f"passes at {LEADING.label} {parameter(setting.passes_at)}"
+
+
+def _rivals(setting: EngineSetting, engine: Engine) -> str:
+    """Return which given setting is clearly better, at what time."""
+    others = [other for other in engine.settings if other is not setting]
+    winners = [other for other in others if beats(other, setting)]
+    if winners:
+        best = min(winners, key=lambda other: other.error.value)
+        if not is_below(best.seconds, setting.seconds):
+            return f"{best.method} takes as long and is better"
+        is_better = is_below(best.error, setting.error)
+        return f"{best.method} is faster and {'better' if is_better else 'no worse'}"
+    # What is better without beating it takes longer.
+    better = [other.seconds.value for other in others if is_below(other.error, setting.error)]
+    if not better:
+        return "nothing given does better"
+    return f"nothing given under {given_time(min(better))} does better"
+
+
+def stated(engine: Engine) -> str:
+    """Return what the times of settings are of."""
+    machine = f", on {engine.machine}" if engine.machine else ""
+    return f"times as given{machine}; the front is their own"
+
+
+def oddities(engine: Engine) -> list[str]:
+    """Return what is odd about the pictures and how they were read, each once, with the names."""
+    named: dict[str, list[str]] = {}
+    for setting in engine.settings:
+        found = setting.agreement
+        for sentence in (*found.mistakes, *found.odd, *setting.picture.notes):
+            named.setdefault(sentence, []).append(setting.method)
+    return [f"{', '.join(names)}: {sentence}" for sentence, names in named.items()]
 
 
 def closure(record: Cost) -> str:
@@ -214,6 +267,30 @@ def _points(points: Sequence[Point]) -> Rows:
             *timed(point.seconds),
             f"{point.error.value:.3f} ± {point.error.high - point.error.value:.3f}",
             f"{point.tolerance.value:.2f} ± {point.tolerance.high - point.tolerance.value:.2f}",
+            ", ".join(notes),
+        )
+
+
+def _settings(engine: Engine) -> Rows:
+    ratio = ("x kernel there",) if engine.kernel_s else ()
+    above = f"above {TOLERANCE:g}"
+    ends = "95 % interval"
+    yield "setting", "files", "time", *ratio, "mean ΔE2000", ends, above, ends, "passes at", "front"
+    for one in engine.settings:
+        share = share_above(one.visible)
+        notes = ["front"] if one.front else []
+        if one.ties:
+            notes.append(f"too close to call: {', '.join(one.ties)}")
+        yield (
+            one.method,
+            f"{one.picture.repeats}",
+            given_time(one.seconds.value),
+            *((number(one.ratio),) if one.ratio else ()),
+            number(one.error.value),
+            f"{number(one.error.low)} to {number(one.error.high)}",
+            percent(share.value),
+            f"{number(100 * share.low)} to {percent(share.high)}",
+            "none" if one.passes_at is None else parameter(one.passes_at),
             ", ".join(notes),
         )
 

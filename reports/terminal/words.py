@@ -138,14 +138,19 @@ def parameter(value: float) -> str:
     return _minus(f"{value:,}" if isinstance(value, int) else f"{value:.4g}")
 
 
-def seconds(value: float | None) -> str:
+def seconds(value: float | None, digits: Callable[[float], str] = number) -> str:
     """A time with its unit: ns, µs, ms or s."""
     if value is None:
         return "–"
     for scale, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs")):
         if abs(value) >= scale:
-            return f"{number(value / scale)} {unit}"
-    return f"{number(value / 1e-9)} ns" if value else "0 s"
+            return f"{digits(value / scale)} {unit}"
+    return f"{digits(value / 1e-9)} ns" if value else "0 s"
+
+
+def given_time(value: float) -> str:
+    """A time that was given, not measured: without trailing zeros."""
+    return seconds(value, parameter)
 
 
 def percent(value: float) -> str:

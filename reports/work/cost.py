@@ -9,6 +9,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.cost.cost_record import Cost
 from fotismos.comparisons.cost.measure import Effort
+from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.reference.records import to_json
@@ -29,10 +30,11 @@ def run(
     rounds: int | None,
     at: Size | None,
     is_measured: bool,
+    engine: EngineTimes | None,
     as_json: bool,
 ) -> None:
     """Study one scene, and print the table or the record."""
-    arguments = (options, rounds, at, is_measured)
+    arguments = (options, rounds, at, is_measured, engine)
     records = results_of(pool, output / "cost", scenes=[scene], work=measured, arguments=arguments)
     ((folder, record),) = records.items()
     if as_json:
@@ -48,6 +50,7 @@ def measured(
     rounds: int | None,
     at: Size | None,
     is_measured: bool,
+    engine: EngineTimes | None,
     target: Path,
     progress: Any,
 ) -> Cost:
@@ -55,7 +58,17 @@ def measured(
     case = open_case(name, options)
     effort = Effort() if rounds is None else Effort(rounds=rounds)
     size = at and f"{at[0]}x{at[1]}"
-    repeated = case.command("cost", rounds=rounds, at=size, measure=is_measured or None)
-    study = cost(case.source, case.options, effort, progress, repeated, at, is_measured)
+    given = {} if engine is None else engine.as_options()
+    repeated = case.command("cost", rounds=rounds, at=size, measure=is_measured or None, **given)
+    study = cost(
+        case.source,
+        case.options,
+        effort,
+        progress,
+        repeated,
+        at,
+        is_measured,
+        engine_times=engine,
+    )
     cost_files.write(target, study)
     return study.record

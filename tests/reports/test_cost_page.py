@@ -116,12 +116,75 @@ def test_the_page_has_what_is_predicted_and_the_table_marks_the_cheapest(study):
     assert rows[first + 1].split() == ["method", "samples", "time", "interval"]
 
 
+def test_given_pictures_stand_beside_the_methods_with_times_as_given(study):
+    for kernel_s in (0.0021, None):
+        given = cost_records.with_engine(study, kernel_s=kernel_s)
+        made = cost_files.documents(given)
+        jsonschema.Draft202012Validator(schema("cost")).validate(json.loads(made["cost.json"]))
+        assert {"cost-picture-1.png", "cost-picture-2.png"} <= made.keys()
+        html = Page(shown(given))
+        shown_values = {value for value, _ in html.values}
+        text = "\n".join(cost_tables.lines(given.record))
+        for one in given.record.engine.settings:
+            wanted = [one.seconds.value, *structs.astuple(one.error), one.ratio]
+            wanted += structs.astuple(one.visible[1])[:3]
+            assert {value for value in wanted if value is not None} <= shown_values
+        for said in (" ".join(html.text.split()), text):
+            assert (
+                "PCSS low does not pass at ΔE2000 2, as 5 % of its pixels exceed 13.6; nothing"
+                " given under 9.1 ms does better."
+            ) in said
+            assert "PCSS high passes at ΔE2000 2; nothing given does better." in said
+            assert "times as given, on RTX 3060; the front is their own" in said
+            assert "PCSS low, PCSS high: The picture is misread." in said
+            assert "6.3 ms" in said
+        assert ("x kernel there" in text) is (kernel_s is not None)
+        assert ("kernel’sthere" in "".join(html.text.split())) is (kernel_s is not None)
+        # What is measured is as without them.
+        points = cost_tables.answer(given.record), given.record.points, given.record.methods
+        assert points == (cost_tables.answer(study.record), study.record.points,
+                          study.record.methods)  # fmt: skip
+        svg = vl_convert.vegalite_to_svg(cost_charts.titled(given.record))
+        assert "diamonds: given pictures, times as given, on RTX 3060" in svg
+        assert "PCSS high" in svg
+    bare = shown(study)
+    assert "Given pictures" not in bare
+    assert "diamonds" not in bare
+    nowhere = cost_tables.stated(cost_records.with_engine(study, machine="").record.engine)
+    assert nowhere == "times as given; the front is their own"
+
+
+def test_a_setting_that_is_beaten_names_the_better_one(study):
+    given = cost_records.with_engine(study).record.engine
+    slow, fast = given.settings
+    for spent, said in (
+        (0.001, "PCSS high is faster and better."),
+        (slow.seconds.value, "PCSS high takes as long and is better."),
+    ):
+        time = structs.replace(fast.seconds, value=spent, low=spent, high=spent)
+        better = structs.replace(fast, seconds=time)
+        engine = structs.replace(given, settings=(slow, better))
+        first, _ = cost_tables.judgements(engine)
+        assert first.endswith(said)
+        alike = structs.replace(better, error=slow.error)
+        engine = structs.replace(given, settings=(slow, alike))
+        first, _ = cost_tables.judgements(engine)
+        faster = spent < slow.seconds.value
+        expected = "is faster and no worse." if faster else "; nothing given does better."
+        assert first.endswith(expected)
+
+
 def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_cost(study):
     machine = structs.replace(study.record.machine, processor=HOSTILE)
     hostile = replace(study, record=structs.replace(study.record, machine=machine))
     html = shown(hostile, records.record(scene=HOSTILE))
     assert HOSTILE not in html
     assert HOSTILE in Page(html).text
+    given = cost_records.with_engine(study, machine=HOSTILE, names=(HOSTILE, "b"))
+    html = shown(given)
+    assert HOSTILE not in html
+    assert Page(html).text.count(HOSTILE) > 3
+    html = shown(hostile, records.record(scene=HOSTILE))
     bare = page.render([SceneView(record=records.record())])
     for text in ("What accuracy costs", "What each effect", "Ladder"):
         assert text in html

@@ -7,7 +7,7 @@ from msgspec import convert, structs
 
 from fotismos.comparisons.comparison import Attribution
 from fotismos.comparisons.cost.cost import Study
-from fotismos.comparisons.cost.cost_record import Cost
+from fotismos.comparisons.cost.cost_record import Cost, Engine
 from fotismos.comparisons.hybrids.attribution import Causes
 from fotismos.reference.records import VERSION
 from tests.shared import records
@@ -33,6 +33,40 @@ def study(scene="fig-8-9"):
     made, image = record(scene), np.random.default_rng(4).random((HEIGHT, WIDTH, 3))
     shown = {one.name: np.full_like(image, 0.2 + 0.2 * n) for n, one in enumerate(made.methods)}
     return Study(record=made, methods=shown, reference=image)
+
+
+def with_engine(study, machine="RTX 3060", kernel_s=0.0021, names=("PCSS low", "PCSS high")):
+    """The study with settings of an engine, the later ones slower and better."""
+    settings = [
+        {
+            "method": name,
+            "seconds": interval(0.0063 + 0.0028 * place, 0),
+            "error": {"mean": 4.567 - place, "low": 4.321 - place, "high": 4.765 - place},
+            "front": True,
+            "visible": [
+                {"threshold": t, "value": 0.0421 / t, "low": 0.0311 / t, "high": 0.0987 / t}
+                for t in (1.0, 2.0)
+            ],
+            "passes_at": 2.0 if place else None,
+            "p95": 13.57 - place,
+            "ratio": kernel_s and (0.0063 + 0.0028 * place) / kernel_s,
+            "picture": {
+                "files": [f"{place}.exr"],
+                "transfer": None,
+                "repeats": 1,
+            },
+            "agreement": {
+                "shift": None,
+                "edges": 0.5,
+                "ratio": [1.0, 1.0, 1.0],
+                "mistakes": ["The picture is misread."],
+            },
+        }
+        for place, name in enumerate(names)
+    ]
+    engine = {"settings": settings, "machine": machine, "kernel_s": kernel_s}
+    record = structs.replace(study.record, engine=convert(engine, Engine))
+    return replace(study, record=record, settings=dict.fromkeys(names, study.reference))
 
 
 def causes():

@@ -1,0 +1,310 @@
+"""Settings of another renderer: how they are written, their errors, and their front."""
+
+import json
+import re
+import shlex
+from decimal import Decimal
+
+import jsonschema
+import msgspec
+import numpy as np
+import pytest
+from msgspec import structs
+
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.cost import engine, times
+from fotismos.comparisons.cost.cost_record import Cost
+from fotismos.comparisons.cost.front import fronted
+from fotismos.comparisons.cost.measure import Effort, converged, measure_ladder
+from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture, seconds_of
+from fotismos.comparisons.options import Options
+from fotismos.heuristic.errors import InputError
+from fotismos.reference.records import Interval
+from fotismos.reference.scene.graph import set_variant
+from tests.shared.schemas import schema
+
+SIDE = 32
+SINGLE = "The picture is one file, so its noise is unknown"
+
+
+@pytest.fixture(autouse=True, scope="module")
+def short():
+    """Times of these scenes need not repeat."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(times, "LEAST_S", 0.0)
+        yield
+
+
+# -- Words -----------------------------------------------------------------------------------------
+
+LETTERS = "abc XYZ 019 @@@ === ,.:;'\"`$\\|&<>[]*?()% äßñ 中文 µπ ✓ 🙂 \u00a0"
+POWERS = {"s": 0, "ms": -3, "us": -6, "µs": -6, "μs": -6}
+
+
+def text_of(rng, most):
+    return "".join(rng.choice(list(LETTERS), rng.integers(1, most)))
+
+
+def test_random_settings_are_read_and_come_back_from_the_command_of_a_record():
+    """Names of any characters, but for an at sign that an equals sign follows."""
+    rng, count = np.random.default_rng(1), 0
+    for _ in range(1500):
+        name, pattern = text_of(rng, 20).strip(), f"{text_of(rng, 15)}.exr"
+        if not name or re.search("@.*=", name):
+            continue
+        number = f"{rng.integers(1, 10_000)}{rng.choice(['', '.', '.5', '.07', 'e-2', 'E1'])}"
+        unit = rng.choice(list(POWERS))
+        blank, other = rng.choice(["", " ", "  "], 2)
+        word = f"{name}{blank}@{other}{number}{blank}{unit}{other}={pattern}"
+        found = TimedPicture.of(word)
+        assert (found.name, found.pattern, found.word) == (name, pattern, word)
+        exact = Decimal(number.rstrip(".")) * Decimal(10) ** POWERS[unit]
+        assert found.seconds == pytest.approx(float(exact), rel=1e-12)
+        machine = text_of(rng, 9)
+        given = EngineTimes.of([word], machine, "2.1 ms")
+        typed = shlex.split(Options().command("cost", "hall.xml", **given.as_options()))
+        options = dict(zip(typed[3::2], typed[4::2], strict=True))
+        words = [options["--picture"]]
+        assert EngineTimes.of(words, options["--machine"], options["--kernel-time"]) == given
+        count += 1
+    assert count > 1000
+
+
+def test_a_name_ends_at_the_first_time():
+    found = TimedPicture.of("a=b @ c = d @ 2ms=dir@3ms=x/*.exr")
+    assert (found.name, found.seconds, found.pattern) == ("a=b @ c = d", 2e-3, "dir@3ms=x/*.exr")
+    assert seconds_of(" .5 s ") == 0.5
+
+
+@pytest.mark.parametrize(
+    ("word", "reason"),
+    [
+        ("PCSS=low_*.exr", "has no time"),
+        ("PCSS low", "has no time"),
+        ("", "has no time"),
+        ("@ 3ms=low.exr", "has no name"),
+        ("PCSS @ 3ms=", "has no picture"),
+        *(
+            (f"k=3 @ {time}=low.exr", f"'{time.strip()}' is not a time")
+            for time in ("", "6", "ms", "6,3ms", "-1ms", "0ms", "nanms", "infs", "1e9s", "1e-9ms")
+        ),
+        *((f"PCSS @ {time}=x.exr", "is not a time") for time in ("6 parsec", "1_0ms", "٣ms")),
+    ],
+)
+def test_a_setting_without_a_part_is_refused_with_an_example(word, reason):
+    with pytest.raises(InputError, match=re.escape(reason)) as refused:
+        TimedPicture.of(word)
+    assert "such as 'PCSS low @ 6.3ms=low_*.exr'" in str(refused.value)
+    if "not a time" in reason:
+        assert "a number with s, ms or us, from 1e-9s to 1e6s, such as 6.3ms" in str(refused.value)
+
+
+def test_names_that_are_taken_and_times_of_nothing_are_refused(rgb):
+    with pytest.raises(InputError, match="2 pictures are called 'a'"):
+        EngineTimes.of(["a @ 1ms=x.exr", " a @ 2ms=y.exr"], None, None)
+    for machine, kernel in (("RTX 3060", None), (None, "2ms")):
+        with pytest.raises(InputError, match="Give a picture"):
+            EngineTimes.of([], machine, kernel)
+    with pytest.raises(InputError, match="'2' is not a time"):
+        EngineTimes.of(["a @ 1ms=x.exr"], None, "2")
+    with pytest.raises(InputError, match="UTF-8"):
+        TimedPicture.of("a\udcff @ 1ms=x.exr")
+    assert EngineTimes.of([], None, None) is None
+    for name in ("full plan", "Phong kernel"):
+        times_of = EngineTimes.of([f"{name} @ 1ms=x.exr"], None, None)
+        with pytest.raises(InputError, match="is a method of the study"):
+            engine.read(times_of, Options())
+
+
+# -- Errors ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def found():
+    """The measured methods of a scene whose reference has some noise."""
+    set_variant("llvm_ad_rgb")
+    case = open_case("plastic-spheres", Options(resolution=(SIDE, SIDE)))
+    effort = Effort(rounds=2, largest=4)
+    return measure_ladder(case.source, case.options, effort, lambda *_: None)
+
+
+def judged(found, folder, repeats, seconds=None, kernel_time=None):
+    """The settings of pictures, ``{name: [repeats]}``, by their names."""
+    words = []
+    for number, (name, images) in enumerate(repeats.items()):
+        for place, image in enumerate(images):
+            np.save(folder / f"{number}_{place}.npy", image)
+        time = (seconds or {}).get(name, 0.001)
+        words.append(f"{name} @ {time}s={folder / str(number)}_*.npy")
+    times_of = EngineTimes.of(words, "its own", kernel_time)
+    read = engine.read(times_of, found.options)
+    made = engine.judged(read, times_of, found)
+    return {setting.method: setting for setting in made.settings}
+
+
+def changed(image, counted, share, by=0.3):
+    """An image of which a share of the counted pixels is brighter."""
+    places = np.argwhere(counted)
+    chosen = np.random.default_rng(3).permutation(len(places))[: round(share * len(places))]
+    other = np.array(image)
+    other[tuple(places[chosen].T)] += by
+    return other
+
+
+def test_the_right_picture_passes_at_the_smallest_threshold_and_a_changed_one_does_not(
+    found, tmp_path
+):
+    """The right one is rendered with other seeds, and its own little noise counts."""
+    right = converged(found.ready, seed=91, progress=None).mean
+    tenth = changed(right, found.ready.counted, 0.1)
+    repeats = {"equal": [found.reference.mean], "right": [right], "tenth": [tenth]}
+    settings = judged(found, tmp_path, repeats)
+    assert settings["equal"].passes_at == settings["right"].passes_at == 1.0
+    assert settings["equal"].error.value == 0
+    error = settings["right"].error
+    assert 0 <= error.low < error.value < error.high < 2 * found.converged.noise_floor
+    changes = settings["tenth"]
+    assert changes.passes_at is None
+    assert changes.p95 > 10
+    for share in changes.visible:
+        assert share.low <= 0.11
+        assert share.high >= 0.1 or share.threshold > 4
+        assert share.high > 0.05
+    added = changes.error.value - error.value
+    assert added == pytest.approx(changes.p95 / 10, rel=0.5)
+    # In between, noise decides: what may be above 5 % does not pass.
+    few = judged(found, tmp_path, {"few": [changed(right, found.ready.counted, 0.04, by=0.02)]})
+    sure = [share.threshold for share in few["few"].visible if share.high <= 0.05]
+    assert few["few"].passes_at == sure[0]
+    assert few["few"].visible[0].value < 0.05 < few["few"].visible[0].high
+    for setting in settings.values():
+        assert setting.picture.repeats == 1
+        assert any(odd.startswith(SINGLE) for odd in setting.agreement.odd)
+
+
+def test_the_spread_of_repeats_widens_the_interval_and_a_mean_is_of_single_pictures(
+    found, tmp_path
+):
+    rng = np.random.default_rng(5)
+    noisy = [
+        np.maximum(found.reference.mean + rng.normal(0, 0.02 * n, (SIDE, SIDE, 3)), 0)
+        for n in (1, 2, 1, 2)
+    ]
+    settings = judged(found, tmp_path, {"all": noisy, **{f"no {n}": [noisy[n]] for n in range(4)}})
+    single = [settings[f"no {n}"] for n in range(4)]
+    every = settings["all"]
+    values = [one.error.value for one in single]
+    assert every.error.value == pytest.approx(np.mean(values))
+    for share, *alone in zip(every.visible, *(one.visible for one in single), strict=True):
+        assert share.value == pytest.approx(np.mean([one.value for one in alone]))
+    # Student's quantile of three degrees of freedom.
+    spread = 3.182446 * np.std(values, ddof=1) / 2
+    assert every.error.high - every.error.value >= spread
+    assert every.error.high - every.error.value <= spread + max(
+        one.error.high - one.error.value for one in single
+    )
+    assert not any(odd.startswith(SINGLE) for odd in every.agreement.odd)
+
+
+def test_intervals_of_repeats_hold_the_mean():
+    rng, held, count = np.random.default_rng(6), 0, 2000
+    for _ in range(count):
+        values = rng.normal(3.0, 0.5, rng.choice([2, 4, 6, 8]))
+        found = engine.of_repeats([Interval(value=v, low=v, high=v) for v in values])
+        held += found.low <= 3.0 <= found.high
+    assert 0.93 < held / count < 0.97
+
+
+def test_a_picture_that_is_misread_or_moved_is_named(found, tmp_path):
+    right = found.reference.mean
+    encoded = np.where(right < 0.0031308, 12.92 * right, 1.055 * right ** (1 / 2.4) - 0.055)
+    wrong = {"encoded": encoded, "mirrored": right[:, ::-1], "right": right, "pi": np.pi * right}
+    settings = judged(found, tmp_path, {name: [image] for name, image in wrong.items()})
+    said = {
+        name: " ".join((*one.agreement.mistakes, *one.agreement.odd))
+        for name, one in settings.items()
+    }
+    assert "values look sRGB-encoded" in said["encoded"]
+    assert "mirrored left to right" in said["mirrored"]
+    assert "a missing division by pi" in said["pi"]
+    for mistake in ("misread", "shifted", "times as bright"):
+        assert mistake not in said["right"]
+
+
+# -- The front -------------------------------------------------------------------------------------
+
+
+def test_given_times_make_a_front_of_their_own_and_no_ratio(found, tmp_path):
+    """Whatever is given, what is measured stays; the front is the one of exact points."""
+    rng = np.random.default_rng(7)
+    for trial in range(6):
+        folder = tmp_path / str(trial)
+        folder.mkdir()
+        names = [f"setting {n}" for n in range(6)]
+        shares = rng.permutation(6) * 0.06 + 0.03
+        images = {
+            name: [changed(found.reference.mean, found.ready.counted, share)]
+            for name, share in zip(names, shares, strict=True)
+        }
+        seconds = {name: float(rng.integers(1, 5)) * 10.0 ** rng.integers(-6, 3) for name in names}
+        settings = judged(found, folder, images, seconds)
+        for name, share in zip(names, shares, strict=True):
+            is_beaten = any(
+                seconds[other] <= seconds[name] and more < share
+                for other, more in zip(names, shares, strict=True)
+            )
+            assert settings[name].front is not is_beaten
+            assert settings[name].ratio is None
+            assert settings[name].seconds.low == settings[name].seconds.high
+        alone = fronted(found.points)
+        for setting in settings.values():
+            assert not set(setting.ties) & {point.method for point in alone}
+    related = judged(found, tmp_path, {"a": [found.reference.mean]}, {"a": 0.0063}, "2.1ms")
+    assert related["a"].ratio == pytest.approx(3.0)
+
+
+# -- The command -----------------------------------------------------------------------------------
+
+
+def test_the_command_puts_pictures_on_a_front_at_their_size(rgb, run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(8)
+    for name, size in (("low", 20), ("high", 20), ("small", 16)):
+        for repeat in range(2):
+            image = rng.uniform(0, 1 if name == "low" else 0.5, (size, size, 3))
+            np.save(f"{name}_{repeat}.npy", image.astype(np.float32))
+    low, high = "PCSS = low @ 6.3ms=low_*.npy", "high @ 9.1 ms=high_*.npy"
+    words = ("cost", "lambert-sphere", "--spp", 4, "--rounds", 2, "--picture", low)
+    code, said, _ = run(*words, "--picture", high, "--machine", "RTX 3060", "--kernel-time", "2ms")
+    assert code == 0
+    text = (tmp_path / "out/cost/lambert-sphere/cost.json").read_text()
+    jsonschema.Draft202012Validator(schema("cost")).validate(json.loads(text))
+    record = msgspec.json.decode(text, type=Cost)
+    assert record.resolution == (20, 20)
+    assert record.engine.machine == "RTX 3060"
+    assert [round(one.ratio, 3) for one in record.engine.settings] == [3.15, 4.55]
+    assert record.engine.settings[0].picture.files == ("low_0.npy", "low_1.npy")
+    typed = shlex.split(record.command)
+    assert [typed[n + 1] for n, word in enumerate(typed) if word == "--picture"] == [low, high]
+    assert "Given pictures: times as given, on RTX 3060; the front is their own" in said
+    assert (tmp_path / "out/cost/lambert-sphere/cost-picture-2.png").exists()
+    for more, reason in (
+        (("--picture", "small @ 1ms=small_*.npy"), "small_0.npy has 16x16 pixels, and low_0.npy"),
+        (("--resolution", "24x24"), "it has 20x20 pixels, and --resolution 24x24 is requested"),
+        (("--picture", "none @ 1ms=none_*.npy"), "none_*.npy: no file matches"),
+        (("--picture", "none=low_*.npy"), "has no time"),
+    ):
+        code, _, error = run(*words, *more)
+        assert code == 2
+        assert reason in error
+    code, _, error = run("cost", "lambert-sphere", "--over", "black")
+    assert (code, "--over: it says how pictures are read" in error) == (2, True)
+
+
+def test_repeats_of_one_seed_are_refused_and_equal_ones_have_no_noise(found, tmp_path):
+    image = found.reference.mean
+    with pytest.raises(InputError, match="3 repeats, of which only 2 differ"):
+        judged(found, tmp_path, {"a": [image, image, image + 0.1]})
+    both = judged(found, tmp_path, {"a": [image + 0.1] * 3, "b": [image + 0.1]})
+    alone = structs.asdict(both["b"].error)
+    assert structs.asdict(both["a"].error) == pytest.approx(alone)
