@@ -31,6 +31,7 @@ from fotismos.comparisons.comparison import (
 )
 from fotismos.comparisons.departure import marks, regions, statistics
 from fotismos.comparisons.departure.blocks import bands
+from fotismos.comparisons.departure.mapped_sums import Light, MappedReference, reference_sums
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
@@ -40,7 +41,6 @@ from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.renderer import Progress, passes
 from fotismos.reference.rendering.sums import (
-    DEVIATION,
     MEAN,
     Accumulator,
     DifferenceEstimate,
@@ -67,7 +67,7 @@ class Estimates:
     """The passes of both halves and of their difference, and where they stopped (or None).
 
     The halves have only means (H, W, 3) and the reference's standard error: the relevant
-    uncertainty is the difference's.
+    uncertainty is the difference's. ``light`` is the reference before its tone map, if it has one.
     """
 
     heuristic: np.ndarray
@@ -76,6 +76,7 @@ class Estimates:
     difference: DifferenceEstimate
     passes: int
     stop: NoiseTarget | None
+    light: Light | None
 
 
 def compare(
@@ -244,8 +245,7 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
     options = ready.options
     distance = leading_distance(options.viewing, ready.metrics())
     heuristic = Accumulator(MEAN)
-    reference = Accumulator(DEVIATION)
-    difference = DifferenceSums(counted)
+    reference, difference = reference_sums(options.tone_map, counted)
     sums = (heuristic, reference, difference)
     done = 0
     reached = None
@@ -277,6 +277,7 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
         difference=difference.estimate(np.float32),
         passes=done,
         stop=stop,
+        light=reference.light() if isinstance(reference, MappedReference) else None,
     )
 
 
@@ -359,6 +360,7 @@ def _measure(estimates: Estimates, ready: Prepared) -> tuple[dict[str, Any], Ima
         counted=counted,
         objects=seen,
         materials=made_of,
+        light=estimates.light,
     )
     numbers = {
         "objects": shapes,

@@ -16,6 +16,7 @@ from msgspec import Meta, structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.departure.regions import ObjectShare, Region
 from fotismos.comparisons.departure.statistics import RatioSummary, Summary
@@ -249,6 +250,8 @@ class PictureRecord(Record):
     ----------
     transfer
         Transfer function of their values, as stated; null if the files' own was taken.
+    tone_map
+        The curve by which the reference was shown, as they were; null for linear light.
     notes
         How the files were read, where they do not say it plainly.
     shift
@@ -265,6 +268,7 @@ class PictureRecord(Record):
 
     files: tuple[str, ...]
     transfer: str | None
+    tone_map: str | None = None
     notes: tuple[str, ...] = ()
     repeats: Size
     shift: tuple[float, float] | None
@@ -353,7 +357,8 @@ class Images:
 
     ``maps`` are those of the perceptual metrics and ``log2_luminance``. ``objects`` and
     ``materials`` hold the index in the record of what each pixel sees, -1 for uncounted pixels.
-    ``terms`` are those of 8.10 in the heuristic half, by layer, if it has any.
+    ``terms`` are those of 8.10 in the heuristic half, by layer, if it has any. ``light`` is the
+    reference before its tone map, if it has one.
     """
 
     heuristic: np.ndarray
@@ -367,6 +372,7 @@ class Images:
     objects: np.ndarray
     materials: np.ndarray
     terms: dict[str, np.ndarray] = field(default_factory=dict)
+    light: Light | None = None
 
 
 @dataclass(frozen=True)

@@ -21,9 +21,12 @@ from time import perf_counter
 import mitsuba as mi
 import numpy as np
 from msgspec import structs
+from scipy.optimize import minimize_scalar
 
 from fotismos.comparisons.comparison import Images, PictureRecord
 from fotismos.comparisons.departure.colour import from_srgb, luminance, to_srgb
+from fotismos.comparisons.departure.mapped_sums import Light
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS, ToneMap
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.heuristic.errors import InputError
@@ -285,13 +288,21 @@ def picture_record(
     record = PictureRecord(
         files=files,
         transfer=options.transfer,
+        tone_map=options.tone_map,
         notes=half.notes,
         repeats=len(files),
         shift=None if is_doubtful else place.shift,
         edges=place.correlation,
         ratio=ratio,
     )
-    odd = describe(record, images.heuristic, images.reference, images.counted)
+    linear = Light(mean=images.reference, standard_error=images.reference_stderr)
+    odd = describe(
+        record,
+        images.heuristic,
+        images.reference,
+        counted=images.counted,
+        light=images.light or linear,
+    )
     return structs.replace(record, odd=tuple(odd))
 
 
@@ -321,13 +332,20 @@ def ratios(picture: np.ndarray, reference: np.ndarray) -> tuple[float, float, fl
 
 
 def describe(
-    record: PictureRecord, picture: np.ndarray, reference: np.ndarray, counted: np.ndarray
+    record: PictureRecord,
+    picture: np.ndarray,
+    reference: np.ndarray,
+    counted: np.ndarray,
+    light: Light,
 ) -> Iterator[str]:
     """Yield what is odd about a picture: how it is read, else its position first.
 
-    Images are linear, (H, W, 3); ``counted`` (H, W) is where the scene has a surface.
+    Images are linear, (H, W, 3); ``counted`` (H, W) is where the scene has a surface. ``light`` is
+    the reference before the tone map of the record, if there is one.
     """
-    if reading := _other_reading(picture, reference, counted):
+    curves = Curves.of(picture, light, counted)
+    given = curves.fit(record.tone_map)
+    if reading := _other_reading(picture, reference, counted=counted, curves=curves, given=given):
         yield f"The picture is misread. {reading}"
         return
     if record.shift is None:
@@ -345,7 +363,7 @@ def describe(
             "The picture is one file, so its noise is unknown and counts as departure. Give"
             " repeats of other seeds to separate the two."
         )
-    level = float(np.mean(record.ratio))
+    level = given.exposure if record.tone_map else float(np.mean(record.ratio))
     if (mistake := factor_of_pi(level)) or not 1 / LEVEL < level < LEVEL:
         yield (
             f"The picture is {level:.3g} times as bright as the reference:"
@@ -388,23 +406,117 @@ def _blocks(image: np.ndarray, counted: np.ndarray) -> np.ndarray:
     return means
 
 
-def _other_reading(picture: np.ndarray, reference: np.ndarray, counted: np.ndarray) -> str:
+def _other_reading(
+    picture: np.ndarray,
+    reference: np.ndarray,
+    counted: np.ndarray,
+    curves: "Curves",
+    given: "FittedCurve",
+) -> str:
     """Describe the other reading of its values that brings the picture near the reference."""
-    plain = _distance(picture[counted], reference[counted])
-    if plain < 1e-3:
-        return ""
     readings = {
         f"Its {misreading}{CURES.get(misreading, '')}.": undo
         for misreading, undo in MISREADINGS.items()
     }
     readings |= {f"It looks {how}, or lit from the other side.": turn
                  for how, turn in TURNED.items()}  # fmt: skip
-    distances = {
-        description: _distance(undo(picture)[counted], reference[counted])
-        for description, undo in readings.items()
-    }
-    description = min(distances, key=distances.__getitem__)
-    return description if distances[description] <= BETTER * plain else ""
+    # What each reading leaves of the difference, as a share of the most that is credible.
+    left: dict[str, float] = {}
+    plain = min(_distance(picture[counted], reference[counted]), curves.left_by(given))
+    if plain >= 1e-3:
+        for description, undo in readings.items():
+            distance = _distance(undo(picture)[counted], reference[counted])
+            left[description] = distance / plain / BETTER
+    if given.distance >= LEAST_CURVE:
+        for curve in map(curves.fit, CURVES):
+            if curve.name != given.name:
+                left[curve.sentence] = curve.distance / given.distance / BETTER_CURVE
+    description = min(left, key=left.__getitem__, default="")
+    return description if left and left[description] <= 1 else ""
+
+
+CURVES: dict[str | None, ToneMap] = {None: lambda light: np.clip(light, 0, 1)}
+CURVES.update(TONE_MAPS.items())
+"""The curves that a picture may show light by; without a name, linearly, up to display white."""
+
+STOPS = np.arange(-8.0, 9.0)
+"""Exposures, in stops, from which the search for a picture's own begins."""
+
+CURVE_PIXELS = 4096
+"""Pixels at which curves are tried, at most."""
+
+LEAST_CURVE = 1 / 255
+BETTER_CURVE = 0.3
+"""Mean difference of sRGB-encoded values from which another curve is looked for, and the largest
+share of it that a credible one leaves: curves resemble each other, and some wrong shading."""
+
+
+@dataclass(frozen=True)
+class FittedCurve:
+    """A curve at the exposure at which it shows light most like a picture.
+
+    ``distance`` is the mean difference of sRGB-encoded values that is left and is not noise, if the
+    picture has as much as the reference.
+    """
+
+    name: str | None
+    exposure: float
+    distance: float
+
+    @property
+    def sentence(self) -> str:
+        """What it says of the picture."""
+        if self.name is None:
+            return "Its values look linear: omit `tone_map`."
+        return (
+            f"Its values look tone-mapped: give `tone_map={self.name}`. It was given"
+            f" {self.exposure:.3g} times the reference's light."
+        )
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Pixels of a picture and of the light of the reference, to fit curves to; all (N, 3)."""
+
+    picture: np.ndarray
+    light: np.ndarray
+    standard_error: np.ndarray
+
+    @classmethod
+    def of(cls, picture: np.ndarray, light: Light, counted: np.ndarray) -> "Curves":
+        """Draw counted pixels of images (H, W, 3), always the same."""
+        places = np.flatnonzero(counted)
+        some = np.random.default_rng(0).permutation(places)[:CURVE_PIXELS]
+        images = (picture, light.mean, light.standard_error)
+        drawn = [image.reshape(-1, 3)[some].astype(float) for image in images]
+        return cls(picture=drawn[0], light=drawn[1], standard_error=drawn[2])
+
+    def fit(self, name: str | None) -> FittedCurve:
+        """Return a curve at its best exposure."""
+        encoded = to_srgb(self.picture)
+
+        def shown(stops: float, light: np.ndarray) -> np.ndarray:
+            return to_srgb(CURVES[name](2.0**stops * light))
+
+        def distance(stops: float) -> float:
+            return float(np.abs(encoded - shown(stops, self.light)).mean())
+
+        start = min(STOPS, key=distance)
+        bounds = (start - 1, start + 1)
+        finest = minimize_scalar(distance, bounds=bounds, method="bounded")
+        # Two images whose noise is normal and alike are 2 / √π of their standard error apart.
+        above = shown(finest.x, self.light + self.standard_error)
+        below = shown(finest.x, self.light - self.standard_error)
+        noise = np.abs(above - below).mean() / np.sqrt(np.pi)
+        return FittedCurve(
+            name=name,
+            exposure=float(2.0**finest.x),
+            distance=float(np.sqrt(max(finest.fun**2 - noise**2, 0.0))),
+        )
+
+    def left_by(self, curve: FittedCurve) -> float:
+        """Return the relative RMS difference of the picture from light shown by a curve."""
+        return _distance(self.picture, CURVES[curve.name](curve.exposure * self.light))
 
 
 def _distance(image: np.ndarray, reference: np.ndarray) -> float:

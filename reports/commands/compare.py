@@ -18,6 +18,7 @@ from fotismos.reports import jobs
 @jobs.option("image")
 @jobs.option("transfer")
 @jobs.option("over")
+@jobs.option("tone_map")
 @jobs.verbosity_options
 @jobs.option("noise")
 @jobs.option("colour_science")

@@ -181,6 +181,8 @@ def _picture(record: ComparisonRecord, picture: PictureRecord) -> Iterator[str]:
     shifted = "not known" if shift is None else f"{shift[0]:+.1f}, {shift[1]:+.1f} pixels"
     yield f"{record.scene}: {record.heuristic}"
     yield f"shift {shifted}; red, green, blue {ratio} times the reference's"
+    if picture.tone_map:
+        yield f"the reference is shown by the tone map {picture.tone_map}, as the picture was"
     yield from picture.notes
     yield from picture.odd
     yield ""

@@ -18,6 +18,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.comparison import PictureRecord
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
+from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
@@ -247,7 +248,8 @@ def odd(picture, cornell):
         files=("x", "y"), transfer=None, repeats=2, shift=shift, edges=edges,
         ratio=pictures.ratios(picture[counted], reference[counted]),
     )  # fmt: skip
-    return list(pictures.describe(record, picture, reference, counted))
+    light = Light(mean=reference, standard_error=0 * reference)
+    return list(pictures.describe(record, picture, reference, counted=counted, light=light))
 
 
 ODD = {
