@@ -364,6 +364,19 @@ cam16ucs_unclipped = Space(partial(_to_cam16ucs, largest=inf))
 linear = Space(lambda viewing: lambda rgb: rgb)
 """Linear RGB itself."""
 
+
+@Space
+def srgb(viewing: Viewing) -> Formula:
+    """Values of sRGB as displayed, from 0 to 1; see `to_srgb`."""
+    exposure = opaque(viewing.exposure)
+
+    def encode(rgb: Array3f64) -> Array3f64:
+        shown = dr.clip(rgb * exposure, 0.0, 1.0)
+        return dr.select(shown <= 0.0031308, 12.92 * shown, 1.055 * shown ** (1 / 2.4) - 0.055)
+
+    return encode
+
+
 ciede2000 = Distance(delta_e_00)
 """ΔE00 between CIE L*a*b* colours, with k_L = k_C = k_H = 1."""
 
@@ -372,3 +385,20 @@ euclidean = Distance(lambda a, b: dr.norm(a - b))
 
 root_mean_square = Distance(lambda a, b: dr.sqrt(dr.squared_norm(a - b) / 3.0))
 """The root mean square difference of three values."""
+
+RELATIVE_EPSILON = 1e-2
+"""Added to the denominators of relative differences, which black would make infinite."""
+
+
+@Distance
+def relative_square(reference: Array3f64, test: Array3f64) -> Float64:
+    """The squared difference over the squared reference: a mean of three values."""
+    squares = dr.square(test - reference) / (dr.square(reference) + RELATIVE_EPSILON)
+    return dr.sum(squares) / 3.0
+
+
+@Distance
+def symmetric_relative(reference: Array3f64, test: Array3f64) -> Float64:
+    """The absolute difference over the sum of both: a mean of three values, below 1."""
+    size = dr.abs(test) + dr.abs(reference) + RELATIVE_EPSILON
+    return dr.sum(dr.abs(test - reference) / size) / 3.0

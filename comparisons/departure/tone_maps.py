@@ -65,8 +65,8 @@ def reinhard(light: Array) -> Array:
 def aces(light: Array) -> Array:
     """Return Hill's fit to the reference and output transforms of ACES for an sRGB display.
 
-    As published with Pettineo's and Neubelt's Baking Lab (``ACES.hlsl``), and used by three.js,
-    Babylon.js and Godot, which scale the light before: three.js by 1 / 0.6.
+    As published with Pettineo's and Neubelt's Baking Lab (``ACES.hlsl``), and used by Babylon.js
+    and by three.js, which shows 1 / 0.6 times the light.
     """
     light = np.maximum(light, 0.0) @ _TO_ACES.T
     above = light * (light + 0.0245786) - 0.000090537
