@@ -371,7 +371,7 @@ def test_summary_is_of_the_mask(metric, images):
 
 @POINTWISE
 def test_noise_floor_is_what_noise_alone_gives(metric):
-    """Twice the noise gives twice the floor, another draw the same, none gives none."""
+    """Twice the noise gives twice the floor, four times of squares, another draw the same, none gives none."""
     rng = np.random.default_rng(3)
     reference = np.full((80, 80, 3), 0.4)
     mask = np.ones((80, 80), bool)
@@ -379,7 +379,9 @@ def test_noise_floor_is_what_noise_alone_gives(metric):
     floor = noise_floor(metric, reference, first, mask)
     assert floor > 0.0
     assert noise_floor(metric, reference, second, mask) == pytest.approx(floor, rel=0.05)
-    assert noise_floor(metric, reference, 2 * first, mask) == pytest.approx(2 * floor, rel=0.02)
+    factor = 4 if metric.squared else 2
+    twice = noise_floor(metric, reference, 2 * first, mask)
+    assert twice == pytest.approx(factor * floor, rel=0.02)
     assert noise_floor(metric, reference, 0 * first, mask) == 0.0
 
 
