@@ -216,7 +216,7 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
     """
     options = ready.options
     distance = leading_distance(options.viewing, metrics_for(options))
-    sums = PassSums(counted)
+    sums = PassSums(counted, options.tone_map)
     reached = None
     loop = passes((ready.heuristic, ready.reference), options.seed, ready.passes, progress=progress)
     for rendered in loop:

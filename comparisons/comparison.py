@@ -15,6 +15,7 @@ from msgspec import Meta, structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.departure.regions import ObjectShare, Region
 from fotismos.comparisons.departure.statistics import RatioSummary, Summary
@@ -255,6 +256,8 @@ class PictureFiles(Record):
         SHA-256 of the files, in hexadecimal digits.
     transfer
         Transfer function of their values, as stated; null if the files' own was taken.
+    tone_map
+        The curve by which the reference was shown, as they were; null for linear light.
     notes
         How the files were read, where they do not say it plainly.
     repeats
@@ -264,6 +267,7 @@ class PictureFiles(Record):
     files: tuple[str, ...]
     digests: tuple[str, ...] = ()
     transfer: str | None
+    tone_map: str | None = None
     notes: tuple[str, ...] = ()
     repeats: Size
 
@@ -385,7 +389,8 @@ class Images:
 
     ``maps`` are those of the perceptual metrics and ``log2_luminance``. ``objects`` and
     ``materials`` hold the index in the record of what each pixel sees, -1 for uncounted pixels.
-    Two pictures without a scene have neither these nor ``position`` and ``normal``.
+    Two pictures without a scene have neither these nor ``position`` and ``normal``. ``light`` is
+    the reference before its tone map, if it has one.
     ``terms`` are those of 8.10 in the heuristic half, by layer, if it has any.
     """
 
@@ -400,6 +405,7 @@ class Images:
     objects: np.ndarray | None = None
     materials: np.ndarray | None = None
     terms: dict[str, np.ndarray] = field(default_factory=dict)
+    light: Light | None = None
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from fotismos.comparisons.comparison import (
 )
 from fotismos.comparisons.departure import marks, regions, statistics
 from fotismos.comparisons.departure.blocks import bands
+from fotismos.comparisons.departure.mapped_sums import Light, MappedReference, reference_sums
 from fotismos.comparisons.departure.metrics import (
     LEADING,
     METRICS,
@@ -23,11 +24,9 @@ from fotismos.comparisons.departure.metrics import (
 from fotismos.comparisons.options import Options
 from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.sums import (
-    DEVIATION,
     MEAN,
     Accumulator,
     DifferenceEstimate,
-    DifferenceSums,
     add_difference,
 )
 
@@ -46,7 +45,7 @@ class Estimates:
     """The passes of both halves and of their difference, and where they stopped (or None).
 
     The halves have only means (H, W, 3) and the reference's standard error: the relevant
-    uncertainty is the difference's.
+    uncertainty is the difference's. ``light`` is the reference before its tone map, if it has one.
     """
 
     heuristic: np.ndarray
@@ -55,20 +54,21 @@ class Estimates:
     difference: DifferenceEstimate
     passes: int
     stop: NoiseTarget | None = None
+    light: Light | None = None
 
 
 class PassSums:
     """Running sums of the passes of both halves, and of their difference.
 
-    ``counted`` (H, W) are the pixels whose noise counts.
+    ``counted`` (H, W) are the pixels whose noise counts. ``tone_map`` names the curve by which the
+    reference is shown; without one it is linear light.
     """
 
-    def __init__(self, counted: np.ndarray) -> None:
+    def __init__(self, counted: np.ndarray, tone_map: str | None = None) -> None:
         self.counted = counted
         self.passes = 0
         self._heuristic = Accumulator(MEAN)
-        self._reference = Accumulator(DEVIATION)
-        self._difference = DifferenceSums(counted)
+        self._reference, self._difference = reference_sums(tone_map, counted)
 
     def add(self, heuristic: Any, reference: Any) -> None:
         """Add a pass of each half, (H, W, 3)."""
@@ -95,12 +95,14 @@ class PassSums:
 
     def estimates(self) -> Estimates:
         """Return the estimates so far, in single precision, like the files."""
+        reference = self._reference
         return Estimates(
             heuristic=self._heuristic.mean(np.float32),
-            reference=self._reference.mean(np.float32),
-            standard_error=self._reference.standard_error(np.float32),
+            reference=reference.mean(np.float32),
+            standard_error=reference.standard_error(np.float32),
             difference=self._difference.estimate(np.float32),
             passes=self.passes,
+            light=reference.light() if isinstance(reference, MappedReference) else None,
         )
 
 
@@ -161,6 +163,7 @@ def measure(
         maps=maps,
         significant=found.image,
         counted=counted,
+        light=estimates.light,
     )
     numbers = {
         "viewing": viewing,

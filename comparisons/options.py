@@ -31,6 +31,7 @@ Fineness = Annotated[int, Meta(ge=1, le=512)]  # fotismos.heuristic.tessellation
 VertexWeights = Literal["mean", "area", "angle"]  # fotismos.heuristic.normals.WEIGHTINGS
 Sensor = Annotated[int, Meta(ge=0, le=2**31 - 1)]
 Density = Annotated[float, Meta(ge=1, le=1000)]  # departure.colour.MOST_PIXELS
+ToneMapName = Literal["reinhard", "aces", "agx", "neutral"]  # departure.tone_maps.TONE_MAPS
 
 
 def _help(description: str, default: str = "") -> Meta:
@@ -121,6 +122,11 @@ class Options(
         str | None,
         _help("What lies behind a picture with alpha: black, white, or R,G,B in linear numbers."),
     ] = None
+    tone_map: Annotated[
+        ToneMapName | None,
+        _help("The curve by which the picture was tone-mapped; the reference is shown by it, too.",
+              "none: the picture is linear light"),
+    ] = None  # fmt: skip
     pixels_per_degree: Annotated[
         Density | None, _help("FLIP: pixels per degree of vision.", "67")
     ] = None
@@ -139,6 +145,11 @@ class Options(
         if self.image and self.heuristic != "phong":
             raise InputError(
                 f"heuristic {self.heuristic} and image {self.image[0]}: give one of them."
+            )
+        if self.tone_map and not self.image:
+            raise InputError(
+                f"tone_map = {self.tone_map} and no image: it is the curve of a picture. Give an"
+                " `image`, or omit it."
             )
 
     @classmethod
@@ -250,6 +261,7 @@ class OptionValues(TypedDict, total=False):
     mask: str | None
     transfer: Literal["linear", "srgb"] | None
     over: str | None
+    tone_map: ToneMapName | None
     pixels_per_degree: float | None
     colour_science: bool
 

@@ -20,7 +20,9 @@ from fotismos.comparisons import alignment
 from fotismos.comparisons.departure.blocks import block_sums
 from fotismos.comparisons.departure.colour import Array, from_srgb, to_srgb
 from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.picture_curves import BETTER_CURVE, Curves, FittedCurve
 
 Mending = Callable[[Array], Array]
 """A function from a picture (H, W, 3) to the one without a mistake."""
@@ -99,10 +101,14 @@ class Names:
 
 @dataclass(frozen=True)
 class Mistake:
-    """A mistake that a picture seems to have, as a sentence, and what mends it."""
+    """A mistake that a picture seems to have, as a sentence, and what mends it, if that is known.
+
+    ``left`` is the share of the difference that is credible, and that is left; at most 1.
+    """
 
     sentence: str
-    mend: Mending
+    mend: Mending | None
+    left: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -154,12 +160,17 @@ def find(
     place: alignment.Place,
     is_encoded: bool,
     names: Names,
+    light: Light,
+    tone_map: str | None = None,
 ) -> Iterator[str]:
     """Yield the mistakes of a picture in words, each mended before the next one is looked for.
 
     Images are linear; ``counted`` (H, W) are the pixels that count. ``is_encoded`` says that the
-    file ends at display white, as a PNG does.
+    file ends at display white, as a PNG does. ``light`` is that of the other image, before the tone
+    map of that name.
     """
+    curves = Curves.of(picture.mean, light, counted)
+    given = curves.fit(tone_map)
     truth = other.mean
     mends: list[Mending] = []
 
@@ -169,18 +180,29 @@ def find(
         return image
 
     def candidates() -> Iterator[Mistake | None]:
-        reading = _other_reading(picture.mean, truth, counted, names)
-        change = _change_of_colours(picture.mean, truth, counted, names)
+        plain = curves.shown(given) if tone_map else None
+        reading = _other_reading(picture.mean, truth, counted, names, plain)
+        curve = _other_curve(curves, given, names)
+        if curve and (reading is None or curve.left < reading.left):
+            yield curve
+            return
+        change = None if tone_map else _change_of_colours(picture.mean, truth, counted, names)
         if reading and not _explains_more(change, reading, picture.mean, truth, counted):
             yield reading  # where its content is, is not known then
         else:
             yield _moved(picture.mean, truth, place, names)
+        if tone_map:
+            yield _exposure(given, names)
+            return
         yield _change_of_colours(mended(picture.mean), truth, counted, names)
         if not is_encoded and not mends:
             yield _clipped(picture.mean, truth, counted, names)
 
     for mistake in candidates():
         if mistake is None:
+            continue
+        if mistake.mend is None:
+            yield mistake.sentence
             continue
         mends.append(mistake.mend)
         apart = LEADING(mended(picture.mean), truth)
@@ -198,7 +220,7 @@ def _explains_more(
     counted: NDArray[np.bool_],
 ) -> bool:
     """Return whether a change of colours leaves far less than a reading does, at its best level."""
-    if change is None:
+    if change is None or change.mend is None or reading.mend is None:
         return False
     read = reading.mend(picture)
     blocks = Blocks.of(read, other, counted)
@@ -238,11 +260,53 @@ TURNED: dict[str, Mending] = {
 }
 
 
+def _other_curve(curves: Curves, given: FittedCurve, names: Names) -> Mistake | None:
+    """Return another tone map than the given one, which a picture seems to have."""
+    curve = curves.other(given)
+    if curve is None:
+        return None
+    cure = "Its values look linear: omit `tone_map`."
+    if curve.name is not None:
+        cure = (
+            f"Its values look tone-mapped: give `tone_map={curve.name}`. It was given"
+            f" {curve.exposure:.3g} times the light of {names.other}."
+        )
+    return Mistake(
+        sentence=f"{names.picture} is misread. {cure}",
+        mend=None,
+        left=curve.distance / given.distance / BETTER_CURVE,
+    )
+
+
+def _exposure(given: FittedCurve, names: Names) -> Mistake | None:
+    """Return the factor of the light that a tone map shows; None if it is near 1."""
+    level = given.exposure
+    reason = factor_of_pi(level)
+    if not reason and 1 / LEVEL < level < LEVEL:
+        return None
+    return Mistake(
+        sentence=(
+            f"{names.picture}'s light is {level:.3g} times as bright as {names.other}:"
+            f" {reason or 'another exposure'}?"
+        ),
+        mend=None,
+    )
+
+
 def _other_reading(
-    picture: Array, other: Array, counted: NDArray[np.bool_], names: Names
+    picture: Array,
+    other: Array,
+    counted: NDArray[np.bool_],
+    names: Names,
+    shown: Array | None = None,
 ) -> Mistake | None:
-    """Return the other reading of its values that brings a picture near the other half."""
+    """Return the other reading of its values that brings a picture near the other half.
+
+    ``shown`` (N, 3) is the other half at the picture's exposure, if a tone map shows it.
+    """
     plain = _distance(picture[counted], other[counted])
+    if shown is not None:
+        plain = min(plain, _distance(picture[counted], shown))
     if plain < 1e-3:
         return None
     readings = {
@@ -259,7 +323,11 @@ def _other_reading(
     symptom = min(distances, key=distances.__getitem__)
     if distances[symptom] > BETTER * plain:
         return None
-    return Mistake(sentence=f"{names.picture} is misread. {symptom}", mend=readings[symptom])
+    return Mistake(
+        sentence=f"{names.picture} is misread. {symptom}",
+        mend=readings[symptom],
+        left=distances[symptom] / plain / BETTER,
+    )
 
 
 def _distance(image: Array, other: Array) -> float:
@@ -431,6 +499,7 @@ def _change_of_colours(
     left = {
         kind: Blocks.of(change.mend(picture), other, counted).departure()
         for kind, change in changes.items()
+        if change.mend is not None
     }
     allowed = SIMPLER * min(left.values()) + SLIGHT * before
     # The first of them is the simplest.

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fotismos.comparisons import alignment, picture_mistakes
 from fotismos.comparisons.comparison import Agreement, Comparison, Images, PictureFiles
 from fotismos.comparisons.departure.colour import Array
+from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
@@ -35,12 +36,14 @@ FLAT = 0.1
 class Pictures:
     """The pictures of a half, all of one size: their names, and how each was read.
 
-    ``transfer`` is the function that was stated for their values, None for the files' own.
+    ``transfer`` is the function that was stated for their values, None for the files' own;
+    ``tone_map`` the curve by which they show light.
     """
 
     names: tuple[str, ...]
     files: tuple[PictureFile, ...]
     transfer: str | None = None
+    tone_map: str | None = None
 
     @property
     def size(self) -> tuple[int, int]:
@@ -80,6 +83,7 @@ class Pictures:
             files=self.names,
             digests=tuple(file.digest for file in self.files),
             transfer=self.transfer,
+            tone_map=self.tone_map,
             notes=tuple(dict.fromkeys(note for file in self.files for note in file.notes)),
             repeats=len(self.files),
         )
@@ -154,7 +158,7 @@ class GivenPictures:
 
 def read_all(options: Options) -> GivenPictures:
     """Return the pictures that options name: all of one size, repeats of different names."""
-    image = _read(options.image, options) if options.image else None
+    image = _read(options.image, options, options.tone_map) if options.image else None
     reference = _read(options.reference, options) if options.reference else None
     mask = None
     if options.mask is not None:
@@ -174,14 +178,16 @@ def read_all(options: Options) -> GivenPictures:
     return given
 
 
-def _read(names: Sequence[str], options: Options) -> Pictures:
+def _read(names: Sequence[str], options: Options, tone_map: str | None = None) -> Pictures:
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
         raise InputError(
             f"{twice[0]} is given {names.count(twice[0])} times. Give each repeat once: they must"
             " differ in their noise."
         )
     files = (read_file(name, options.transfer, options.over, is_mask=True) for name in names)
-    return Pictures(names=tuple(names), files=tuple(files), transfer=options.transfer)
+    return Pictures(
+        names=tuple(names), files=tuple(files), transfer=options.transfer, tone_map=tone_map
+    )
 
 
 def require_one_size(images: Iterable[np.ndarray]) -> None:
@@ -298,6 +304,8 @@ def agreement(
         place=place,
         is_encoded=any(file.is_encoded for file in pictures.files),
         names=names,
+        light=images.light or Light(mean=other, standard_error=error),
+        tone_map=pictures.tone_map,
     )
     odd = []
     if place.shift is None:

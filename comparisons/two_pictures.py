@@ -42,7 +42,7 @@ def compare_pictures(options: Options, name: str, command: str = "") -> Comparis
     passes = given.passes or FEWEST
     first = pictures.PictureHalf(given.image, passes)
     second = pictures.PictureHalf(given.reference, passes)
-    sums = PassSums(counted)
+    sums = PassSums(counted, options.tone_map)
     for number in range(passes):
         sums.add(first.render(number), second.render(number))
     estimates = sums.estimates()

@@ -56,6 +56,8 @@ sin = _function("sin", np.sin)
 sqrt = _function("sqrt", np.sqrt)
 square = _function("square", np.square)
 squared_norm = _function("squared_norm", lambda colours: np.square(colours).sum(axis=0))
+total = _function("sum", lambda colours: colours.sum(axis=0))
+"""``total(colours)`` is the sum of their three components."""
 with_sign = _function("mulsign", np.copysign)
 """``with_sign(size, other)`` is a size ≥ 0 with the sign of another number."""
 evaluate = _function("eval", lambda *values: None)

@@ -356,6 +356,20 @@ cam16ucs_unclipped = Space(partial(_to_cam16ucs, largest=inf))
 linear = Space(lambda viewing: lambda rgb: rgb)
 """Linear RGB itself."""
 
+
+@Space
+def srgb(viewing: Viewing) -> Formula:
+    """Values of sRGB as displayed, from 0 to 1; see `to_srgb`."""
+    exposure = arrays.constant(viewing.exposure)
+
+    def encode(rgb: Colours) -> Colours:
+        shown = arrays.clip(rgb * exposure, 0.0, 1.0)
+        curved = 1.055 * arrays.power(shown, 1 / 2.4) - 0.055
+        return arrays.select(shown <= 0.0031308, 12.92 * shown, curved)
+
+    return encode
+
+
 ciede2000 = Distance(delta_e_00)
 """ΔE00 between CIE L*a*b* colours, with k_L = k_C = k_H = 1."""
 
@@ -364,3 +378,20 @@ euclidean = Distance(lambda a, b: arrays.sqrt(arrays.squared_norm(a - b)))
 
 root_mean_square = Distance(lambda a, b: arrays.sqrt(arrays.squared_norm(a - b) / 3.0))
 """The root mean square difference of three values."""
+
+RELATIVE_EPSILON = 1e-2
+"""Added to the denominators of relative differences, which black would make infinite."""
+
+
+@Distance
+def relative_square(reference: Colours, test: Colours) -> Numbers:
+    """The squared difference over the squared reference: a mean of three values."""
+    squares = arrays.square(test - reference) / (arrays.square(reference) + RELATIVE_EPSILON)
+    return arrays.total(squares) / 3.0
+
+
+@Distance
+def symmetric_relative(reference: Colours, test: Colours) -> Numbers:
+    """The absolute difference over the sum of both: a mean of three values, below 1."""
+    size = arrays.absolute(test) + arrays.absolute(reference) + RELATIVE_EPSILON
+    return arrays.total(arrays.absolute(test - reference) / size) / 3.0

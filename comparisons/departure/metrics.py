@@ -5,6 +5,9 @@ dE2000         CIE DE2000                        display-referred: exposed, clip
 dE_ITP         ITU-R BT.2124                     HDR: absolute luminance up to 10,000 cd/m²
 dE_CAM16UCS    CAM16-UCS (Li et al. 2017)        display-referred, with viewing conditions
 rmse           root mean square                  linear light, neither exposed nor clipped
+relmse         relative mean square              linear light, as rmse
+smape          symmetric mean absolute error     linear light, as rmse
+srgb_rmse      root mean square, and PSNR        display-referred: values of sRGB
 ldr_flip       FLIP (Andersson et al. 2020)      display-referred, knows spatial frequency
 hdr_flip       HDR-FLIP (2021)                   the largest of FLIP over many exposures
 =============  ================================  ==========================================
@@ -36,6 +39,7 @@ Every image is a float array (H, W, 3) of linear light with the sRGB primaries (
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import InitVar, dataclass
+from math import log10
 from types import EllipsisType
 from typing import Any
 
@@ -44,6 +48,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons.departure.colour import (
     DEFAULT_VIEWING,
+    RELATIVE_EPSILON,
     Array,
     Viewing,
     cam16ucs,
@@ -53,7 +58,10 @@ from fotismos.comparisons.departure.colour import (
     lab,
     linear,
     luminance,
+    relative_square,
     root_mean_square,
+    srgb,
+    symmetric_relative,
 )
 from fotismos.comparisons.departure.flip import hdr_flip, ldr_flip
 from fotismos.heuristic.convention import Floats
@@ -91,8 +99,9 @@ class Metric:
     images (H, W, 3). `Pixelwise` needs none. Summaries give the share of pixels above each
     threshold in ``visible``, in rising order. ``rounding`` is the difference that rounding of
     float32 renderings can make in its mean. Its map is shown and saved if it is ``drawn``. If it
-    ``averages_squares``, its mean is a root mean square, and its best exposure minimises squares.
-    ``linear`` is the former name of that.
+    ``averages_squares``, its mean is a root mean square; ``linear`` is the former name of that. If
+    its distances are ``squared``, noise adds its variance to them. A root mean square of values up
+    to a ``peak`` has a PSNR, too.
     """
 
     name: str
@@ -107,6 +116,8 @@ class Metric:
     heading: str = ""
     drawn: bool = True
     averages_squares: bool = False
+    squared: bool = False
+    peak: float | None = None
     linear: InitVar[bool] = False
 
     def __post_init__(self, linear: bool) -> None:
@@ -158,6 +169,10 @@ class Metric:
             # Each distance is a root mean square of channels: squares average over all values.
             return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
         return float(values.mean(dtype=np.float64))
+
+    def psnr(self, mean: float) -> float | None:
+        """Return ``20 log10(peak / mean)``, dB; None without a peak, and for equal images."""
+        return 20.0 * log10(self.peak / mean) if self.peak and mean > 0.0 else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,16 +282,69 @@ METRICS.own(
 RMSE = METRICS.own(
     Pixelwise(
         name="rmse",
-        label="RMSE",
+        label="RMSE, linear",
         unit="1 is display white",
-        definition="Root mean square of the linear RGB difference over pixels and channels.",
+        definition="Root mean square of the linear RGB difference over pixels and channels, "
+        "neither exposed nor clipped.",
         caution="It knows nothing of eyes: a few very bright pixels outweigh all others.",
         map_range=(0.0, 1.0),
         rounding=1e-6,
-        heading="RMSE, linear",
+        heading="RMSE, linear and unclipped",
         drawn=False,
         averages_squares=True,
         coordinates=linear,
+        difference=root_mean_square,
+    )
+)
+METRICS.own(
+    Pixelwise(
+        name="relmse",
+        label="relMSE",
+        unit="1 is a difference as large as the reference",
+        definition="Relative mean square error of linear RGB over pixels and channels, neither "
+        f"exposed nor clipped: (x − r)² / (r² + ε), ε = {RELATIVE_EPSILON:g} (Rousselle et al. "
+        "2011).",
+        caution="It knows nothing of eyes, and grows without limit where the reference is dark.",
+        map_range=(0.0, 1.0),
+        rounding=1e-6,
+        drawn=False,
+        squared=True,
+        coordinates=linear,
+        difference=relative_square,
+    )
+)
+METRICS.own(
+    Pixelwise(
+        name="smape",
+        label="SMAPE",
+        unit="from 0 to 1",
+        definition="Symmetric mean absolute percentage error of linear RGB over pixels and "
+        "channels, as a share, neither exposed nor clipped: |x − r| / (|x| + |r| + ε), "
+        f"ε = {RELATIVE_EPSILON:g} (Vogels et al. 2018).",
+        caution="It knows nothing of eyes. Near 1, images differ by orders of magnitude.",
+        map_range=(0.0, 1.0),
+        rounding=1e-6,
+        drawn=False,
+        coordinates=linear,
+        difference=symmetric_relative,
+    )
+)
+METRICS.own(
+    Pixelwise(
+        name="srgb_rmse",
+        label="RMSE, sRGB",
+        unit="1 is display white",
+        definition="Root mean square of the difference of sRGB values over pixels and channels, of "
+        "the images as a display shows them: exposed, then clipped to [0, 1]. In decibels it is "
+        "the peak signal-to-noise ratio, PSNR = −20 log10 of it.",
+        caution="It knows little of eyes. Values above white look alike to it.",
+        map_range=(0.0, 1.0),
+        rounding=1e-5,
+        heading="RMSE of sRGB values",
+        drawn=False,
+        averages_squares=True,
+        peak=1.0,
+        coordinates=srgb,
         difference=root_mean_square,
     )
 )

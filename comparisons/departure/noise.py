@@ -55,7 +55,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fotismos.comparisons.departure.blocks import ratio
-from fotismos.comparisons.departure.colour import Array, Viewing
+from fotismos.comparisons.departure.colour import Array, Viewing, linear
 from fotismos.comparisons.departure.metrics import Distances, Metric, Pixelwise
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Interval, Positive, Share
@@ -123,12 +123,16 @@ def roughly(metric: Metric, values: Floats, noise: Floats) -> dict[str, Any]:
             values + noise,
         )
     ]
-    # Noise added once more is taken to add its square: what remains is `√(mean² − floor²)`.
+    # Noise added once more is taken to add its square: what remains is `√(mean² − floor²)`. The
+    # triangle inequality holds for the roots of squares.
+    power = 2 if metric.squared else 1
+    mean = mean ** (1 / power)
+    floor = floor ** (1 / power)
     clean = max(float(without_noise(mean, np.hypot(mean, floor))), 0.0)
     half = MARGIN * floor
-    return _fields(
-        metric, clean, low=max(mean - half, 0.0), high=mean + half, shares=np.array(shares)
-    )
+    low = max(mean - half, 0.0) ** power
+    high = (mean + half) ** power
+    return _fields(metric, clean**power, low=low, high=high, shares=np.array(shares))
 
 
 def _fields(metric: Metric, value: float, low: float, high: float, shares: Array) -> dict[str, Any]:
@@ -193,7 +197,7 @@ def debiased(
         value, low, high = np.sqrt([value, low, high])
     between = distances_between(metric, shown, viewing)
     apart = Halves.of(between, grouped.means, grouped.sizes)
-    if apart.are_heavy and not metric.averages_squares:
+    if apart.are_heavy and not (metric.averages_squares or metric.squared):
         low = max(min(low, measured - apart.below), 0.0)
         high = max(high, measured + apart.above)
     shares = _widened(metric, _shares(metric.visible, distances, grouped, raw), apart)
@@ -397,7 +401,7 @@ class _Extrapolated:
 
     @classmethod
     def of(
-        cls, metric: Metric, distances: Distances, grouped: Grouped, chosen: Sequence[int]
+        cls, metric: Pixelwise, distances: Distances, grouped: Grouped, chosen: Sequence[int]
     ) -> _Extrapolated:
         means = grouped.means[chosen]
         sizes = grouped.sizes[chosen]
@@ -407,9 +411,13 @@ class _Extrapolated:
         pixels = grouped.by_block(np.ones(len(plain)))
         before = grouped.by_block(plain)
         after = grouped.by_block(np.mean(noisy, axis=0))
-        if metric.averages_squares:
-            added = grouped.by_block(np.mean(np.square(noisy), axis=0) - plain**2)
-            gap = 0.0
+        if metric.averages_squares or metric.squared:
+            # Noise adds its variance to squares.
+            power = 1 if metric.squared else 2
+            added = grouped.by_block(np.mean(np.power(noisy, power), axis=0) - plain**power)
+            # Light itself is not curved.
+            curved = 0.0 if metric.coordinates is linear else 2.0 * CURVATURE
+            gap = max(float(curved * added.sum() / pixels.sum()), 0.0)
             noise = 0.0
         else:
             pair = plain**2, np.mean(np.square(noisy), axis=0)

@@ -12,7 +12,7 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Array, Viewing
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Array, Viewing, linear
 from fotismos.comparisons.departure.metrics import (
     Metric,
     Pixelwise,
@@ -41,7 +41,7 @@ class Exposed(Record):
 class Summary(Record):
     """A metric over the counted pixels, in the metric's own unit."""
 
-    mean: Annotated[Amount, Meta(description="Mean; for rmse, the root mean square.")]
+    mean: Annotated[Amount, Meta(description="Mean; for rmse and srgb_rmse, the root mean square.")]
     p50: Annotated[Amount, Meta(description="Median of the pixels.")]
     p95: Amount
     max: Amount
@@ -53,6 +53,10 @@ class Summary(Record):
     high: Amount
     noise_floor: Annotated[Amount, Meta(description="Mean from the reference's noise alone.")]
     after_exposure: Exposed
+    psnr: Annotated[
+        float | None,
+        Meta(description="The mean as a PSNR, dB; null of other metrics, and of equal images."),
+    ] = None
 
 
 class RatioSummary(Record):
@@ -125,6 +129,7 @@ def summarise(
         **numbers,
         noise_floor=metric.mean(noise_alone),
         after_exposure=Exposed(exposure=factor, **after),
+        psnr=metric.psnr(numbers["mean"]),
         **clean,
     )
     return summary, maps[0]
@@ -210,17 +215,20 @@ def best_exposure(
 ) -> float:
     """Return the factor on `test`, within ±6 stops, of the smallest mean of `metric` over `mask`.
 
-    For a linear metric it is the factor of least squares, and also for a metric of neighbourhoods,
-    which would need whole images. For others, the mean is over at most 16,384 counted pixels, drawn
-    with a fixed seed. Whole stops bracket the minimum, a bounded scalar search (Brent) finds it to
-    0.001 stop, and the factors 1 and least squares compete with it, so a multiple of the reference
-    gives that multiple exactly. 1 if no pixel counts or if either image has no positive value.
+    For a root mean square of light it is the factor of least squares, and also for a metric of
+    neighbourhoods, which would need whole images. For others, the mean is over at most 16,384
+    counted pixels, drawn with a fixed seed. Whole stops bracket the minimum, a bounded scalar
+    search (Brent) finds it to 0.001 stop, and the factors 1 and least squares compete with it, so a
+    multiple of the reference gives that multiple exactly. 1 if no pixel counts or if either image
+    has no positive value.
     """
     from scipy.optimize import minimize_scalar
 
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
-    if metric.averages_squares or not isinstance(metric, Pixelwise):
+    if not isinstance(metric, Pixelwise):
+        return least_squares_factor(test[mask], reference[mask])
+    if metric.averages_squares and metric.coordinates is linear:
         return least_squares_factor(test[mask], reference[mask])
     lit = [(mask & (image > 0.0).any(axis=-1)).any() for image in (test, reference)]
     if not all(lit):

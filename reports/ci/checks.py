@@ -14,6 +14,7 @@ from fotismos.comparisons.check.moved import LEVEL, Check, Move, check, level_of
 from fotismos.comparisons.check.pictures import (
     PictureCheck,
     PictureGate,
+    Repeats,
     SmallestChanges,
     check_pictures,
     picture_gate,
@@ -33,6 +34,7 @@ from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines, pictures
 from fotismos.reports.ci.baselines import BaselineFile
 from fotismos.reports.files import images, results
+from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import Before, SceneView
 from fotismos.reports.run import scene_files
 from fotismos.reports.terminal import progress
@@ -282,6 +284,16 @@ def _before(made: CheckRecord, before: baselines.Kept, after: baselines.Kept) ->
     )
 
 
+def write_page(
+    folder: Path, title: str, views: Sequence[SceneView] = (), moved: Sequence[Before] = ()
+) -> Path:
+    """Write the page of what moved, and its details, into a folder; return the page's path."""
+    details = page.details(records=[view.record for view in views])
+    results.write(folder / results.DETAILS, details)
+    results.write(folder / results.PAGE, page.render(views, title, moved=moved))
+    return folder / results.PAGE
+
+
 # --- Pictures --------------------------------------------------------------------------------
 
 
@@ -299,11 +311,18 @@ def examine_pictures(
         gate = picture_gate(before, after, tolerance.within, tolerance.bound)
         has_failed = gate.state != "pass"
     status = "failed" if has_failed else "passed"
-    made = _of_pictures(path, pattern, status=status, found=found, begin=begin)
+    made = of_pictures(path, pattern, status=status, found=found, begin=begin)
     if gate is not None:
         made = structs.replace(made, gate=gate, message=gate.sentence)
     if not has_failed:
         return made, None
+    return picture_section(made, before, found)
+
+
+def picture_section(
+    made: CheckRecord, before: Repeats, found: PictureCheck
+) -> tuple[CheckRecord, Before]:
+    """Return the record of pictures that failed, with the cause, and their section of the page."""
     causes = (found.cause(),) if found.moved else ()
     made = structs.replace(made, passed=False, causes=causes)
     old = {"picture": baselines.small(before.mean), "blocks": found.blocks.before}
@@ -328,12 +347,13 @@ def update_pictures(
     repeats = pictures.read_repeats(pattern, transfer, over)
     pictures.write(path, repeats, transfer, over)
     found = check_pictures(repeats, repeats, level)
-    return _of_pictures(path, pattern, status=status, found=found, begin=begin), None
+    return of_pictures(path, pattern, status=status, found=found, begin=begin), None
 
 
-def _of_pictures(
+def of_pictures(
     path: Path, pattern: str, status: Any, found: PictureCheck, begin: float
 ) -> CheckRecord:
+    """Return the record of a check of pictures that match a pattern."""
     changes = found.smallest_changes()
     return CheckRecord(
         baseline=path.as_posix(),

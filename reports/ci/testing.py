@@ -5,10 +5,12 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
+from msgspec import structs
 
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import Case, Scene, open_case
@@ -30,7 +32,8 @@ from fotismos.reference.rendering.finite import require_finite
 from fotismos.reference.rendering.sums import student
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines, checks, pictures, summary
-from fotismos.reports.files import images
+from fotismos.reports.files import images, results
+from fotismos.reports.page.scene_view import Before, SceneView
 
 Pictures = np.ndarray | Sequence[np.ndarray] | str | Path
 """A linear picture (H, W, 3), several that differ by noise, a file, or a pattern of files."""
@@ -89,11 +92,15 @@ def rendering_in(variant: str | None) -> Iterator[None]:
 class Fotismos:
     """The fixture ``fotismos``: baselines in a folder, which are written if ``update``.
 
-    ``pictures`` returns the folder for a failure's; ``variant`` replaces the scenes'.
+    ``beside`` is the folder of the test's file, to which paths are relative. ``pictures`` returns
+    the folder for what a failure leaves. ``significance`` is the chance of a failure though
+    nothing changed, where a test states none; ``variant`` replaces the scenes'.
     """
 
     folder: Path
+    beside: Path
     pictures: Callable[[], Path]
+    significance: float = LEVEL
     variant: str | None = None
     update: bool = False
 
@@ -125,15 +132,20 @@ class Fotismos:
         )
 
     def unchanged(
-        self, scene: Scene, name: str | None = None, significance: float = LEVEL, **options: Any
+        self,
+        scene: Scene,
+        name: str | None = None,
+        significance: float | None = None,
+        **options: Any,
     ) -> bool:
         """Return True; fail the test if a scene moved from its baseline, or has none.
 
         For ``scene`` and ``options`` see :meth:`departure`; a scene may also be a baseline's path.
         ``name`` is the baseline's, if not the scene's. ``significance`` is the chance of a failure
-        though nothing changed. If the options differ from the baseline's, the test fails, or
-        ``--fotismos-update`` writes them.
+        though nothing changed, the fixture's by default. If the options differ from the baseline's,
+        the test fails, or ``--fotismos-update`` writes them.
         """
+        level = self.significance if significance is None else significance
         scene = self._scene(scene)
         given = self._options(options)
         path = self._path(scene, name)
@@ -161,13 +173,16 @@ class Fotismos:
                 )
             checks.create(path, file.baseline.scene, case)
         elif self.update:
-            checks.update(file, case, significance)
+            checks.update(file, case, level)
         else:
-            result, _ = checks.examine(file, case, significance, self.pictures() / path.stem)
+            folder = self.pictures() / path.stem / path.stem
+            result, view = checks.examine(file, case, level, folder)
             if result.status != "passed":
                 text = [f"{path}: {len(result.moved or ())} of {result.tested} moved"]
                 text += [*summary.moved_lines(result), result.versions_line]
-                text += [f"pictures: {result.pictures}"]
+                title = f"{path.stem} moved"
+                views = [view] if view else []
+                text += [f"page: {_page(folder.parent, title, views)}"]
                 raise AssertionError("\n".join(filter(None, text)))
             if result.message:
                 warnings.warn(f"{path}: {result.message}", stacklevel=2)
@@ -179,7 +194,7 @@ class Fotismos:
         image: Pictures,
         within: float | None = TOLERANCE,
         max_visible: float = LIMIT,
-        significance: float = LEVEL,
+        significance: float | None = None,
     ) -> bool:
         """Return True; fail the test if a picture is not as its baseline, or has none.
 
@@ -199,14 +214,19 @@ class Fotismos:
             pictures.write(path, _noiseless(after), None)
             return True
         _, before = pictures.read(path)
-        if within is None:
-            fault = _drift(check_pictures(before, after, significance))
-        else:
-            fault = _visible(before, after, within, max_visible)
+        begin = perf_counter()
+        level = self.significance if significance is None else significance
+        found = check_pictures(before, after, level)
+        fault = _drift(found) if within is None else _visible(before, after, within, max_visible)
         if fault and self.update:
             pictures.write(path, _noiseless(after), None)
         elif fault:
-            raise AssertionError(f"{path}: {fault}\n{self._shown(name, before, after)}")
+            folder = self._shown(name, before, after)
+            made = checks.of_pictures(path, name, status="failed", found=found, begin=begin)
+            _, section = checks.picture_section(made, before, found)
+            section = structs.replace(section, headline=fault, command="pytest --fotismos-update")
+            page = _page(folder, f"{name} differs", moved=[section])
+            raise AssertionError(f"{path}: {fault}\npage: {page}")
         return True
 
     def same(
@@ -220,13 +240,13 @@ class Fotismos:
         before = _noiseless(self._repeats(reference))
         after = self._repeats(image)
         if fault := _visible(before, after, within, max_visible):
-            raise AssertionError(f"{fault}\n{self._shown('same', before, after)}")
+            raise AssertionError(f"{fault}\npictures: {self._shown('same', before, after)}")
         return True
 
     def _repeats(self, image: Pictures) -> Repeats:
         """Return pictures as repeats."""
         if isinstance(image, (str, Path)):
-            beside = self.folder.parent / image
+            beside = self.beside / image
             return pictures.read_repeats(str(beside), None)
         arrays = [image] if isinstance(image, np.ndarray) else list(image)
         for array in arrays:
@@ -238,8 +258,8 @@ class Fotismos:
             require_finite(np.asarray(array), "the picture")
         return Repeats.of(arrays)
 
-    def _shown(self, name: str, before: Repeats, after: Repeats) -> str:
-        """Write both pictures and the map of their difference; return where they are."""
+    def _shown(self, name: str, before: Repeats, after: Repeats) -> Path:
+        """Write both pictures and the map of their difference; return their folder."""
         folder = self.pictures() / atomic.file_name(name, "a picture")
         folder.mkdir(parents=True, exist_ok=True)
         error = images.error_map(LEADING(after.mean, before.mean), LEADING.map_range[1])
@@ -250,13 +270,13 @@ class Fotismos:
         }
         for panel, shown in panels.items():
             (folder / f"{panel}.png").write_bytes(images.png(shown))
-        return f"pictures: {folder}"
+        return folder
 
     def _scene(self, scene: Scene) -> Scene:
         """Return a scene; a path relative to the test's folder, if there is such a file."""
         if not isinstance(scene, (str, Path)):
             return scene
-        beside = self.folder.parent / scene
+        beside = self.beside / scene
         return beside if beside.is_file() else scene
 
     def _path(self, scene: Scene, name: str | None) -> Path:
@@ -275,8 +295,16 @@ class Fotismos:
             return options
         name = known_as(options["heuristic"])
         file, _ = in_file(name) or ("", "")
-        is_beside = file and (self.folder.parent / file).is_file()
-        return options | {"heuristic": str(self.folder.parent / name) if is_beside else name}
+        is_beside = file and (self.beside / file).is_file()
+        return options | {"heuristic": str(self.beside / name) if is_beside else name}
+
+
+def _page(
+    folder: Path, title: str, views: Sequence[SceneView] = (), moved: Sequence[Before] = ()
+) -> Path:
+    """Write the page of a failure into its folder, in place of that of an earlier one."""
+    results.own(folder, results.PAGE, results.DETAILS)
+    return checks.write_page(folder, title, views, moved)
 
 
 def _noiseless(repeats: Repeats) -> Repeats:

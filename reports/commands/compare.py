@@ -21,6 +21,7 @@ from fotismos.reports import jobs
 @jobs.option("mask")
 @jobs.option("transfer")
 @jobs.option("over")
+@jobs.option("tone_map")
 @jobs.verbosity_options
 @jobs.option("noise")
 @jobs.option("colour_science")

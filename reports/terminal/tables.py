@@ -195,6 +195,8 @@ def _pictures(record: ComparisonRecord, found: Agreement) -> Iterator[str]:
 
 def _files(scene: str, half: str, picture: PictureFiles) -> Iterator[str]:
     yield f"{scene}: {half} {', '.join(picture.files)}"
+    if picture.tone_map:
+        yield f"the reference is shown by the tone map {picture.tone_map}, as the picture was"
     yield from picture.notes
 
 

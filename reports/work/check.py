@@ -13,7 +13,6 @@ from fotismos.reports.ci import checks, summary
 from fotismos.reports.ci.checks import CheckRecord, Tolerance
 from fotismos.reports.files import results
 from fotismos.reports.jobs import command_line
-from fotismos.reports.page import page
 from fotismos.reports.terminal.words import echo, is_quiet, tell
 
 
@@ -111,7 +110,4 @@ def _examined(
             results.clear(folder, (results.PAGE, results.DETAILS))
             return outcomes, ""
         title = f"fotismos check: {summary.outcome(outcomes, significance)}"
-        details = page.details(records=[view.record for view in views])
-        results.write(folder / results.DETAILS, details)
-        results.write(folder / results.PAGE, page.render(views, title, moved=moved))
-        return outcomes, str(folder / results.PAGE)
+        return outcomes, str(checks.write_page(folder, title, views, moved))

@@ -5,7 +5,12 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.departure import definitions
-from fotismos.comparisons.departure.colour import Viewing, cam16ucs_unclipped, ciede2000
+from fotismos.comparisons.departure.colour import (
+    Viewing,
+    cam16ucs_unclipped,
+    ciede2000,
+    from_srgb,
+)
 from fotismos.comparisons.departure.definitions import AGREEMENT, DEFINED
 from fotismos.comparisons.departure.metrics import (
     LEADING,
@@ -233,7 +238,7 @@ def test_every_pair_of_colours_has_a_finite_symmetric_distance(metric):
     assert np.isfinite(found).all()
     assert (found >= 0).all()
     assert not found.diagonal().any()
-    if metric.name != "hdr_flip":
+    if metric.name not in ("hdr_flip", "relmse"):
         np.testing.assert_allclose(found, found.T, rtol=1e-9, atol=1e-6)
     assert found[1, 2] < 1e-6  # the hues of greys are undefined
     for viewing in (Viewing(exposure=1e-30), Viewing(exposure=1e30), Viewing(white_luminance=1e6)):
@@ -251,6 +256,36 @@ def test_a_map_is_not_a_view_of_the_memory_of_dr_jit(metric):
         while isinstance(owner, np.ndarray) and owner.base is not None:
             owner = owner.base
         assert isinstance(owner, np.ndarray)
+
+
+def test_errors_of_the_literature_are_as_defined():
+    """Against NumPy, with closed forms: of greys whose codes of 8 bits differ by one, and of black.
+
+    Their PSNR is 20 log10(255) = 48.13 dB.
+    """
+    x, r = np.random.default_rng(3).lognormal(-1, 2, (2, 24, 20, 3))
+    mask = np.random.default_rng(4).random((24, 20)) < 0.7
+    shown = [colour.cctf_encoding((0.5 * image).clip(0, 1), function="sRGB") for image in (x, r)]
+    expected = {
+        "rmse": np.sqrt(np.mean((x - r)[mask] ** 2)),
+        "relmse": np.mean(((x - r) ** 2 / (r**2 + 0.01))[mask]),
+        "smape": np.mean((np.abs(x - r) / (x + r + 0.01))[mask]),
+        "srgb_rmse": np.sqrt(np.mean((shown[0] - shown[1])[mask] ** 2)),
+    }
+    for name, value in expected.items():
+        found = summarise(METRICS[name], x, r, mask, Viewing(exposure=0.5))[0]
+        assert found.mean == pytest.approx(value, rel=1e-6)
+        assert (found.psnr is not None) == (name == "srgb_rmse")
+        if found.psnr is not None:
+            assert found.psnr == pytest.approx(10 * np.log10(1 / value**2))
+    greys = [np.full((8, 8, 3), from_srgb(np.array(code / 255))) for code in (100, 101)]
+    everywhere = np.ones((8, 8), bool)
+    assert summarise(METRICS["srgb_rmse"], *greys, everywhere)[0].psnr == pytest.approx(48.1308)
+    assert summarise(METRICS["srgb_rmse"], greys[0], greys[0], everywhere)[0].psnr is None
+    white, black = np.ones((8, 8, 3)), np.zeros((8, 8, 3))
+    assert METRICS["relmse"](white, black).mean() == pytest.approx(100)
+    assert METRICS["relmse"](black, white).mean() == pytest.approx(1 / 1.01)
+    assert METRICS["smape"](white, black).mean() == pytest.approx(1 / 1.01)
 
 
 def test_a_pixel_that_is_not_finite_is_named_with_layer_count_and_place():
@@ -287,7 +322,7 @@ def test_best_exposure_finds_a_known_factor(metric, images):
     reference = images[1]
     mask, black = np.ones(reference.shape[:2], bool), np.zeros_like(reference)
     for factor in (0.11, 1.0, 13.0):
-        precision = 1e-12 if metric.averages_squares else 1e-6
+        precision = 1e-12 if metric.name == "rmse" else 1e-6
         found = best_exposure(metric, reference / factor, reference, mask)
         assert found == pytest.approx(factor, rel=precision)
     after = summarise(metric, reference / 1.7, reference, mask)[0].after_exposure
@@ -337,7 +372,7 @@ def test_summary_is_of_the_mask(metric, images):
 
 @POINTWISE
 def test_noise_floor_is_what_noise_alone_gives(metric):
-    """Twice the noise gives twice the floor, another draw the same, none gives none."""
+    """Twice the noise gives twice the floor, four times of squares; another draw gives the same."""
     rng = np.random.default_rng(3)
     reference = np.full((80, 80, 3), 0.4)
     mask = np.ones((80, 80), bool)
@@ -345,7 +380,9 @@ def test_noise_floor_is_what_noise_alone_gives(metric):
     floor = noise_floor(metric, reference, first, mask)
     assert floor > 0.0
     assert noise_floor(metric, reference, second, mask) == pytest.approx(floor, rel=0.05)
-    assert noise_floor(metric, reference, 2 * first, mask) == pytest.approx(2 * floor, rel=0.02)
+    factor = 4 if metric.squared else 2
+    twice = noise_floor(metric, reference, 2 * first, mask)
+    assert twice == pytest.approx(factor * floor, rel=0.02)
     assert noise_floor(metric, reference, 0 * first, mask) == 0.0
 
 

@@ -17,6 +17,7 @@ from fotismos.comparisons import alignment, picture_files, picture_mistakes, pic
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
+from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_mistakes import Names, NoisyImage
@@ -278,7 +279,8 @@ def mistakes(picture, cornell):
     reference, _, expected, counted = cornell
     place = alignment.measure(picture, expected)
     sides = NoisyImage(picture), NoisyImage(reference)
-    return list(picture_mistakes.find(*sides, counted, place, False, Names()))
+    light = Light(mean=reference, standard_error=0 * reference)
+    return list(picture_mistakes.find(*sides, counted, place, False, Names(), light))
 
 
 ODD = {

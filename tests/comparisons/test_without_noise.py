@@ -5,7 +5,7 @@ import pytest
 
 from fotismos.comparisons.departure import criterion, statistics
 from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
-from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.metrics import LEADING, METRICS
 from fotismos.comparisons.departure.noise import VisibleShare, debiased
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Interval
@@ -148,3 +148,23 @@ def test_the_interval_of_a_mean_is_that_of_students_table():
     assert (found.value, found.low) == (2.5, pytest.approx(2.5 - half, rel=1e-6))
     assert found.high - 2.5 == 2.5 - found.low
     assert sums.student(0.25, 0.0, 16) == Interval(value=0.25, low=0.25, high=0.25)
+
+
+@pytest.mark.parametrize("name", ["rmse", "relmse", "smape", "srgb_rmse"])
+def test_errors_of_the_literature_lose_their_noise(name):
+    """By skewed noise of up to 30 %, of images that are equal, alike or apart."""
+    rng = np.random.default_rng(6)
+    metric = METRICS[name]
+    held = []
+    for spread in (0.02, 0.1, 0.3):
+        for apart in (0.0, 0.1, 0.5):
+            left = []
+            for _ in range(12):
+                truth = rng.lognormal(-1.5, 1, 3) * rng.lognormal(0, 0.3, (32, 32, 3))
+                test = truth * (1 + apart * rng.normal(size=truth.shape))
+                found = summary(test, passes_of(truth, 16, spread, rng), metric)
+                expected = metric.mean(metric(test, truth))
+                held.append(found.low - 1e-12 <= expected <= found.high + 1e-12)
+                left.append((found.debiased - expected) / found.noise_floor)
+            assert abs(np.mean(left)) < 0.6, (spread, apart)
+    assert np.mean(held) > 0.9

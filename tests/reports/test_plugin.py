@@ -105,8 +105,46 @@ def test_a_suite_fails_updates_and_passes(suite, tmp_path):
     (tmp_path / "tests/scenes/scene.xml").write_text(redder)
     code, printed = suite("-k", "unchanged or variants and rgb")
     assert "2 failed, 2 passed" in printed
-    for words in ("scene.json: ", "moved", "standard errors", "reference R, block", "pictures: "):
+    for words in ("scene.json: ", "moved", "standard errors", "reference R, block", "page: "):
         assert words in printed
+
+
+PICTURES = """
+import numpy as np
+
+RAMP = np.linspace(0.2, 0.8, 32 * 24 * 3).reshape(24, 32, 3)
+
+def test_hall(fotismos):
+    assert fotismos.significance == 0.001
+    fotismos.picture("hall", RAMP * FACTOR)
+"""
+
+INI = """[pytest]
+fotismos_baselines = references/pictures
+fotismos_report = out
+fotismos_significance = 0.001
+"""
+
+
+@pytest.mark.thorough
+def test_an_ini_file_chooses_folders_and_significance(suite, tmp_path):
+    (tmp_path / "tests/test_mine.py").write_text(PICTURES.replace("FACTOR", "1"))
+    (tmp_path / "pytest.ini").write_text(INI)
+    assert suite("--fotismos-update")[0] == 0
+    names = sorted(path.name for path in (tmp_path / "references/pictures").iterdir())
+    assert names == ["hall.exr", "hall.json"]
+    assert not (tmp_path / "tests/baselines").exists()
+    (tmp_path / "tests/test_mine.py").write_text(PICTURES.replace("FACTOR", "1.5"))
+    code, printed = suite()
+    page = tmp_path / "out/tests-test_mine.py-test_hall/hall/index.html"
+    assert code == 1
+    assert f"page: {page}" in printed
+    assert "hall differs" in page.read_text()
+    for word in ("0", "1", "-2", "often"):
+        (tmp_path / "pytest.ini").write_text(f"[pytest]\nfotismos_significance = {word}\n")
+        code, printed = suite()
+        assert code == pytest.ExitCode.USAGE_ERROR
+        assert f"fotismos_significance = {word} is not allowed: give a number" in printed
 
 
 @pytest.mark.thorough
@@ -133,7 +171,7 @@ def fixtures(rgb, tmp_path):
     """What a test gets without and with ``--fotismos-update``, in a folder with a scene."""
     (tmp_path / "scenes").mkdir()
     (tmp_path / "scenes/scene.xml").write_text(PLAIN)
-    places = tmp_path / "baselines", lambda: tmp_path
+    places = tmp_path / "baselines", tmp_path, lambda: tmp_path
     return Fotismos(*places), Fotismos(*places, update=True)
 
 
@@ -209,8 +247,11 @@ def test_a_picture_is_as_its_baseline_or_fails_with_a_map(fixtures, tmp_path):
     assert plain.picture("hall", wrong, max_visible=0.1)
     with pytest.raises(AssertionError, match=r"8\.33% of the pixels differ .* it fails"):
         plain.picture("hall", wrong)
-    shown = {path.name for path in (tmp_path / "hall").iterdir()}
-    assert shown == {"before.png", "now.png", "dE2000.png"}
+    shown = {path.name for path in (tmp_path / "hall").glob("[!.]*")}
+    assert shown == {"before.png", "now.png", "dE2000.png", "index.html", "details.html"}
+    page = (tmp_path / "hall/index.html").read_text()
+    for words in ("hall differs", "8.33% of the pixels differ", "pytest --fotismos-update"):
+        assert words in page
     with pytest.raises(AssertionError, match=r"moved\. The whole picture moved by a constant"):
         plain.picture("hall", RAMP * 1.002, within=None)
     assert updated.picture("hall", wrong)
