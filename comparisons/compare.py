@@ -176,6 +176,8 @@ def _render_and_measure(
     # The passes, and their times.
     estimates = render(ready, ready.counted, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
+    if prepared := getattr(heuristic, "preparation", 0.0):  # pictures have none
+        stages["preparation"] = prepared
     price = _price(ready, alone)
     done("timing")
 
