@@ -1,8 +1,8 @@
 """Light of the environment by nine numbers for each colour: spherical harmonics up to order two.
 
-After Ramamoorthi and Hanrahan, "An efficient representation for irradiance environment maps" (2001).
-The cosine keeps the orders 0, 1 and 2 to the shares 1, 2/3 and 1/4; nearly nothing is left of the
-others. Around a small bright lamp the sum rings, and falls below 0: a Hann window lowers the orders.
+After Ramamoorthi and Hanrahan, "An efficient representation for irradiance environment maps"
+(2001). The cosine keeps 1, 2/3 and 1/4 of the orders 0, 1 and 2, and nearly nothing of the others.
+Around a small bright lamp the sum rings, and falls below 0: a Hann window lowers its orders.
 """
 
 from math import sqrt
@@ -16,7 +16,7 @@ from cook_torrance import lit, reflectance
 
 from fotismos import Range
 
-ROWS = 256
+SAMPLES = 2**18
 ORDERS = (0, 1, 1, 1, 2, 2, 2, 2, 2)
 SHARES = (1, 2 / 3, 1 / 4)
 
@@ -26,10 +26,10 @@ def prepare(scene):
 
     They are means of light times function, over directions that are even on the sphere.
     """
-    height, turn = np.meshgrid((np.arange(ROWS) + 0.5) / ROWS, np.arange(2 * ROWS), indexing="ij")
-    z = 1 - 2 * height.ravel()
+    number = np.arange(SAMPLES)
+    z = 1 - 2 * (number + 0.5) / SAMPLES
     side = np.sqrt(1 - z * z)
-    turn = np.pi * (turn.ravel() + 0.5) / ROWS
+    turn = np.pi * (3 - np.sqrt(5)) * number  # the golden angle
     toward = mi.Vector3f(side * np.cos(turn), side * np.sin(turn), z)
     light = fotismos.environment(scene, toward, sun=False)
     coefficients = [dr.mean(light * one, axis=1) for one in functions(toward)]
@@ -38,9 +38,7 @@ def prepare(scene):
 
 
 def shade(point, window: Range(2.5, 100) = 8):
-    """The base's light about the normal, and a metal's about the mirrored ray; other lights as in
-    `cook_torrance`.
-    """
+    """A base's light about the normal, a metal's about the mirrored ray; lights one by one."""
     material, normal, view = point.material, point.normal, point.view
     mirrored = 2 * dr.dot(normal, view) * normal - view
     toward = dr.normalize(dr.lerp(normal, mirrored, material.metallic))

@@ -13,9 +13,9 @@ import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is impor
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+import split_sum
 from cook_torrance import lit, reflectance
 from scipy.optimize import least_squares
-from split_sum import _halves, brdf
 
 SIZE = 16
 """Matrices by roughness, the root of alpha, and by the root of 1 - N.V."""
@@ -23,7 +23,7 @@ SIZE = 16
 
 def prepare(scene):
     """Return the tables of the inverse matrices and of the BRDF; they depend on no scene."""
-    matrices, amounts = (mi.TensorXf(one) for one in (fitted(), brdf()))
+    matrices, amounts = (mi.TensorXf(one) for one in (fitted(), split_sum.brdf()))
     clamp = {"wrap_mode": dr.WrapMode.Clamp}
     return mi.Texture2f(matrices, **clamp), mi.Texture2f(amounts, **clamp)
 
@@ -38,9 +38,8 @@ def shade(point):
     about_normal = mi.Frame3f(dr.cross(across, normal), across, normal)
     about_mirrored = mi.Frame3f(dr.cross(across, mirrored), across, mirrored)
     roughness = dr.sqrt(material.alpha)
-    at = mi.Point2f(dr.sqrt(1 - facing), roughness) * ((SIZE - 1) / SIZE) + 0.5 / SIZE
-    a, b, d, e = matrices.eval(at)
-    scale, bias = amounts.eval(mi.Point2f(facing, roughness))
+    a, b, d, e = matrices.eval(split_sum.place(dr.sqrt(1 - facing), roughness, SIZE))
+    scale, bias = amounts.eval(split_sum.place(facing, roughness, split_sum.SIZE))
     lobe = reflectance(material) * scale + bias
     base = (1 - lobe) * (1 - material.metallic) * material.base_color
     value = point.ambient * material.base_color
@@ -65,7 +64,7 @@ def shade(point):
 def polygon(corners):
     """Return the share of the cosine's light, from above z = 0, that comes from a convex polygon.
 
-    The sum over its edges, as seen from the origin, of angle times z of the edge's normal (Lambert).
+    Lambert's sum over its edges, as seen from the origin: the angle times z of the edge's normal.
     The edges end at the horizon, and one along the horizon joins their ends.
     """
     total = 0
@@ -108,7 +107,7 @@ def fitted():
 
 def _lobe(alpha, facing):
     """Return directions drawn from GGX, their density, and GGX's lobe with an integral of 1."""
-    half = _halves(alpha)
+    half = split_sum.facets(alpha)
     side = np.sqrt(1 - facing**2)
     view = np.array([[side], [0], [facing]])
     turned = np.sum(half * view, axis=0)

@@ -17,9 +17,12 @@ from cook_torrance import lit, reflectance
 LEVELS = 5
 """Blurred maps, at roughness 1/5 to 1, which is the root of alpha; at 0 the map is sharp."""
 
+SIZE = 64
+"""Rows and columns of the table."""
+
 SAMPLES = 512
 SPREAD = (np.arange(SAMPLES) + 0.5) / SAMPLES
-TURN = 2.399963 * np.arange(SAMPLES)  # by the golden angle, so that they fill a disc evenly
+TURN = np.pi * (3 - np.sqrt(5)) * np.arange(SAMPLES)  # the golden angle fills a disc evenly
 
 
 def prepare(scene):
@@ -27,7 +30,7 @@ def prepare(scene):
 
     The sun is not among them, since it is one of the lights.
     """
-    halves = [_halves((level / LEVELS) ** 2) for level in range(1, LEVELS + 1)]
+    halves = [facets((level / LEVELS) ** 2) for level in range(1, LEVELS + 1)]
     blurred = [_mean(scene, 64, 2 * h[2] * h - [[0], [0], [1]]) for h in halves]
     sharp = _mean(scene, 512, np.array([[0.0], [0.0], [1.0]]))
     cosine = _mean(scene, 64, _directions(SPREAD, TURN))
@@ -45,21 +48,26 @@ def shade(point):
     level = roughness * LEVELS
     rough = _read(blurred, mirrored, level - 1)
     light = dr.lerp(_read(sharp, mirrored), rough, dr.minimum(level, 1))
-    scale, bias = table.eval(mi.Point2f(facing, roughness))
+    scale, bias = table.eval(place(facing, roughness, SIZE))
     lobe = reflectance(material) * scale + bias
     base = (1 - lobe) * (1 - material.metallic) * material.base_color
     value = light * lobe + _read(cosine, normal) * base
     return value + sum(lit(point, light) for light in point.lights)
 
 
+def place(x, y, size):
+    """Return where a table with texels at 0 to 1, both included, is read."""
+    return mi.Point2f(x, y) * ((size - 1) / size) + 0.5 / size
+
+
 @cache
-def brdf(size=64):
-    """Return A and B by roughness and N.V, (size, size, 2): means over facets drawn from GGX."""
-    at = (np.arange(size) + 0.5) / size
-    facing = at[:, None]
+def brdf():
+    """Return A and B by roughness and N.V, (SIZE, SIZE, 2): means over facets drawn from GGX."""
+    steps = np.maximum(np.linspace(0, 1, SIZE), 0.01)
+    facing = steps[:, None]
     rows = []
-    for alpha in at**2:
-        half = _halves(alpha)
+    for alpha in steps**2:
+        half = facets(alpha)
         turned = np.maximum(facing * half[2] + np.sqrt(1 - facing**2) * half[0], 0)  # V.H
         cosine = 2 * turned * half[2] - facing  # N.L
         # Smith's masking, to which Karis has Schlick's approximation.
@@ -72,7 +80,7 @@ def brdf(size=64):
     return np.moveaxis(np.array(rows, np.float32), 1, 2)
 
 
-def _halves(alpha):
+def facets(alpha):
     """Return the normals (3, SAMPLES) of facets about z, as dense as GGX has them."""
     return _directions(np.sqrt((1 - SPREAD) / (1 + (alpha**2 - 1) * SPREAD)), TURN)
 
