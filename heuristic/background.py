@@ -47,10 +47,12 @@ def environment(scene: Scene, direction: Vector, sun: bool = True) -> Colour:
     if sun or "sun_scale" not in parameters:
         return radiance(emitter, direction)
     scale = parameters["sun_scale"]
-    _edit(parameters, "sun_scale", 0.0)
+    parameters["sun_scale"] = 0.0
+    parameters.update()
     sky = radiance(emitter, direction)
     dr.eval(sky)  # before the sun is back
-    _edit(parameters, "sun_scale", scale)
+    parameters["sun_scale"] = scale
+    parameters.update()
     return sky
 
 
@@ -71,11 +73,7 @@ def radiance(
 
 @dataclass(frozen=True)
 class EnvironmentMap:
-    """The background as ``texels`` (H, W, 3), and the rotation (3, 3) from the world to its frame.
-
-    >>> directions(2, 4)[1, 0].round(6)
-    array([ 0., -1., -0.])
-    """
+    """The background as ``texels`` (H, W, 3), and the rotation (3, 3) into its own frame."""
 
     texels: Floats
     to_local: Doubles
@@ -85,19 +83,18 @@ def environment_map(scene: Scene) -> EnvironmentMap:
     """Return the background as a map: that of ``envmap`` itself, others at the texels."""
     emitter = scene.environment()
     if emitter is None:
-        level = np.array(environment(scene, mi.Vector3f(0, 1, 0)), np.float32)
-        return EnvironmentMap(np.broadcast_to(level.reshape(1, 1, 3), (2, 1, 3)), np.eye(3))
+        level = np.array(environment(scene, mi.Vector3f(0)), np.float32).reshape(1, 1, 3)
+        return EnvironmentMap(np.repeat(level, 2, axis=0), np.eye(3))
     parameters = mi.traverse(emitter)
     if "data" in parameters:
         # Its first and last columns repeat the last and the first.
         texels = np.array(parameters["data"])[:, 1:-1, :3] * float(np.ravel(parameters["scale"])[0])
         to_world = np.array(parameters["to_world"].matrix, float).reshape(4, 4, -1)[:3, :3, 0]
         return EnvironmentMap(texels, np.linalg.inv(to_world))
-    rows = 2 if "radiance.value" in parameters else ROWS
-    toward = directions(rows, 2 * rows)
-    texels = radiance(emitter, mi.Vector3f(toward.reshape(-1, 3).T.astype(np.float32)))
-    shown = np.broadcast_to(np.array(texels, np.float32).reshape(3, -1), (3, toward.size // 3))
-    return EnvironmentMap(shown.T.reshape(toward.shape), np.eye(3))
+    toward = directions(ROWS, 2 * ROWS)
+    texels = radiance(emitter, mi.Vector3f(*toward.reshape(-1, 3).T.astype(np.float32)))
+    shown = np.array(texels, np.float32).reshape(3, -1).T + np.zeros((toward.size // 3, 1))
+    return EnvironmentMap(shown.reshape(toward.shape), np.eye(3))
 
 
 def directions(rows: int, columns: int) -> Doubles:
@@ -107,8 +104,3 @@ def directions(rows: int, columns: int) -> Doubles:
     x = np.sin(polar) * np.sin(azimuth)
     z = -np.sin(polar) * np.cos(azimuth)
     return np.stack([x, np.broadcast_to(np.cos(polar), x.shape), z], axis=-1)
-
-
-def _edit(parameters: Any, name: str, value: Any) -> None:
-    parameters[name] = value
-    parameters.update()

@@ -20,8 +20,7 @@ import mitsuba as mi
 import numpy as np
 
 from fotismos.heuristic import background, program, user_shaders
-from fotismos.heuristic.background import EnvironmentMap
-from fotismos.heuristic.convention import Floats, Scene
+from fotismos.heuristic.convention import Doubles, Floats, Scene
 from fotismos.heuristic.errors import InputError, InstallationError
 from fotismos.heuristic.heuristics import (
     INPUTS,
@@ -234,23 +233,21 @@ class Shader:
 
     def prepare(self, scene: Scene) -> "Textures":
         """Return what it reads of a scene besides its points: the background, and its table."""
-        textures: dict[str, Any] = {}
-        is_read = "environment" in self.words
-        map_ = background.environment_map(scene) if is_read else None
-        if map_ is not None:
-            textures["fotismos_map"] = map_.texels
+        found = Textures({}, np.eye(3))
+        if "environment" in self.words:
+            around = background.environment_map(scene)
+            found = Textures({"fotismos_map": around.texels}, around.to_local)
         if self.table and self.make_table:
             name, file = self.table
             table = np.array(self.make_table(scene), np.float32)
-            table = table[:, :, None] if table.ndim == 2 else table
             if table.ndim != 3 or not 1 <= table.shape[2] <= 4 or not np.isfinite(table).all():
                 raise InputError(
                     f"{file}: prepare(scene) returned an array of shape {table.shape} for the table"
-                    f" {name} of {self.file}: return (height, width), or (height, width, channels)"
-                    " with 1 to 4 channels, of finite numbers."
+                    f" {name} of {self.file}: return (height, width, channels), with 1 to 4"
+                    " channels, of finite numbers."
                 )
-            textures[name] = table
-        return Textures(textures, map_)
+            found.tables[name] = table
+        return found
 
     def fields(self, lights: int) -> dict[str, int]:
         """Return the fields of a point that the code may read, in the order of the buffer.
@@ -329,10 +326,10 @@ void main() {{
 
 @dataclass(frozen=True)
 class Textures:
-    """Tables (H, W, channels) by the name of their sampler, and the map that is among them."""
+    """Tables (H, W, channels) by the name of their sampler, and the rotation of the map."""
 
     tables: dict[str, Floats]
-    map: EnvironmentMap | None
+    to_local: Doubles
     _sent: dict[int, tuple[Any, dict[str, Any]]] = field(default_factory=dict)
 
     def bind(self, compute: Any) -> None:
@@ -342,21 +339,15 @@ class Textures:
         for number, (name, table) in enumerate(self.tables.items()):
             if name not in sent:
                 height, width, channels = table.shape
-                if max(height, width) > context.info["GL_MAX_TEXTURE_SIZE"]:
-                    raise InputError(
-                        f"a table of {width}x{height} numbers is too large for this OpenGL: give"
-                        f" {context.info['GL_MAX_TEXTURE_SIZE']} on a side at most."
-                    )
-                data = np.ascontiguousarray(table, np.float32).tobytes()
+                data = np.ascontiguousarray(table, np.float32)
                 sent[name] = context.texture((width, height), channels, data, dtype="f4")
-                sent[name].repeat_x = False
-                sent[name].repeat_y = False
+                sent[name].repeat_x = sent[name].repeat_y = False
             sent[name].use(number)
             if name in compute:  # compilers drop unused names
                 compute[name] = number
-        if self.map is not None and "fotismos_to_local" in compute:
-            columns = self.map.to_local.T  # as OpenGL stores matrices
-            compute["fotismos_to_local"].write(columns.astype(np.float32).tobytes())
+        if "fotismos_to_local" in compute:
+            columns = np.ascontiguousarray(self.to_local.T, np.float32)  # as OpenGL stores them
+            compute["fotismos_to_local"].write(columns)
 
 
 def _value(point: Point, lights: tuple[LightAtPoint, ...], name: str) -> Any:
@@ -426,12 +417,14 @@ vec3 environment(vec3 direction) {
     float x = fotismos_angle(d.x, -d.z) / 6.28318530718 * size.x - 0.5;
     float y = fotismos_angle(length(d.xz), d.y) / 3.14159265359 * (size.y - 1);
     int left = int(floor(x)), top = clamp(int(y), 0, size.y - 2);
-    int first = (left + size.x) % size.x, second = (left + 1 + size.x) % size.x;
-    vec3 above = mix(texelFetch(fotismos_map, ivec2(first, top), 0).rgb,
-                     texelFetch(fotismos_map, ivec2(second, top), 0).rgb, x - left);
-    vec3 below = mix(texelFetch(fotismos_map, ivec2(first, top + 1), 0).rgb,
-                     texelFetch(fotismos_map, ivec2(second, top + 1), 0).rgb, x - left);
-    return mix(above, below, y - top);
+    vec3 rows[2];
+    for (int row = 0; row < 2; ++row) {
+        ivec2 a = ivec2((left + size.x) % size.x, top + row);
+        ivec2 b = ivec2((left + 1 + size.x) % size.x, top + row);
+        vec3 first = texelFetch(fotismos_map, a, 0).rgb;
+        rows[row] = mix(first, texelFetch(fotismos_map, b, 0).rgb, x - left);
+    }
+    return mix(rows[0], rows[1], y - top);
 }
 """
 """What reads the background: float textures, interpolated by hand, since OpenGL may round weights.
