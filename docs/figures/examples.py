@@ -30,11 +30,11 @@ PICTURED = SCENES[-1]
 SIDE, SAMPLES = 192, 256
 
 SPHERES = {
-    ("map", "phong"): "textbook ambient",
+    ("map", "phong"): "phong",
     ("map", "harmonics"): "harmonics",
     ("map", "split_sum"): "split sum",
     ("lamps", "cook_torrance"): "lamps as points",
-    ("lamps", "ltc"): "transformed cosines",
+    ("lamps", "ltc"): "lamps by ltc",
 }
 """Shaders of docs/scenes/spheres.py, by its light and their files."""
 
