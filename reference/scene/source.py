@@ -21,7 +21,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.errors import InputError, suggestion
 from fotismos.heuristic.user_code import contained
 from fotismos.reference.scene.graph import (
     SCRIPT,
@@ -94,11 +94,12 @@ class Script:
         if any(one.kind is Argument.VAR_KEYWORD for one in known.values()):
             return
         takes = ", ".join(known) or "none"
-        if wrong := ", ".join(name for name in self.values if name not in known):
-            raise InputError(
-                f"-D {wrong}: `{SCRIPT}` of {self.path} does not take it; it takes {takes}. Write"
-                f" `def {SCRIPT}({wrong})`, or omit the option."
-            )
+        for name in self.values:
+            if name not in known:
+                raise InputError(
+                    f"-D {name}: `{SCRIPT}` of {self.path} does not take it"
+                    f"{suggestion(name, known)}; it takes {takes}. Correct the name, or omit it."
+                )
         needed = [name for name, one in known.items() if one.default is Argument.empty]
         if missing := ", ".join(name for name in needed if name not in self.values):
             raise InputError(

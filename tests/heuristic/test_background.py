@@ -97,6 +97,7 @@ def test_the_environment_is_mitsubas(rgb, written):
     toward = some_directions()
     for name, emitter in emitters().items():
         shown, _, physical = seen(scene(around=emitter), written(PYTHON), toward)
+        assert named("mine.py").reads == ("environment", "normal")
         expected = evaluated(physical.environment(), toward)
         np.testing.assert_allclose(shown, expected, rtol=1e-5, atol=1e-5, err_msg=name)
         assert shown.min() >= 0
@@ -115,6 +116,7 @@ def test_the_environment_is_the_same_in_glsl(rgb, written):
     toward = some_directions()
     for name, emitter in emitters().items():
         shown, _, physical = seen(scene(around=emitter), written(GLSL, "mine.glsl"), toward)
+        assert named("mine.glsl").reads == ("environment", "normal")
         expected = evaluated(physical.environment(), toward)
         if "sunsky" in name:  # documented: a map of it, in the world's frame
             at = background.directions(background.ROWS, 2 * background.ROWS)
