@@ -163,13 +163,14 @@ class Point:
 
     @_input
     def ambient(self) -> Array:
-        """``I_a``, display-linear: the mean of the environment, in its place or beside it."""
+        """``I_a``, display-linear; of a scene with an environment its mean, without a sun."""
         return self.arguments.ambient
 
     def environment(self, direction: Array) -> Array:
         """Return the radiance of the background in a direction of any length, in world space.
 
-        It arrives at white diffuse surfaces as it is: a uniform one of 1 gives the value 1.
+        Display-linear: under a uniform one of 1, a white diffuse surface has the value 1. Without
+        an environment it is ``I_a``.
         """
         self.require("environment")
         return self.arguments.ambient if self._environment is None else self._environment(direction)
