@@ -59,15 +59,15 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
     """
     options = options or Options()
     path = file_of(scene) if isinstance(scene, (str, Path)) else None
-    if options.define and (path is None or path.suffix == ".py"):
+    if options.define and path is None:
         raise InputError(
-            f"-D {', '.join(options.define)}: only Mitsuba files (.xml) have placeholders. Omit the"
-            " option."
+            f"-D {', '.join(options.define)}: only files take values: Mitsuba's for placeholders"
+            " (.xml), and Python's for arguments of `scene` (.py). Omit the option."
         )
     if path is not None:
         content: Any = path
         if path.suffix == ".py":
-            content = Script(path)
+            content = Script(path, options.define)
         return _complete(Source(name or path.stem, content, options.define), options, str(path))
     if isinstance(scene, (str, Path)):
         entry = builtin(str(scene))

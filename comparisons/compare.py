@@ -145,6 +145,8 @@ def _render_and_measure(
     counted = ready.counted
     estimates = render(ready, counted, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
+    if prepared := getattr(heuristic, "preparation", 0.0):  # pictures have none
+        stages["preparation"] = prepared
     price = _price(ready, alone)
     done("timing")
 

@@ -94,7 +94,12 @@ class Options(
     pairing: Annotated[
         Literal["literal", "matched"], _help("How roughplastic and phong are paired.")
     ] = "matched"
-    define: Annotated[dict[str, str], _help("Values of placeholders $NAME of a scene file.")] = {}
+    define: Annotated[
+        dict[str, str],
+        _help(
+            "Values of a scene file's placeholders $NAME, or of the arguments of a script's scene."
+        ),
+    ] = {}
     sensor: Annotated[Sensor, _help("Which sensor of the scene, from 0.")] = 0
     allow_empty: Annotated[
         bool, _help("Accept pictures in which no pixel sees a surface, or none sees light.")

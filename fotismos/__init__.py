@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from fotismos.comparisons.fit.fit_record import FitRecord
     from fotismos.comparisons.options import Options
     from fotismos.comparisons.pixel_terms import PixelTerms
+    from fotismos.heuristic.background import environment
     from fotismos.heuristic.errors import (
         FotismosError,
         InputError,
@@ -78,7 +79,8 @@ __all__ = [
     "FitRecord", "FotismosError", "Heuristic", "InputError", "InstallationError",
     "LostProcessError", "Material", "Method", "Metric", "NonFiniteError", "Options", "OutputError",
     "Parameter", "PixelTerms", "Pixelwise", "PlanReport", "PointLight", "Range", "Scene", "Shown",
-    "SpotLight", "audit", "check", "compare", "cost", "declare", "fit", "plan", "register", "shade",
+    "SpotLight", "audit", "check", "compare", "cost", "declare", "environment", "fit", "plan",
+    "register", "shade",
 ]  # fmt: skip
 
 

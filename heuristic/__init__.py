@@ -10,6 +10,7 @@ from fotismos.heuristic import llvm
 from fotismos.heuristic.program import __version__
 
 if TYPE_CHECKING:
+    from fotismos.heuristic.background import environment
     from fotismos.heuristic.heuristics import Heuristic, Parameter, Range
     from fotismos.heuristic.kernel import shade
     from fotismos.heuristic.lights import DirectionalLight, PointLight, SpotLight
@@ -26,6 +27,7 @@ HOMES = {
     "PointLight": "fotismos.heuristic.lights",
     "Range": "fotismos.heuristic.heuristics",
     "SpotLight": "fotismos.heuristic.lights",
+    "environment": "fotismos.heuristic.background",
     "register": "fotismos.heuristic.plugins",
     "shade": "fotismos.heuristic.kernel",
 }
@@ -33,7 +35,7 @@ HOMES = {
 
 __all__ = [
     "DirectionalLight", "Heuristic", "Material", "Parameter", "PointLight", "Range", "SpotLight",
-    "__version__", "register", "shade",
+    "__version__", "environment", "register", "shade",
 ]  # fmt: skip
 
 

@@ -1,14 +1,16 @@
 """Heuristics in GLSL, run by OpenGL 4.3, which a command names as ``FILE.glsl``.
 
 The file holds ``vec3 shade(Point point)``. Its text is put between declarations of the record and a
-``main``, compiled in a context without a window and called for arrays of points.
+``main``, compiled in a context without a window and called for arrays of points. The background is
+a texture behind ``environment(direction)``, read as :mod:`fotismos.heuristic.background` says;
+``uniform sampler2D NAME;  // FILE.py`` is a table, which ``prepare(scene)`` of that file returns.
 """
 
 import os
 import re
 import threading
-from dataclasses import replace
-from hashlib import sha256
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -17,9 +19,18 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from fotismos.heuristic import program, user_shaders
+from fotismos.heuristic import background, program, user_shaders
+from fotismos.heuristic.convention import Doubles, Floats, Scene
 from fotismos.heuristic.errors import InputError, InstallationError
-from fotismos.heuristic.heuristics import INPUTS, Heuristic, LightAtPoint, Parameter, Point
+from fotismos.heuristic.heuristics import (
+    INPUTS,
+    Heuristic,
+    LightAtPoint,
+    Parameter,
+    Point,
+    content_digest,
+)
+from fotismos.heuristic.user_code import contained
 
 VERSION = 430
 """OpenGL 4.3, the first with compute shaders."""
@@ -96,6 +107,14 @@ def device() -> tuple[str, bool]:
 def from_file(word: str) -> Heuristic:
     """Return the heuristic in a GLSL file, after a trial; a file that changed is read again."""
     path = Path(word)
+    key = word, path.resolve()
+    known = _known.get(key)
+    if known is None or known.code != content_digest(known.files):
+        _known[key] = known = _read(word, path)
+    return known
+
+
+def _read(word: str, path: Path) -> Heuristic:
     if not path.is_file():
         raise InputError(
             f"{path}: there is no such file. Give a GLSL file with a function `{SIGNATURE}`."
@@ -103,16 +122,13 @@ def from_file(word: str) -> Heuristic:
     size = path.stat().st_size
     if size > LARGEST:
         raise InputError(f"{path}: {size} bytes are too long for a shader: give {LARGEST} at most.")
-    content = path.read_bytes()
-    code = sha256(content).hexdigest()
-    key = word, path.resolve()
-    if key not in _known or _known[key].code != code:
-        try:
-            text = content.decode("utf-8-sig")
-        except UnicodeDecodeError as error:
-            raise InputError(f"{word} is not text in UTF-8: {error}.") from error
-        _known[key] = replace(of_text(word, text), files=(path.resolve(),), code=code)
-    return _known[key]
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{word} is not text in UTF-8: {error}.") from error
+    heuristic = of_text(word, text)
+    files = {path.resolve(), *heuristic.files}
+    return replace(heuristic, files=tuple(sorted(files)), code=content_digest(files))
 
 
 def of_text(word: str, text: str) -> Heuristic:
@@ -126,6 +142,7 @@ def of_text(word: str, text: str) -> Heuristic:
     if refused := refusal(text):
         raise InputError(f"{word}, line {refused[0]}: {refused[1]}.")
     shader.compiled(2)
+    files = shader.read_table()
     renderer, is_software = device()
     heuristic = Heuristic(
         name=word,
@@ -133,6 +150,8 @@ def of_text(word: str, text: str) -> Heuristic:
         label=Path(word).stem + (", software GPU" if is_software else ""),
         needs=frozenset(name for name in INPUTS if name in shader.words),
         parameters=uniforms(text),
+        prepare=shader.prepare if shader.table or "environment" in shader.words else None,
+        files=tuple(files),
         traced=False,
         remarks=(ON_SOFTWARE.format(word, renderer),) if is_software else (),
     )
@@ -155,6 +174,9 @@ class Shader:
         match = _SHADE.search(code)
         self.line = match and code.count("\n", 0, match.start()) + 1
         self.__qualname__ = f"{file}, line {self.line}"  # its name in messages
+        matches = [found for line in text.splitlines() if (found := _TABLE.match(line))]
+        self.table = matches[0].groups() if matches else None  # its name and file
+        self.make_table: Callable[[Scene], Any] | None = None
         self._programs: dict[int, tuple[Any, Any]] = {}
 
     def __call__(self, point: Point) -> Any:
@@ -180,6 +202,10 @@ class Shader:
         for name, value in vars(point.parameters).items():
             if name in compute:  # compilers drop unused names
                 compute[name] = float(np.ravel(value)[0])
+        if "environment" in self.words:
+            point.require("environment")
+        if point.prepared is not None:
+            point.prepared.bind(compute)
         # Chunk by chunk, within the limits of buffers and work groups.
         colours = np.empty((count, 3), np.float32)
         step = max(min(POINTS, FLOATS // max(len(rows), 1)), 1)
@@ -188,6 +214,40 @@ class Shader:
             chunk = [np.broadcast_to(row, count)[part] for row in rows]
             colours[part] = _run(compute, chunk, part.stop - start)
         return mi.Spectrum(*(mi.Float(np.ascontiguousarray(channel)) for channel in colours.T))
+
+    def read_table(self) -> set[Path]:
+        """Read the file that makes its table, and return it and what it imports."""
+        if self.table is None:
+            return set()
+        name, file = self.table
+        script = Path(self.file).parent / file
+        with contained(script) as modules:
+            names = user_shaders.names_of(script, "with a function `prepare(scene)`")
+        if "prepare" not in names:
+            raise InputError(
+                f"{script}: there is no function `prepare(scene)`. Add it; it returns the table"
+                f" {name} of {self.file}, (height, width, channels)."
+            )
+        self.make_table = names["prepare"]
+        return {script.resolve(), *modules}
+
+    def prepare(self, scene: Scene) -> "Textures":
+        """Return what it reads of a scene besides its points: the background, and its table."""
+        found = Textures({}, np.eye(3))
+        if "environment" in self.words:
+            around = background.environment_map(scene)
+            found = Textures({"fotismos_map": around.texels}, around.to_local)
+        if self.table and self.make_table:
+            name, file = self.table
+            table = np.array(self.make_table(scene), np.float32)
+            if table.ndim != 3 or not 1 <= table.shape[2] <= 4 or not np.isfinite(table).all():
+                raise InputError(
+                    f"{file}: prepare(scene) returned an array of shape {table.shape} for the table"
+                    f" {name} of {self.file}: return (height, width, channels), with 1 to 4"
+                    " channels, of finite numbers."
+                )
+            found.tables[name] = table
+        return found
 
     def fields(self, lights: int) -> dict[str, int]:
         """Return the fields of a point that the code may read, in the order of the buffer.
@@ -245,6 +305,7 @@ uniform int fotismos_count;
 {_structure("Extent", EXTENT)}
 {_structure("Light", LIGHT, "Extent extent;").replace("float visible", "bool visible")}
 {_structure("Point", POINT, f"Material material; Light lights[{lights}];")}
+{_ENVIRONMENT if "environment" in self.words else ""}
 #line 1
 {whole}
 
@@ -261,6 +322,32 @@ void main() {{
     for (int part = 0; part < 3; ++part) fotismos_colours[3 * index + part] = colour[part];
 }}
 """
+
+
+@dataclass(frozen=True)
+class Textures:
+    """Tables (H, W, channels) by the name of their sampler, and the rotation of the map."""
+
+    tables: dict[str, Floats]
+    to_local: Doubles
+    _sent: dict[int, tuple[Any, dict[str, Any]]] = field(default_factory=dict)
+
+    def bind(self, compute: Any) -> None:
+        """Let a program read them; the first time in a context they are sent to it."""
+        context = opengl()
+        _, sent = self._sent.setdefault(id(context), (context, {}))
+        for number, (name, table) in enumerate(self.tables.items()):
+            if name not in sent:
+                height, width, channels = table.shape
+                data = np.ascontiguousarray(table, np.float32)
+                sent[name] = context.texture((width, height), channels, data, dtype="f4")
+                sent[name].repeat_x = sent[name].repeat_y = False
+            sent[name].use(number)
+            if name in compute:  # compilers drop unused names
+                compute[name] = number
+        if "fotismos_to_local" in compute:
+            columns = np.ascontiguousarray(self.to_local.T, np.float32)  # as OpenGL stores them
+            compute["fotismos_to_local"].write(columns)
 
 
 def _value(point: Point, lights: tuple[LightAtPoint, ...], name: str) -> Any:
@@ -310,6 +397,39 @@ _OURS = 1_000_001
 the right number of the source string only in some of its messages.
 """
 
+_ENVIRONMENT = """
+uniform sampler2D fotismos_map;
+uniform mat3 fotismos_to_local;
+float fotismos_angle(float y, float x) {  // atan(y, x) to 1e-7, as in Cephes; OpenGL promises less
+    float a = min(abs(x), abs(y)) / max(max(abs(x), abs(y)), 1e-37);
+    bool is_wide = a > 0.41421356;
+    float t = is_wide ? (a - 1.0) / (a + 1.0) : a;
+    float s = t * t;
+    float p = ((8.05374449538e-2 * s - 1.38776856032e-1) * s + 1.99777106478e-1) * s;
+    float angle = (p - 3.33329491539e-1) * s * t + t + (is_wide ? 0.785398163397 : 0.0);
+    angle = abs(y) > abs(x) ? 1.57079632679 - angle : angle;
+    angle = x < 0.0 ? 3.14159265359 - angle : angle;
+    return y < 0.0 ? -angle : angle;
+}
+vec3 environment(vec3 direction) {
+    vec3 d = fotismos_to_local * direction;
+    ivec2 size = textureSize(fotismos_map, 0);
+    float x = fotismos_angle(d.x, -d.z) / 6.28318530718 * size.x - 0.5;
+    float y = fotismos_angle(length(d.xz), d.y) / 3.14159265359 * (size.y - 1);
+    int left = int(floor(x)), top = clamp(int(y), 0, size.y - 2);
+    vec3 rows[2];
+    for (int row = 0; row < 2; ++row) {
+        ivec2 a = ivec2((left + size.x) % size.x, top + row);
+        ivec2 b = ivec2((left + 1 + size.x) % size.x, top + row);
+        vec3 first = texelFetch(fotismos_map, a, 0).rgb;
+        rows[row] = mix(first, texelFetch(fotismos_map, b, 0).rgb, x - left);
+    }
+    return mix(rows[0], rows[1], y - top);
+}
+"""
+"""What reads the background: float textures, interpolated by hand, since OpenGL may round weights.
+"""
+
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _SHADE = re.compile(r"\bvec3\s+shade\s*\(\s*(?:const\s+)?(?:in\s+)?Point\b")
 _PLACE = re.compile(r"(?<![\w.])\d+(?::(\d+)\(\d+\)|\((\d+)\)|:(\d+))\s*:\s*")
@@ -317,6 +437,7 @@ _NUMBER = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)"
 _PARAMETER = re.compile(
     rf"\s*uniform\s+float\s+(\w+)\s*=\s*{_NUMBER}\s*;\s*//\s*{_NUMBER}\s+to\s+{_NUMBER}\s*$"
 )
+_TABLE = re.compile(r"\s*uniform\s+sampler2D\s+(\w+)\s*;\s*//\s*(\S.*\.py)\s*$")
 _UNIFORM = re.compile(r"\s*(?:layout\s*\(.*\)\s*)?uniform\b")
 _REFUSED = {
     re.compile(r"(?m)^[ \t]*#[ \t]*include\b"): "a shader is one file here: paste the included"
@@ -343,13 +464,19 @@ def uniforms(text: str) -> tuple[Parameter, ...]:
 def refusal(text: str) -> tuple[int, str] | None:
     """Return the line of a forbidden word, and what to do; None if there is none."""
     code = bare(text)
+    tables = 0
     for number, (line, stripped) in enumerate(
         zip(text.splitlines(), code.splitlines(), strict=False), 1
     ):
-        if _UNIFORM.match(stripped) and not _PARAMETER.match(line):
+        is_table = _TABLE.match(line) is not None
+        tables += is_table
+        if tables > 1:
+            return number, "a shader has one table: join them, side by side or as channels"
+        if _UNIFORM.match(stripped) and not (is_table or _PARAMETER.match(line)):
             return number, (
                 "a uniform is a parameter: write its default and bounds, as in"
-                " `uniform float wrap = 0.5;  // 0 to 1`"
+                " `uniform float wrap = 0.5;  // 0 to 1`; or it is a table, as in"
+                " `uniform sampler2D table;  // table.py`"
             )
     for pattern, advice in _REFUSED.items():
         if match := pattern.search(code):

@@ -30,7 +30,9 @@ from fotismos.heuristic.materials import Material, check_form
 
 GROUP = "fotismos.heuristics"
 
-INPUTS = ("position", "normal", "view", "uv", "material", "ambient", "lights", "visible")
+INPUTS = (
+    "position", "normal", "view", "uv", "material", "ambient", "environment", "lights", "visible",
+)  # fmt: skip
 """The possible needs of a heuristic; ``visible`` is a shadow ray to a light."""
 
 RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "prune")
@@ -44,6 +46,7 @@ LOADERS = {
 
 OF_FUNCTION = "fotismos.heuristic.user_shaders:of_function"
 SHADED = "fotismos.heuristic.user_shaders:shaded"
+PREPARED = "fotismos.heuristic.user_shaders:prepared"
 """Make a heuristic of a function, and call and check a user's; imported as late."""
 
 _FILE = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)
@@ -127,6 +130,7 @@ class Point:
     parameters: SimpleNamespace
     prepared: Any = None
     wavelengths: Array = ()
+    _environment: Callable[[Array], Array] | None = None
 
     @_input
     def position(self) -> Array:
@@ -159,8 +163,17 @@ class Point:
 
     @_input
     def ambient(self) -> Array:
-        """``I_a``, display-linear."""
+        """``I_a``, display-linear; of a scene with an environment its mean, without a sun."""
         return self.arguments.ambient
+
+    def environment(self, direction: Array) -> Array:
+        """Return the radiance of the background in a direction of any length, in world space.
+
+        Display-linear: under a uniform one of 1, a white diffuse surface has the value 1. Without
+        an environment it is ``I_a``.
+        """
+        self.require("environment")
+        return self.arguments.ambient if self._environment is None else self._environment(direction)
 
     @_input
     def lights(self) -> tuple[LightAtPoint, ...]:
@@ -303,16 +316,21 @@ class Heuristic:
             raise InputError(
                 f"heuristic {self.name} cannot shade this scene: {reason}. Choose another one."
             )
-        return self.prepare(scene, **values) if self.prepare is not None else None
+        if self.prepare is None:
+            return None
+        if self.is_builtin:
+            return self.prepare(scene, **values)
+        return pkgutil.resolve_name(PREPARED)(self.name, self.prepare, scene, values)
 
     def digest(self) -> str | None:
         """Return what identifies the code: a name of the package's, or a digest of GLSL.
 
-        None for others' Python, of which nobody knows what else it reads.
+        None for others' Python, of which nobody knows what else it reads; GLSL may have a table of
+        it.
         """
         if self.is_builtin:
             return self.name
-        return self.code if self.name.endswith(".glsl") else None
+        return self.code if self.name.endswith(".glsl") and len(self.files) == 1 else None
 
     def evaluate(
         self,
@@ -321,6 +339,7 @@ class Heuristic:
         parameters: dict[str, Array],
         prepared: Any,
         wavelengths: Array = (),
+        environment: Callable[[Array], Array] | None = None,
     ) -> Array:
         """Return the colour at points; InputError if a user's heuristic fails or returns none."""
         tuned = SimpleNamespace(**parameters)
@@ -331,6 +350,7 @@ class Heuristic:
             parameters=tuned,
             prepared=prepared,
             wavelengths=wavelengths,
+            _environment=environment,
         )
         if self.is_builtin:
             return self.shade(point)
@@ -410,6 +430,6 @@ def content_digest(files: Iterable[Path]) -> str:
     return whole.hexdigest()
 
 
-_READ = frozenset(INPUTS) - {"uv", "visible"}
+_READ = frozenset(INPUTS) - {"uv", "environment", "visible"}
 PHONG = Heuristic(name="phong", shade=Point.textbook, label="Phong", needs=_READ)
 BLINN = Heuristic(name="blinn", shade=Point.textbook, label="Blinn", needs=_READ, form="blinn")

@@ -190,7 +190,7 @@ HEMISPHERE = Heuristic(
     name="hemisphere-ambient",
     shade=shade,
     label="hemisphere ambient light",
-    needs=frozenset(INPUTS) - {"uv", "visible"},
+    needs=frozenset(INPUTS) - {"uv", "environment", "visible"},
     prepare=fitted_sky,
     refuse=refuse,
 )

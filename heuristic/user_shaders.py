@@ -1,8 +1,9 @@
 """Heuristics made of plain functions, in files or programs: parameters, needs, and a trial.
 
 A file is named as ``FILE.py`` or ``FILE.py:function``; the function is ``shade`` unless another is
-named, or a :class:`fotismos.heuristic.heuristics.Heuristic`. Every process finds the same heuristic
-by the same words, and reads a changed file again::
+named, or a :class:`fotismos.heuristic.heuristics.Heuristic`. A function ``prepare`` beside it makes
+what it needs of a scene. Every process finds the same heuristic by the same words, and reads a
+changed file again::
 
     import drjit as dr
     from fotismos.heuristic import Range
@@ -20,8 +21,9 @@ fails or gives infinite or negative values in most scenes, and what the code rea
 
 import inspect
 import runpy
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from functools import wraps
 from math import inf, isfinite
 from numbers import Real
@@ -34,6 +36,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.random import default_rng
 
+from fotismos.heuristic import plugins
 from fotismos.heuristic.errors import FotismosError, InputError, suggestion, type_of
 from fotismos.heuristic.heuristics import (
     INPUTS,
@@ -100,7 +103,7 @@ def _read(word: str, path: Path, function: str) -> Heuristic:
         if function not in names:
             raise _missing(names, function, path)
         label = path.stem if function == FUNCTION else function
-        heuristic = of_function(names[function], word, label)
+        heuristic = of_function(names[function], word, label, names.get("prepare"))
     files = tuple(sorted({path.resolve(), *modules}))
     return replace(heuristic, files=files, code=content_digest(files))
 
@@ -122,11 +125,14 @@ def _missing(names: dict[str, Any], function: str, path: Path) -> InputError:
     )
 
 
-def of_function(function: Any, name: str, label: str = "") -> Heuristic:
+def of_function(
+    function: Any, name: str, label: str = "", prepare: Callable[[Any], Any] | None = None
+) -> Heuristic:
     """Return a user's function or object as a heuristic, after a trial.
 
     The function takes a :class:`Point`, and numbers with a default: these are the parameters, and a
-    :class:`Range` as annotation gives their bounds. A :class:`Heuristic` keeps its own label.
+    :class:`Range` as annotation gives their bounds. A :class:`Heuristic` keeps its own label and
+    preparation, and is tried if it has none; a function has ``prepare``, on trial, too.
     """
     if isinstance(function, Heuristic):
         renamed = replace(function, name=name)
@@ -145,7 +151,12 @@ def of_function(function: Any, name: str, label: str = "") -> Heuristic:
 
     # On trial everything may be read; what is read becomes the needs.
     everything = Heuristic(
-        name=name, shade=shade, label=label, needs=frozenset(INPUTS), parameters=parameters
+        name=name,
+        shade=shade,
+        label=label,
+        needs=frozenset(INPUTS),
+        parameters=parameters,
+        prepare=prepare,
     )
     read = examine(everything)
     needs = {part.partition(".")[0] for part in read} & set(INPUTS)
@@ -193,23 +204,8 @@ def shaded(name: str, shade: Callable[[Point], Any], point: Point) -> Any:
 
     InputError names file and line if it fails or does not return a colour.
     """
-    variant = mi.variant()
-    try:
-        with np.errstate():
-            value = shade(point)
-    except FotismosError as error:
-        where, line, _ = error_text(error).partition(f"{type(error).__name__}: ")
-        raise type(error)(f"{where if line else ''}{error}") from error
-    except (Exception, SystemExit) as error:  # a user's code may raise anything
-        raise InputError(f"{error_text(error)} (heuristic {name}).{_advice(error)}") from error
-    if mi.variant() != variant:
-        changed = mi.variant()
-        mi.set_variant(variant)
-        raise InputError(
-            f"{place_of(shade)}: heuristic {name} switched Mitsuba to {changed}, but the comparison"
-            f" is in {variant}. Remove its mitsuba.set_variant: the variant is an option of the"
-            " comparison."
-        )
+    with _explained(name, shade):
+        value = shade(point)
     if isinstance(value, Real) and not isinstance(value, bool):
         return mi.Spectrum(value)
     components = dr.size_v(mi.Spectrum)
@@ -228,6 +224,36 @@ def shaded(name: str, shade: Callable[[Point], Any], point: Point) -> Any:
         if width not in (1, points):
             raise InputError(f"{returned} {width} values for {points} points; {expected}.")
     return mi.Spectrum(value)
+
+
+def prepared(
+    name: str, prepare: Callable[..., Any], scene: Any, values: Mapping[str, float]
+) -> Any:
+    """Return what a user's function prepares for a scene; InputError names file and line."""
+    with _explained(name, prepare):
+        return prepare(scene, **values)
+
+
+@contextmanager
+def _explained(name: str, function: Callable[..., Any]) -> Iterator[None]:
+    """Call a user's function in the block: errors name its file and line, and the variant stays."""
+    variant = mi.variant()
+    try:
+        with np.errstate():
+            yield
+    except FotismosError as error:
+        where, line, _ = error_text(error).partition(f"{type(error).__name__}: ")
+        raise type(error)(f"{where if line else ''}{error}") from error
+    except (Exception, SystemExit) as error:  # a user's code may raise anything
+        raise InputError(f"{error_text(error)} (heuristic {name}).{_advice(error)}") from error
+    if mi.variant() != variant:
+        changed = mi.variant()
+        mi.set_variant(variant)
+        raise InputError(
+            f"{place_of(function)}: heuristic {name} switched Mitsuba to {changed}, but the"
+            f" comparison is in {variant}. Remove its mitsuba.set_variant: the variant is an option"
+            " of the comparison."
+        )
 
 
 def _advice(error: BaseException) -> str:
@@ -254,12 +280,15 @@ def examine(heuristic: Heuristic) -> tuple[str, ...]:
     if mi.variant() is None:
         mi.set_variant(DEFAULT_VARIANT)
     point = trial_points(heuristic)
+    if heuristic.prepare is not None:
+        numbers = {one.name: one.default for one in heuristic.parameters if one.prepared}
+        point = replace(point, prepared=heuristic.prepared(trial_scene(0.5), numbers))
     value = shaded(heuristic.name, heuristic.shade, point)
     colours = np.array(value, float).reshape(dr.size_v(mi.Spectrum), -1)
     colours = np.broadcast_to(colours, (len(colours), POINTS))
     _require(heuristic, np.isfinite(colours), colours, "finite")
     _require(heuristic, colours >= -ROUNDING, colours, "0 or more")
-    return tuple(sorted(point.prepared))
+    return tuple(sorted(point.read))
 
 
 @dataclass(frozen=True)  # hashable, like what it imitates
@@ -275,22 +304,25 @@ class _WatchedMaterial:
         return value
 
 
+@dataclass(frozen=True)
 class _TrialPoint(Point):
-    """Points that note in ``prepared`` which of their inputs are read."""
+    """Points that note in ``read`` which of their inputs are read."""
+
+    read: set[str] = field(default_factory=set)
 
     def require(self, name: str) -> None:
         super().require(name)
-        self.prepared[name] = None
+        self.read.add(name)
 
     @property
     def material(self) -> Any:
-        return _WatchedMaterial(Point.material.func(self), self.prepared.setdefault)
+        return _WatchedMaterial(Point.material.func(self), self.read.add)
 
 
 _TrialPoint.__name__ = "Point"  # for users' AttributeErrors
 
 
-def trial_points(heuristic: Heuristic) -> Point:
+def trial_points(heuristic: Heuristic) -> _TrialPoint:
     """Return the points of a trial."""
     random = default_rng(8)
 
@@ -335,7 +367,26 @@ def trial_points(heuristic: Heuristic) -> Point:
         arguments=arguments,
         _uv=uv,
         parameters=SimpleNamespace(**parameters),
-        prepared={},
+        _environment=lambda direction: mi.Spectrum(0.5) * (1 + 0 * mi.Vector3f(direction).x),
+    )
+
+
+def trial_scene(radiance: float) -> Any:
+    """Return the scene that is prepared on trial: a white square, one light, a background."""
+    plugins.register()
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "sensor": {
+                "type": "perspective",
+                "to_world": mi.ScalarTransform4f().look_at((0, -2, 2), (0, 0, 0), (0, 0, 1)),
+                "film": {"type": "hdrfilm", "width": 16, "height": 16},
+            },
+            "square": {"type": "rectangle", "bsdf": {"type": "phong", "k_a": 1.0, "k_d": 1.0}},
+            "light": {"type": "heuristic_directional", "direction": [0, 0, -1], "intensity": 1.0},
+            "background": {"type": "constant", "radiance": radiance},
+        },
+        optimize=False,
     )
 
 

@@ -158,7 +158,7 @@ class ShadingSubject(Subject):
             for parameter in known.values()
             if parameter.prepared
         }
-        self.prepared = heuristic.prepared(_square(), prepared)
+        self.prepared = heuristic.prepared(user_shaders.trial_scene(0.0), prepared)
         if not heuristic.traced:
             self.untuned = "Dr.Jit cannot differentiate it"
 
@@ -287,24 +287,6 @@ def _within(parameter: heuristics.Parameter, value: float) -> float | None:
     room = 0.1 * abs(value)
     centre = value if low < value - room and value + room < high else inner
     return centre or None
-
-
-def _square() -> Any:
-    """Return the scene that a heuristic may prepare: a white square under one light, at night."""
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "sensor": {
-                "type": "perspective",
-                "to_world": mi.ScalarTransform4f().look_at((0, -2, 2), (0, 0, 0), (0, 0, 1)),
-                "film": {"type": "hdrfilm", "width": 16, "height": 16},
-            },
-            "square": {"type": "rectangle", "bsdf": {"type": "phong", "k_a": 1.0, "k_d": 1.0}},
-            "light": {"type": "heuristic_directional", "direction": [0, 0, -1], "intensity": 1.0},
-            "night": {"type": "constant", "radiance": 0.0},
-        },
-        optimize=False,
-    )  # fmt: skip
 
 
 # --- BSDFs -------------------------------------------------------------------------------------

@@ -296,6 +296,10 @@ def _shaders() -> None:
     replace("shaders.md", "mistakes", examples.mistakes())
     shown = examples.pictures(found)
     _sheet("shaders.png", list(shown), [list(shown.values())])
+    spheres = examples.spheres()
+    replace("shaders.md", "spheres", examples.table_of_spheres(spheres))
+    drawn = hero.encoded(examples.picture_of_spheres(spheres))
+    atomic.write(DOCS / "shaders-spheres.webp", drawn)
 
 
 def _renderers() -> None:

@@ -2,12 +2,16 @@
 
 import runpy
 from collections.abc import Iterator
+from functools import partial
 from textwrap import wrap
 
 import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
 
+from docs.figures import model_figures
 from docs.figures.from_tests import ROOT, fact
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
@@ -15,6 +19,8 @@ from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.reference.scene.source import Source
+from fotismos.reports.charts import figures
+from fotismos.reports.files import images
 from fotismos.reports.terminal.tables import markdown
 
 SHADERS = ROOT / "docs/shaders"
@@ -22,6 +28,15 @@ NAMES = ("phong", "wrapped", "oren_nayar", "toon", "cook_torrance")
 SCENES = ("lambert-sphere", "fig-8-9", "plastic-spheres")
 PICTURED = SCENES[-1]
 SIDE, SAMPLES = 192, 256
+
+SPHERES = {
+    ("map", "phong"): "phong",
+    ("map", "harmonics"): "harmonics",
+    ("map", "split_sum"): "split sum",
+    ("lamps", "cook_torrance"): "lamps as points",
+    ("lamps", "ltc"): "lamps by ltc",
+}
+"""Shaders of docs/scenes/spheres.py, by its light and their files."""
 
 
 def comparisons() -> dict[tuple[str, str], Comparison]:
@@ -70,6 +85,54 @@ def lamp() -> Iterator[str]:
         f" {metallic[1][0]:.2f}.",
         width=110,
     )
+
+
+def spheres() -> dict[tuple[str, str], Comparison]:
+    """Compare shaders of environments and of lamps on spheres; keys are those of `SPHERES`."""
+    scene = runpy.run_path(str(ROOT / "docs/scenes/spheres.py"))["scene"]
+    found = {}
+    for light, name in SPHERES:
+        asked = Options(heuristic=str(SHADERS / f"{name}.py"), spp=2 * SAMPLES)
+        case = open_case(partial(scene, light), asked, name=light)
+        found[light, name] = compare(case.source, case.options)
+    return found
+
+
+def table_of_spheres(found: dict[tuple[str, str], Comparison]) -> Iterator[str]:
+    """Yield the departures on the spheres: over all, over the plastic ones, and over the gold."""
+    rows = []
+    for (light, name), comparison in found.items():
+        record = comparison.record
+        means = [record.metrics[LEADING.name].mean]
+        for kind in ("plastic", "gold"):
+            one = [region for region in record.objects if region.name.startswith(kind)]
+            total = sum(region.mean_dE2000 * region.pixels for region in one)
+            means.append(total / sum(region.pixels for region in one))
+        rmse = record.metrics["rmse"].mean
+        rows.append((_link(name), light, *(f"{mean:.2f}" for mean in means), f"{rmse:.3f}"))
+    yield from markdown([("Shader", "Light", "all", "plastic", "gold", "RMSE"), *rows], right=2)
+
+
+def picture_of_spheres(found: dict[tuple[str, str], Comparison]) -> Figure:
+    """Draw each shader beside the reference, and the error beside both."""
+    titles = "shader", "reference", LEADING.label
+    with rc_context(model_figures.STYLE):
+        figure = Figure(figsize=(9.6, 1.22 * len(found) + 0.3), facecolor=model_figures.GROUND)
+        grid = figure.subplots(len(found), 3)
+        figure.subplots_adjust(0.03, 0, 0.93, 0.955, wspace=0.02, hspace=0.03)
+        for line, (key, comparison) in zip(grid, found.items(), strict=True):
+            shown = comparison.images
+            error = images.error_map(shown.maps[LEADING.name], LEADING.map_range[1])
+            pictures = images.tonemap(shown.heuristic), images.tonemap(shown.reference), error
+            for axes, picture in zip(line, pictures, strict=True):
+                axes.imshow(picture.convert("RGB"), interpolation="none", aspect="auto")
+                axes.axis("off")
+            line[0].text(-0.02, 0.5, SPHERES[key], rotation=90, ha="right", va="center",
+                         fontsize=9, transform=line[0].transAxes)  # fmt: skip
+        for axes, title in zip(grid[0], titles, strict=True):
+            axes.set_title(title, pad=4)
+        figures.legend(figure, figure.add_axes((0.94, 0.02, 0.012, 0.93)))
+    return figure
 
 
 def mistakes() -> Iterator[str]:

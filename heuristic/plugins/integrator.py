@@ -28,6 +28,7 @@ equal rays. Python::
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from operator import is_
 from time import perf_counter
 from typing import Any, Self
@@ -35,7 +36,7 @@ from typing import Any, Self
 import drjit as dr
 import mitsuba as mi
 
-from fotismos.heuristic import heuristics
+from fotismos.heuristic import background, heuristics
 from fotismos.heuristic.convention import (
     Colour,
     Direction,
@@ -150,6 +151,8 @@ def define() -> dict[str, Any]:
             ``shares`` are factors on the material's coefficients, for images of single terms.
             """
             prepared = self.known(scene).prepared
+            emitter = scene.environment()
+            behind = emitter and partial(background.radiance, emitter, at=si)
 
             def evaluate(*arguments: Any) -> Colour:
                 shading = ShadingArguments._make(arguments)
@@ -160,7 +163,7 @@ def define() -> dict[str, Any]:
                     }
                     shading = shading._replace(material=replace(shading.material, **changed))
                 return self.model.evaluate(
-                    shading, si.uv, self.parameters, prepared, si.wavelengths
+                    shading, si.uv, self.parameters, prepared, si.wavelengths, behind
                 )
 
             return evaluate

@@ -167,9 +167,16 @@ class Renderer:
                 self._replayed = None
         return _rendered(self.scene, self.integrator, spp, seed)
 
+    @property
+    def preparation(self) -> float:
+        """The seconds in which its heuristic prepared the scene; the first pass has them, too."""
+        seconds: float = getattr(self.integrator, "preparation", 0.0)
+        return seconds
+
     def pass_times(self) -> Times:
-        """Return the :class:`Times` of the passes so far."""
-        return Times.of(self.times, self.compilation)
+        """Return the :class:`Times` of the passes so far, without the preparation."""
+        first = max(self.times[0] - self.preparation, 0.0)
+        return Times.of([first, *self.times[1:]], self.compilation)
 
 
 def warm(renderer: Renderer) -> None:

@@ -4,13 +4,16 @@ Mitsuba's logger writes to standard output, which is for results. Its messages a
 so a record can state them.
 """
 
+import ast
 import hashlib
 import re
 import runpy
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from inspect import Parameter as Argument
+from inspect import signature
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -18,7 +21,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
-from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.errors import InputError, suggestion
 from fotismos.heuristic.user_code import contained
 from fotismos.reference.scene.graph import (
     SCRIPT,
@@ -44,23 +47,38 @@ def text_of(path: Path) -> str:
 
 
 def placeholders(path: Path) -> set[str]:
-    """Return the names of the placeholders ``$name`` in a scene file; none in other files."""
-    is_scene = path.suffix == ".xml" and path.is_file()
-    return set(re.findall(r"\$(\w+)", text_of(path))) if is_scene else set()
+    """Return the names of the placeholders ``$name`` in a scene file, and what a script takes."""
+    if path.suffix not in (".xml", ".py") or not path.is_file():
+        return set()
+    text = text_of(path)
+    if path.suffix == ".py":
+        with suppress(SyntaxError):  # running it names the line
+            made = [one for one in ast.parse(text).body if isinstance(one, ast.FunctionDef)]
+            lists = [one.args for one in made if one.name == SCRIPT]
+            return {arg.arg for args in lists for arg in (*args.args, *args.kwonlyargs)}
+        return set()
+    return set(re.findall(r"\$(\w+)", text))
 
 
 @dataclass(frozen=True)
 class Script:
-    """A function that runs a Python file and returns its scene, a dictionary."""
+    """A function that runs a Python file and returns its scene, a dictionary.
+
+    ``values`` are arguments of the file's function, by name.
+    """
 
     path: Path
+    values: Mapping[str, str] = field(default_factory=dict)
 
     def __call__(self) -> Any:
-        """Run the file; ``InputError`` if it raises or has no scene."""
+        """Run the file; ``InputError`` if it raises, has no scene, or takes other values."""
         try:
             with contained(self.path):
                 scene = runpy.run_path(str(self.path)).get(SCRIPT)
-                content = scene() if callable(scene) else scene
+                self._check(scene)
+                content = scene(**self.values) if callable(scene) else scene
+        except InputError:
+            raise
         except (Exception, SystemExit) as error:  # a user's code may raise anything
             raise InputError(f"{self.path}: {type(error).__name__}: {error}") from error
         if not isinstance(content, Mapping):
@@ -69,6 +87,24 @@ class Script:
                 " mitsuba.load_dict, or a function that returns one."
             )
         return content
+
+    def _check(self, scene: Any) -> None:
+        """Raise InputError if the function takes none of the values, or needs another."""
+        known = dict(signature(scene).parameters) if callable(scene) else {}
+        if any(one.kind is Argument.VAR_KEYWORD for one in known.values()):
+            return
+        takes = ", ".join(known) or "none"
+        for name in self.values:
+            if name not in known:
+                raise InputError(
+                    f"-D {name}: `{SCRIPT}` of {self.path} does not take it"
+                    f"{suggestion(name, known)}; it takes {takes}. Correct the name, or omit it."
+                )
+        needed = [name for name, one in known.items() if one.default is Argument.empty]
+        if missing := ", ".join(name for name in needed if name not in self.values):
+            raise InputError(
+                f"`{SCRIPT}` of {self.path} needs {missing}. Give -D NAME=VALUE for each."
+            )
 
 
 @dataclass(eq=False)

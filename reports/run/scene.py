@@ -98,7 +98,10 @@ def _stages(record: ComparisonRecord, seconds: float) -> Seconds:
     rendering = record.time.heuristic.total_s + record.time.reference.total_s
     spent = {
         "scenes and plans": stages["scene and pairing"] + stages["planning"] + stages["guard"],
-        "rendering": rendering + stages["sums of passes"] + stages["timing"],
+        "rendering": rendering
+        + stages.get("preparation", 0.0)
+        + stages["sums of passes"]
+        + stages["timing"],
         "terms": stages.get("terms", 0.0),
         CAUSES: stages.get(CAUSES, 0.0),
     }

@@ -93,9 +93,43 @@ def test_a_command_repeats_what_was_given(rgb, tmp_path):
 def test_values_for_placeholders_are_refused_where_there_are_none(rgb, tmp_path):
     script = tmp_path / "s.py"
     script.write_text(SCRIPT)
-    for scene in ("fig-8-9", script, spectral_scene):
-        with pytest.raises(InputError, match=r"-D foo: only Mitsuba files"):
+    for scene in ("fig-8-9", spectral_scene):
+        with pytest.raises(InputError, match=r"-D foo: only files take values"):
             open_case(scene, Options(define={"foo": 1}))
+    with pytest.raises(InputError, match=r"-D foo: `scene` of .*s\.py does not take it.*none"):
+        open_case(script, Options(define={"foo": 1}))
+
+
+def test_a_script_takes_values(rgb, tmp_path):
+    script = tmp_path / "s.py"
+    script.write_text(
+        "def scene(radiance, *, size='2'):\n"
+        "    ball = {'type': 'sphere', 'radius': float(size)}\n"
+        "    light = {'type': 'constant', 'radiance': float(radiance)}\n"
+        "    view = {'type': 'perspective'}\n"
+        "    return {'type': 'scene', 'ball': ball, 'light': light, 'view': view}\n"
+    )
+    assert source.placeholders(script) == {"radiance", "size"}
+    digests = set()
+    for values in ({"radiance": "0.5"}, {"radiance": "0.25"}, {"radiance": "0.5", "size": "3"}):
+        made = open_case(script, Options(define=values)).source
+        graph = made.parse()
+        (light,) = graph.nodes(mi.ObjectType.Emitter)
+        assert graph.props(light)["radiance"] == float(values["radiance"])
+        digests.add(source.digest(made))
+    assert len(digests) == 3
+    for values, message in (
+        ({}, r"`scene` of .*s\.py needs radiance\. Give -D NAME=VALUE"),
+        ({"size": "1"}, r"needs radiance\."),
+        ({"radiance": "1", "colour": "2"}, r"-D colour: .* does not take it; .* radiance, size"),
+        ({"radiance": "bright"}, r"s\.py: ValueError: could not convert"),
+    ):
+        with pytest.raises(InputError, match=message):
+            open_case(script, Options(define=values))
+    script.write_text(
+        "def scene(**values):\n    return {'type': 'scene', 'v': {'type': 'perspective'}}"
+    )
+    open_case(script, Options(define={"anything": "1"}))
 
 
 REFUSED = [
