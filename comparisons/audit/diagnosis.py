@@ -1,10 +1,10 @@
-"""Describe a shader's mistakes: probe it, and compare it with known mistakes in the textbook's model.
+"""Describe a shader's mistakes: probe it, and compare it with the textbook's model.
 
-The probes (:mod:`fotismos.comparisons.audit.probes`) know no model. The textbook's model is a sum of terms, each a coefficient times emission, ambient, diffuse or
-specular light. A shader that equals this sum, with coefficients of 1, is right. One that equals the
-sum of a *changed* model has made that mistake, whatever its coefficients; each coefficient that is
-not 1 is a further mistake. A shader that equals neither is another model, of which only the probes
-know.
+The probes (:mod:`fotismos.comparisons.audit.probes`) know no model. The textbook's is a sum of
+terms, each a coefficient times emission, ambient, diffuse or specular light. A shader that equals
+this sum, with coefficients of 1, is right. One that equals the sum of a *changed* model has made
+that mistake, whatever its coefficients; each coefficient that is not 1 is a further mistake. A
+shader that equals neither is another model, of which only the probes know.
 """
 
 from collections.abc import Callable, Iterator
@@ -92,11 +92,12 @@ def describe(name: str) -> tuple[str, ...]:
     with mi.scoped_set_variant(DEFAULT_VARIANT):
         heuristic = heuristics.named(name)
         try:
-            sure, vague = probes.findings(heuristic)
-            found = [*sure, *_compared(heuristic)]
+            found = probes.findings(heuristic)
+            sure = [words for name, words in found.items() if not probes.PROBES[name].vague]
+            sure += _compared(heuristic)
         except Exception:  # a user's code may raise anything where it was not tried
             return ()
-    return tuple(found or vague)
+    return tuple(sure or found.values())
 
 
 def _compared(heuristic: Heuristic) -> Iterator[str]:

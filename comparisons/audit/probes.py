@@ -12,11 +12,11 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from fotismos.comparisons.audit import furnace
 from fotismos.comparisons.audit.furnace import UP, direction
 from fotismos.comparisons.audit.subjects import shaded
 from fotismos.comparisons.departure.colour import from_srgb
 from fotismos.comparisons.pictures import CHANNELS, MISREADINGS, factor_of_pi
-from fotismos.comparisons.textbook import unit
 from fotismos.heuristic.heuristics import Heuristic
 from fotismos.heuristic.lights import INVERSE_SQUARE, PointLight
 
@@ -29,15 +29,13 @@ SURFACES = {
 }
 """A white matte surface, a black one with a lobe, and a grey one with a lobe."""
 
-COEFFICIENTS = {"k_a": "k_d", "k_d": "k_d", "base_color": "k_d", "k_s": "k_s"}
-"""The colours of a material, and the coefficient of a surface that each has."""
-
 LIGHT = 0.1
 """Intensity of a light: no value comes near 1, where a shader may cut it."""
 
-DIM = LIGHT * 2 ** np.arange(-6, 0.1, 0.25)
-BRIGHT = LIGHT * 2 ** np.arange(0, 10.1, 0.25)
-"""Intensities, a quarter of a stop apart."""
+STOP = 4
+DIM = LIGHT * 2 ** (np.arange(-24, 1) / STOP)
+BRIGHT = LIGHT * 2 ** (np.arange(0, 41) / STOP)
+"""Intensities, so many to each doubling of the light."""
 
 POINTS = 64
 """Points in random directions."""
@@ -59,8 +57,8 @@ MANY = 0.1
 class Cases:
     """Points with lights of their own; vectors are (3, N) or (3,), the others (N,) or numbers.
 
-    ``toward`` are unit vectors to each light, ``view`` is one to the viewer. ``colour`` (3,)
-    multiplies the coefficients of the ``surface``, one of :data:`SURFACES`, ``tint`` (3,) the ``intensity``.
+    ``toward`` are unit vectors to each light, ``view`` is one to the viewer. ``tint`` (3,) is the
+    colour of the light, and ``colour`` (3,) that of the ``surface``, one of :data:`SURFACES`.
     """
 
     toward: tuple[Array, ...]
@@ -69,8 +67,8 @@ class Cases:
     position: Any = (0.5, 0.5, 1.5)
     distance: Any = 1.0
     intensity: Any = LIGHT
-    tint: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    tint: Any = (1.0, 1.0, 1.0)
+    colour: Any = (1.0, 1.0, 1.0)
     surface: str = "mixed"
 
 
@@ -78,39 +76,54 @@ Values = Mapping[str, Array]
 """What lights add at the points of named cases, (3, N) each."""
 
 
+Find = Callable[[Values], str | None]
+"""Returns a sentence, an empty one if all is well, and None if it cannot tell."""
+
+
 @dataclass(frozen=True)
 class Probe:
-    """What is varied, and what must follow.
+    """What is varied, and what is found.
 
-    ``find`` returns a sentence, an empty one if all is well, and None if it cannot tell. It is
-    asked if all is well with the probes ``after`` which it comes. A ``vague`` one is heard if
+    It is asked if all is well with the probes ``after`` which it comes. A ``vague`` one is heard if
     nothing else is found.
     """
 
-    name: str
+    find: Find
     cases: Mapping[str, Cases]
-    find: Callable[[Values], str | None]
-    after: tuple[str, ...] = ()
-    vague: bool = False
+    after: tuple[str, ...]
+    vague: bool
 
 
-def findings(heuristic: Heuristic) -> tuple[list[str], list[str]]:
-    """Return what the probes find in a heuristic, as sentences: the sure ones, and the vague."""
-    cases = {(probe.name, name): case for probe in PROBES for name, case in probe.cases.items()}
+PROBES: dict[str, Probe] = {}
+"""All probes, each after those that it builds on. Exchanging light and viewer is not one of them:
+Phong's lobe, sheen and rims are right, and not reciprocal; a reversed view shows in the mirror."""
+
+
+def probe(cases: Mapping[str, Cases], *after: str, vague: bool = False) -> Callable[[Find], Find]:
+    """Declare a function as a probe; its first line states what must follow."""
+
+    def declared(find: Find) -> Find:
+        PROBES[find.__name__] = Probe(find=find, cases=cases, after=after, vague=vague)
+        return find
+
+    return declared
+
+
+def findings(heuristic: Heuristic) -> dict[str, str]:
+    """Return what the probes find in a heuristic, as sentences by the probe's name."""
+    cases = {(name, part): each.cases[part] for name, each in PROBES.items() for part in each.cases}
     # One kernel for all cases with one light, and one for those with two.
     values: dict[tuple[str, str], Array] = {}
     for number in (1, 2):
         alike = {key: case for key, case in cases.items() if len(case.toward) == number}
         values |= dict(zip(alike, evaluate(heuristic, tuple(alike.values())), strict=True))
     said: dict[str, str | None] = {}
-    for probe in PROBES:
-        seen = {name: values[probe.name, name] for name in probe.cases}
-        is_asked = all(said[name] == "" for name in probe.after)
-        is_finite = all(np.isfinite(each).all() for each in seen.values())
-        said[probe.name] = probe.find(seen) if is_asked and is_finite else None
-    sure = [words for probe in PROBES if (words := said[probe.name]) and not probe.vague]
-    vague = [words for probe in PROBES if (words := said[probe.name]) and probe.vague]
-    return sure, vague
+    for name, each in PROBES.items():
+        seen = {part: values[name, part] for part in each.cases}
+        is_asked = all(said[other] == "" for other in each.after)
+        is_lit = 0 < sum(np.abs(value).sum() for value in seen.values()) < np.inf  # nor NaN
+        said[name] = each.find(seen) if is_asked and is_lit else None
+    return {name: words for name, words in said.items() if words}
 
 
 def evaluate(heuristic: Heuristic, cases: Sequence[Cases]) -> list[Array]:
@@ -131,10 +144,11 @@ def evaluate(heuristic: Heuristic, cases: Sequence[Cases]) -> list[Array]:
     ]
     dark = [replace(light, intensity=0 * light.intensity) for light in lights]
     point = (joined["position"], joined["normal"], joined["view"])
-    colours = {name: joined[of] for name, of in COEFFICIENTS.items()}
-    numbers = {name: joined[name][0] for name in ("n", "alpha", "ior")}
+    material = {name: joined[name] for name in ("k_d", "k_s")}
+    material |= {name: joined["k_d"] for name in ("k_a", "base_color")}
+    material |= {name: joined[name][0] for name in ("n", "alpha", "ior")}
     bright, black = (
-        np.array(shaded(heuristic, point, colours | numbers, each), float).reshape(3, -1)
+        np.array(shaded(heuristic, point, material, each), float).reshape(3, -1)
         for each in (lights, dark)
     )
     added = np.broadcast_to(bright - black, (3, sum(sizes)))
@@ -156,59 +170,50 @@ def _inputs(case: Cases) -> dict[str, Array]:
 
 # --- Directions --------------------------------------------------------------------------------
 
+HIGH, VIEW = furnace.random_pairs(POINTS)
+TOWARD, OTHER = (np.roll(each, 1, axis=1) for each in furnace.random_pairs(POINTS, eta=1.0))
+"""To lights and viewers above the horizon, and to lights on both sides of it."""
 
-def _directions(seed: int, above: Any = None) -> Array:
-    """Return random unit vectors (3, N); ``above`` puts them on the side of others, at 9 degrees.
-
-    They are further from the horizon, but not nearer to it.
-    """
-    vectors = unit(np.random.default_rng(seed).normal(size=(POINTS, 3))).T
-    if above is None:
-        return vectors
-    cosines = (vectors * above).sum(axis=0)
-    return unit((vectors * np.sign(cosines) + 0.2 * above).T).T
-
-
-NORMAL = _directions(1)
-VIEW = _directions(2, NORMAL)
-TOWARD = _directions(3)
-OTHER = _directions(4)
-POSITION = 2 * _directions(5)
-"""Surfaces seen from above, anywhere, with lights on both sides."""
-
-TURN = np.linalg.qr(_directions(6)[:, :3])[0]
-"""A rotation, or one with a reflection."""
-
-HIGH = _directions(7, UP)
-ALSO_HIGH = _directions(8, UP)
+TURN = np.linalg.qr(HIGH[:, :3])[0]
+TURN *= np.linalg.det(TURN)  # a rotation without a reflection
 
 COSINES = np.linspace(0.05, 1, 400)
 RISING = direction(np.arccos(COSINES), 0.4)
+DOWN = np.array([[1], [1], [-1]])
 
-ELEVATIONS = ((60.0, 75.0), (75.0, 60.0), (70.0, 70.0))
-AZIMUTHS = np.arange(0.0, 360, 5)
-"""Degrees from the normal of lights and viewers, and degrees that viewers turn about it."""
-
-
-def _flipped(vectors: Array) -> Array:
-    return vectors * [[1], [1], [-1]]
+ELEVATIONS = np.deg2rad([(60, 75), (75, 60), (70, 70)])
+AZIMUTHS = np.deg2rad(np.arange(0, 360, 5))
+"""Angles of a light and a viewer from the normal, and of viewers about it."""
 
 
-def _anywhere(turn: Array = np.eye(3), toward: tuple[Array, ...] = (TOWARD,), **more: Any) -> Cases:
-    turned = tuple(turn @ each for each in toward)
-    return Cases(turned, view=turn @ VIEW, normal=turn @ NORMAL, position=POSITION, **more)
+ANYWHERE = Cases(toward=(TOWARD,), view=VIEW, position=2 * OTHER)
+TURNED = replace(ANYWHERE, toward=(TURN @ TOWARD,), view=TURN @ VIEW, normal=TURN @ UP)
+RISEN = Cases(toward=(RISING,), surface="matte")
+HEIGHTS = {"above": RISEN, "below": replace(RISEN, toward=(RISING * DOWN,))}
+LOBE = Cases(toward=(HIGH,), view=VIEW, surface="glossy")
+AROUND = Cases(
+    toward=(np.repeat(direction(ELEVATIONS[:, 0], 0.0), len(AZIMUTHS), axis=1),),
+    view=np.hstack([direction(elevation, AZIMUTHS) for elevation in ELEVATIONS[:, 1]]),
+    surface="glossy",
+)
 
 
 def _stops(intensities: Array) -> Cases:
     """Return the points anywhere, at one intensity after the other."""
     count = len(intensities)
     return Cases(
-        (np.tile(TOWARD, count),),
+        toward=(np.tile(TOWARD, count),),
         view=np.tile(VIEW, count),
-        normal=np.tile(NORMAL, count),
-        position=np.tile(POSITION, count),
         intensity=np.repeat(intensities, POINTS),
     )
+
+
+def _coloured(what: str) -> dict[str, Cases]:
+    """Return points in light of one channel, or surfaces of one channel."""
+    primaries = zip(CHANNELS, np.eye(3), strict=True)
+    if what == "light":
+        return {f"{name} light": replace(ANYWHERE, tint=colour) for name, colour in primaries}
+    return {f"{name} surface": replace(RISEN, colour=colour) for name, colour in primaries}
 
 
 def _share(a: Array, b: Array) -> float:
@@ -216,6 +221,18 @@ def _share(a: Array, b: Array) -> float:
     size = np.maximum(np.abs(a), np.abs(b)).max(axis=0)
     is_lit = size > 1e-4 * size.max()
     return float((np.abs(a - b).max(axis=0) > ALIKE * size)[is_lit].mean())
+
+
+def _brightest(values: Array) -> Array:
+    """Return the values at the intensities of the brightest point, in its brightest channel."""
+    table = values.reshape(3, -1, POINTS)
+    channel, _, point = np.unravel_index(table.argmax(), table.shape)
+    brightest: Array = table[channel, :, point]
+    return brightest
+
+
+def _is_even(ratios: Array) -> bool:
+    return bool(np.ptp(ratios) <= ALIKE * np.abs(ratios).max())
 
 
 # --- Probes ------------------------------------------------------------------------------------
@@ -230,114 +247,144 @@ ENCODINGS: dict[str, Callable[[Array], Array]] = {
 """Mistakes in how a shader encodes its values, and their inverses."""
 
 
-def _brightest(values: Array) -> Array:
-    """Return the values at intensities, of the brightest point and channel: (intensities,)."""
-    table = values.reshape(3, -1, POINTS)
-    channel, _, point = np.unravel_index(table.argmax(), table.shape)
-    return table[channel, :, point]
-
-
-def _is_even(ratios: Array) -> bool:
-    return bool(np.ptp(ratios) <= ALIKE * np.abs(ratios).max())
-
-
-def _proportion(seen: Values) -> str | None:
+@probe({"dim": _stops(DIM)})
+def proportion(seen: Values) -> str | None:
+    """Twice the intensity gives twice the value."""
     value = _brightest(seen["dim"])
-    if value.min() <= 0 or np.mean(np.abs(np.diff(value)) < FLAT * value[1:]) > 0.5:
+    steps = np.abs(np.diff(value)) < FLAT * value[1:]
+    if value.min() <= 0 or np.mean(steps) > 0.5:
         return None  # dark, or in steps
     if _is_even(value / DIM):
         return ""
-    times = (value[-1] / value[0]) ** (1 / np.log2(DIM[-1] / DIM[0]))
     looks = [name for name, undo in ENCODINGS.items() if _is_even(undo(value) / DIM)]
     end = f": its {looks[0]}" if looks else ", not 2 times"
-    return f"Twice the light gives {times:.3g} times the value{end}."
+    return f"Twice the light gives {value[-1] / value[-1 - STOP]:.3g} times the value{end}."
 
 
-def _cut(seen: Values) -> str:
+@probe({"bright": _stops(BRIGHT)}, "proportion")
+def cut(seen: Values) -> str:
+    """However bright the light is, more of it gives more."""
     value = _brightest(seen["bright"])
-    is_cut = np.ptp(value[-5:]) <= FLAT * value[-1]
+    is_cut = np.ptp(value[-STOP:]) <= FLAT * value[-1]
     return f"Its values end at {value[-1]:.3g}: brighter light is cut off." if is_cut else ""
 
 
-def _channels(seen: Values) -> str:
+@probe(_coloured("light") | _coloured("surface"), "proportion")
+def channels(seen: Values) -> str:
+    """Each channel is its own, of light and surface."""
     for what in ("light", "surface"):
-        # Rows: the channel given. Columns: the channels shown.
-        shown = np.array([seen[f"{colour} {what}"].sum(axis=1) for colour in CHANNELS])
+        # Rows: what the light or the surface has. Columns: what is shown.
+        shown = np.array([seen[f"{name} {what}"].sum(axis=1) for name in CHANNELS])
         order = shown.argmax(axis=0)
-        right = np.diagonal(shown[order])
-        rest = (shown.sum(axis=0) - right) / np.maximum(right, 1e-9)
-        if sorted(order) != [0, 1, 2] or right.min() <= 0:
-            continue
-        if list(order) != [0, 1, 2]:
-            return f"Its channels look like {', '.join(CHANNELS[each] for each in order)}."
-        if rest.max() > 10 * ALIKE:
-            name = CHANNELS[rest.argmax()]
-            return f"Its channels are mixed: {rest.max():.0%} of {name} is of the other two."
+        if sorted(order) == [0, 1, 2] and list(order) != [0, 1, 2]:
+            return f"Its channels look like {', '.join(CHANNELS[given] for given in order)}."
+        # A tint of the shader's own is mixed with the surface's colour, but not with the light's.
+        share = 1 - np.diagonal(shown) / np.maximum(shown.sum(axis=0), 1e-9)
+        if what == "light" and share.max() > MANY:
+            of = f"{share.max():.0%} of its {CHANNELS[share.argmax()]} comes from the other two"
+            return f"Its channels are mixed: {of}."
     return ""
 
 
-def _turning(seen: Values) -> str | None:
-    if not seen["here"].any():
-        return None
+@probe(
+    {
+        "first": ANYWHERE,
+        "last": replace(ANYWHERE, toward=(OTHER,)),
+        "both": replace(ANYWHERE, toward=(TOWARD, OTHER)),
+    },
+    "proportion",
+)
+def both_lights(seen: Values) -> str:
+    """Two lights give the sum of each."""
+    both = seen["both"]
+    total = seen["first"] + seen["last"]
+    if _share(both, total) <= MANY:
+        return ""
+    end = "they are not added"
+    if _share(both, seen["first"]) <= MANY:
+        end = "only the first light is used"
+    elif _share(both, seen["last"]) <= MANY:
+        end = "only the last light is used, as if the sum were overwritten"
+    return f"Two lights give {both.sum() / total.sum():.3g} times the sum of each: {end}."
+
+
+FALL_OFFS = (
+    (1.0, ": the fall-off with the square of the distance is missing"),
+    (0.0625, ": it falls off with the square of the distance a second time"),
+)
+
+
+@probe({"near": ANYWHERE, "far": replace(ANYWHERE, distance=2.0)}, "proportion")
+def distance(seen: Values) -> str:
+    """At twice the distance the value is that of the intensity, which has fallen off."""
+    ratio = seen["far"].sum() / seen["near"].sum()
+    if abs(ratio - 0.25) <= ALIKE * 0.25:
+        return ""
+    named = [words for wanted, words in FALL_OFFS if abs(ratio - wanted) <= ALIKE * wanted]
+    end = named[0] if named else "; is the light vector not normalised?"
+    return f"At twice the distance its value is {ratio:.3g} times as large, not 0.25{end}."
+
+
+@probe({"here": ANYWHERE, "turned": TURNED}, vague=True)
+def turning(seen: Values) -> str:
+    """Turning surface, lights and viewer together changes nothing."""
     share = _share(seen["here"], seen["turned"])
     if share <= MANY:
         return ""
-    return (
-        f"It changes at {share:.0%} of the points if surface, lights and viewer are turned together:"
-        " is a vector in another space?"
-    )
+    changes = f"It changes at {share:.0%} of the points if surface, lights and viewer are turned"
+    return f"{changes} together: a vector is in another space."
 
 
-def _cosine(seen: Values) -> str | None:
+@probe(HEIGHTS, "proportion", "turning")
+def cosine(seen: Values) -> str:
+    """White matte goes with N.L, or with steps of it, seen along the normal."""
     value = seen["above"].mean(axis=0)
-    if value.max() <= ALIKE * seen["below"].mean(axis=0).max():
+    if value.max() <= ALIKE * seen["below"].max():
         return ""  # the next probe tells
     for power, name in ((1, ""), (0, "missing cosine"), (2, "squared cosine")):
         ratio = value / COSINES**power
-        is_ramp = np.mean(np.abs(np.diff(ratio)) < FLAT * ratio.max()) > 0.9
-        is_constant = np.ptp(ratio) <= 5 * ALIKE * ratio.max()
-        if is_ramp and power == 1 and not is_constant:
+        if np.ptp(ratio) <= 5 * ALIKE * ratio.max():
+            return name and f"On white matte its value goes with (N.L)^{power}: {name}."
+        if power == 1 and np.mean(np.abs(np.diff(ratio)) < FLAT * ratio.max()) > 1 - MANY:
             return "On white matte its value goes with N.L times steps of N.L: squared cosine."
-        if is_constant:
-            return f"On white matte its value goes with (N.L)^{power}: {name}." if name else ""
     return ""
 
 
-def _below(seen: Values) -> str | None:
-    above = seen["above"].mean(axis=0)
-    below = seen["below"].mean(axis=0)
-    if above.max() <= ALIKE * below.max():
-        shown = below.max() / LIGHT
+@probe(HEIGHTS, "turning", "cosine")
+def below(seen: Values) -> str:
+    """Light from above is seen, and light from below is not, or less."""
+    above = seen["above"].sum()
+    below = seen["below"].sum()
+    if above <= ALIKE * below:
+        shown = seen["below"].max() / LIGHT
         return (
             f"Light from below gives {shown:.3g} times its intensity, and light from above none:"
             " the light vector is reversed, or the normal."
         )
-    # From straight below: wrapped light may reach beyond the horizon.
-    ratio = below[-1] / above[-1]
-    if ratio <= ALIKE:
+    # Less is meant: light that is wrapped about the horizon, or that shines through.
+    if below <= 0.7 * above:
         return ""
-    is_same = np.abs(below - above).max() <= ALIKE * above.max()
-    end = "N.L has lost its sign" if is_same else "is the condition N.L > 0 missing?"
-    return f"Light from below gives {ratio:.0%} of the value of light from above: {end}"
+    share = f"{below / above:.0%} of the value of light from above"
+    return f"Light from below gives {share}: N.L has lost its sign."
 
 
-def _highlights(seen: Values) -> str | None:
-    above = seen["above"].mean()
-    ratio = seen["below"].mean() / above if above > 0 else 0
-    if ratio <= ALIKE:
+@probe({"above": LOBE, "below": replace(LOBE, toward=(HIGH * DOWN,))}, "below")
+def highlights(seen: Values) -> str:
+    """Light from below gives no highlight."""
+    ratio = seen["below"].sum() / seen["above"].sum()
+    # Above 1, what is seen is not a lobe.
+    if not ALIKE < ratio < 1:
         return ""
-    return (
-        f"Light from below gives highlights, {ratio:.0%} of those by light from above: is the"
-        " condition N.L > 0 missing?"
-    )
+    share = f"{ratio:.0%} of those by light from above"
+    return f"Light from below gives highlights, {share}: the condition N.L > 0 is missing."
 
 
-def _mirror(seen: Values) -> str | None:
-    around = seen["around"].mean(axis=0).reshape(len(ELEVATIONS), -1)
-    if around.max() <= 0:
-        return None
-    # At the azimuth of 180 degrees the viewer looks into the mirrored light.
-    ratio = around[:, around.shape[1] // 2].sum() / around.mean(axis=1).sum()
+@probe({"around": AROUND}, "highlights")
+def mirror(seen: Values) -> str:
+    """A highlight is where the viewer looks into the mirrored light."""
+    around = seen["around"].sum(axis=0).reshape(len(ELEVATIONS), -1)
+    # Halfway around, viewers look towards the mirrored light.
+    ratio = around[:, len(AZIMUTHS) // 2].sum() / around.mean(axis=1).sum()
     if ratio >= 0.5:
         return ""
     return (
@@ -347,97 +394,11 @@ def _mirror(seen: Values) -> str | None:
     )
 
 
-def _sum(seen: Values) -> str:
-    first, last = seen["first"], seen["last"]
-    if not (first.any() and last.any()) or _share(seen["both"], first + last) <= MANY:
-        return ""
-    ratio = seen["both"].sum() / (first + last).sum()
-    if _share(seen["both"], first) <= MANY:
-        end = "only the first light is used"
-    elif _share(seen["both"], last) <= MANY:
-        end = "only the last light is used; is the sum overwritten?"
-    else:
-        end = "they are not summed"
-    return f"Two lights give {ratio:.3g} times the sum of each: {end}"
-
-
-def _distance(seen: Values) -> str:
-    near, far = seen["near"].sum(), seen["far"].sum()
-    ratio = far / near if near > 0 else 0.25
-    if abs(ratio / 0.25 - 1) <= ALIKE:
-        return ""
-    names = {1.0: "the intensity's fall-off with the square of the distance is missing",
-             0.5: "is the light vector not normalised?",
-             0.0625: "the intensity falls off with the square of the distance a second time"}  # fmt: skip
-    near_to = min(names, key=lambda each: abs(each - ratio))
-    end = f": {names[near_to]}" if abs(ratio / near_to - 1) <= 10 * ALIKE else ""
-    return f"At twice the distance its value is {ratio:.3g} times as large, not 0.25{end}."
-
-
-def _factor(seen: Values) -> str:
+@probe({"facing": Cases(toward=(UP,), surface="matte")}, "proportion", "below", vague=True)
+def factor(seen: Values) -> str:
+    """White matte that faces a light is as bright as the intensity."""
     level = seen["facing"].mean() / LIGHT
     mistake = factor_of_pi(level)
     if not mistake and level > BRIGHTEST:
         mistake = "no surface is as bright; is a division by pi missing?"
-    return f"White matte has {level:.3g} times the light's intensity: {mistake}" if mistake else ""
-
-
-def _exchange(seen: Values) -> str:
-    there, back = seen["there"].mean(axis=0), seen["back"].mean(axis=0)
-    # Phong's value is the same, a BRDF's is over N.L.
-    brdf = there / HIGH[2], back / ALSO_HIGH[2]
-    error = min(
-        float(np.sqrt(np.mean((a - b) ** 2)) / max(np.mean(a + b), 1e-9))
-        for a, b in ((there, back), brdf)
-    )
-    if error <= 20 * ALIKE:
-        return ""
-    return f"Its highlights change by {error:.0%} as light and viewer change places: is one reversed?"
-
-
-PRIMARIES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-NEAR_AND_FAR = {"near": _anywhere(), "far": _anywhere(distance=2.0)}
-VERTICAL = {
-    "above": Cases((RISING,), surface="matte"), "below": Cases((_flipped(RISING),), surface="matte")
-}  # fmt: skip
-
-PROBES = (
-    Probe("proportion", {"dim": _stops(DIM)}, _proportion),
-    Probe("cut", {"bright": _stops(BRIGHT)}, _cut, after=("proportion",)),
-    Probe(
-        "channels",
-        {
-            f"{name} light": _anywhere(tint=colour)
-            for name, colour in zip(CHANNELS, PRIMARIES, strict=True)
-        }
-        | {
-            f"{name} surface": Cases((RISING,), colour=colour, surface="matte")
-            for name, colour in zip(CHANNELS, PRIMARIES, strict=True)
-        },
-        _channels,
-    ),
-    Probe("sum", {
-            "first": _anywhere(), "last": _anywhere(toward=(OTHER,)),
-            "both": _anywhere(toward=(TOWARD, OTHER)),
-        }, _sum, after=("proportion",)),
-    Probe("distance", {"near": _anywhere(), "far": _anywhere(distance=2.0)}, _distance, after=("proportion",)),
-    Probe("turning", {"here": _anywhere(), "turned": _anywhere(TURN)}, _turning, vague=True),
-    Probe("cosine", VERTICAL, _cosine, after=("turning", "proportion")),
-    Probe("below", VERTICAL, _below, after=("turning", "cosine")),
-    Probe("highlights", {
-            "above": Cases((HIGH,), view=ALSO_HIGH, surface="glossy"),
-            "below": Cases((_flipped(HIGH),), view=ALSO_HIGH, surface="glossy"),
-        }, _highlights, after=("below",)),
-    Probe("mirror", {
-        "around": Cases(
-            (np.repeat(direction(np.deg2rad([light for light, _ in ELEVATIONS]), 0.0), len(AZIMUTHS), axis=1),),
-            view=np.concatenate([direction(np.deg2rad(view), np.deg2rad(AZIMUTHS)) for _, view in ELEVATIONS], axis=1),
-            surface="glossy",
-        )}, _mirror, after=("highlights",)),
-    Probe("exchange", {
-        "there": Cases((HIGH,), view=ALSO_HIGH, surface="glossy"),
-        "back": Cases((ALSO_HIGH,), view=HIGH, surface="glossy"),
-    }, _exchange, after=("mirror",), vague=True),
-    Probe("factor", {"facing": Cases((UP,), surface="matte")}, _factor, after=("proportion", "below"), vague=True),
-)  # fmt: skip
-"""All of them, each after those that it builds on."""
+    return f"White matte has {level:.3g} times the light's intensity: {mistake}." if mistake else ""

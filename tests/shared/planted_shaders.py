@@ -64,7 +64,9 @@ KINDS = {
     "cut at 1": {"result": "dr.minimum(value, 1)"},
     "factor of pi": {"result": "value * 3.14159"},
     "fall-off twice": {"intensity": "light.intensity / dr.square(light.distance)"},
-    "fall-off left out": {"intensity": "light.intensity * dr.square(dr.minimum(light.distance, 9))"},
+    "fall-off left out": {
+        "intensity": "light.intensity * dr.square(dr.minimum(light.distance, 9))"
+    },
     "channels swapped": {"result": "mi.Spectrum(value[2], value[1], value[0])"},
     "sum overwritten": {"sum": f"= {RIGHT['first']} +"},
     "normal in another space": {
@@ -95,7 +97,7 @@ MESSAGES = {
     "light of either side": r"N\.L (has lost its sign|> 0 missing)",
     "gamma": "encoded by a power of 1/2.2",
     "cut at 1": "values end at 1",
-    "factor of pi": r"3\.14 times .* a missing division by pi|1/pi|missing division",
+    "factor of pi": "division by pi",
     "fall-off twice": "square of the distance a second time",
     "fall-off left out": "square of the distance is missing",
     "channels swapped": "blue, green, red",
@@ -130,7 +132,9 @@ class Planted:
         return Template(GLSL if is_glsl else PYTHON).substitute(pieces | changed)
 
 
-_BLINN = f"material.k_d * {{}} + material.k_s * dr.select(cosine > 0, {LOBE} ** (4 * material.n), 0)"
+_BLINN = (
+    f"material.k_d * {{}} + material.k_s * dr.select(cosine > 0, {LOBE} ** (4 * material.n), 0)"
+)
 _GGX = (
     "{} * (material.base_color * (1 - material.metallic) + dr.square(material.alpha / (1 -"
     f" {LOBE} ** 2 * (1 - dr.square(material.alpha)))) / 4 * dr.lerp(dr.square((material.ior - 1) /"
@@ -141,9 +145,7 @@ _TOON = "material.base_color * {}"
 
 SHADERS = (
     Planted("Lambert", "material.k_d * cosine", "material.k_d", "material.k_d * cosine * cosine"),
-    Planted(
-        "Blinn", _BLINN.format("cosine"), _BLINN.format("1"), _BLINN.format("cosine * cosine")
-    ),
+    Planted("Blinn", _BLINN.format("cosine"), _BLINN.format("1"), _BLINN.format("cosine * cosine")),
     Planted("Cook-Torrance", _GGX.format("cosine"), _GGX.format("1"), _GGX.format("cosine ** 2")),
     Planted(
         "toon",
