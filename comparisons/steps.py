@@ -13,11 +13,13 @@ from msgspec import structs
 
 from fotismos.comparisons.compare import Step
 from fotismos.comparisons.comparison import Comparison
+from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.price import with_price
 from fotismos.heuristic import heuristics
-from fotismos.reference.rendering.renderer import Progress
+from fotismos.reference.rendering.renderer import Progress, passes
+from fotismos.reference.rendering.sums import MEAN, Accumulator
 
 
 def steps(options: Options, why: bool) -> list[Step]:
@@ -27,7 +29,7 @@ def steps(options: Options, why: bool) -> list[Step]:
         return [*added, with_price]
     added = []
     if not heuristics.named(options.heuristic).is_builtin:
-        added.append(with_mistakes)
+        added += [with_mistakes, with_textbook]
     if why:
         from fotismos.comparisons.hybrids.attribution import with_causes  # see above
 
@@ -54,6 +56,22 @@ def with_mistakes(comparison: Comparison, ready: Prepared, progress: Progress | 
 
     mistakes = diagnosis.describe(ready.options.heuristic)
     return replace(comparison, record=structs.replace(comparison.record, mistakes=mistakes))
+
+
+def with_textbook(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
+    """Return a comparison with the error of Phong's picture, rendered as the heuristic's was."""
+    begin = perf_counter()
+    record = comparison.record
+    images = comparison.images
+    sums = Accumulator(MEAN)
+    renderer = ready.shaded_by(heuristics.PHONG.name)
+    for rendered in passes((renderer,), record.seed, record.plan.passes, stage="textbook"):
+        sums.add(rendered.images[0])
+    distance = leading_distance(record.viewing, ready.metrics())
+    counted = images.counted
+    errors = distance(sums.mean()[counted], images.reference[counted])
+    record = structs.replace(record, textbook=float(errors.mean()))
+    return replace(comparison, record=record).timed("textbook", perf_counter() - begin)
 
 
 def with_terms(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
