@@ -9,10 +9,12 @@ from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
+import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons.compare import Step
 from fotismos.comparisons.comparison import Comparison
+from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
@@ -65,12 +67,18 @@ def with_textbook(comparison: Comparison, ready: Prepared, progress: Progress | 
     images = comparison.images
     sums = Accumulator(MEAN)
     renderer = ready.shaded_by(heuristics.PHONG.name)
-    for rendered in passes((renderer,), record.seed, record.plan.passes, stage="textbook"):
+    for rendered in passes(
+        (renderer,), record.seed, record.plan.passes, progress=progress, stage="textbook image"
+    ):
         sums.add(rendered.images[0])
+    shown = sums.mean(np.float32)
     distance = leading_distance(record.viewing, ready.metrics())
     counted = images.counted
-    errors = distance(sums.mean()[counted], images.reference[counted])
-    record = structs.replace(record, textbook=float(errors.mean()))
+    total = sum(
+        distance(shown[rows][counted[rows]], images.reference[rows][counted[rows]]).sum()
+        for rows in bands(len(counted))
+    )
+    record = structs.replace(record, textbook=float(total / max(counted.sum(), 1)))
     return replace(comparison, record=record).timed("textbook", perf_counter() - begin)
 
 
