@@ -177,11 +177,11 @@ TOWARD, OTHER = (np.roll(each, 1, axis=1) for each in furnace.random_pairs(POINT
 TURN = np.linalg.qr(HIGH[:, :3])[0]
 TURN *= np.linalg.det(TURN)  # a rotation without a reflection
 
-COSINES = np.linspace(0.05, 1, 400)
+COSINES = np.linspace(0.05, 0.99, 400)  # not 1: a reversed view would have no half vector
 RISING = direction(np.arccos(COSINES), 0.4)
 DOWN = np.array([[1], [1], [-1]])
 
-ELEVATIONS = np.deg2rad([(60, 75), (75, 60), (70, 70)])
+ELEVATIONS = np.deg2rad([(60, 75), (75, 60), (70, 65)])
 AZIMUTHS = np.deg2rad(np.arange(0, 360, 5))
 """Angles of a light and a viewer from the normal, and of viewers about it."""
 
@@ -190,6 +190,7 @@ ANYWHERE = Cases(toward=(TOWARD,), view=VIEW, position=2 * OTHER)
 TURNED = replace(ANYWHERE, toward=(TURN @ TOWARD,), view=TURN @ VIEW, normal=TURN @ UP)
 RISEN = Cases(toward=(RISING,), surface="matte")
 HEIGHTS = {"above": RISEN, "below": replace(RISEN, toward=(RISING * DOWN,))}
+FACING = Cases(toward=(UP,), view=direction(0.5, 0.0), surface="matte")
 LOBE = Cases(toward=(HIGH,), view=VIEW, surface="glossy")
 AROUND = Cases(
     toward=(np.repeat(direction(ELEVATIONS[:, 0], 0.0), len(AZIMUTHS), axis=1),),
@@ -345,8 +346,10 @@ def cosine(seen: Values) -> str:
         ratio = value / COSINES**power
         if np.ptp(ratio) <= 5 * ALIKE * ratio.max():
             return name and f"On white matte its value goes with (N.L)^{power}: {name}."
-        if power == 1 and np.mean(np.abs(np.diff(ratio)) < FLAT * ratio.max()) > 1 - MANY:
-            return "On white matte its value goes with N.L times steps of N.L: squared cosine."
+        edges = np.abs(np.diff(ratio)) >= FLAT * ratio.max()
+        if power == 1 and edges.mean() < MANY:
+            steps = f"N.L times a ramp of {edges.sum() + 1} steps"
+            return f"On white matte its value goes with {steps}: squared cosine."
     return ""
 
 
@@ -371,11 +374,12 @@ def below(seen: Values) -> str:
 @probe({"above": LOBE, "below": replace(LOBE, toward=(HIGH * DOWN,))}, "below")
 def highlights(seen: Values) -> str:
     """Light from below gives no highlight."""
-    ratio = seen["below"].sum() / seen["above"].sum()
-    # Above 1, what is seen is not a lobe.
-    if not ALIKE < ratio < 1:
+    above = seen["above"].sum()
+    below = seen["below"].sum()
+    # With more from below, what is seen is not a lobe.
+    if not ALIKE * above < below < above:
         return ""
-    share = f"{ratio:.0%} of those by light from above"
+    share = f"{below / above:.0%} of those by light from above"
     return f"Light from below gives highlights, {share}: the condition N.L > 0 is missing."
 
 
@@ -394,7 +398,7 @@ def mirror(seen: Values) -> str:
     )
 
 
-@probe({"facing": Cases(toward=(UP,), surface="matte")}, "proportion", "below", vague=True)
+@probe({"facing": FACING}, "proportion", "below", vague=True)
 def factor(seen: Values) -> str:
     """White matte that faces a light is as bright as the intensity."""
     level = seen["facing"].mean() / LIGHT

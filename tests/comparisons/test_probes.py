@@ -50,7 +50,7 @@ OTHERS = {
     "Minnaert": "value += I * m.base_color * dr.maximum(c, 1e-6) ** 0.8 * facing ** -0.2",
     "sheen": "value += I * c * (m.base_color + 0.5 * (1 - facing) ** 5)",
     "a rim": "value += I * (c * m.base_color + dr.select(signed > 0, 0.3, 0) * (1 - facing) ** 3)",
-    "a soft ramp": "value += I * m.base_color * (soft(0, 0.05, signed) + soft(0.5, 0.6, signed))",
+    "a soft ramp": "value += I * m.base_color * (soft(0, 0.05, signed) + soft(0.5, 0.6, c)) / 2",
     "two tones": "value += I * m.base_color * dr.select(signed > 0.3, 1, 0.2)",
     "a toon highlight": "value += I * (m.base_color * dr.ceil(c * 4) / 4"
     " + m.k_s * dr.select((top > 0.95) & (signed > 0), 1, 0))",
@@ -60,7 +60,7 @@ OTHERS = {
     "no intensity": "value += m.base_color * dr.ceil(c * 3) / 3",
     "a pattern": "value += I * c * m.base_color * (1 + dr.sin(9 * point.position.x))",
     "leaves": "value += I * m.base_color * (c + 0.3 * dr.maximum(-signed, 0))",
-    "mirrors alone": "value = value * 0 + I * m.k_s * dr.select(signed > 0, top ** m.n, 0)",
+    "mirrors alone": "value += I * m.k_s * dr.select(signed > 0, top ** (4 * m.n), 0)",
     "normals": "value = mi.Spectrum(0.5 * n + 0.5)",
     "fog": "value += I * c * m.base_color\n"
     "    value = dr.lerp(value, 0.5, dr.exp(-dr.norm(point.position)))",
@@ -69,14 +69,12 @@ OTHERS = {
     " mi.Spectrum(dr.maximum((signed + 0.4) / 1.4, 0), c, c)",
     "F0 of its own": "value += I * c * (m.base_color + 0.04 * m.alpha ** 2 /"
     " (1 - top * top * (1 - m.alpha ** 2)) ** 2 / (c + facing + 0.1))",
-    "another divisor": "value += I * c * m.base_color * 0.8",
 }  # fmt: skip
 """What is added in the loop over the lights."""
 
 BROKEN = {
     "fails": "value += I * c\n    if len(point.lights) == 1:\n        raise RuntimeError('no')",
-    "is not finite": "value += I * c / dr.select(dr.squared_norm(toward - v) < 9, 1, 1)"
-    "\n    value /= dr.select(len(point.lights) == 1, 0, 1)",
+    "is not finite": "value += I * c\n    if len(point.lights) == 1:\n        value /= mi.Float(0)",
 }
 
 
@@ -94,7 +92,8 @@ def test_planted_mistakes_are_named(rgb, tmp_path, shader):
         path.write_text(shader.text(kind), encoding="utf-8")
         (said,) = diagnosis.describe(str(path))
         assert re.search(message, said), (kind, said)
-        assert re.search(r"\d|blue, green, red|[xyz], -?[xyz]", said), (kind, said)
+        is_number = r"\d|blue, green, red|\(x, z, -y\)"
+        assert re.search(is_number, said), (kind, said)
 
 
 @pytest.mark.parametrize("shader", EACH)
@@ -110,13 +109,17 @@ def test_nothing_is_said_of_what_is_meant(rgb, tmp_path, body):
 
 
 FURTHER = {
-    "gates for highlights": ("value += I * (c + m.k_s * top ** m.n)", "gives highlights, .* N.L > 0"),
+    "gates for highlights": (
+        "value += I * (c + m.k_s * top ** m.n)", "gives highlights, .* N.L > 0"
+    ),
     "a view reversed": (
         "value += I * c * (m.base_color + m.k_s * dr.maximum(dr.dot(n,"
         " dr.normalize(toward - v)), 1e-6) ** m.n)", "the view vector or the mirrored one",
     ),
     "a tone curve": ("value += I * c\n    value = value / (1 + value)", "tone-mapped by x / "),
-    "another one": ("value += I * c\n    value = 1 - dr.exp(-value)", "1.9. times the value, not 2"),
+    "another one": (
+        "value += I * c\n    value = 1 - dr.exp(-value)", "1.9. times the value, not 2"
+    ),
     "a length": ("value += I * dr.maximum(dr.dot(n, toward * dr.minimum(light.distance, 9)), 0)",
                  "0.5 times as large, not 0.25; is the light vector not normalised"),
     "the first light": ("value += I * c * m.base_color\n        break", "only the first light"),
@@ -168,7 +171,7 @@ def test_the_textbook_stands_beside_a_wrong_shader_and_no_advice_to_trace(rgb, t
 
 def test_the_textbooks_error_is_that_of_its_own_picture(rgb):
     path = Path(__file__).parents[2] / "docs/shaders/phong.py"
-    for scene in ("fig-8-9", "plastic-spheres", "red-green-blue"):
+    for scene in ("fig-8-9", "plastic-spheres", "fig-8-11-n9"):
         record = compared(scene, str(path))
         assert record.textbook == pytest.approx(record.metrics[LEADING.name].mean, rel=1e-3)
         assert record.textbook > 0.1
