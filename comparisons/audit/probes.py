@@ -6,15 +6,15 @@ shader shows in the dark is subtracted first. Toon shaders are right, too: value
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import mitsuba as mi
 import numpy as np
 
 from fotismos.comparisons.audit import furnace
 from fotismos.comparisons.audit.furnace import UP, direction
-from fotismos.comparisons.audit.subjects import shaded
+from fotismos.comparisons.audit.subjects import COLOURS, shaded
 from fotismos.comparisons.departure.colour import from_srgb
 from fotismos.comparisons.pictures import CHANNELS, MISREADINGS, factor_of_pi
 from fotismos.heuristic.heuristics import Heuristic
@@ -22,10 +22,12 @@ from fotismos.heuristic.lights import INVERSE_SQUARE, PointLight
 
 Array = np.ndarray
 
+MATTE = {"k_a": 1.0, "k_d": 1.0, "base_color": 1.0, "k_s": 0.0, "n": 1.0, "alpha": 1.0, "ior": 1.0}
+ROUGH = {"n": 4.0, "alpha": 0.5, "ior": 1.5}
 SURFACES = {
-    "matte": {"k_d": 1.0, "k_s": 0.0, "n": 1.0, "alpha": 1.0, "ior": 1.0},
-    "glossy": {"k_d": 0.0, "k_s": 1.0, "n": 4.0, "alpha": 0.5, "ior": 1.5},
-    "mixed": {"k_d": 0.5, "k_s": 0.3, "n": 4.0, "alpha": 0.5, "ior": 1.5},
+    "matte": MATTE,
+    "glossy": dict.fromkeys(MATTE, 0.0) | {"k_s": 1.0} | ROUGH,
+    "mixed": dict.fromkeys(MATTE, 0.5) | {"k_s": 0.3} | ROUGH,
 }
 """A white matte surface, a black one with a lobe, and a grey one with a lobe."""
 
@@ -33,9 +35,9 @@ LIGHT = 0.1
 """Intensity of a light: no value comes near 1, where a shader may cut it."""
 
 STOP = 4
-DIM = LIGHT * 2 ** (np.arange(-24, 1) / STOP)
-BRIGHT = LIGHT * 2 ** (np.arange(0, 41) / STOP)
-"""Intensities, so many to each doubling of the light."""
+DIM = 25
+INTENSITIES = LIGHT * 2 ** (np.arange(-24, 41) / STOP)
+"""Many, a quarter of a stop apart; the dim ones are up to :data:`LIGHT`."""
 
 POINTS = 64
 """Points in random directions."""
@@ -53,22 +55,19 @@ MANY = 0.1
 """Share of the points above which a difference is more than the edge of a step."""
 
 
-@dataclass(frozen=True)
-class Cases:
-    """Points with lights of their own; vectors are (3, N) or (3,), the others (N,) or numbers.
+class Cases(NamedTuple):
+    """Points with lights of their own: vectors (3, N) or (3, 1), and numbers (N,) or alone.
 
-    ``toward`` are unit vectors to each light, ``view`` is one to the viewer. ``tint`` (3,) is the
-    colour of the light, and ``colour`` (3,) that of the ``surface``, one of :data:`SURFACES`.
+    ``toward`` are unit vectors to each light, ``view`` is one to the viewer. ``intensity`` may be a
+    colour (3, 1); ``surface`` is one of :data:`SURFACES`.
     """
 
     toward: tuple[Array, ...]
-    view: Any = (0.0, 0.0, 1.0)
-    normal: Any = (0.0, 0.0, 1.0)
-    position: Any = (0.5, 0.5, 1.5)
-    distance: Any = 1.0
+    view: Array = UP
+    normal: Array = UP
+    position: Array = 0.5 + UP
+    distance: float = 1.0
     intensity: Any = LIGHT
-    tint: Any = (1.0, 1.0, 1.0)
-    colour: Any = (1.0, 1.0, 1.0)
     surface: str = "mixed"
 
 
@@ -132,40 +131,31 @@ def evaluate(heuristic: Heuristic, cases: Sequence[Cases]) -> list[Array]:
     A second evaluation in the dark tells what they add.
     """
     parts = [_inputs(case) for case in cases]
-    joined = {name: np.concatenate([part[name] for part in parts], axis=1) for name in parts[0]}
-    sizes = [part["position"].shape[1] for part in parts]
-    lights = [
-        PointLight(
-            position=mi.Point3f(joined["position"] + joined["distance"] * joined[f"toward {i}"]),
-            intensity=mi.Spectrum(joined["intensity"]),
-            attenuation=INVERSE_SQUARE,
-        )
-        for i in range(len(cases[0].toward))
-    ]
-    dark = [replace(light, intensity=0 * light.intensity) for light in lights]
-    point = (joined["position"], joined["normal"], joined["view"])
-    material = {name: joined[name] for name in ("k_d", "k_s")}
-    material |= {name: joined["k_d"] for name in ("k_a", "base_color")}
-    material |= {name: joined[name][0] for name in ("n", "alpha", "ior")}
-    bright, black = (
-        np.array(shaded(heuristic, point, material, each), float).reshape(3, -1)
-        for each in (lights, dark)
-    )
-    added = np.broadcast_to(bright - black, (3, sum(sizes)))
-    return np.split(added, np.cumsum(sizes)[:-1], axis=1)
+    inputs = {name: np.concatenate([part[name] for part in parts], axis=1) for name in parts[0]}
+    material = {
+        name: inputs[name] if name in COLOURS else inputs[name][0] for name in SURFACES["matte"]
+    }
+    point = (inputs["position"], inputs["normal"], inputs["view"])
+    shown = []
+    for intensity in (inputs["intensity"], 0 * inputs["intensity"]):
+        lights = [
+            PointLight(mi.Point3f(inputs[f"light {i}"]), mi.Spectrum(intensity), INVERSE_SQUARE)
+            for i in range(len(cases[0].toward))
+        ]
+        values = np.array(shaded(heuristic, point, material, lights), float).reshape(3, -1)
+        shown.append(np.broadcast_to(values, intensity.shape))
+    ends = np.cumsum([part["position"].shape[1] for part in parts])
+    return np.split(shown[0] - shown[1], ends[:-1], axis=1)
 
 
 def _inputs(case: Cases) -> dict[str, Array]:
     """Return the inputs at a case's points, (3, N) each."""
-    surface = SURFACES[case.surface]
-    vectors = {f"toward {i}": each for i, each in enumerate(case.toward)}
-    vectors |= {name: getattr(case, name) for name in ("position", "normal", "view")}
-    vectors |= {name: np.multiply(case.colour, surface[name]) for name in ("k_d", "k_s")}
-    inputs: dict[str, Any] = {name: np.reshape(value, (3, -1)) for name, value in vectors.items()}
-    inputs |= {name: surface[name] for name in ("n", "alpha", "ior")}
-    inputs |= {"distance": case.distance, "intensity": np.outer(case.tint, case.intensity)}
-    count = max(np.atleast_2d(value).shape[1] for value in inputs.values())
-    return {name: np.broadcast_to(value, (3, count)) for name, value in inputs.items()}
+    inputs = {name: getattr(case, name) for name in ("position", "normal", "view", "intensity")}
+    inputs |= SURFACES[case.surface]
+    for i, toward in enumerate(case.toward):
+        inputs[f"light {i}"] = case.position + case.distance * toward
+    shape = np.broadcast_shapes(*map(np.shape, inputs.values()))
+    return {name: np.broadcast_to(value, shape) for name, value in inputs.items()}
 
 
 # --- Directions --------------------------------------------------------------------------------
@@ -185,36 +175,27 @@ ELEVATIONS = np.deg2rad([(60, 75), (75, 60), (70, 65)])
 AZIMUTHS = np.deg2rad(np.arange(0, 360, 5))
 """Angles of a light and a viewer from the normal, and of viewers about it."""
 
-
 ANYWHERE = Cases(toward=(TOWARD,), view=VIEW, position=2 * OTHER)
-TURNED = replace(ANYWHERE, toward=(TURN @ TOWARD,), view=TURN @ VIEW, normal=TURN @ UP)
+BOTH = ANYWHERE._replace(toward=(TOWARD, OTHER))
+TURNED = ANYWHERE._replace(toward=(TURN @ TOWARD,), view=TURN @ VIEW, normal=TURN @ UP)
 RISEN = Cases(toward=(RISING,), surface="matte")
-HEIGHTS = {"above": RISEN, "below": replace(RISEN, toward=(RISING * DOWN,))}
+HEIGHTS = {"above": RISEN, "below": RISEN._replace(toward=(RISING * DOWN,))}
 FACING = Cases(toward=(UP,), view=direction(0.5, 0.0), surface="matte")
 LOBE = Cases(toward=(HIGH,), view=VIEW, surface="glossy")
 AROUND = Cases(
-    toward=(np.repeat(direction(ELEVATIONS[:, 0], 0.0), len(AZIMUTHS), axis=1),),
-    view=np.hstack([direction(elevation, AZIMUTHS) for elevation in ELEVATIONS[:, 1]]),
+    toward=(direction(ELEVATIONS[:, :1], 0 * AZIMUTHS).reshape(3, -1),),
+    view=direction(ELEVATIONS[:, 1:], AZIMUTHS).reshape(3, -1),
     surface="glossy",
 )
-
-
-def _stops(intensities: Array) -> Cases:
-    """Return the points anywhere, at one intensity after the other."""
-    count = len(intensities)
-    return Cases(
-        toward=(np.tile(TOWARD, count),),
-        view=np.tile(VIEW, count),
-        intensity=np.repeat(intensities, POINTS),
-    )
-
-
-def _coloured(what: str) -> dict[str, Cases]:
-    """Return points in light of one channel, or surfaces of one channel."""
-    primaries = zip(CHANNELS, np.eye(3), strict=True)
-    if what == "light":
-        return {f"{name} light": replace(ANYWHERE, tint=colour) for name, colour in primaries}
-    return {f"{name} surface": replace(RISEN, colour=colour) for name, colour in primaries}
+BRIGHTER = Cases(
+    toward=(np.tile(TOWARD, len(INTENSITIES)),),
+    view=np.tile(VIEW, len(INTENSITIES)),
+    intensity=np.repeat(INTENSITIES, POINTS),
+)
+COLOURED = {
+    name: ANYWHERE._replace(intensity=LIGHT * np.reshape(colour, (3, 1)))
+    for name, colour in zip(CHANNELS, np.eye(3), strict=True)
+}
 
 
 def _share(a: Array, b: Array) -> float:
@@ -248,53 +229,45 @@ ENCODINGS: dict[str, Callable[[Array], Array]] = {
 """Mistakes in how a shader encodes its values, and their inverses."""
 
 
-@probe({"dim": _stops(DIM)})
+@probe({"brighter": BRIGHTER})
 def proportion(seen: Values) -> str | None:
     """Twice the intensity gives twice the value."""
-    value = _brightest(seen["dim"])
+    light = INTENSITIES[:DIM]
+    value = _brightest(seen["brighter"][:, : DIM * POINTS])
     steps = np.abs(np.diff(value)) < FLAT * value[1:]
     if value.min() <= 0 or np.mean(steps) > 0.5:
         return None  # dark, or in steps
-    if _is_even(value / DIM):
+    if _is_even(value / light):
         return ""
-    looks = [name for name, undo in ENCODINGS.items() if _is_even(undo(value) / DIM)]
+    looks = [name for name, undo in ENCODINGS.items() if _is_even(undo(value) / light)]
     end = f": its {looks[0]}" if looks else ", not 2 times"
     return f"Twice the light gives {value[-1] / value[-1 - STOP]:.3g} times the value{end}."
 
 
-@probe({"bright": _stops(BRIGHT)}, "proportion")
+@probe({"brighter": BRIGHTER}, "proportion")
 def cut(seen: Values) -> str:
     """However bright the light is, more of it gives more."""
-    value = _brightest(seen["bright"])
+    value = _brightest(seen["brighter"])
     is_cut = np.ptp(value[-STOP:]) <= FLAT * value[-1]
     return f"Its values end at {value[-1]:.3g}: brighter light is cut off." if is_cut else ""
 
 
-@probe(_coloured("light") | _coloured("surface"), "proportion")
+@probe(COLOURED, "proportion")
 def channels(seen: Values) -> str:
-    """Each channel is its own, of light and surface."""
-    for what in ("light", "surface"):
-        # Rows: what the light or the surface has. Columns: what is shown.
-        shown = np.array([seen[f"{name} {what}"].sum(axis=1) for name in CHANNELS])
-        order = shown.argmax(axis=0)
-        if sorted(order) == [0, 1, 2] and list(order) != [0, 1, 2]:
-            return f"Its channels look like {', '.join(CHANNELS[given] for given in order)}."
-        # A tint of the shader's own is mixed with the surface's colour, but not with the light's.
-        share = 1 - np.diagonal(shown) / np.maximum(shown.sum(axis=0), 1e-9)
-        if what == "light" and share.max() > MANY:
-            of = f"{share.max():.0%} of its {CHANNELS[share.argmax()]} comes from the other two"
-            return f"Its channels are mixed: {of}."
-    return ""
+    """Each channel is its own."""
+    # Rows: the channel of the light. Columns: what is shown.
+    shown = np.array([seen[name].sum(axis=1) for name in CHANNELS])
+    order = shown.argmax(axis=0)
+    share = 1 - np.diagonal(shown) / np.maximum(shown.sum(axis=0), 1e-9)
+    if share.max() <= MANY:
+        return ""
+    of = f"{share.max():.0%} of its {CHANNELS[share.argmax()]} comes from light of the other two"
+    if sorted(order) == [0, 1, 2] and list(order) != [0, 1, 2]:
+        return f"Its channels look like {', '.join(CHANNELS[given] for given in order)}: {of}."
+    return f"Its channels are mixed: {of}."
 
 
-@probe(
-    {
-        "first": ANYWHERE,
-        "last": replace(ANYWHERE, toward=(OTHER,)),
-        "both": replace(ANYWHERE, toward=(TOWARD, OTHER)),
-    },
-    "proportion",
-)
+@probe({"first": ANYWHERE, "last": ANYWHERE._replace(toward=(OTHER,)), "both": BOTH}, "proportion")
 def both_lights(seen: Values) -> str:
     """Two lights give the sum of each."""
     both = seen["both"]
@@ -315,7 +288,7 @@ FALL_OFFS = (
 )
 
 
-@probe({"near": ANYWHERE, "far": replace(ANYWHERE, distance=2.0)}, "proportion")
+@probe({"near": ANYWHERE, "far": ANYWHERE._replace(distance=2.0)}, "proportion")
 def distance(seen: Values) -> str:
     """At twice the distance the value is that of the intensity, which has fallen off."""
     ratio = seen["far"].sum() / seen["near"].sum()
@@ -371,7 +344,7 @@ def below(seen: Values) -> str:
     return f"Light from below gives {share}: N.L has lost its sign."
 
 
-@probe({"above": LOBE, "below": replace(LOBE, toward=(HIGH * DOWN,))}, "below")
+@probe({"above": LOBE, "below": LOBE._replace(toward=(HIGH * DOWN,))}, "below")
 def highlights(seen: Values) -> str:
     """Light from below gives no highlight."""
     above = seen["above"].sum()
