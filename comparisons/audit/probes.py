@@ -161,7 +161,7 @@ def _inputs(case: Cases) -> dict[str, Array]:
 # --- Directions --------------------------------------------------------------------------------
 
 HIGH, VIEW = furnace.random_pairs(POINTS)
-TOWARD, OTHER = (np.roll(each, 1, axis=1) for each in furnace.random_pairs(POINTS, eta=1.0))
+TOWARD, OTHER = np.roll(furnace.random_pairs(POINTS, eta=1.0), 1, axis=2)
 """To lights and viewers above the horizon, and to lights on both sides of it."""
 
 TURN = np.linalg.qr(HIGH[:, :3])[0]
