@@ -217,7 +217,9 @@ OWN = {
 
 @pytest.mark.thorough
 @opengl
-@pytest.mark.guarantee("runs", "Of five right shaders nothing is said on the built-in scenes, and on five others.")
+@pytest.mark.guarantee(
+    "runs", "Of five right shaders nothing is said, on built-in scenes and others."
+)
 def test_nothing_is_said_of_right_shaders_on_scenes(rgb, tmp_path):
     paths = [tmp_path / f"right{number}{s.suffix}" for number, s in enumerate(SHADERS)]
     for path, shader in zip(paths, SHADERS, strict=True):
