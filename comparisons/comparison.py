@@ -379,6 +379,10 @@ class ComparisonRecord(Record):
     mistakes: Annotated[
         tuple[str, ...], Meta(description="Mistakes that the heuristic seems to make, in words.")
     ] = ()
+    textbook: Annotated[
+        Amount | None,
+        Meta(description="Mean dE2000 of Phong in place of a user's heuristic; null otherwise."),
+    ] = None
     colour_science: Deviations | None = None
     record_version: int = VERSION
 

@@ -25,6 +25,9 @@ from fotismos.comparisons.picture_mistakes import Names, NoisyImage
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Times
 
+TEMPLATE_SPP = 16
+"""Samples per pixel of the textbook half whose edges and colours a picture may have."""
+
 SAME = 0.01
 """ΔE2000 to which a picture equals the textbook half, away from edges."""
 

@@ -111,6 +111,15 @@ class Prepared:
         fine = (alignment.FINER * width, alignment.FINER * height)
         return alignment.geometry_edges(gbuffer(self.scene, fine), width, height)
 
+    def shaded_by(self, heuristic: str) -> Renderer:
+        """Return what renders the first half with another heuristic."""
+        options = self.options.changed(heuristic=heuristic)
+        pair = pair_for(self.source, options)
+        renderer: Renderer = _heuristic_renderer(
+            self.source, pair, chosen=self.plan, spp=self.reference.pass_spp, options=options
+        )
+        return renderer
+
     @cached_property
     def unpruned(self) -> Renderer | None:
         """Return what renders the physical half with everything simulated.

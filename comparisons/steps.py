@@ -14,24 +14,25 @@ from msgspec import structs
 
 from fotismos.comparisons.compare import Step
 from fotismos.comparisons.comparison import Comparison
+from fotismos.comparisons.departure.blocks import bands
+from fotismos.comparisons.departure.metrics import leading_distance
+from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.price import with_price
 from fotismos.heuristic import heuristics
-from fotismos.reference.rendering.renderer import Progress
-
-TEMPLATE_SPP = 16
-"""Samples per pixel of the textbook half whose edges and colours a picture may have."""
+from fotismos.reference.rendering.renderer import Progress, passes
+from fotismos.reference.rendering.sums import MEAN, Accumulator
 
 
 def steps(options: Options, why: bool) -> list[Step]:
     """Return the steps for options; ``why`` traces the terms of 8.10, and finds causes."""
+    added: list[Step] = []
+    if not options.image and not heuristics.named(options.heuristic).is_builtin:
+        added += [with_mistakes, with_textbook]
     if options.has_pictures:  # no effect can be added to a picture
-        added: list[Step] = [with_pictures, with_terms] if why else [with_pictures]
+        added += [with_pictures, with_terms] if why else [with_pictures]
         return [*added, with_price]
-    added = []
-    if not heuristics.named(options.heuristic).is_builtin:
-        added.append(with_mistakes)
     if why:
         from fotismos.comparisons.hybrids.attribution import with_causes  # see above
 
@@ -50,7 +51,7 @@ def with_pictures(comparison: Comparison, ready: Prepared, progress: Progress | 
     textbook = None
     if given.image is not None:
         half: Any = ready.heuristic
-        textbook = np.array(half.replaced.sampled(TEMPLATE_SPP).render(0), float)
+        textbook = np.array(half.replaced.sampled(pictures.TEMPLATE_SPP).render(0), float)
         expected.append(alignment.picture_edges(textbook))
     return pictures.with_records(comparison, given, expected, textbook)
 
@@ -61,6 +62,28 @@ def with_mistakes(comparison: Comparison, ready: Prepared, progress: Progress | 
 
     mistakes = diagnosis.describe(ready.options.heuristic)
     return replace(comparison, record=structs.replace(comparison.record, mistakes=mistakes))
+
+
+def with_textbook(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
+    """Return a comparison with the error of Phong's picture, rendered as the heuristic's was."""
+    begin = perf_counter()
+    record = comparison.record
+    images = comparison.images
+    sums = Accumulator(MEAN)
+    renderer = ready.shaded_by(heuristics.PHONG.name)
+    for rendered in passes(
+        (renderer,), record.seed, ready.passes, progress=progress, stage="textbook image"
+    ):
+        sums.add(rendered.images[0])
+    shown = sums.mean(np.float32)
+    distance = leading_distance(record.viewing, metrics_for(ready.options))
+    counted = images.counted
+    total = sum(
+        distance(shown[rows][counted[rows]], images.reference[rows][counted[rows]]).sum()
+        for rows in bands(len(counted))
+    )
+    record = structs.replace(record, textbook=float(total / max(counted.sum(), 1)))
+    return replace(comparison, record=record).timed("textbook", perf_counter() - begin)
 
 
 def with_terms(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:

@@ -86,6 +86,11 @@ def is_noise_known(record: ComparisonRecord) -> bool:
     return any(half is None or half.repeats > 1 for half in halves)
 
 
+def is_searched(record: ComparisonRecord) -> bool:
+    """Return whether a method may be looked for: of a scene whose shader has no mistakes."""
+    return bool(record.command and record.plan and not record.mistakes)
+
+
 # --- One scene -------------------------------------------------------------------------------
 
 
@@ -113,9 +118,11 @@ def missing(record: ComparisonRecord) -> dict[str, float]:
 
 
 def cause(record: ComparisonRecord) -> str:
-    """Return why a scene differs, as a sentence; empty if that is unknown."""
+    """Return why a scene differs, as a sentence; empty if that is unknown, or the shader wrong."""
     if record.agreement:
         return " ".join(record.agreement.mistakes)
+    if record.mistakes:
+        return ""
     largest = list(missing(record))[:1]
     if MICROFACETS.label in largest and (albedo := _impossible_albedo(record)):
         amount = f"{number(albedo)} times the light that it receives"
@@ -142,7 +149,10 @@ def sentence(
         return record.caution
     lead = record.metrics[LEADING.name]
     found = share(record, threshold)
-    match decision(record, threshold):
+    looks = decision(record, threshold)
+    if record.mistakes and looks != "pass":
+        return "Correct the shader first."
+    match looks:
         case "pass":
             return "Exact, as far as can be seen." if lead.high <= EXACT else "Nothing to do."
         case "undecided":
@@ -253,10 +263,12 @@ def savings(records: Sequence[ComparisonRecord]) -> str:
 def price_at(record: ComparisonRecord, threshold: float = TOLERANCE) -> float | None:
     """Return the time of what makes a scene look right, over that of its textbook picture.
 
-    1 if that passes, or would if it were brighter; None if it is not known.
+    1 if that passes, or would if it were brighter; None if it is not known, or the shader wrong.
     """
     if decision(record, threshold) == "pass" or _brightness_suffices(record, threshold):
         return 1.0
+    if record.mistakes:
+        return None
     price = record.price
     found = price and price.samples_at(threshold)
     if not price or not found or found.value is None:
@@ -335,7 +347,7 @@ def search(record: ComparisonRecord, threshold: float, spp: int | None = None) -
 
 def about(record: ComparisonRecord) -> str:
     """Return a scene's verdict, what is mostly missing, and what is needed, in a few sentences."""
-    parts = [headline([record])]
+    parts = [headline([record]), *record.mistakes]
     if not record.caution and decision(record) != "pass":
         parts += [cause(record), sentence(record)]
     return " ".join(dict.fromkeys(filter(None, parts)))
@@ -393,7 +405,7 @@ def most_missing(records: Sequence[ComparisonRecord], threshold: float = TOLERAN
     """Return what the scenes that fail lack most, by pixels; empty if that is unknown."""
     pixels: Counter[str] = Counter()
     for record in records:
-        if decision(record, threshold) == "fail":
+        if decision(record, threshold) == "fail" and not record.mistakes:
             wrong = share(record, threshold).value
             parts = missing(record)
             # There microfacets are not at fault: `cause` names the material instead.

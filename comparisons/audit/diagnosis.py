@@ -1,9 +1,10 @@
-"""Describe a shader's mistakes: evaluate it at points, and compare it with known mistakes.
+"""Describe a shader's mistakes: probe it, and compare it with the textbook's model.
 
-The textbook's model is a sum of terms, each a coefficient times emission, ambient, diffuse or
-specular light. A shader that equals this sum, with coefficients of 1, is right. One that equals the
-sum of a *changed* model has made that mistake, whatever its coefficients; each coefficient that is
-not 1 is a further mistake. A shader that equals neither is another model, and nothing is reported.
+The probes (:mod:`fotismos.comparisons.audit.probes`) know no model. The textbook's is a sum of
+terms, each a coefficient times emission, ambient, diffuse or specular light. A shader that equals
+this sum, with coefficients of 1, is right. One that equals the sum of a *changed* model has made
+that mistake, whatever its coefficients; each coefficient that is not 1 is a further mistake. A
+shader that equals neither is another model, of which only the probes know.
 """
 
 from collections.abc import Callable, Iterator
@@ -15,9 +16,10 @@ import mitsuba as mi
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from fotismos.comparisons.audit import probes
 from fotismos.comparisons.audit.subjects import shaded
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
-from fotismos.comparisons.picture_mistakes import MISREADINGS, factor_of_pi
+from fotismos.comparisons.picture_mistakes import factor_of_pi
 from fotismos.comparisons.textbook import clamped, dot, halfway, lobe, mirrored, unit
 from fotismos.heuristic import heuristics
 from fotismos.heuristic.heuristics import Heuristic
@@ -32,7 +34,8 @@ ALIKE = 1e-3
 """Relative RMS difference up to which two models count as equal."""
 
 LAMPS = ((3.0, 1.0, 2.5), (-2.0, 2.5, 1.5), (1.0, -2.0, 3.0))
-INTENSITIES = (5.0, 6.0, 7.0)
+INTENSITIES = (1.25, 1.5, 1.75)
+"""So low that no value is above 1, where a shader may cut it."""
 
 TERMS = ("emission", "ambient", "diffuse", "specular")
 
@@ -41,9 +44,8 @@ TERMS = ("emission", "ambient", "diffuse", "specular")
 class Model:
     """The textbook's model at points: vectors and colours are (P, 3), numbers (P, 1).
 
-    ``toward`` (L, P, 3), ``distance`` and ``intensity`` (L, P, 1) are of the lights. ``along``,
-    ``incident`` and ``lobe`` are the lobe's cosine, the diffuse term's function of ``N.L``, and the
-    lobe.
+    ``toward`` (L, P, 3) and ``intensity`` (L, P, 1) are of the lights. ``along`` and ``lobe`` are
+    the lobe's cosine, and the lobe.
     """
 
     position: Array
@@ -55,10 +57,8 @@ class Model:
     k_s: Array
     ambient: Array
     toward: Array
-    distance: Array
     intensity: Array
     along: Callable[[Array, Array, Array], Array] = mirrored
-    incident: Callable[[Array], Array] = clamped
     lobe: Callable[[Array, Array, Array], Array] = lobe
 
     def terms(self, **changes: Any) -> Array:
@@ -69,7 +69,7 @@ class Model:
         m = replace(self, **changes)
         incidence = dot(m.normal, m.toward)
         along = m.along(m.normal, m.toward, m.view)
-        diffuse = (m.intensity * m.incident(incidence)).sum(axis=0)
+        diffuse = (m.intensity * clamped(incidence)).sum(axis=0)
         specular = (m.intensity * m.lobe(along, m.n, incidence)).sum(axis=0)
         return np.stack([m.k_i, m.ambient * m.k_d, m.k_d * diffuse, m.k_s * specular])
 
@@ -90,52 +90,49 @@ def describe(name: str) -> tuple[str, ...]:
     if heuristic.is_builtin or heuristic.prepare is not None:
         return ()
     with mi.scoped_set_variant(DEFAULT_VARIANT):
-        return tuple(_describe(heuristics.named(name)))
+        heuristic = heuristics.named(name)
+        try:
+            found = probes.findings(heuristic)
+            sure = [words for name, words in found.items() if not probes.PROBES[name].vague]
+            sure += _compared(heuristic)
+        except Exception:  # a user's code may raise anything where it was not tried
+            return ()
+    return tuple(sure or found.values())
 
 
-def _describe(heuristic: Heuristic) -> Iterator[str]:
+def _compared(heuristic: Heuristic) -> Iterator[str]:
+    """Yield how a heuristic differs from the textbook's model, if some mistake explains it."""
     model = sample(halfway if heuristic.form == "blinn" else mirrored)
-    seen = evaluate(heuristic, model)
-    # Some values are exactly 1, and none is above: they are cut, and tell only a lower bound.
-    is_cut = seen.max() == 1 and 3 < np.count_nonzero(seen == 1) < seen.size / 2
-    counts = seen < 1 if is_cut else np.ones_like(seen, bool)
-    explanation = _explain(model, seen, counts)
+    explanation = _explain(model, evaluate(heuristic, model))
     if explanation is None:
         return
     description, fit = explanation
-    if is_cut:
-        yield "Its values end at 1: brighter light is cut off."
     if description:
         yield f"A likely mistake: {description}."
     yield from _factors(fit, len(model.toward))
 
 
-def _explain(model: Model, seen: Array, counts: Array) -> tuple[str, TermFit] | None:
+def _explain(model: Model, seen: Array) -> tuple[str, TermFit] | None:
     """Return the mistake that explains the values seen, and its fit; no words if there is none."""
-    # No mistake, wrong encodings, then changed models: the first that fits is the answer.
-    right = model.terms()
-    candidates = [("", right, seen)]
-    candidates += [(f"its {symptom}", right, undo(seen)) for symptom, undo in ENCODINGS.items()]
-    candidates += [
-        (description, model.terms(**change(model)), seen) for description, change in MISTAKES
-    ]
-    for description, terms, values in candidates:
-        fit = _fit(terms, values, counts)
+    # No mistake, then changed models: the first that fits is the answer.
+    unchanged: Mistake = ("", lambda m: {})
+    for description, change in (unchanged, *MISTAKES):
+        fit = _fit(model.terms(**change(model)), seen)
         if fit[1] < ALIKE:
             return description, fit
     # With a number to choose, more fits by chance: these come last.
-    scaled = [_best(mistake, model, seen, counts) for mistake in SCALED]
+    scaled = [_best(mistake, model, seen) for mistake in SCALED]
     alike = [pair for pair in scaled if pair[1][1] < ALIKE]
     # Among several the one whose coefficients need the fewest sentences is the likeliest.
     return min(alike, key=lambda pair: len(list(_factors(pair[1], 0))), default=None)
 
 
-def _best(mistake: Mistake, model: Model, seen: Array, counts: Array) -> tuple[str, TermFit]:
+def _best(mistake: Mistake, model: Model, seen: Array) -> tuple[str, TermFit]:
     """Return a mistake by some number, described with the one that fits best."""
     description, change = mistake
 
     def fit(log: float) -> TermFit:
-        return _fit(model.terms(**change(model, np.exp(log))), seen, counts)
+        return _fit(model.terms(**change(model, np.exp(log))), seen)
 
     # The remainder may have several minima: a grid finds the valley, a search its bottom.
     grid, step = np.linspace(-LARGEST_LOG, LARGEST_LOG, 32, retstep=True)
@@ -145,15 +142,12 @@ def _best(mistake: Mistake, model: Model, seen: Array, counts: Array) -> tuple[s
     return description.format(f"{np.exp(best):.3g}"), fit(best)
 
 
-def _fit(terms: Array, values: Array, counts: Array) -> TermFit:
+def _fit(terms: Array, values: Array) -> TermFit:
     """Return the least-squares coefficients of terms (4, P, 3) by channel.
 
     Rows are weighted by the inverse of their size, or highlights alone would decide.
     """
-    # A negative value has no inverse under some encodings.
-    if not np.isfinite(values).all():
-        return np.zeros((3, 4)), np.inf
-    weights = counts / (np.abs(values) + np.median(np.abs(values)) + 1e-9)
+    weights = 1 / (np.abs(values) + np.median(np.abs(values)) + 1e-9)
     coefficients = []
     left = []
     for channel in range(3):
@@ -213,12 +207,11 @@ def sample(along: Callable[[Array, Array, Array], Array]) -> Model:
         normal=normal,
         view=view,
         n=random.uniform(2, 24, (POINTS, 1)),
-        k_i=0.2 * colour(),
+        k_i=0.05 * colour(),
         k_d=colour(),
         k_s=colour(),
-        ambient=np.array([0.3, 0.2, 0.4]),
+        ambient=np.array([0.08, 0.05, 0.1]),
         toward=away / distance,
-        distance=distance,
         intensity=np.array(INTENSITIES)[:, None, None] / distance**2,
         along=along,
     )
@@ -246,7 +239,8 @@ def evaluate(heuristic: Heuristic, model: Model) -> Array:
 def _spaces() -> Iterator[Mistake]:
     """Yield a mistake for each other space whose axes are the world's, swapped or reversed."""
     for order, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
-        if (order, signs) != ((0, 1, 2), (1, 1, 1)):
+        # Neither the world's, nor the same reversed, which the probes tell.
+        if order != (0, 1, 2) or abs(sum(signs)) != 3:
             pairs = zip(order, signs, strict=True)
             axes = ", ".join(f"{'-' if sign < 0 else ''}{'xyz'[axis]}" for axis, sign in pairs)
             yield (
@@ -255,29 +249,9 @@ def _spaces() -> Iterator[Mistake]:
             )
 
 
-def _without_gate(cosine: Array, n: Array, incidence: Array) -> Array:
-    power: Array = clamped(cosine) ** n
-    return power
-
-
-def _mirrored_behind(normal: Array, toward: Array, view: Array) -> Array:
-    # 8.7 with `|N.L|` in place of `N.L`.
-    return 2 * np.abs(dot(normal, toward)) * dot(normal, view) - dot(toward, view)
-
-
-BEHIND = "light from behind counts: N.L has lost its sign"
-
 MISTAKES: tuple[Mistake, ...] = (
-    ("the light vector is reversed: it leads from the light to the surface",
-     lambda m: {"toward": -m.toward}),
-    ("the view vector or the mirrored one is reversed (GLSL's reflect takes the direction in"
-     " which light travels)", lambda m: {"view": -m.view}),
     ("the lobe is about the half vector, with the exponent for the mirrored one: too wide",
      lambda m: {"along": halfway}),
-    ("the intensity falls off with the square of the distance a second time",
-     lambda m: {"intensity": m.intensity / m.distance**2}),
-    ("the fall-off with the square of the distance is missing",
-     lambda m: {"intensity": m.intensity * m.distance**2}),
     ("the view vector is the position reversed, which is right only in view space",
      lambda m: {"view": unit(-m.position)}),
     ("the view vector is the position reversed, and not normalised",
@@ -285,13 +259,8 @@ MISTAKES: tuple[Mistake, ...] = (
     ("the normal is encoded as N / 2 + 1/2", lambda m: {"normal": 0.5 * m.normal + 0.5}),
     ("the normal is encoded as N / 2 + 1/2, and then normalised",
      lambda m: {"normal": unit(0.5 * m.normal + 0.5)}),
-    (BEHIND, lambda m: {"incident": np.abs}),
-    (BEHIND, lambda m: {"incident": np.abs, "along": _mirrored_behind, "lobe": _without_gate}),
-    ("lights below the horizon cause highlights", lambda m: {"lobe": _without_gate}),
     ("the lobe is multiplied by N.L, as in a BRDF; the textbook's is not",
      lambda m: {"lobe": lambda *words: lobe(*words) * clamped(words[-1])}),
-    ("only the first light is used",
-     lambda m: {"toward": m.toward[:1], "intensity": m.intensity[:1]}),
     # Constant factors are left out: the fitted coefficient takes them up.
     ("the lobe is normalised by n + 2, which the paired k_s already includes",
      lambda m: {"k_s": m.k_s * (m.n + 2)}),
@@ -319,12 +288,3 @@ SCALED: tuple[Mistake, ...] = (
      lambda m, by: {"view": m.view * by}),
 )  # fmt: skip
 """Mistakes by some number, which their words show."""
-
-ENCODINGS: dict[str, Callable[[Array], Array]] = {
-    **MISREADINGS,
-    "values look encoded by a power of 1/2.2": lambda image: image**2.2,
-    "values look decoded by a power of 2.2": lambda image: image ** (1 / 2.2),
-    "values look sRGB-encoded twice": lambda image: from_srgb(from_srgb(image)),
-    "values look tone-mapped by x / (1 + x)": lambda image: image / np.maximum(1 - image, 1e-6),
-}
-"""Mistakes in how a shader encodes its values."""

@@ -33,13 +33,13 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import matching, read_file
 from fotismos.comparisons.picture_mistakes import Names
 from fotismos.comparisons.pictures import (
+    TEMPLATE_SPP,
     GivenPictures,
     Pictures,
     agreement,
     at_size_of_pictures,
     unknown_noise,
 )
-from fotismos.comparisons.steps import TEMPLATE_SPP
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size

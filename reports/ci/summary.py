@@ -239,8 +239,9 @@ def of_comparison(
             percent(verdict.share(record, threshold).value),
             number(record.metrics[LEADING.name].mean),
         )
-        sentences = f"{verdict.cause(record)} {verdict.sentence(record, cost, threshold)}"
-        rows.append((record.scene, *numbers, sentences.strip()))
+        wanted = (verdict.cause(record), verdict.sentence(record, cost, threshold))
+        sentences = " ".join(filter(None, (*record.mistakes, *wanted)))
+        rows.append((record.scene, *numbers, sentences))
     records = [record for record, _ in scenes]
     first = verdict.headline(records, threshold)
     second = verdict.most_missing(records, threshold)

@@ -187,7 +187,7 @@ def _scene(view: SceneView, taken: set[str], usual: float) -> PageScene:
         cause=verdict.cause(record),
         advice=_runs(lambda t: verdict.sentence(record, cost, t)),
         prices=tuple(_digits(verdict.price_at(record, threshold)) for threshold in THRESHOLDS),
-        command=verdict.search(record, usual) if record.command and record.plan else "",
+        command=verdict.search(record, usual) if verdict.is_searched(record) else "",
     )
 
 

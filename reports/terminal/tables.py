@@ -155,7 +155,11 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
     # What is special about single scenes.
     for record in records:
         if record.heuristic != Options().heuristic and not record.picture:
-            yield f"{record.scene}: heuristic {record.heuristic}"
+            line = f"{record.scene}: heuristic {record.heuristic}"
+            if record.textbook is not None:
+                own = number(record.metrics[LEADING.name].mean)
+                line += f" {own}, Phong {number(record.textbook)} (mean {LEADING.label})"
+            yield line
             yield from record.mistakes
         if record.noise_target:
             yield _noise(record, record.noise_target)

@@ -85,6 +85,7 @@ def price_lines(record: ComparisonRecord, within: float) -> Iterator[str]:
     what = f"{judged} {outcome or 'is undecided'} at {LEADING.label} {parameter(within)}"
     size = cost_tables.sized(record.resolution)
     yield f"At {size}: {what}. {verdict.sentence(record, threshold=within)}"
+    yield from record.mistakes
     if saving := verdict.saving(record):
         yield saving
 
