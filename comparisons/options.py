@@ -5,7 +5,7 @@ The command line, the notebook, baselines and studies name them alike.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 
@@ -230,13 +230,11 @@ class Options(
         density = self.pixels_per_degree
         return DEFAULT_VIEWING if density is None else Viewing(pixels_per_degree=density)
 
-    def require_model(self, what: str) -> None:
-        """Raise InputError if a picture replaces a half that ``what`` renders."""
-        for name in ("image", "reference"):
+    def require_model(self, what: str, halves: Sequence[str] = ("image", "reference")) -> None:
+        """Raise InputError if a picture replaces one of the halves, which ``what`` renders."""
+        for name in halves:
             if files := getattr(self, name):
-                raise InputError(
-                    f"{what} renders both halves, and {files[0]} is a picture. Omit `{name}`."
-                )
+                raise InputError(f"{what} renders what {files[0]} would replace. Omit `{name}`.")
 
 
 class OptionValues(TypedDict, total=False):

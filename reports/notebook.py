@@ -213,9 +213,11 @@ def fit(
     ``loss`` is ``perceptual``, the mean ΔE2000, or ``linear``, the squared difference of linear
     colours. Other arguments and errors are those of :func:`compare`.
     """
-    case = open_case(scene, Options.of(options), name)
-    command = case.command("fit")
-    return fit_parameters(case.source, case.options, loss, command=command).record
+    values, arrays = _with_names(options)
+    with as_files(arrays):
+        case = open_case(scene, Options.of(values), name)
+        command = case.command("fit")
+        return fit_parameters(case.source, case.options, loss, command=command).record
 
 
 @_alone

@@ -126,7 +126,8 @@ def fit(
 
     ``loss`` is a name in :data:`fotismos.comparisons.fit.search.LOSSES`; ``forms`` are forms of the
     lobe. The resolution and samples are :data:`RESOLUTION` and :data:`SPP` if omitted. Films get a
-    box filter, which keeps pixels independent. ``progress(stage, done, total)`` is called after
+    box filter, which keeps pixels independent. Pictures of another renderer may be the reference.
+    ``progress(stage, done, total)`` is called after
     each pass; ``command`` repeats the fit, for the record.
     """
     begin = perf_counter()
@@ -155,7 +156,7 @@ def fit(
         scene=source.name,
         variant=ready.reference.variant,
         seed=options.seed,
-        resolution=options.resolution or RESOLUTION,
+        resolution=rendered.counted.shape[::-1],
         spp=ready.reference.pass_spp * ready.passes,
         passes=ready.passes,
         viewing=options.viewing,
@@ -181,7 +182,7 @@ def fit(
 
 def _completed(options: Options) -> Options:
     """Fill in a fit's own defaults."""
-    options.require_model("a fit")
+    options.require_model("a fit", halves=["image"])
     heuristic = named(options.heuristic)
     if heuristic is not PHONG and heuristic.is_builtin:
         raise InputError(
@@ -204,7 +205,8 @@ def _completed(options: Options) -> Options:
             f"heuristic {heuristic.name} has no parameters to fit. Declare one with its bounds:"
             f" {advice}."
         )
-    resolution = options.resolution or RESOLUTION
+    # A reference that is a picture has its own size.
+    resolution = options.resolution or (None if options.reference else RESOLUTION)
     spp = options.spp or SPP
     return options.changed(resolution=resolution, spp=spp, allow_empty=False)
 

@@ -29,6 +29,10 @@ from fotismos.reports import jobs
 @jobs.json_option
 @jobs.timeout_option
 @jobs.options_of_scenes(resolution="96x96", spp="64")
+@jobs.option("reference")
+@jobs.option("mask")
+@jobs.option("transfer")
+@jobs.option("over")
 @jobs.verbosity_options
 def fit(
     scenes: tuple[str, ...],
@@ -43,12 +47,14 @@ def fit(
 
     The loss that the best parameters remove is the parameter error. The rest is the model error,
     which no parameters remove. Writes a page (before, reference, after, error left) and fit.json to
-    OUTPUT/fit/SCENE. By default it renders 96x96 pixels with 64 samples each.
+    OUTPUT/fit/SCENE. By default it renders 96x96 pixels with 64 samples each. With pictures of
+    another renderer as the reference, it has their size.
 
     \b
     Examples:
       fotismos fit fig-8-9
       fotismos fit my_scene.xml --loss linear --form phong
+      fotismos fit my_scene.xml --reference 'theirs_*.exr'
     """  # noqa: D301 click reads the \b as: keep these lines
     jobs.work(
         "fit",

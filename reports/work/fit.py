@@ -11,6 +11,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.fit.fit import fit
 from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.picture_files import matching
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.materials import FORMS
 from fotismos.reference.records import plain
@@ -30,6 +31,7 @@ def run(
     as_json: bool,
 ) -> None:
     """Fit each scene, and print the tables or the records."""
+    options = options.changed(reference=matching(options.reference))
     records = results_of(
         pool, output / "fit", scenes=scenes, work=fitted, arguments=(options, loss, form)
     )

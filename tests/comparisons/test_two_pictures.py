@@ -8,9 +8,11 @@ from PIL import Image
 
 import fotismos
 from fotismos.comparisons import pictures
+from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import as_files, read_file
+from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic.errors import InputError
 
@@ -220,3 +222,28 @@ def test_a_notebook_compares_arrays():
     assert "1.5 times as bright" in repr(shown)
     with pytest.raises(InputError, match="a scene of type NoneType"):
         fotismos.compare(image=image)
+
+
+def test_parameters_are_fitted_to_a_picture_of_another_renderer(run, tmp_path, monkeypatch, rgb):
+    """Of repeats of the scene's own reference they are those of a fit of the scene."""
+    monkeypatch.chdir(tmp_path)
+    case = open_case("fig-8-9", Options(resolution=(48, 48), spp=64))
+    half = prepare(case.source, case.options).reference
+    for seed in range(4):
+        np.save(f"theirs_{seed}.npy", np.array(half.render(seed)))
+    words = ("fit", "fig-8-9", "--form", "phong", "--json")
+    fitted = {}
+    for name, more in (
+        ("scene", ("--resolution", "48x48")),
+        ("pictures", ("--reference", "theirs_*.npy")),
+    ):
+        code, said, _ = run(*words, *more, "-o", name)
+        assert code == 0
+        fitted[name] = json.loads(said)[0]
+    assert fitted["pictures"]["resolution"] == [48, 48]
+    values = {}
+    for name, record in fitted.items():
+        (material,) = record["fits"][0]["materials"]
+        values[name] = [parameter["fitted"] for parameter in material["parameters"]]
+    assert values["pictures"] == pytest.approx(values["scene"], rel=0.02)
+    assert run("fit", "fig-8-9", "--reference", "none.npy")[0] == 2
