@@ -107,7 +107,7 @@ def put(path: Path, content: str | bytes) -> None:
             write(Path(os.path.realpath(path)), content)  # a link stays one
             return
         # Opening a pipe without a reader would wait forever.
-        descriptor = os.open(path, os.O_WRONLY | os.O_NONBLOCK)
+        descriptor = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
         os.set_blocking(descriptor, True)
         with open(descriptor, "wb") as file:
             file.write(encoded(content))

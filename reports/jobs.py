@@ -20,7 +20,7 @@ from msgspec import inspect
 
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.processes.pool import Pool, cores
+from fotismos.comparisons.processes.pool import CAN_SHARE, Pool, cores
 from fotismos.heuristic import llvm, program
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.terminal.words import as_typed, echo, level, quiet_option, verbose_option
@@ -251,10 +251,10 @@ timeout_option = click.option(
 workers_option = click.option(
     "--workers",
     show_default="one per core",
-    type=click.IntRange(min=1),
+    type=click.IntRange(min=0),
     metavar="N",
     help="Processes that render at the same time, each with its share of the cores, and at most one"
-    " per scene.",
+    " per scene; 0 renders in the command's own process, as on Windows.",
 )
 scheduler_option = click.option(
     "--scheduler",
@@ -318,8 +318,11 @@ def pool(
 
     They are separate, since a scene may run its own code, and native code may crash or hang. There
     are at most as many as ``tasks``, ``workers`` or else cores. ``timeout`` is in seconds without
-    any progress; a Dask cluster, by its scheduler's address, has its own limits.
+    any progress; a Dask cluster, by its scheduler's address, has its own limits. With no workers,
+    this process does it all.
     """
+    if scheduler is None and (workers == 0 or not CAN_SHARE):
+        return Pool(0, ProcessSetup(level(), None))
     if scheduler is None:
         workers = min(workers or cores(), max(1, tasks))
         # Dr.Jit takes all cores by default: processes that run together share them.

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-SIGNALS = {signal.SIGINT, signal.SIGTERM, signal.SIGHUP}
-"""Ctrl-C, the end of a job, and the end of a terminal."""
+NAMES = ("SIGINT", "SIGTERM", "SIGHUP")
+SIGNALS = {signal.Signals[name] for name in NAMES if name in signal.Signals.__members__}
+"""Ctrl-C, the end of a job, and the end of a terminal, which Windows does not signal."""
 
 PAUSE_S = 0.02
 """Seconds after which a signal that arrived in delicate code is tried again."""
@@ -53,7 +54,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     for handled in SIGNALS:
         if signal.getsignal(handled) is _interrupt:
             signal.signal(handled, lambda number, _: os._exit(128 + number))
-    if not _is_delicate(frame):
+    if not _is_delicate(frame) or not hasattr(signal, "setitimer"):
         raise Interrupted(number)
     # An alarm tries again, in whatever code runs by then.
     signal.signal(signal.SIGALRM, lambda _, frame: _interrupt(number, frame))

@@ -6,7 +6,6 @@ when its time is up, or when the parent ends in any way. The processes of a comm
 while one measures times, the others wait.
 """
 
-import fcntl
 import logging
 import os
 import signal
@@ -25,6 +24,14 @@ from typing import Any, NoReturn, Self
 
 from fotismos.comparisons.processes.interruption import SIGNALS, held_back
 from fotismos.heuristic.errors import FotismosError, InputError, LostProcessError
+
+try:
+    import fcntl
+except ImportError:  # Windows, where tasks are done in one process
+    CAN_SHARE = False
+else:
+    CAN_SHARE = True
+"""Whether processes can take turns, and end with their groups."""
 
 LOOK_S = 1.0
 """Seconds between checks that a process lives: its forks may hold its pipe open."""
@@ -308,6 +315,7 @@ class Turn:
 
     Working processes share a lock on the folder. One that measures has it alone, and first takes
     that of a subfolder: a process that begins to work waits there, so that it never comes first.
+    Where processes cannot share locks, there is only one.
     """
 
     def __init__(self, folder: Path, gate: Path) -> None:
@@ -315,16 +323,20 @@ class Turn:
         self._gate = gate
 
     def __enter__(self) -> Self:
-        self._file = os.open(self._folder, os.O_RDONLY)
-        with self._at_gate():
-            fcntl.flock(self._file, fcntl.LOCK_SH)
+        if CAN_SHARE:
+            self._file = os.open(self._folder, os.O_RDONLY)
+            with self._at_gate():
+                fcntl.flock(self._file, fcntl.LOCK_SH)
         return self
 
     def __exit__(self, *_: object) -> None:
-        os.close(self._file)
+        if CAN_SHARE:
+            os.close(self._file)
 
     def give_way(self) -> None:
         """Wait while another process measures, or is about to."""
+        if not CAN_SHARE:
+            return
         fcntl.flock(self._file, fcntl.LOCK_UN)
         with self._at_gate():
             fcntl.flock(self._file, fcntl.LOCK_SH)
@@ -332,6 +344,9 @@ class Turn:
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Wait until no other process works, and let none begin within this context."""
+        if not CAN_SHARE:
+            yield
+            return
         # Two that kept their shared locks would wait for each other forever.
         fcntl.flock(self._file, fcntl.LOCK_UN)
         with self._at_gate():

@@ -7,7 +7,6 @@ both. Samples within a pass are stratified; passes are independent, and give the
 
 import gc
 import logging
-import resource
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
@@ -27,6 +26,13 @@ from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.records import Times
 from fotismos.reference.rendering.finite import LARGEST_VALUE, require_finite, wrong_pixels
 from fotismos.reference.rendering.gbuffer import image_size, resize
+
+try:
+    import resource
+except ImportError:  # Windows, which limits no process
+    HAS_LIMITS = False
+else:
+    HAS_LIMITS = True
 
 LOGGER = logging.getLogger(__name__)
 """Receives why passes cannot be replayed."""
@@ -342,6 +348,8 @@ def require_memory(name: str, width: int, height: int) -> None:
 
 def available_memory() -> int | None:
     """Return the bytes free on the machine and to this process; None if it does not say."""
+    if not HAS_LIMITS:
+        return None
     with suppress(OSError, ValueError, KeyError):
         files = (Path("/proc/meminfo"), Path("/proc/self/status"))
         lines = [line.split() for file in files for line in file.read_text("utf-8").splitlines()]
