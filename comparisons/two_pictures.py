@@ -19,6 +19,12 @@ from fotismos.heuristic.errors import InputError
 FEWEST = 2
 """Passes of two single pictures, which are equal."""
 
+USED = {
+    "image", "reference", "mask", "transfer", "over", "tone_map", "pixels_per_degree",
+    "colour_science", "allow_empty", "seed",
+}  # fmt: skip
+"""Options that serve pictures; the others are of a scene."""
+
 BLACK = 1e-5
 """Display-linear: a picture with no brighter pixel is black, and no difference is seen in it."""
 
@@ -35,6 +41,11 @@ def compare_pictures(options: Options, name: str, command: str = "") -> Comparis
     given = pictures.read_all(options)
     if given.image is None or given.reference is None:
         raise InputError("two pictures are needed: give `image` and `reference`.")
+    if others := sorted(set(options.stated()) - USED - {"pairing"}):
+        raise InputError(
+            f"{', '.join(others)}: this needs a scene, and two pictures have none. Omit it, or give"
+            " a scene."
+        )
     stages["reading"] = perf_counter() - begin
 
     begin = perf_counter()

@@ -157,6 +157,7 @@ BAD = (
     ({"image": [0 * GREY], "reference": [0 * GREY]}, {}, "both pictures are black"),
     ({"image": [GREY], "reference": []}, {}, "two pictures are needed"),
     ({"image": [GREY], "reference": [GREY]}, {"mask": "none.png"}, "none.png: there is no such"),
+    ({"image": [GREY], "reference": [GREY]}, {"spp": 4}, "spp: this needs a scene"),
 )
 
 
