@@ -180,7 +180,9 @@ def find(
         return image
 
     def candidates() -> Iterator[Mistake | None]:
-        plain = curves.shown(given) if tone_map else None
+        plain = _distance(picture.mean[counted], truth[counted])
+        if tone_map:
+            plain = min(plain, _distance(curves.picture, curves.shown(given)))
         reading = _other_reading(picture.mean, truth, counted, names, plain)
         curve = _other_curve(curves, given, names)
         if curve and (reading is None or curve.left < reading.left):
@@ -298,15 +300,12 @@ def _other_reading(
     other: Array,
     counted: NDArray[np.bool_],
     names: Names,
-    shown: Array | None = None,
+    plain: float,
 ) -> Mistake | None:
     """Return the other reading of its values that brings a picture near the other half.
 
-    ``shown`` (N, 3) is the other half at the picture's exposure, if a tone map shows it.
+    ``plain`` is how far they are as they are read, by :func:`_distance`.
     """
-    plain = _distance(picture[counted], other[counted])
-    if shown is not None:
-        plain = min(plain, _distance(picture[counted], shown))
     if plain < 1e-3:
         return None
     readings = {
