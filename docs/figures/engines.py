@@ -1,11 +1,11 @@
 """The content of docs/engines.md: what approximations of engines lose on five scenes, and cost.
 
-``./run docs --engines`` measures for 15 minutes on an idle machine, and writes the page.
+``./run docs --engines`` measures for ten minutes, and writes the page.
 """
 
 import runpy
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from math import log2
 from pathlib import Path
 from statistics import median
@@ -26,189 +26,215 @@ from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.comparison import machine
 from fotismos.comparisons.cost import measure, times
 from fotismos.comparisons.cost.cost_record import Method
-from fotismos.comparisons.cost.methods import DIRECT, Ladder
+from fotismos.comparisons.cost.methods import DIRECT, FULL_PLAN, Ladder
 from fotismos.comparisons.departure.colour import luminance
-from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.scenes import plastic_spheres
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
 from fotismos.heuristic.convention import Floats
-from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.renderer import passes
 from fotismos.reference.rendering.sums import Accumulator
 from fotismos.reports.files import images
 from fotismos.reports.terminal.tables import markdown
-from fotismos.reports.terminal.words import number, percent
+from fotismos.reports.terminal.words import number, percent, seconds
 
-SHADERS = ROOT / "docs/shaders"
-SCENES = ROOT / "docs/scenes"
-WIDTH = 192
-ROUNDS = 7
-FEW_PASSES = 2
-REFERENCE = "reference"
-KERNEL = Method(name="kernel", family="kernel", heuristic="phong")
-"""Phong's model without shadows: the time of its samples is 1."""
-
-LAMP = "lamp"
-SKY = "sun and sky"
-MAP = "map"
+DOCS = ROOT / "docs"
+WIDTH, ROUNDS = 192, 7
 
 
 def _still_life() -> dict[str, Any]:
     """Return the plastic spheres under a sky instead of their lamp."""
-    sky = runpy.run_path(str(SCENES / "outdoors.py"))["scene"]["sky"]
+    sky = runpy.run_path(str(DOCS / "scenes/outdoors.py"))["scene"]["sky"]
     return plastic_spheres() | {"lamp": sky}
 
 
-LIT: Mapping[str, tuple[str | Callable[[], Any], str]] = {
+LAMP, SKY, MAP = "lamp", "sky", "map"
+SCENES: Mapping[str, tuple[str | Callable[[], Any], str]] = {
     "Cornell box": ("cornell-box", LAMP),
-    "textured room": (str(SCENES / "textured_room.py"), LAMP),
+    "textured room": (str(DOCS / "scenes/textured_room.py"), LAMP),
     "plastic, sky": (_still_life, SKY),
-    "outdoors": (str(SCENES / "outdoors.py"), SKY),
-    "spheres": (str(SCENES / "spheres.py"), MAP),
+    "outdoors": (str(DOCS / "scenes/outdoors.py"), SKY),
+    "spheres": (str(DOCS / "scenes/spheres.py"), MAP),
 }
 """Scenes by name, and the kind of their light."""
 
 
-@dataclass(frozen=True)
-class Approximation:
-    """A way to shade: a method with its heuristic, and the kinds of light for which it is made."""
-
-    method: Method
-    lights: tuple[str, ...] = (LAMP, SKY, MAP)
+def _shaded(name: str, heuristic: str, shadows: bool = True) -> Method:
+    file = DOCS / "shaders" / heuristic
+    heuristic = str(file) if file.exists() else heuristic
+    return Method(name=name, family="kernel", shadows=shadows, heuristic=heuristic)
 
 
-def _shaded(name: str, heuristic: str, *lights: str) -> Approximation:
-    """Return an approximation by a heuristic, with shadow rays unless it has its own shadows."""
-    shadows = heuristic != "shadow-map"
-    method = Method(name=name, family="kernel", shadows=shadows, heuristic=heuristic)
-    return Approximation(method, lights or (LAMP, SKY, MAP))
+KERNEL = _shaded("kernel", "phong", shadows=False)
+"""Phong's model without shadows: the time of a sample is 1."""
+
+LTC = _shaded("ltc", "ltc.py")
+NO_INTERREFLECTION = structs.replace(DIRECT, name="no interreflection")
+PATHS = structs.replace(FULL_PLAN, name="path tracing")
+"""Again, with other seeds: it shows how much is noise."""
+
+APPROXIMATIONS: Mapping[Method, tuple[str, ...]] = {
+    _shaded("textbook ambient", "phong"): (LAMP, SKY, MAP),
+    _shaded("hemisphere ambient", "hemisphere-ambient"): (LAMP, SKY, MAP),
+    _shaded("harmonics", "harmonics.py"): (SKY, MAP),
+    _shaded("split sum", "split_sum.py"): (SKY, MAP),
+    _shaded("points for lamps", "cook_torrance.py"): (LAMP,),
+    LTC: (LAMP,),
+    _shaded("hard shadow map", "shadow-map", shadows=False): (LAMP, SKY),
+    NO_INTERREFLECTION: (LAMP, SKY, MAP),
+    PATHS: (LAMP, SKY, MAP),
+}
+"""Approximations, and the kinds of light that they are made for."""
 
 
-DIRECT_LIGHT = structs.replace(DIRECT, name="no interreflection")
-"""Path tracing of direct light alone."""
+@dataclass(frozen=True, kw_only=True)
+class Rendered:
+    """A converged picture (H, W, 3), the time of a sample over the kernel's, and preparation."""
 
-APPROXIMATIONS = (
-    _shaded("textbook ambient", "phong"),
-    _shaded("hemisphere ambient", "hemisphere-ambient"),
-    _shaded("harmonics", str(SHADERS / "harmonics.py"), SKY, MAP),
-    _shaded("split sum", str(SHADERS / "split_sum.py"), SKY, MAP),
-    _shaded("points for lamps", str(SHADERS / "cook_torrance.py"), LAMP),
-    _shaded("ltc", str(SHADERS / "ltc.py"), LAMP),
-    _shaded("hard shadow map", "shadow-map", LAMP, SKY),
-    Approximation(DIRECT_LIGHT),
-)
+    picture: Floats
+    time: float
+    prepare_s: float
 
 
-@dataclass(frozen=True)
-class Measured:
+@dataclass(frozen=True, kw_only=True)
+class Measured(Rendered):
     """What an approximation loses on a scene, and costs.
 
-    ``visible`` is the share of the pixels above :data:`TOLERANCE`, ``de2000`` the mean, ``stops``
-    the mean luminance over the reference's as a binary logarithm; ``visible_direct`` is the share
-    against a reference without interreflection, ``visible_noise`` that of the reference's noise
-    alone. ``time`` is a sample's over the kernel's.
+    ``visible`` is the share of the pixels above :data:`TOLERANCE`, ``visible_direct`` that against
+    a reference without interreflection, ``de2000`` the mean, and ``stops`` the mean luminance over
+    the reference's as a binary logarithm.
     """
 
     scene: str
     approximation: str
     visible: float
+    visible_direct: float
     de2000: float
     stops: float
-    visible_direct: float
-    visible_noise: float
-    time: float
-    time_low: float
-    time_high: float
-    prepare_s: float
 
 
-@dataclass(frozen=True)
-class Taken:
-    """The converged picture (H, W, 3) of an approximation, its time over the kernel's, and more."""
-
-    picture: Floats
-    time: Interval
-    prepare_s: float
+def measured() -> list[Measured]:
+    """Measure all approximations on each scene, in turn."""
+    return [row for scene in SCENES for row in on_scene(scene)]
 
 
-@dataclass(frozen=True)
-class Found:
-    """What is measured on a scene, and its pictures by approximation, the reference last."""
-
-    measured: tuple[Measured, ...]
-    pictures: Mapping[str, Floats]
-
-
-def measured() -> dict[str, Found]:
-    """Measure each scene, in turn."""
-    found = {}
-    for name, (scene, light) in LIT.items():
-        found[name] = _measured(name, scene, light)
-        print(name, flush=True)
-    return found
-
-
-def _measured(name: str, scene: Any, light: str) -> Found:
-    """Render the reference of a scene, and all approximations that serve its light."""
+def on_scene(name: str) -> Iterator[Measured]:
+    """Yield what is measured on a scene."""
+    scene, light = SCENES[name]
     case = open_case(scene, Options(), name=name)
     case = case.changed(resolution=measure.reduced(case.source, case.options, WIDTH))
     ready = guarded(case.source, case.options)
-    reference = measure.converged(ready, case.options.seed, progress=None)
-    methods = [one.method for one in APPROXIMATIONS if light in one.lights]
-    taken = {method.name: _taken(case, method) for method in methods}
-    truths = {"all": reference.mean, "direct": taken[DIRECT_LIGHT.name].picture}
-    against = {
-        key: LEADING.against(truth, ready.counted, case.options.viewing)
-        for key, truth in truths.items()
-    }
-    noise = _share(against["all"](reference.mean + reference.noise))
-    bright = luminance(reference.mean[ready.counted]).mean()
-    rows = []
-    for key, one in taken.items():
-        errors = against["all"](one.picture)
-        rows.append(
-            Measured(
-                scene=name,
-                approximation=key,
-                visible=_share(errors),
-                de2000=LEADING.mean(errors),
-                stops=log2(luminance(one.picture[ready.counted]).mean() / bright),
-                visible_direct=_share(against["direct"](one.picture)),
-                visible_noise=noise,
-                time=one.time.value,
-                time_low=one.time.low,
-                time_high=one.time.high,
-                prepare_s=one.prepare_s,
-            )
+    reference = measure.converged(ready, case.options.seed, progress=None).mean
+    served = [method for method, lights in APPROXIMATIONS.items() if light in lights]
+    rendered = {method.name: _rendered(case, method) for method in served}
+    direct = rendered[NO_INTERREFLECTION.name].picture
+    distances, to_direct = (
+        LEADING.against(truth, ready.counted, case.options.viewing) for truth in (reference, direct)
+    )
+    bright = luminance(reference[ready.counted]).mean()
+    for approximation, one in rendered.items():
+        errors = distances(one.picture)
+        yield Measured(
+            scene=name,
+            approximation=approximation,
+            visible=float(np.mean(errors > TOLERANCE)),
+            visible_direct=float(np.mean(to_direct(one.picture) > TOLERANCE)),
+            de2000=LEADING.mean(errors),
+            stops=log2(luminance(one.picture[ready.counted]).mean() / bright),
+            **vars(one),
         )
-    pictures = {key: one.picture for key, one in taken.items()}
-    return Found(tuple(rows), pictures | {REFERENCE: reference.mean})
 
 
-def _taken(case: Case, method: Method) -> Taken:
+def _rendered(case: Case, method: Method) -> Rendered:
     """Render an approximation, and time it in turn with the kernel in the same scene."""
     options = case.options.changed(heuristic=method.heuristic or "phong")
     ready = guarded(case.source, options)
     ladder = Ladder(case.source, options, ready)
     firsts = {one.name: ladder.renderer(one, 4) for one in (KERNEL, method)}
     width, height = image_size(ready.scene)
-    pixels = width * height
-    renderers = measure.tried(firsts, dict.fromkeys(firsts, (4,)), pixels)
+    renderers = measure.tried(firsts, dict.fromkeys(firsts, (4,)), width * height)
     measure.rendered(renderers, lambda _: (0.0, 0.0), (), ROUNDS, options.seed, None, "timing")
-    lines = measure.timed(renderers, ROUNDS, pixels)
+    lines = measure.timed(renderers, ROUNDS, width * height)
     total = Accumulator()
     renderer = firsts[method.name].sampled(measure.REFERENCE_SPP)
-    # Without random light only the pixel filter is random.
-    count = FEW_PASSES if method.is_kernel else measure.REFERENCE_PASSES
-    for one in passes([renderer], options.seed, count):
+    for one in passes([renderer], options.seed, measure.REFERENCE_PASSES):
         total.add(one.images[0])
-    prepare_s = getattr(firsts[method.name].integrator, "preparation", 0.0)
-    ratio = times.ratio(lines[method.name], lines[KERNEL.name])
-    return Taken(picture=total.mean(), time=ratio, prepare_s=prepare_s)
+    return Rendered(
+        picture=total.mean(),
+        time=times.ratio(lines[method.name], lines[KERNEL.name]).value,
+        prepare_s=getattr(firsts[method.name].integrator, "preparation", 0.0),
+    )
 
 
-def _share(errors: Floats) -> float:
-    return float(np.mean(errors > TOLERANCE))
+def lead(rows: Sequence[Measured]) -> Iterator[str]:
+    """Yield the finding in a few sentences."""
+    shaded = [one for one in rows if one.approximation != PATHS.name]
+    right = sum(one.visible <= LIMIT for one in shaded)
+    best = min(shaded, key=lambda one: one.visible)
+    yield (
+        f"**{right} of {len(shaded)} pictures look right**, with at most {percent(LIMIT)} of their"
+        f" pixels visibly off, by more than {LEADING.label} {TOLERANCE:g}. The nearest is"
+        f" {best.approximation} on *{best.scene}*: {percent(best.visible)}."
+    )
+    ltc = [one for one in rows if one.approximation == LTC.name]
+    yield (
+        "What is missing under lamps is light from other surfaces: of ltc, "
+        + "; ".join(
+            f"{percent(one.visible)} of *{one.scene}* differ from the reference, and"
+            f" {percent(one.visible_direct)} from one without that light"
+            for one in ltc
+        )
+        + "."
+    )
+
+
+def chart(rows: Sequence[Measured]) -> Figure:
+    """Draw each picture, and the share of its pixels that differ visibly."""
+    names = [method.name for method in APPROXIMATIONS]
+    with rc_context(STYLE):
+        figure = Figure(figsize=(5.6, 8.6), facecolor=GROUND)
+        grid = figure.subplots(len(names), len(SCENES))
+        figure.subplots_adjust(0.2, 0.005, 0.995, 0.92, wspace=0.05, hspace=0.32)
+        for axes in grid.flat:
+            axes.axis("off")
+        for one in rows:
+            axes = grid[names.index(one.approximation), list(SCENES).index(one.scene)]
+            axes.imshow(images.tonemap(one.picture).convert("RGB"), interpolation="antialiased")
+            axes.set_title(percent(one.visible), pad=2)
+        for axes, name in zip(grid[0], SCENES, strict=True):
+            axes.text(0.5, 1.4, name.replace(" ", "\n"), ha="center", transform=axes.transAxes)
+        for axes, name in zip(grid[:, 0], names, strict=True):
+            label = name.replace(" ", "\n")
+            axes.text(-0.05, 0.5, label, ha="right", va="center", transform=axes.transAxes)
+    return figure
+
+
+def table(rows: Sequence[Measured]) -> Iterator[str]:
+    """Yield the errors of each approximation by scene, its time and that of its preparation."""
+    lines = []
+    for method in APPROXIMATIONS:
+        own = {one.scene: one for one in rows if one.approximation == method.name}
+        cells = (
+            f"{number(own[scene].de2000)} ({own[scene].stops:+.2f})" if scene in own else "–"
+            for scene in SCENES
+        )
+        time = median(one.time for one in own.values())
+        prepare = median(one.prepare_s for one in own.values())
+        lines.append((method.name, *cells, f"{time:.2f}", seconds(prepare) if prepare else "–"))
+    yield from markdown([("Approximation", *SCENES, "time", "preparation"), *lines], right=7)
+    yield ""
+    yield (
+        f"Pictures are {WIDTH} pixels wide. Times are from {ROUNDS} rounds on"
+        f" {machine().processor}, {machine().cores} cores."
+    )
+
+
+def write(rows: Sequence[Measured], folder: Path) -> None:
+    """Write all numbers as ``engines.csv`` and ``engines.parquet``."""
+    plain = [{key: value for key, value in vars(one).items() if key != "picture"} for one in rows]
+    found = pa.Table.from_pylist(plain)
+    csv.write_csv(found, folder / "engines.csv")
+    parquet.write_table(found, folder / "engines.parquet")
