@@ -42,36 +42,35 @@ from fotismos.reports.terminal.tables import markdown
 from fotismos.reports.terminal.words import number, percent, seconds
 
 DOCS = ROOT / "docs"
-WIDTH, ROUNDS = 192, 7
+WIDTH = 192
+ROUNDS = measure.MEASURED_ROUNDS
+OUTDOORS = str(DOCS / "scenes/outdoors.py")
 
-
-def _still_life() -> dict[str, Any]:
-    """Return the plastic spheres under a sky instead of their lamp."""
-    sky = runpy.run_path(str(DOCS / "scenes/outdoors.py"))["scene"]["sky"]
-    return plastic_spheres() | {"lamp": sky}
-
-
-LAMP, SKY, MAP = "lamp", "sky", "map"
+LAMP = "lamp"
+SKY = "sky"
+MAP = "map"
 SCENES: Mapping[str, tuple[str | Callable[[], Any], str]] = {
     "Cornell box": ("cornell-box", LAMP),
     "textured room": (str(DOCS / "scenes/textured_room.py"), LAMP),
-    "plastic, sky": (_still_life, SKY),
-    "outdoors": (str(DOCS / "scenes/outdoors.py"), SKY),
+    "plastic, sky": (
+        lambda: plastic_spheres() | {"lamp": runpy.run_path(OUTDOORS)["scene"]["sky"]},
+        SKY,
+    ),
+    "outdoors": (OUTDOORS, SKY),
     "spheres": (str(DOCS / "scenes/spheres.py"), MAP),
 }
 """Scenes by name, and the kind of their light."""
 
 
 def _shaded(name: str, heuristic: str, shadows: bool = True) -> Method:
-    file = DOCS / "shaders" / heuristic
-    heuristic = str(file) if file.exists() else heuristic
+    heuristic = heuristic.replace("docs", str(DOCS), 1)
     return Method(name=name, family="kernel", shadows=shadows, heuristic=heuristic)
 
 
 KERNEL = _shaded("kernel", "phong", shadows=False)
 """Phong's model without shadows: the time of a sample is 1."""
 
-LTC = _shaded("ltc", "ltc.py")
+LTC = _shaded("ltc", "docs/shaders/ltc.py")
 NO_INTERREFLECTION = structs.replace(DIRECT, name="no interreflection")
 PATHS = structs.replace(FULL_PLAN, name="path tracing")
 """Again, with other seeds: it shows how much is noise."""
@@ -79,9 +78,9 @@ PATHS = structs.replace(FULL_PLAN, name="path tracing")
 APPROXIMATIONS: Mapping[Method, tuple[str, ...]] = {
     _shaded("textbook ambient", "phong"): (LAMP, SKY, MAP),
     _shaded("hemisphere ambient", "hemisphere-ambient"): (LAMP, SKY, MAP),
-    _shaded("harmonics", "harmonics.py"): (SKY, MAP),
-    _shaded("split sum", "split_sum.py"): (SKY, MAP),
-    _shaded("points for lamps", "cook_torrance.py"): (LAMP,),
+    _shaded("harmonics", "docs/shaders/harmonics.py"): (SKY, MAP),
+    _shaded("split sum", "docs/shaders/split_sum.py"): (SKY, MAP),
+    _shaded("points for lamps", "docs/shaders/cook_torrance.py"): (LAMP,),
     LTC: (LAMP,),
     _shaded("hard shadow map", "shadow-map", shadows=False): (LAMP, SKY),
     NO_INTERREFLECTION: (LAMP, SKY, MAP),
@@ -104,8 +103,8 @@ class Measured(Rendered):
     """What an approximation loses on a scene, and costs.
 
     ``visible`` is the share of the pixels above :data:`TOLERANCE`, ``visible_direct`` that against
-    a reference without interreflection, ``de2000`` the mean, and ``stops`` the mean luminance over
-    the reference's as a binary logarithm.
+    a reference without interreflection, ``de2000`` the mean, and ``stops`` the ratio of the mean
+    luminances on a display.
     """
 
     scene: str
@@ -131,10 +130,9 @@ def on_scene(name: str) -> Iterator[Measured]:
     served = [method for method, lights in APPROXIMATIONS.items() if light in lights]
     rendered = {method.name: _rendered(case, method) for method in served}
     direct = rendered[NO_INTERREFLECTION.name].picture
-    distances, to_direct = (
-        LEADING.against(truth, ready.counted, case.options.viewing) for truth in (reference, direct)
-    )
-    bright = luminance(reference[ready.counted]).mean()
+    counted = ready.counted
+    distances = LEADING.against(reference, counted, case.options.viewing)
+    to_direct = LEADING.against(direct, counted, case.options.viewing)
     for approximation, one in rendered.items():
         errors = distances(one.picture)
         yield Measured(
@@ -143,9 +141,14 @@ def on_scene(name: str) -> Iterator[Measured]:
             visible=float(np.mean(errors > TOLERANCE)),
             visible_direct=float(np.mean(to_direct(one.picture) > TOLERANCE)),
             de2000=LEADING.mean(errors),
-            stops=log2(luminance(one.picture[ready.counted]).mean() / bright),
+            stops=log2(_shown(one.picture[counted]) / _shown(reference[counted])),
             **vars(one),
         )
+
+
+def _shown(pixels: Floats) -> float:
+    """Return the mean luminance on a display, on which a lamp counts as white."""
+    return float(luminance(np.clip(pixels, 0, 1)).mean())
 
 
 def _rendered(case: Case, method: Method) -> Rendered:
@@ -175,40 +178,40 @@ def lead(rows: Sequence[Measured]) -> Iterator[str]:
     right = sum(one.visible <= LIMIT for one in shaded)
     best = min(shaded, key=lambda one: one.visible)
     yield (
-        f"**{right} of {len(shaded)} pictures look right**, with at most {percent(LIMIT)} of their"
+        f"**{right} of {len(shaded)} pictures look right**, with at most {100 * LIMIT:g} % of their"
         f" pixels visibly off, by more than {LEADING.label} {TOLERANCE:g}. The nearest is"
-        f" {best.approximation} on *{best.scene}*: {percent(best.visible)}."
+        f" {best.approximation} on *{best.scene}*: {percent(best.visible)}. Under lamps, what is"
+        " missing is mostly light from other surfaces:"
     )
-    ltc = [one for one in rows if one.approximation == LTC.name]
-    yield (
-        "What is missing under lamps is light from other surfaces: of ltc, "
-        + "; ".join(
-            f"{percent(one.visible)} of *{one.scene}* differ from the reference, and"
-            f" {percent(one.visible_direct)} from one without that light"
-            for one in ltc
+    for one in (row for row in rows if row.approximation == LTC.name):
+        yield (
+            f"of ltc on *{one.scene}*, {percent(one.visible)} of the pixels differ from the"
+            f" reference, and {percent(one.visible_direct)} from one without that light."
         )
-        + "."
-    )
 
 
 def chart(rows: Sequence[Measured]) -> Figure:
     """Draw each picture, and the share of its pixels that differ visibly."""
-    names = [method.name for method in APPROXIMATIONS]
+    shown = {(one.approximation, one.scene): one for one in rows}
     with rc_context(STYLE):
         figure = Figure(figsize=(5.6, 8.6), facecolor=GROUND)
-        grid = figure.subplots(len(names), len(SCENES))
+        grid = figure.subplots(len(APPROXIMATIONS), len(SCENES))
         figure.subplots_adjust(0.2, 0.005, 0.995, 0.92, wspace=0.05, hspace=0.32)
-        for axes in grid.flat:
-            axes.axis("off")
-        for one in rows:
-            axes = grid[names.index(one.approximation), list(SCENES).index(one.scene)]
-            axes.imshow(images.tonemap(one.picture).convert("RGB"), interpolation="antialiased")
-            axes.set_title(percent(one.visible), pad=2)
-        for axes, name in zip(grid[0], SCENES, strict=True):
-            axes.text(0.5, 1.4, name.replace(" ", "\n"), ha="center", transform=axes.transAxes)
-        for axes, name in zip(grid[:, 0], names, strict=True):
-            label = name.replace(" ", "\n")
-            axes.text(-0.05, 0.5, label, ha="right", va="center", transform=axes.transAxes)
+        for line, method in zip(grid, APPROXIMATIONS, strict=True):
+            for axes, scene in zip(line, SCENES, strict=True):
+                axes.axis("off")
+                one = shown.get((method.name, scene))
+                if one is None:
+                    axes.text(0.5, 0.5, "–", ha="center", va="center")
+                    continue
+                axes.imshow(images.tonemap(one.picture).convert("RGB"), interpolation="antialiased")
+                axes.set_title(percent(one.visible), pad=2)
+            box = line[0].get_position()
+            figure.text(0.2, box.y0 + box.height / 2, method.name.replace(" ", "\n"),
+                        ha="right", va="center")  # fmt: skip
+        for axes, scene in zip(grid[0], SCENES, strict=True):
+            box = axes.get_position()
+            figure.text(box.x0 + box.width / 2, 0.95, scene.replace(" ", "\n"), ha="center")
     return figure
 
 
