@@ -9,6 +9,8 @@ A map has rows from straight up to straight down, and columns around that axis, 
 texels it is interpolated bilinearly.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,17 +45,30 @@ def environment(scene: Scene, direction: Vector, sun: bool = True) -> Colour:
     if emitter is None:
         ambient = getattr(scene.integrator(), "ambient", None)
         return mi.Spectrum(ambient.eval(dr.zeros(mi.SurfaceInteraction3f)) if ambient else 0)
-    parameters = mi.traverse(emitter)
-    if sun or "sun_scale" not in parameters:
+    if sun:
         return radiance(emitter, direction)
+    with without_sun(scene):
+        sky = radiance(emitter, direction)
+        dr.eval(sky)  # before the sun is back
+    return sky
+
+
+@contextmanager
+def without_sun(scene: Scene) -> Iterator[None]:
+    """Switch off the sun of a scene's ``sunsky``, which is one of the lights, for the block."""
+    emitter = scene.environment()
+    parameters = {} if emitter is None else mi.traverse(emitter)
+    if "sun_scale" not in parameters:
+        yield
+        return
     scale = parameters["sun_scale"]
     parameters["sun_scale"] = 0.0
     parameters.update()
-    sky = radiance(emitter, direction)
-    dr.eval(sky)  # before the sun is back
-    parameters["sun_scale"] = scale
-    parameters.update()
-    return sky
+    try:
+        yield
+    finally:
+        parameters["sun_scale"] = scale
+        parameters.update()
 
 
 def radiance(

@@ -15,7 +15,8 @@ with ``c = n.up`` receives ``E / pi = S (1 + c) / 2 + G (1 - c) / 2``: the integ
 over its hemisphere. ``S`` and ``G`` are fitted by least squares to these points, each weighted by
 its ``k_d``, which keeps the image's mean.
 
-``I_a`` stands for the environment if the scene has one, and is then replaced. If the scene has its
+The sun of ``sunsky`` is one of the lights, so it is not part of the environment here. ``I_a``
+stands for the environment if the scene has one, and is then replaced. If the scene has its
 own ``I_a``, it stays, and the light reflected by surfaces is added.
 """
 
@@ -25,7 +26,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from fotismos.heuristic import materials
+from fotismos.heuristic import background, materials
 from fotismos.heuristic.convention import RADIANCE_PER_IRRADIANCE, Array, Doubles
 from fotismos.heuristic.heuristics import INPUTS, Heuristic, Point
 from fotismos.heuristic.plugins.coefficients import SceneMaterials
@@ -49,8 +50,9 @@ def gather(scene: Any) -> tuple[Doubles, Doubles, Doubles]:
     (N, K): the weight of each in the image.
     """
     si, normal, k_d = _seen(scene)
-    light = _arriving(scene, si, normal)
-    dr.eval(light, k_d, normal)
+    with background.without_sun(scene):
+        light = _arriving(scene, si, normal)
+        dr.eval(light, k_d, normal)
     return np.array(normal, float).T[:: STRATA**2], _by_point(light), _by_point(k_d)
 
 
@@ -104,7 +106,7 @@ def _arriving(scene: Any, si: Any, normal: Any) -> Any:
     corner = mi.Point2f(mi.Float(cell % STRATA), mi.Float(cell // STRATA))
     toward = mi.warp.square_to_cosine_hemisphere((corner + sampler.next_2d()) / STRATA)
     ray = si.spawn_ray(mi.Frame3f(normal).to_world(toward))
-    # The visible environment is added below: rays would hit a sun too seldom.
+    # The visible environment is added below: rays would hit a small bright part too seldom.
     paths = mi.load_dict({"type": "path", "max_depth": REFLECTIONS + 1, "hide_emitters": True})
     reflected, _, _ = paths.sample(scene, sampler, ray, active=active)
     around = _from_environment(

@@ -20,6 +20,7 @@ from docs.figures import (
     accuracy,
     audits,
     density,
+    engines,
     examples,
     guarantees,
     hero,
@@ -76,20 +77,23 @@ POLYGONS = (
 def main(words: Sequence[str]) -> None:
     """Make everything; ``--all`` adds the slow parts.
 
-    ``--accuracy`` makes only one page, ``--prices`` only the first part of it.
+    ``--accuracy`` and ``--engines`` make only one page, ``--prices`` only the first part of one.
     """
-    if not set(words) <= {"--all", "--accuracy", "--prices", "--site"}:
+    if not set(words) <= {"--all", "--accuracy", "--engines", "--prices", "--site"}:
         sys.exit(__doc__)
     if words == ["--site"]:
         return _site()
     set_variant("llvm_ad_rgb")
     if words == ["--accuracy"]:
         return _accuracy()
+    if words == ["--engines"]:
+        return _engines()
     if words == ["--prices"]:
         return _prices()
     if words == ["--all"]:
         _measurements()
         _accuracy()
+        _engines()
         _prices()
     _guarantees()
     replace("plans.md", "rules", rules())
@@ -222,6 +226,15 @@ def _accuracy() -> None:
     replace("accuracy.md", "predictions", accuracy.predictions())
     for record, path in accuracy.charts(records):
         atomic.write(DOCS / path, vega.paper(titled(record)))
+
+
+def _engines() -> None:
+    """Measure what approximations of engines lose and cost."""
+    found = engines.measured()
+    engines.write(found, DOCS)
+    for part in ("lead", "table"):
+        replace("engines.md", part, getattr(engines, part)(found))
+    atomic.write(DOCS / "engines.webp", hero.encoded(engines.chart(found)))
 
 
 def _prices() -> None:

@@ -9,7 +9,8 @@ from docs.figures.from_tests import ROOT
 from docs.figures.guarantees import Guarantee, guarantees
 
 LANGUAGES = {
-    ".py": "python", ".json": "json", ".toml": "toml", ".glsl": "glsl", ".xml": "xml"
+    ".py": "python", ".json": "json", ".toml": "toml", ".glsl": "glsl", ".xml": "xml",
+    ".csv": "text", ".cff": "yaml",
 }  # fmt: skip
 
 

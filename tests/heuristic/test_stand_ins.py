@@ -72,6 +72,21 @@ def test_an_environment_replaces_ambient_light_and_is_gathered_where_nothing_hid
     assert shown == pytest.approx(0.25 * 0.8, rel=0.01)
 
 
+def test_a_sun_counts_once_as_a_light_and_not_as_environment(rgb):
+    """A white plane below ``sunsky`` is as bright as by Mitsuba's ``path``."""
+    scene = {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 2, "hide_emitters": True},
+        "sensor": camera((0, 0, 5), (0, 0, 0), fov=20.0, up=(0, 1, 0)),
+        "plane": {"type": "rectangle", "bsdf": {"type": "diffuse", "reflectance": 0.5}},
+        "sky": {"type": "sunsky", "sun_direction": (-0.5, -0.6, 0.6)},
+    }
+    expected = np.mean([mi.render(mi.load_dict(scene), spp=512, seed=s) for s in (1, 2)], 0)
+    half = pair(Source("plane", scene), PairOptions()).heuristic.instantiate()
+    found = image(half, AMBIENT, hide_emitters=True)
+    np.testing.assert_allclose(found.mean((0, 1)), expected.mean((0, 1)), rtol=0.02)
+
+
 def test_ambient_light_of_its_own_stays_without_an_environment(rgb):
     given = sky_above(two_colours)
     del given["sky"]

@@ -10,9 +10,11 @@ import pytest
 from markdown_it import MarkdownIt
 from nbclient import NotebookClient
 from PIL import Image
+from pyarrow import csv, parquet
 
-from docs.figures import hero
+from docs.figures import engines, hero
 from fotismos.reports import cli
+from fotismos.reports.terminal.words import number
 from tests.shared.programs import ROOT, python
 
 PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
@@ -84,3 +86,22 @@ def test_the_readme_shows_a_picture_with_the_command_that_makes_its_numbers():
     with Image.open(ROOT / "docs/hero.webp") as picture:
         assert picture.width >= 900
     assert (ROOT / "docs/hero.webp").stat().st_size < 150_000
+
+
+def test_the_page_of_engines_has_the_numbers_of_its_files():
+    rows = csv.read_csv(ROOT / "docs/engines.csv").to_pylist()
+    assert rows == parquet.read_table(ROOT / "docs/engines.parquet").to_pylist()
+    served = {
+        (method.name, scene)
+        for method, lights in engines.APPROXIMATIONS.items()
+        for scene, (_, light) in engines.SCENES.items()
+        if light in lights
+    }
+    assert {(row["approximation"], row["scene"]) for row in rows} == served
+    table = (ROOT / "docs/engines.md").read_text().split("<!-- table")[1].split("<!-- end")[0]
+    rows_of_page = [line.removeprefix("| ").split(" | ") for line in table.splitlines()]
+    lines = {cells[0]: cells for cells in rows_of_page}
+    for row in rows:
+        cells = lines[row["approximation"]]
+        cell = cells[list(engines.SCENES).index(row["scene"]) + 1]
+        assert cell == f"{number(row['de2000'])} ({row['stops']:+.2f})"

@@ -1,0 +1,242 @@
+"""The content of docs/engines.md: what approximations of engines lose on five scenes, and cost.
+
+``./run docs --engines`` measures for ten minutes, and writes the page.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import log2
+from pathlib import Path
+from statistics import median
+from textwrap import wrap
+from typing import Any
+
+import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+
+import numpy as np
+import pyarrow as pa
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from msgspec import structs
+from pyarrow import csv, parquet
+
+from docs.figures.from_tests import ROOT
+from docs.figures.model_figures import GROUND, STYLE
+from fotismos.comparisons.case import Case, open_case
+from fotismos.comparisons.comparison import machine
+from fotismos.comparisons.cost import measure, times
+from fotismos.comparisons.cost.cost_record import Method
+from fotismos.comparisons.cost.methods import DIRECT, FULL_PLAN, Ladder
+from fotismos.comparisons.departure.colour import luminance
+from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.gallery.scenes import plastic_spheres
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import guarded
+from fotismos.heuristic.convention import Floats
+from fotismos.reference.rendering.gbuffer import image_size
+from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.sums import Accumulator
+from fotismos.reports.files import images
+from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.words import number, percent, seconds
+
+DOCS = ROOT / "docs"
+WIDTH = 192
+ROUNDS = measure.MEASURED_ROUNDS
+DAYLIGHT = {"type": "sunsky", "sun_direction": (-0.5, -0.6, 0.6), "turbidity": 4.0}
+
+LAMP = "lamp"
+SKY = "sky"
+MAP = "map"
+SCENES: Mapping[str, tuple[str | Callable[[], Any], str]] = {
+    "Cornell box": ("cornell-box", LAMP),
+    "textured room": (str(DOCS / "scenes/textured_room.py"), LAMP),
+    "plastic, sky": (lambda: plastic_spheres() | {"lamp": DAYLIGHT}, SKY),
+    "outdoors": (str(DOCS / "scenes/outdoors.py"), SKY),
+    "spheres": (str(DOCS / "scenes/spheres.py"), MAP),
+}
+"""Scenes by name, and the kind of their light."""
+
+
+def _shaded(name: str, heuristic: str, shadows: bool = True) -> Method:
+    heuristic = heuristic.replace("docs", str(DOCS), 1)
+    return Method(name=name, family="kernel", shadows=shadows, heuristic=heuristic)
+
+
+KERNEL = _shaded("kernel", "phong", shadows=False)
+"""Phong's model without shadows: the time of a sample is 1."""
+
+LTC = _shaded("ltc", "docs/shaders/ltc.py")
+NO_INTERREFLECTION = structs.replace(DIRECT, name="no interreflection")
+PATHS = structs.replace(FULL_PLAN, name="path tracing")
+"""Again, with other seeds: it shows how much is noise."""
+
+APPROXIMATIONS: Mapping[Method, tuple[str, ...]] = {
+    _shaded("textbook ambient", "phong"): (LAMP, SKY, MAP),
+    _shaded("hemisphere ambient", "hemisphere-ambient"): (LAMP, SKY, MAP),
+    _shaded("harmonics", "docs/shaders/harmonics.py"): (SKY, MAP),
+    _shaded("split sum", "docs/shaders/split_sum.py"): (SKY, MAP),
+    _shaded("points for lamps", "docs/shaders/cook_torrance.py"): (LAMP,),
+    LTC: (LAMP,),
+    _shaded("hard shadow map", "shadow-map", shadows=False): (LAMP, SKY),
+    NO_INTERREFLECTION: (LAMP, SKY, MAP),
+    PATHS: (LAMP, SKY, MAP),
+}
+"""Approximations, and the kinds of light that they are made for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rendered:
+    """A converged picture (H, W, 3), the time of a sample over the kernel's, and preparation."""
+
+    picture: Floats
+    time: float
+    prepare_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured(Rendered):
+    """What an approximation loses on a scene, and costs.
+
+    ``visible`` is the share of the pixels above :data:`TOLERANCE`, ``visible_direct`` that against
+    a reference without interreflection, ``de2000`` the mean, and ``stops`` the ratio of the mean
+    luminances on a display.
+    """
+
+    scene: str
+    approximation: str
+    visible: float
+    visible_direct: float
+    de2000: float
+    stops: float
+
+
+def measured() -> list[Measured]:
+    """Measure all approximations on each scene, in turn."""
+    return [row for scene in SCENES for row in on_scene(scene)]
+
+
+def on_scene(name: str) -> Iterator[Measured]:
+    """Yield what is measured on a scene."""
+    scene, light = SCENES[name]
+    case = open_case(scene, Options(), name=name)
+    case = case.changed(resolution=measure.reduced(case.source, case.options, WIDTH))
+    ready = guarded(case.source, case.options)
+    reference = measure.converged(ready, case.options.seed, progress=None).mean
+    served = [method for method, lights in APPROXIMATIONS.items() if light in lights]
+    rendered = {method.name: _rendered(case, method) for method in served}
+    direct = rendered[NO_INTERREFLECTION.name].picture
+    counted = ready.counted
+    distances = LEADING.against(reference, counted, case.options.viewing)
+    to_direct = LEADING.against(direct, counted, case.options.viewing)
+    for approximation, one in rendered.items():
+        errors = distances(one.picture)
+        yield Measured(
+            scene=name,
+            approximation=approximation,
+            visible=float(np.mean(errors > TOLERANCE)),
+            visible_direct=float(np.mean(to_direct(one.picture) > TOLERANCE)),
+            de2000=LEADING.mean(errors),
+            stops=log2(_shown(one.picture[counted]) / _shown(reference[counted])),
+            **vars(one),
+        )
+
+
+def _shown(pixels: Floats) -> float:
+    """Return the mean luminance on a display, on which a lamp counts as white."""
+    return float(luminance(np.clip(pixels, 0, 1)).mean())
+
+
+def _rendered(case: Case, method: Method) -> Rendered:
+    """Render an approximation, and time it in turn with the kernel in the same scene."""
+    options = case.options.changed(heuristic=method.heuristic or "phong")
+    ready = guarded(case.source, options)
+    ladder = Ladder(case.source, options, ready)
+    firsts = {one.name: ladder.renderer(one, 4) for one in (KERNEL, method)}
+    width, height = image_size(ready.scene)
+    renderers = measure.tried(firsts, dict.fromkeys(firsts, (4,)), width * height)
+    measure.rendered(renderers, lambda _: (0.0, 0.0), (), ROUNDS, options.seed, None, "timing")
+    lines = measure.timed(renderers, ROUNDS, width * height)
+    total = Accumulator()
+    renderer = firsts[method.name].sampled(measure.REFERENCE_SPP)
+    for one in passes([renderer], options.seed, measure.REFERENCE_PASSES):
+        total.add(one.images[0])
+    return Rendered(
+        picture=total.mean(),
+        time=times.ratio(lines[method.name], lines[KERNEL.name]).value,
+        prepare_s=getattr(firsts[method.name].integrator, "preparation", 0.0),
+    )
+
+
+def lead(rows: Sequence[Measured]) -> Iterator[str]:
+    """Yield the finding in a few sentences."""
+    shaded = [one for one in rows if one.approximation != PATHS.name]
+    right = sum(one.visible <= LIMIT for one in shaded)
+    best = min(shaded, key=lambda one: one.visible)
+    ltc = "; ".join(
+        f"on *{one.scene}*, {percent(one.visible)} and {percent(one.visible_direct)}"
+        for one in rows
+        if one.approximation == LTC.name
+    )
+    yield from wrap(
+        f"**{right} of {len(shaded)} pictures look right**, with at most {100 * LIMIT:g} % of their"
+        f" pixels visibly off, by more than {LEADING.label} {TOLERANCE:g}. The nearest is"
+        f" {best.approximation} on *{best.scene}*: {percent(best.visible)}. Under lamps, most of"
+        " what is missing is light from other surfaces. These shares of ltc's pixels differ from"
+        f" the reference, and from one without that light: {ltc}.",
+        width=110,
+    )
+
+
+def chart(rows: Sequence[Measured]) -> Figure:
+    """Draw each picture, and the share of its pixels that differ visibly."""
+    shown = {(one.approximation, one.scene): one for one in rows}
+    with rc_context(STYLE):
+        figure = Figure(figsize=(5.6, 8.6), facecolor=GROUND)
+        grid = figure.subplots(len(APPROXIMATIONS), len(SCENES))
+        figure.subplots_adjust(0.2, 0.005, 0.995, 0.92, wspace=0.05, hspace=0.32)
+        for line, method in zip(grid, APPROXIMATIONS, strict=True):
+            for axes, scene in zip(line, SCENES, strict=True):
+                axes.axis("off")
+                one = shown.get((method.name, scene))
+                if one is None:
+                    axes.text(0.5, 0.5, "–", ha="center", va="center")
+                    continue
+                axes.imshow(images.tonemap(one.picture).convert("RGB"), interpolation="antialiased")
+                axes.set_title(f"{100 * one.visible:.1f} %", pad=2)
+            box = line[0].get_position()
+            figure.text(0.2, box.y0 + box.height / 2, method.name.replace(" ", "\n"),
+                        ha="right", va="center")  # fmt: skip
+        for axes, scene in zip(grid[0], SCENES, strict=True):
+            box = axes.get_position()
+            figure.text(box.x0 + box.width / 2, 0.95, scene.replace(" ", "\n"), ha="center")
+    return figure
+
+
+def table(rows: Sequence[Measured]) -> Iterator[str]:
+    """Yield the errors of each approximation by scene, its time and that of its preparation."""
+    lines = []
+    for method in APPROXIMATIONS:
+        own = {one.scene: one for one in rows if one.approximation == method.name}
+        cells = (
+            f"{number(own[scene].de2000)} ({own[scene].stops:+.2f})" if scene in own else "–"
+            for scene in SCENES
+        )
+        time = median(one.time for one in own.values())
+        prepare = median(one.prepare_s for one in own.values())
+        lines.append((method.name, *cells, f"{time:.2f}", seconds(prepare) if prepare else "–"))
+    yield from markdown([("Approximation", *SCENES, "time", "preparation"), *lines], right=1)
+    yield ""
+    yield (
+        f"Pictures are {WIDTH} pixels wide. Times are from {ROUNDS} rounds on"
+        f" {machine().processor}, {machine().cores} cores."
+    )
+
+
+def write(rows: Sequence[Measured], folder: Path) -> None:
+    """Write all numbers as ``engines.csv`` and ``engines.parquet``."""
+    plain = [{key: value for key, value in vars(one).items() if key != "picture"} for one in rows]
+    found = pa.Table.from_pylist(plain)
+    csv.write_csv(found, folder / "engines.csv")
+    parquet.write_table(found, folder / "engines.parquet")
