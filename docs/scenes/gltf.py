@@ -64,13 +64,12 @@ class Scene:
         if both := given.get("metallicRoughnessTexture"):
             roughness = self.texture(both, roughness, channels=slice(1, 2))
             metallic = self.texture(both, metallic, channels=slice(2, 3))
-        bsdf = {
-            "type": "principled",
-            "base_color": self.colour(colour, given.get("baseColorTexture")),
-            "roughness": roughness,
-            "metallic": metallic,
-            "eta": extension(material, IOR).get("ior", 1.5),
-        }
+        base = self.colour(colour, given.get("baseColorTexture"))
+        eta = extension(material, IOR).get("ior", 1.5)
+        bsdf = {"type": "principled", "base_color": base, "metallic": metallic, "eta": eta}
+        bsdf["roughness"] = roughness
+        if (eta, metallic) == (1, 0):  # without a highlight, as glTF's diffuse part
+            bsdf = {"type": "diffuse", "reflectance": base}
         if info := material.get("normalTexture"):
             bsdf = {"type": "normalmap", "normalmap": self.texture(info, 1), "bsdf": bsdf}
         return {"type": "twosided", "bsdf": bsdf} if material.get("doubleSided") else bsdf
