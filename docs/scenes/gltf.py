@@ -51,8 +51,7 @@ class Scene:
         self.parts = {"type": "scene", "integrator": {"type": "path", "max_depth": 8}}
         self.has_camera = False
         self.ends = []
-        self.materials = [*self.json.get("materials", []), {}]
-        for number, material in enumerate(self.materials):
+        for number, material in enumerate(self.json.get("materials", [])):
             self.parts[f"material {number}"] = self.bsdf(material)
 
     def bsdf(self, material):
@@ -128,14 +127,13 @@ class Scene:
         columns, faces = self.file.triangles(primitive, to_world)
         positions = columns["x y z"]
         self.ends += [positions.min(axis=0), positions.max(axis=0)]
-        number = primitive.get("material", len(self.materials) - 1)
-        shape = {
-            "type": "ply",
-            "filename": ply(columns, faces),
-            "face_normals": "nx ny nz" not in columns,
-            "bsdf": {"type": "ref", "id": f"material {number}"},
-        }
-        material = self.materials[number]
+        has_faces = "nx ny nz" not in columns
+        shape = {"type": "ply", "filename": ply(columns, faces), "face_normals": has_faces}
+        if "material" not in primitive:
+            return shape | {"bsdf": self.bsdf({})}
+        number = primitive["material"]
+        shape["bsdf"] = {"type": "ref", "id": f"material {number}"}
+        material = self.json["materials"][number]
         strength = self.light * extension(material, STRENGTH).get("emissiveStrength", 1)
         emitted = strength * np.array(material.get("emissiveFactor", (0, 0, 0)))
         if emitted.any():

@@ -76,8 +76,8 @@ class File:
         columns = {"x y z": self.array(given["POSITION"]) @ linear.T + to_world[:3, 3]}
         if "NORMAL" in given:
             columns["nx ny nz"] = self.array(given["NORMAL"]) @ np.linalg.pinv(linear)
-        if "TEXCOORD_0" in given:  # in Mitsuba, v points up
-            columns["u v"] = self.array(given["TEXCOORD_0"]) * (1, -1) + (0, 1)
+        if "TEXCOORD_0" in given:  # v points down in both
+            columns["u v"] = self.array(given["TEXCOORD_0"])
         corners = np.arange(len(columns["x y z"]))
         if "indices" in primitive:
             corners = self.array(primitive["indices"])
