@@ -130,8 +130,8 @@ def _mesh(shape: Triangles, arrays: list[np.ndarray]) -> dict[str, Any]:
     attributes = {"POSITION": add(shape.positions, np.float32)}
     if shape.normals is not None:
         attributes["NORMAL"] = add(shape.normals, np.float32)
-    if shape.texcoords is not None:  # v points down in glTF
-        attributes["TEXCOORD_0"] = add(shape.texcoords * [1, -1] + [0, 1], np.float32)
+    if shape.texcoords is not None:  # v points down in both
+        attributes["TEXCOORD_0"] = add(shape.texcoords, np.float32)
     indices = add(shape.faces.ravel(), np.uint32)
     primitive = {"attributes": attributes, "indices": indices, "material": shape.material}
     return {"name": shape.name, "primitives": [primitive]}
