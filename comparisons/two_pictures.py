@@ -14,13 +14,11 @@ from fotismos.comparisons.comparison import (
 )
 from fotismos.comparisons.estimates import PassSums, measure
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.picture_mistakes import BLACK
 from fotismos.heuristic.errors import InputError
 
 FEWEST = 2
 """Passes of two single pictures, which are equal."""
-
-BLACK = 1e-5
-"""Display-linear: a picture with no brighter pixel is black, and no difference is seen in it."""
 
 
 def compare_pictures(options: Options, name: str, command: str = "") -> Comparison:
