@@ -151,7 +151,11 @@ def test_a_mask_and_alpha_say_which_pixels_count(run, tmp_path, monkeypatch):
 
 GREY = np.full((8, 8, 3), 0.5)
 BAD = (
-    ({"image": [GREY], "reference": [np.full((8, 16, 3), 0.5)]}, {}, "8x8, 16x8: 2 times as wide"),
+    (
+        {"image": [GREY], "reference": [np.full((8, 16, 3), 0.5)]},
+        {},
+        "8x8, 16x8: the last is 2 times as wide as",
+    ),
     ({"image": [0 * GREY], "reference": [0 * GREY]}, {}, "both pictures are black"),
     ({"image": [GREY], "reference": []}, {}, "two pictures are needed"),
     ({"image": [GREY], "reference": [GREY]}, {"mask": "none.png"}, "none.png: there is no such"),
