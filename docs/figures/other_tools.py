@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from docs.figures.model_figures import FAINT, GROUND, STYLE
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.criterion import Verdict
+from fotismos.comparisons.departure.criterion import LIMIT, Verdict
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import as_files
 from fotismos.comparisons.prepared import prepare
@@ -51,7 +51,7 @@ LETTERS = 44
 
 @dataclass(frozen=True)
 class Answers:
-    """What tools say of a pair: FLIP's mean, idiff's RMS, and the verdict with what is named."""
+    """What tools say of a pair: FLIP's mean, idiff's RMS, and a verdict with what is named."""
 
     pair: str
     flip: float
@@ -167,13 +167,16 @@ def _dots(axes: Axes, title: str, values: Sequence[float], found: Sequence[Answe
 
 def lines(found: Sequence[Answers]) -> Iterator[str]:
     """Yield the picture and what it shows."""
-    named = [one.pair for one in found if one.named]
-    noise = found[0]
-    less = [one.pair for one in found[1:] if one.flip < noise.flip]
+    passed = [one for one in found if one.verdict == "pass"]
+    named = [one for one in found if one.named]
+    unnamed = [one.pair for one in found if one.verdict == "fail" and not one.named]
+    worst = max(passed, key=lambda one: one.rms)
+    better = sum(one.verdict == "fail" and one.rms < worst.rms for one in found)
     yield "![Ten pairs: FLIP and RMS give a number, fotismos a verdict and a name](other-tools.svg)"
     yield ""
     yield (
-        f"FLIP and RMS give a number only, fotismos also names {len(named)} of the 7 mistakes;"
-        f" two pictures that differ by noise alone have a FLIP of {number(noise.flip)} (dotted),"
-        f" more than these: {', '.join(less) or 'none'}."
+        f"FLIP and RMS give a number only. fotismos passes {len(passed)} pairs, in which at most"
+        f" {percent(LIMIT)} of the pixels differ visibly, and names the mistake in {len(named)} of"
+        f" the {len(found) - len(passed)} others; not named is {', '.join(unnamed)}, which varies"
+        f" over the picture. By RMS, *{worst.pair}* is worse than {better} of those that fail."
     )
