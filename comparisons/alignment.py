@@ -25,7 +25,9 @@ FINER = 4
 along each side of a pixel."""
 
 LEAST = 0.08
-"""Correlation below which edges are uninformative."""
+CHANCE = 5.0
+"""Correlation below which edges are uninformative; and that of a picture of so few pixels that
+chance makes it, in units of one over the root of their number."""
 
 DOUBTFUL = 2.0
 """A shift improves the agreement by more than this times what noise does."""
@@ -75,7 +77,8 @@ def measure(image: np.ndarray, expected: Sequence[np.ndarray]) -> Place:
 
 def _edges(layers: np.ndarray) -> np.ndarray:
     """Return the size of the gradient, on a scale that is 1/2 at 1/4 and ends at 1."""
-    size = np.sqrt((np.array(np.gradient(layers, axis=(0, 1))) ** 2).sum(axis=(0, -1)))
+    slopes = [np.gradient(layers, axis=axis) for axis in (0, 1) if layers.shape[axis] > 1]
+    size = np.sqrt(sum((slope**2).sum(axis=-1) for slope in slopes) + np.zeros(layers.shape[:2]))
     strength: np.ndarray = size / (size + 0.25)
     return strength
 
@@ -87,7 +90,7 @@ def _shift(edges: np.ndarray, seen: np.ndarray) -> Place:
     y, x = map(int, np.unravel_index(np.argmax(table), table.shape))
     highest = float(table[y, x])
     gain = highest - float(table[reach, reach])
-    if highest < LEAST:
+    if highest < max(LEAST, CHANCE / np.sqrt(seen.size)):
         return Place(shift=None, correlation=highest, gain=gain)
     down = y - reach + _vertex(table[:, x], y)
     right = x - reach + _vertex(table[y], x)
@@ -99,6 +102,8 @@ def _correlation(seen: np.ndarray, edges: np.ndarray, down: int, right: int) -> 
     height, width = edges.shape
     a = seen[max(down, 0) : height + down, max(right, 0) : width + right]
     b = edges[max(-down, 0) : height - down, max(-right, 0) : width - right]
+    if not a.size:  # the picture is a pixel wide or high
+        return 0.0
     a = a - a.mean()
     b = b - b.mean()
     size = np.sqrt((a * a).sum() * (b * b).sum())

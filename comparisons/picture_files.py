@@ -17,8 +17,9 @@ files they are not. Without that colour, these pixels do not count.
 """
 
 import hashlib
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from glob import glob, has_magic
 from pathlib import Path
@@ -137,6 +138,8 @@ def read_file(
     elif not path.is_file():
         fault = "it is not a regular file" if path.exists() else "there is no such file"
         raise InputError(f"{path}: {fault}. Give a {' or '.join(PICTURES)} picture.")
+    elif layer_name and path.suffix.lower() != ".exr":
+        raise InputError(f"{word}: only EXR files have layers. Give {path}.")
     elif path.suffix.lower() == ".exr":
         layer = _exr(path, layer_name)
     elif path.suffix.lower() == ".npy":
@@ -145,6 +148,8 @@ def read_file(
         layer = _bitmap(path, path.suffix.lower())
     # A NaN would pass the later tests: it is neither above nor below.
     wrong = np.asarray(~np.isfinite(layer.colours).all(axis=-1))
+    if layer.alpha is not None:
+        wrong |= ~np.isfinite(layer.alpha)
     if wrong.any():
         raise NonFiniteError(f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture.")
     decode = {"srgb": from_srgb, "linear": None}.get(transfer or "", layer.transfer)
@@ -171,6 +176,7 @@ def read_file(
             " say its primaries, and so are overshoots of a sharpening filter. Write the"
             " chromaticities, or clip the picture at 0."
         )
+    image = np.where(np.abs(image) < 1 / LARGEST_VALUE, 0.0, image)
     if over is not None:
         notes.append(f"alpha over {over}")
     content = ARRAYS[word].tobytes() if word in ARRAYS else path.read_bytes()
@@ -226,12 +232,14 @@ def _exr(path: Path, name: str) -> Layer:
     import OpenEXR  # loaded late: other pictures do not need it
 
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
             parts = [part.name() for part in file.parts]
+            if not parts:  # the library keeps none that it cannot read to its end
+                raise ValueError("it ends too soon, or is damaged")
             header = dict(file.header())
             channels = {name: np.array(c.pixels) for name, c in file.channels().items()}
     except Exception as error:  # the library raises many types for a file that is not EXR
-        raise InputError(f"{path}: not a readable EXR file: {error}.") from error
+        raise _unreadable(path, "EXR", error) from error
     if len(parts) > 1:
         raise InputError(
             f"{path}: it has {len(parts)} parts, {', '.join(map(repr, parts))}. Save the picture"
@@ -255,6 +263,22 @@ def _exr(path: Path, name: str) -> Layer:
         colours = _converted(path, colours, primaries)
         notes.append(f"converted from {_named(primaries)} to BT.709")
     return Layer(colours=colours, alpha=alpha, is_premultiplied=True, notes=tuple(notes))
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep a library's own messages from being printed: the error that is raised says it."""
+    kept = {stream: os.dup(stream) for stream in (1, 2)}
+    # It prints by C, and by Python's streams, which are others in a notebook.
+    with open(os.devnull, "w") as nothing, redirect_stdout(nothing), redirect_stderr(nothing):
+        try:
+            for stream in kept:
+                os.dup2(nothing.fileno(), stream)
+            yield
+        finally:
+            for stream, copy in kept.items():
+                os.dup2(copy, stream)
+                os.close(copy)
 
 
 def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> InputError:
@@ -333,6 +357,9 @@ def _converted(path: Path, colours: Array, primaries: Any) -> Array:
 # --- Other files -------------------------------------------------------------------------------
 
 
+BEGINNINGS = {".hdr": (b"#?",), ".pfm": (b"PF", b"Pf")}
+"""What files that Mitsuba reads begin with; it also reads others by these names, wrongly."""
+
 PNG_HEADER = 26
 """Bytes that a PNG file begins with; the last two are its bit depth and its kind of colours."""
 
@@ -342,15 +369,17 @@ MODES = ("L", "LA", "RGB", "RGBA", "I;16")
 
 def _bitmap(path: Path, suffix: str) -> Layer:
     """Read a file by Pillow, or by Mitsuba, which also reads HDR, PFM and 16 bits of colours."""
-    kind = suffix.removeprefix(".").upper()
+    kind = (suffix or path.name).removeprefix(".").upper()
     with path.open("rb") as stream:
         header = stream.read(PNG_HEADER)
+    if not header.startswith(BEGINNINGS.get(suffix, (b"",))):
+        raise _unreadable(path, kind, ValueError("it does not begin as one"))
     is_deep = suffix == ".png" and header[24:25] == b"\x10" and header[25:26] != b"\0"
     is_for_mitsuba = is_deep or suffix in (".hdr", ".pfm")
     try:
         pixels = _by_mitsuba(path, kind) if is_for_mitsuba else _by_pillow(path)
     except (OSError, RuntimeError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise InputError(f"{path}: not a readable {kind} file: {error}.") from error
+        raise _unreadable(path, kind, error) from error
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
     if pixels.dtype.kind == "f":
         return _layer(path, pixels.astype(float))
@@ -401,9 +430,10 @@ def _by_mitsuba(path: Path, kind: str) -> NDArray[Any]:
 
 def _array(path: Path) -> Layer:
     try:
-        values = np.load(path, allow_pickle=False)
-    except (ValueError, OSError, EOFError) as error:
-        raise InputError(f"{path}: not a readable NPY file: {error}.") from error
+        with path.open("rb") as stream:
+            values = np.lib.format.read_array(stream, allow_pickle=False)
+    except (ValueError, OSError, EOFError, MemoryError) as error:
+        raise _unreadable(path, "NPY", error) from error
     values = values[..., None] if values.ndim == 2 else values
     if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or values.dtype.kind not in "fiu":
         raise InputError(
@@ -421,6 +451,11 @@ def _layer(path: Path, values: Array) -> Layer:
     rest = values[..., count:]
     colours = np.broadcast_to(values[..., :count], (*values.shape[:2], 3))
     return Layer(colours=colours, alpha=rest[..., 0] if rest.shape[2] else None)
+
+
+def _unreadable(path: Path, kind: str, error: Exception) -> InputError:
+    fault = str(error).rstrip(". ")
+    return InputError(f"{path}: not a readable {kind} file: {fault}. Save the picture again.")
 
 
 def _counted(wrong: NDArray[np.bool_]) -> str:

@@ -24,6 +24,9 @@ from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.picture_curves import BETTER_CURVE, Curves, FittedCurve
 
+BLACK = 1e-5
+"""Display-linear: a picture with no brighter pixel is black, and no difference is seen in it."""
+
 Mending = Callable[[Array], Array]
 """A function from a picture (H, W, 3) to the one without a mistake."""
 
@@ -55,8 +58,8 @@ FEWEST = 8
 SLOPES = 400
 CONTRAST = 0.5
 LEAST_POWER = 0.1
-"""Blocks from which a power follows, at least and at most; their range in powers of e, and the
-smallest power."""
+"""Blocks from which a power or a tint follows, at least and at most; their range in powers of e,
+and the smallest power."""
 
 NOTICED = 0.3
 """ΔE2000 of the blocks, below which nothing needs a reason."""
@@ -169,6 +172,8 @@ def find(
     file ends at display white, as a PNG does. ``light`` is that of the other image, before the tone
     map of that name.
     """
+    if min(image.mean[counted].max(initial=0.0) for image in (picture, other)) < BLACK:
+        return
     curves = Curves.of(picture.mean, light, counted)
     given = curves.fit(tone_map)
     truth = other.mean
@@ -210,8 +215,12 @@ def find(
         apart = LEADING(mended(picture.mean), truth)
         noise = np.hypot(picture.noise(mended), other.noise(lambda image: image))
         without_noise = np.sqrt(np.maximum(apart**2 - noise**2, 0.0))
-        left = 100 * float(np.mean(without_noise[counted] > TOLERANCE))
-        yield f"{mistake.sentence} After that, {left:.2g} % of the pixels differ visibly."
+        left = _percent(float(np.mean(without_noise[counted] > TOLERANCE)))
+        yield f"{mistake.sentence} After that, {left} of the pixels differ visibly."
+
+
+def _percent(share: float) -> str:
+    return f"{float(f'{100 * share:.2g}'):g} %"
 
 
 def _explains_more(
@@ -355,7 +364,8 @@ def _moved(picture: Array, other: Array, place: alignment.Place, names: Names) -
         )
     shift = place.shift
     if shift is not None and max(map(abs, shift)) >= SHIFT:
-        right, down = (round(amount / SHIFT) * SHIFT for amount in shift)
+        right = round(shift[0] / SHIFT) * SHIFT
+        down = round(shift[1] / SHIFT) * SHIFT
         across = _in_pixels(right, "to the right", "to the left")
         along = _in_pixels(down, "down", "up")
         amount = " and ".join(filter(None, (across, along)))
@@ -388,6 +398,8 @@ def _shifted(picture: Array, right: float, down: float) -> Array:
 def _zoom(picture: Array, other: Array) -> float | None:
     """Return how much larger a picture's content is; None if no other size agrees far better."""
     height, width = picture.shape[:2]
+    if min(height, width) < 2 * BLOCK:  # edges agree by chance
+        return None
     scale = min(1.0, SMALL / max(height, width))
     size = (max(1, round(scale * width)), max(1, round(scale * height)))
     agreement = []
@@ -578,6 +590,8 @@ def _power(blocks: Blocks, names: Names) -> Mistake | None:
 
 def _is_even_tint(blocks: Blocks) -> bool:
     """Return whether a tint is the same everywhere; wrong shading varies over the picture."""
+    if len(blocks.other) < FEWEST:
+        return False
     least = 1e-3 * max(float(blocks.other.mean()), 1e-9)
     logs = np.log(np.maximum(blocks.picture, least) / np.maximum(blocks.other, least))
     # Without the level of each block, the balance of its channels is left.
@@ -603,7 +617,7 @@ def _clipped(
     return Mistake(
         sentence=(
             f"{names.picture}'s values end at {largest:.3g}, where {names.other} is brighter in"
-            f" {100 * share:.2g} % of the pixels: clipped?"
+            f" {_percent(share)} of the pixels: clipped?"
         ),
         mend=lambda image: np.where(brighter[..., None], other, image),
     )

@@ -7,6 +7,7 @@ They are read by :mod:`fotismos.comparisons.picture_files`, placed by
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
@@ -182,12 +183,14 @@ def read_all(options: Options) -> GivenPictures:
 
 
 def _read(names: Sequence[str], options: Options, tone_map: str | None = None) -> Pictures:
-    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
-        raise InputError(
-            f"{twice[0]} is given {names.count(twice[0])} times. Give each repeat once: they must"
-            " differ in their noise."
-        )
-    files = (read_file(name, options.transfer, options.over, is_mask=True) for name in names)
+    files = [read_file(name, options.transfer, options.over, is_mask=True) for name in names]
+    places = [str(Path(name).resolve()) for name in names]
+    for name, place in zip(names, places, strict=True):
+        if places.count(place) > 1:
+            raise InputError(
+                f"{name} is given {places.count(place)} times. Give each repeat once: they must"
+                " differ in their noise."
+            )
     return Pictures(
         names=tuple(names), files=tuple(files), transfer=options.transfer, tone_map=tone_map
     )
@@ -199,7 +202,9 @@ def require_one_size(images: Iterable[np.ndarray]) -> None:
     if len(sizes) > 1:
         (width, height), (wider, higher) = sizes[0], sizes[-1]
         shown = ", ".join(map(_by, sizes))
-        larger = f"{wider / width:.3g} times as wide and {higher / height:.3g} times as high"
+        sides = {"wide": wider / width, "high": higher / height}
+        differing = [f"{by:.3g} times as {side}" for side, by in sides.items() if by != 1]
+        larger = f"the last is {' and '.join(differing)} as the first"
         raise InputError(
             f"pictures of {shown}: {larger}. Give pictures of one size; none is scaled."
         )
@@ -289,8 +294,9 @@ def agreement(
     ``expected`` are maps (H, W) of edges that they may contain, besides those of the other image.
     ``textbook`` is the textbook half that they replace, (H, W, 3).
     """
-    picture = images.heuristic
-    other = images.reference
+    # In double precision, in which the squares of all values are finite.
+    picture = images.heuristic.astype(float)
+    other = images.reference.astype(float)
     counted = images.counted
     edges = [*expected, alignment.picture_edges(other)]
     place = alignment.measure(pictures.mean, edges)
@@ -349,10 +355,16 @@ def unknown_noise(given: GivenPictures) -> Iterator[str]:
     for name, half in named.items():
         if half is None or len(half.files) == 1:
             continue
-        if len({file.digest for file in half.files}) == 1:
+        different = len({file.digest for file in half.files})
+        if different == 1:
             yield (
                 f"{name}'s repeats are the same file, byte for byte: if its renderer is random,"
                 " give each its own seed."
+            )
+        elif different < len(half.files):
+            yield (
+                f"Of {name[0].lower()}{name[1:]}'s {len(half.files)} repeats, only {different}"
+                " differ, so noise is taken for smaller than it is. Give each its own seed."
             )
 
 

@@ -14,6 +14,7 @@ from fotismos.comparisons.comparison import (
 )
 from fotismos.comparisons.estimates import PassSums, measure
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.picture_mistakes import BLACK
 from fotismos.heuristic.errors import InputError
 
 FEWEST = 2
@@ -24,9 +25,6 @@ USED = {
     "colour_science", "allow_empty", "seed",
 }  # fmt: skip
 """Options that serve pictures; the others are of a scene."""
-
-BLACK = 1e-5
-"""Display-linear: a picture with no brighter pixel is black, and no difference is seen in it."""
 
 
 def compare_pictures(options: Options, name: str, command: str = "") -> Comparison:

@@ -114,15 +114,22 @@ def roughly(metric: Metric, values: Floats, noise: Floats) -> dict[str, Any]:
     """Debias distances (N,), given those from noise alone, by the triangle inequality."""
     mean = metric.mean(values)
     floor = metric.mean(noise)
+    # A pixel's noise is not the one that it has here. So the largest is taken off the largest
+    # distance: if there is nothing but noise, nothing remains.
+    ordered = np.sort(values)
+    taken = np.sort(noise)
+    # The value, then both ends.
     shares = [
         shares_above(distances, metric.visible)
         for distances in (
-            # The value, then both ends: the truth is at most `noise` away from what is measured.
-            np.sqrt(np.maximum(values**2 - noise**2, 0.0)),
-            values - noise,
+            np.sqrt(np.maximum(ordered**2 - taken**2, 0.0)),
+            ordered - MARGIN * taken,
             values + noise,
         )
     ]
+    # Nor are there more than those that noise alone does not bring above.
+    by_noise = shares_above(MARGIN * noise, metric.visible)
+    shares[1] = np.minimum(shares[1], shares_above(values, metric.visible) - by_noise)
     # Noise added once more is taken to add its square: what remains is `√(mean² − floor²)`. The
     # triangle inequality holds for the roots of squares.
     power = 2 if metric.squared else 1

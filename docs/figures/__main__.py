@@ -28,6 +28,7 @@ from docs.figures import (
     light_counts,
     measured,
     model_figures,
+    other_tools,
     prices,
     renderers,
     rooms,
@@ -107,6 +108,7 @@ def main(words: Sequence[str]) -> None:
     _audits()
     _lessons()
     _pictures()
+    _other_tools()
     _notebook()
 
 
@@ -125,6 +127,13 @@ def _pictures() -> None:
     comparison = two_pictures.made()
     atomic.write(DOCS / "pictures.webp", two_pictures.picture(comparison))
     replace("pictures.md", "two pictures", two_pictures.lines(comparison))
+
+
+def _other_tools() -> None:
+    """Ask three tools about the same pairs of pictures."""
+    found = other_tools.made()
+    atomic.write(DOCS / "other-tools.svg", figures.drawn(other_tools.chart(found), "svg"))
+    replace("checks.md", "other tools", other_tools.lines(found))
 
 
 def marks(part: str) -> tuple[str, str]:

@@ -413,7 +413,11 @@ def test_sizes_and_repeats_must_fit(rgb, tmp_path):
     for files, more, message in (
         (sized(8, 12, "wide"), {}, "12x8 pixels, an aspect ratio of 1.5, and the .* film .*x.*, 1"),
         (eight, {"resolution": (16, 16)}, "8x8 pixels, and `resolution=16x16` is requested"),
-        ((eight, nine), {}, "pictures of 8x8, 9x9: 1.12 times as wide and 1.12 times as high"),
+        (
+            (eight, nine),
+            {},
+            "pictures of 8x8, 9x9: the last is 1.12 times as wide and 1.12 times as high",
+        ),
         ((eight, other, eight), {}, r"8.exr is given 2 times. Give each repeat once"),
         ((eight, other), {"noise": 1.0, "spp": None}, r"noise = 1 and 2 repeats: .* Give `spp`"),
     ):

@@ -5,10 +5,13 @@ import json
 import numpy as np
 import pytest
 from PIL import Image
+from scipy.ndimage import gaussian_filter
 
 import fotismos
 from fotismos.comparisons import pictures
 from fotismos.comparisons.case import open_case
+from fotismos.comparisons.departure import marks
+from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import as_files, read_file
@@ -131,6 +134,39 @@ def test_single_pictures_tell_a_difference_from_noise():
     assert any("noise is unknown" in words for words in record.warnings)
 
 
+@pytest.mark.guarantee("noise", "Filtered noise of single pictures is not taken for a difference.")
+def test_the_filtered_noise_of_single_pictures_is_no_certain_difference():
+    """A Gaussian of up to 2 pixels makes neighbours alike; changes of a part are still found."""
+    random = np.random.default_rng(4)
+    everywhere = np.ones((96, 128), bool)
+    part = np.ones((96, 128, 1))
+    part[:64, :64] = 1.3
+    false = found = 0
+    for width in (0, 0.5, 1, 1.5, 2):
+        for _ in range(40):
+            noise = 0.3 * random.normal(size=(2, 96, 128, 3))
+            first, second = (0.5 + gaussian_filter(each, (width, width, 0)) for each in noise)
+            false += marks._is_even(first - second, everywhere)
+            found += marks._is_even(first * part - second, everywhere)
+    assert false <= 6  # of 200: three times the stated rate
+    assert found >= 180
+
+
+@pytest.mark.parametrize(("first", "second"), [(2, 2), (2, 7), (3, 3), (4, 8)])
+def test_few_repeats_do_not_make_a_share_from_noise(first, second):
+    """The interval holds the truth also where noise is larger than what is visible."""
+    image = landscape()
+    changed = image.copy()
+    changed[:, :8] *= 1.5
+    truth = float((LEADING(changed, image) > 2).mean())
+    for seed in range(6):
+        reference = noisy(image, second, seed, 0.3)
+        for expected, half in ((0.0, image), (truth, changed)):
+            record = record_of(noisy(half, first, 100 + seed, 0.3), reference)
+            share = share_above(record.metrics["dE2000"].visible, 2.0)
+            assert share.low <= expected <= share.high
+
+
 def test_a_mask_and_alpha_say_which_pixels_count(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     image = landscape()
@@ -153,7 +189,11 @@ def test_a_mask_and_alpha_say_which_pixels_count(run, tmp_path, monkeypatch):
 
 GREY = np.full((8, 8, 3), 0.5)
 BAD = (
-    ({"image": [GREY], "reference": [np.full((8, 16, 3), 0.5)]}, {}, "8x8, 16x8: 2 times as wide"),
+    (
+        {"image": [GREY], "reference": [np.full((8, 16, 3), 0.5)]},
+        {},
+        "8x8, 16x8: the last is 2 times as wide as",
+    ),
     ({"image": [0 * GREY], "reference": [0 * GREY]}, {}, "both pictures are black"),
     ({"image": [GREY], "reference": []}, {}, "two pictures are needed"),
     ({"image": [GREY], "reference": [GREY]}, {"mask": "none.png"}, "none.png: there is no such"),
