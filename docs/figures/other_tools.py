@@ -104,7 +104,8 @@ def answers(pair: str, image: Sequence[Array], reference: Sequence[Array]) -> An
     arrays = {f"{half}_{i}.npy": one for half in halves for i, one in enumerate(halves[half])}
     names = {half: tuple(name for name in arrays if name.startswith(half)) for half in halves}
     with as_files(arrays):
-        record = compare_pictures(Options(**names), pair).record
+        options = Options(image=names["image"], reference=names["reference"])
+        record = compare_pictures(options, pair).record
     first = [np.ascontiguousarray(repeats[0], np.float32) for repeats in (reference, image)]
     _, flip, _ = evaluate(*first, "HDR", inputsRGB=False, applyMagma=False)
     assert record.agreement is not None
