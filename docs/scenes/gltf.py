@@ -17,8 +17,7 @@ from gltf_file import IOR, LIGHTS, STRENGTH, File, extension, local
 
 MESHES = Path(tempfile.gettempdir(), f"gltf-{Path.home().name}")
 WRAPS = {33071: "clamp", 33648: "mirror"}
-BACK = np.diag((-1.0, 1.0, -1.0, 1.0))
-"""From axes of a camera or spot that faces -z, as in glTF, to +z, as in Mitsuba."""
+BACK = np.diag((-1.0, 1.0, -1.0, 1.0))  # cameras and spots face -z in glTF, +z in Mitsuba
 
 
 def scene(file, environment="", sky=0, light=1):
@@ -33,11 +32,11 @@ def scene(file, environment="", sky=0, light=1):
     for number in source.json["scenes"][source.json.get("scene", 0)]["nodes"]:
         made.add_node(number, np.eye(4))
     if environment:
-        made.parts["sky"] = {"type": "envmap", "filename": str(Path(environment).resolve())}
+        made.add("sky", {"type": "envmap", "filename": str(Path(environment).resolve())})
     elif float(sky) > 0:
-        made.parts["sky"] = {"type": "constant", "radiance": float(sky)}
+        made.add("sky", {"type": "constant", "radiance": float(sky)})
     if not made.has_camera:
-        made.parts["camera"] = made.camera_of_all()
+        made.add("camera", made.camera_of_all())
     return made.parts
 
 
@@ -50,20 +49,18 @@ class Scene:
         self.light = light
         self.parts = {"type": "scene", "integrator": {"type": "path", "max_depth": 8}}
         self.has_camera = False
-        self.ends = []
-        for number, material in enumerate(self.json.get("materials", [])):
-            self.parts[f"material {number}"] = self.bsdf(material)
+        self.positions = []
 
     def bsdf(self, material):
         """Return a material with its normal map, for both sides if it says so."""
         given = material.get("pbrMetallicRoughness", {})
-        colour = given.get("baseColorFactor", (1, 1, 1, 1))[:3]
         roughness = given.get("roughnessFactor", 1.0)
         metallic = given.get("metallicFactor", 1.0)
         if both := given.get("metallicRoughnessTexture"):
             roughness = self.texture(both, roughness, channels=slice(1, 2))
             metallic = self.texture(both, metallic, channels=slice(2, 3))
-        base = self.colour(colour, given.get("baseColorTexture"))
+        tint = given.get("baseColorFactor", (1, 1, 1, 1))[:3]
+        base = self.colour(tint, given.get("baseColorTexture"))
         eta = extension(material, IOR).get("ior", 1.5)
         bsdf = {"type": "principled", "base_color": base, "metallic": metallic, "eta": eta}
         bsdf["roughness"] = roughness
@@ -107,8 +104,8 @@ class Scene:
                 if primitive.get("mode", 4) == 4:
                     self.add(name, self.mesh(primitive, to_world))
         if lit := extension(node, LIGHTS):
-            light = extension(self.json, LIGHTS)["lights"][lit["light"]]
-            self.add(name, self.lamp(light, to_world))
+            lights = extension(self.json, LIGHTS)["lights"]
+            self.add(name, self.lamp(lights[lit["light"]], to_world))
         if "camera" in node:
             seen = self.json["cameras"][node["camera"]]
             if seen["type"] == "perspective":
@@ -120,20 +117,21 @@ class Scene:
     def add(self, name, part):
         """Add a part of the scene, with a number if its name is taken."""
         name = name.replace(".", "_")
-        self.parts[f"{name} {len(self.parts)}" if name in self.parts else name] = part
+        while name in self.parts:
+            name = f"{name} {len(self.parts)}"
+        self.parts[name] = part
 
     def mesh(self, primitive, to_world):
         """Return triangles in world space, with what they emit."""
         columns, faces = self.file.triangles(primitive, to_world)
-        positions = columns["x y z"]
-        self.ends += [positions.min(axis=0), positions.max(axis=0)]
-        has_faces = "nx ny nz" not in columns
-        shape = {"type": "ply", "filename": ply(columns, faces), "face_normals": has_faces}
-        if "material" not in primitive:
-            return shape | {"bsdf": self.bsdf({})}
-        number = primitive["material"]
-        shape["bsdf"] = {"type": "ref", "id": f"material {number}"}
-        material = self.json["materials"][number]
+        self.positions.append(columns["x y z"])
+        number = primitive.get("material")
+        material = {} if number is None else self.json["materials"][number]
+        key = f"material {number}"
+        if key not in self.parts:
+            self.parts[key] = self.bsdf(material)
+        shape = {"type": "ply", "face_normals": "nx ny nz" not in columns}
+        shape |= {"filename": ply(columns, faces), "bsdf": {"type": "ref", "id": key}}
         strength = self.light * extension(material, STRENGTH).get("emissiveStrength", 1)
         emitted = strength * np.array(material.get("emissiveFactor", (0, 0, 0)))
         if emitted.any():
@@ -158,11 +156,10 @@ class Scene:
 
     def camera_of_all(self):
         """Return a camera before all meshes, a little above."""
-        low = np.min(self.ends, axis=0)
-        high = np.max(self.ends, axis=0)
-        centre = (low + high) / 2
+        rows = np.vstack(self.positions)
+        centre = (rows.min(axis=0) + rows.max(axis=0)) / 2
         yfov = np.radians(35)
-        distance = np.linalg.norm(high - low) / 2 / np.sin(yfov / 2)
+        distance = np.linalg.norm(rows - centre, axis=1).max() / np.sin(yfov / 2)
         place = centre + distance * np.array((0.36, 0.27, 0.89))
         return camera(mi.ScalarTransform4f().look_at(place, centre, (0, 1, 0)), yfov)
 
@@ -188,13 +185,11 @@ def ply(columns, faces):
     triangles["count"] = 3
     triangles["corners"] = faces
     lines = [
-        "ply",
-        "format binary_little_endian 1.0",
+        "ply\nformat binary_little_endian 1.0",
         f"element vertex {len(rows)}",
         *(f"property float {name}" for name in " ".join(columns).split()),
         f"element face {len(faces)}",
-        "property list uchar uint vertex_indices",
-        "end_header\n",
+        "property list uchar uint vertex_indices\nend_header\n",
     ]
     content = "\n".join(lines).encode() + rows.tobytes() + triangles.tobytes()
     MESHES.mkdir(exist_ok=True)

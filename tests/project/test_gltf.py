@@ -2,6 +2,7 @@
 
 import io
 import json
+import runpy
 import struct
 
 import drjit as dr
@@ -42,7 +43,7 @@ def png(pixels):
 def glb(path, nodes, materials=(), lights=(), normals=True, **more):
     """Write a GLB file of squares with vertices in one view, side by side, and two images."""
     vertices = np.hstack([CORNERS, NORMALS, UV]).astype("<f4").tobytes()
-    parts = [vertices, FACES.tobytes(), png(PIXELS), png(ROUGH)]
+    parts = [vertices, FACES.tobytes(), png(more.pop("pixels", PIXELS)), png(ROUGH)]
     views, content = [], b""
     for part in parts:
         views.append({"buffer": 0, "byteOffset": len(content), "byteLength": len(part)})
@@ -203,11 +204,57 @@ def test_an_image_stands_upright_and_shines_as_the_file_says(rgb, tmp_path):
                 "extensions": {STRENGTH: {"emissiveStrength": 3}}}  # fmt: skip
     half = 1 / np.tan(0.35)  # as far as the square fills the picture from top to bottom
     eye = {"name": "eye", "camera": 0, "translation": [0, 0, half]}
-    path = glb(tmp_path / "lamp.glb", [{"mesh": 0}, eye], [material])
+    clamp = [{"wrapS": 33071}]
+    path = glb(tmp_path / "lamp.glb", [{"mesh": 0}, eye], [material], samplers=clamp)
     seen = image(made(path), 1, size=(96, 64))[:, 16:80]  # the square
     # Symmetric about the middles of the image's pixels, where its own values show.
     middle = seen.reshape(4, 16, 8, 8, 3)[:, 7:9, :, 3:5].mean(axis=(1, 3))
     np.testing.assert_allclose(middle, decoded(PIXELS) * (3, 1.5, 0.75), atol=0.3)
+    edge = seen.reshape(4, 16, 64, 3)[:, 7:9, 0].mean(axis=1)  # not mixed with the other edge
+    np.testing.assert_allclose(edge, decoded(PIXELS)[:, 0] * (3, 1.5, 0.75), atol=0.3)
+
+
+@pytest.mark.parametrize("normal", [(0.6, 0, 0.8), (0, 0.6, 0.8), (-0.36, -0.48, 0.8)])
+def test_a_normal_map_tilts_to_the_images_right_and_top(rgb, tmp_path, normal):
+    """Lambert's cosine about the mapped normal, whose x is the image's right, and y its top."""
+    colour = np.round((np.array(normal) + 1) * 127.5).astype(np.uint8)
+    even = {"metallicFactor": 0.0, "baseColorFactor": [0.5, 0.5, 0.5, 1]}
+    material = {"pbrMetallicRoughness": even, "normalTexture": {"index": 0},
+                "extensions": {"KHR_materials_ior": {"ior": 1}}}  # fmt: skip
+    sun = {"extensions": {LIGHTS: {"light": 0}}, "rotation": quaternion((0.6, 0.8, 0), 20)}
+    eye = {"name": "eye", "camera": 0, "translation": [0, 0, 6]}
+    pixels = np.tile(colour, (2, 2, 1))
+    light = {"type": "directional", "intensity": 2}
+    path = glb(tmp_path / "a.glb", [{"mesh": 0}, eye, sun], [material], [light],
+               normals=False, pixels=pixels)  # fmt: skip
+    angle = np.radians(20)  # by Rodrigues, (0, 0, 1) turned about (0.6, 0.8, 0)
+    to_light = np.array([0.8 * np.sin(angle), -0.6 * np.sin(angle), np.cos(angle)])
+    mapped = colour / 127.5 - 1
+    cosine = mapped @ to_light / np.linalg.norm(mapped)
+    seen = image(made(path), 2)[32, 48]
+    np.testing.assert_allclose(
+        seen, 0.5 / np.pi * 2 * cosine, rtol=5e-3
+    )  # Mitsuba softens terminators
+
+
+def test_parts_of_one_name_are_all_there_and_integers_may_stand_for_fractions(rgb, tmp_path):
+    nodes = [{"name": name, "mesh": 0, "translation": [0, 0, z]}
+             for z, name in enumerate(("a", "camera", "a", "a.b", "type", "a 4"))]  # fmt: skip
+    path = glb(tmp_path / "a.glb", nodes, [{}])
+    kinds = [part["type"] for part in made(path).values() if isinstance(part, dict)]
+    assert kinds.count("ply") == len(nodes)
+    assert kinds.count("perspective") == 1
+    byte = np.array([-128, -127, 0, 127], np.int8).tobytes()
+    (tmp_path / "a.bin").write_bytes(bytes(2) + byte)
+    content = {
+        "buffers": [{"uri": "a.bin"}],
+        "bufferViews": [{"buffer": 0, "byteOffset": 2, "byteLength": 4}],
+        "accessors": [{"bufferView": 0, "componentType": 5120, "count": 4, "type": "SCALAR",
+                       "normalized": True}],
+    }  # fmt: skip
+    (tmp_path / "a.gltf").write_text(json.dumps(content))
+    file = runpy.run_path(str(SCRIPT.with_name("gltf_file.py")))["File"](tmp_path / "a.gltf")
+    np.testing.assert_allclose(file.array(0).ravel(), [-1, -1, 0, 1])
 
 
 @pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (1, -1, 1)])
