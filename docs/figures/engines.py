@@ -179,9 +179,10 @@ def lead(rows: Sequence[Measured]) -> Iterator[str]:
         for one in rows
         if one.approximation == LTC.name
     )
+    look = "looks" if right == 1 else "look"
     yield from wrap(
-        f"**{right} of {len(shaded)} pictures look right**, with at most {100 * LIMIT:g} % of their"
-        f" pixels visibly off, by more than {LEADING.label} {TOLERANCE:g}. The nearest is"
+        f"**{right} of {len(shaded)} pictures {look} right**, with at most {100 * LIMIT:g} % of"
+        f" their pixels visibly off, by more than {LEADING.label} {TOLERANCE:g}. The nearest is"
         f" {best.approximation} on *{best.scene}*: {percent(best.visible)}. Under lamps, most of"
         " what is missing is light from other surfaces. These shares of ltc's pixels differ from"
         f" the reference, and from one without that light: {ltc}.",
