@@ -113,7 +113,7 @@ class Options(
     reference: Annotated[
         tuple[str, ...],
         _help("A picture in place of the physical half, such as of another path tracer, or a"
-              " pattern of repeats; with --image, no scene is needed."),
+              " pattern of repeats."),
     ] = ()  # fmt: skip
     mask: Annotated[
         str | None,
