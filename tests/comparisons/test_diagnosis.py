@@ -38,7 +38,8 @@ def test_wrong_shaders_are_told_what_is_wrong(rgb, tmp_path, suffix):
 @pytest.mark.parametrize("suffix", LANGUAGES)
 def test_nothing_is_told_of_right_shaders_and_other_models(rgb, suffix):
     for path in sorted(SHADERS.glob(f"*{suffix}")):
-        functions = re.findall(r"^def ([a-z]\w*)\(point", path.read_text(), re.MULTILINE)
+        shader = r"^def ([a-z]\w*)\(point(?:\)|, \w+: Range)"
+        functions = re.findall(shader, path.read_text(), re.MULTILINE)
         for name in functions or [""]:
             assert mistakes_of(f"{path}:{name}" if name else path) == ()
 
