@@ -182,6 +182,7 @@ def examine(
     # Checks usually pass, so a failure alone is compared in full.
     added = steps(case.options, why=False)
     comparison = compare(case.source, case.options, progress, case.command(), then=added)
+    folder.parent.mkdir(parents=True, exist_ok=True)
     view = scene_files.write(folder.parent, folder.name, comparison)
     results.write(folder / RECORD, to_json(made))
     return made, structs.replace(view, before=_before(made, kept or {}, found.now.pictures))

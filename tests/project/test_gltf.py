@@ -311,7 +311,7 @@ def test_pixels_see_an_exports_surfaces_where_they_were(rgb, tmp_path, name):
     scene = mi.load_dict(made(tmp_path / "scene.gltf"))
     seen = gbuffer(scene, size)
     hit = found.layers["shape"] > 0
-    assert (seen.hit == hit).mean() > 0.99  # rays along the open edge of the box
+    assert (seen.hit == hit).mean() > 0.98  # rays along the open edge of the box
     for layer, own in (("P", seen.position), ("N", seen.normal)):
         off = np.linalg.norm(own - found.layers[layer], axis=-1)[hit & seen.hit]
         assert np.percentile(off, 98) < 0.02  # a sphere is triangles in the file

@@ -288,7 +288,7 @@ def test_what_is_no_picture_is_refused_in_a_test(fixtures, tmp_path):
         (RAMP[..., 0], InputError, r"a picture of shape \(24, 32\) is not allowed"),
         (RAMP[:3], InputError, "pictures of 32x3, 32x24"),
         (np.where(RAMP > 0.7, np.nan, RAMP), NonFiniteError, "NaN"),
-        ("gone.exr", InputError, r"gone\.exr: no file matches"),
+        ("gone.exr", InputError, r"gone\.exr: there is no such file"),
     ):
         with pytest.raises(error, match=message):
             plain.picture("hall", image)
