@@ -402,13 +402,15 @@ def _zoom(picture: Array, other: Array) -> float | None:
         return None
     scale = min(1.0, SMALL / max(height, width))
     size = (max(1, round(scale * width)), max(1, round(scale * height)))
+    small = _resized(picture, size)
+    small_other = _resized(other, size)
     agreement = []
     for zoom in ZOOMS:
         # The smaller one is enlarged, since nothing is known beyond its edges.
-        shown = picture if zoom > 1 else _zoomed(picture, 1 / zoom)
-        expected = _zoomed(other, zoom) if zoom > 1 else other
-        edges = [alignment.picture_edges(_resized(image, size)) for image in (shown, expected)]
-        agreement.append(_best_correlation(edges[0], edges[1]))
+        shown = small if zoom > 1 else _zoomed(small, 1 / zoom)
+        expected = _zoomed(small_other, zoom) if zoom > 1 else small_other
+        edges = alignment.picture_edges(shown)
+        agreement.append(_best_correlation(edges, alignment.picture_edges(expected)))
     best = int(np.argmax(agreement))
     unchanged = agreement[len(ZOOMS) // 2]
     is_other = best not in (0, len(ZOOMS) - 1) and abs(ZOOMS[best] - 1) > OTHER_SIZE
