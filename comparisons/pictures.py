@@ -174,12 +174,18 @@ def read_all(options: Options) -> GivenPictures:
             " passes than there are pictures. Give `spp` instead of `noise`."
         )
     require_one_size(file.image for half in given.halves for file in half.files)
-    if mask is not None and given.halves and mask.shape[::-1] != given.halves[0].size:
+    if mask is not None and given.halves:
+        require_size_of_mask(options, mask, given.halves[0].size)
+    return given
+
+
+def require_size_of_mask(options: Options, mask: NDArray[np.bool_], size: tuple[int, int]) -> None:
+    """Ensure that a mask (H, W) has the width and height of what it is for."""
+    if mask.shape[::-1] != size:
         raise InputError(
             f"{options.mask}: the mask has {mask.shape[1]}x{mask.shape[0]} pixels, and the pictures"
-            f" {_by(given.halves[0].size)}. Give a mask of that size."
+            f" {_by(size)}. Give a mask of that size."
         )
-    return given
 
 
 def _read(names: Sequence[str], options: Options, tone_map: str | None = None) -> Pictures:

@@ -269,6 +269,8 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
     sampler = STOCK_SAMPLER if options.everything else SAMPLER
     physical = with_sampler(pair.physical, sampler).instantiate()
     width, height = image_size(physical)
+    if given is not None and given.mask is not None:
+        pictures.require_size_of_mask(options, given.mask, (width, height))
     if width * height > LARGEST_PASS:
         raise InputError(
             f"{source.name}: an image of {width}x{height} pixels is too large: at most"

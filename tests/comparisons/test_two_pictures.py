@@ -187,6 +187,21 @@ def test_a_mask_and_alpha_say_which_pixels_count(run, tmp_path, monkeypatch):
     assert run(*words, "-t", "alpha.npy", "--over", "black", "-o", "over")[0] == 1
 
 
+def test_a_mask_says_which_pixels_of_a_rendering_count(run, tmp_path, monkeypatch):
+    """Without any picture; one of another size is refused."""
+    monkeypatch.chdir(tmp_path)
+    mask = np.zeros((16, 16), np.uint8)
+    mask[4:8, 4:8] = 255
+    Image.fromarray(mask).save("mask.png")
+    words = ("compare", "fig-8-9", "--spp", 4, "--no-why", "--mask", "mask.png", "--resolution")
+    assert run(*words, "16x16")[0] == 0
+    record = json.loads((tmp_path / "out/fig-8-9/comparison.json").read_text())
+    assert record["pixels"]["counted"] == 16
+    code, _, error = run(*words, "8x8")
+    assert code == 2
+    assert "the mask has 16x16 pixels, and the pictures 8x8" in error
+
+
 GREY = np.full((8, 8, 3), 0.5)
 BAD = (
     (
