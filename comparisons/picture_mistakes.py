@@ -18,14 +18,11 @@ from PIL import Image
 
 from fotismos.comparisons import alignment
 from fotismos.comparisons.departure.blocks import block_sums
-from fotismos.comparisons.departure.colour import Array, from_srgb, to_srgb
+from fotismos.comparisons.departure.colour import BLACK, Array, from_srgb, to_srgb
 from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.picture_curves import BETTER_CURVE, Curves, FittedCurve
-
-BLACK = 1e-5
-"""Display-linear: a picture with no brighter pixel is black, and no difference is seen in it."""
 
 Mending = Callable[[Array], Array]
 """A function from a picture (H, W, 3) to the one without a mistake."""
@@ -201,7 +198,7 @@ def find(
         if tone_map:
             yield _exposure(given, names)
             return
-        yield _change_of_colours(mended(picture.mean), truth, counted, names)
+        yield _change_of_colours(mended(picture.mean), truth, counted, names) if mends else change
         if not is_encoded and not mends:
             yield _clipped(picture.mean, truth, counted, names)
 

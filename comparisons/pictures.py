@@ -132,9 +132,9 @@ class PictureHalf:
 class GivenPictures:
     """The pictures that options name for either half, and for the pixels that count."""
 
-    image: Pictures | None
-    reference: Pictures | None
-    mask: NDArray[np.bool_] | None
+    image: Pictures | None = None
+    reference: Pictures | None = None
+    mask: NDArray[np.bool_] | None = None
 
     @property
     def halves(self) -> tuple[Pictures, ...]:

@@ -13,6 +13,7 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons import alignment
+from fotismos.comparisons.departure.colour import BLACK
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
@@ -47,9 +48,6 @@ WAVEFRONT = 2**24
 
 LIMIT_SPP = 4096
 """Samples per pixel at which a run with a noise target stops, unless another limit is given."""
-
-BLACK = 1e-5
-"""Display-linear: an image with no brighter pixel is black, and no difference can be seen in it."""
 
 UNIFORM = 1e-6
 """Relative differences within a picture that are rounding."""

@@ -12,9 +12,9 @@ from fotismos.comparisons.comparison import (
     TimeSpent,
     versions,
 )
+from fotismos.comparisons.departure.colour import BLACK
 from fotismos.comparisons.estimates import PassSums, measure
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_mistakes import BLACK
 from fotismos.heuristic.errors import InputError
 
 FEWEST = 2

@@ -99,21 +99,31 @@ def _require_one_size(settings: Sequence[Repeated]) -> None:
 
 def at_their_size(source: Source, options: Options, settings: Sequence[Repeated]) -> Options:
     """Return options whose resolution is that of the pictures, as the scene's film allows it."""
-    given = GivenPictures(image=settings[0].pictures, reference=None, mask=None)
+    given = GivenPictures(image=settings[0].pictures)
     film = film_size(source.parse(), options.sensor)
     return at_size_of_pictures(film, given, options)
 
 
 def judged(settings: Sequence[Repeated], times: EngineTimes, found: Measurements) -> Engine:
     """Return the settings with their errors, on a front of their own."""
+    textbook = np.array(found.ready.heuristic.sampled(TEMPLATE_SPP).render(0), float)
+    edges = [found.ready.geometry_edges(), picture_edges(textbook)]
+    judged = [_setting(setting, times, found, edges, textbook) for setting in settings]
     return Engine(
-        settings=fronted([_setting(setting, times, found) for setting in settings]),
+        settings=fronted(judged),
         machine=times.machine,
         kernel_s=times.kernel_s,
     )
 
 
-def _setting(setting: Repeated, times: EngineTimes, found: Measurements) -> EngineSetting:
+def _setting(
+    setting: Repeated,
+    times: EngineTimes,
+    found: Measurements,
+    edges: Sequence[Floats],
+    textbook: Floats,
+) -> EngineSetting:
+    """Return a setting with its error; ``edges`` and ``textbook`` are as for `agreement`."""
     seconds = setting.given.seconds
     summaries = [_summary(image, found) for image in setting.images]
     error = of_repeats(
@@ -131,9 +141,7 @@ def _setting(setting: Repeated, times: EngineTimes, found: Measurements) -> Engi
         significant=np.zeros_like(found.ready.counted),
         counted=found.ready.counted,
     )
-    textbook = np.array(found.ready.heuristic.sampled(TEMPLATE_SPP).render(0), float)
-    edges = [found.ready.geometry_edges(), picture_edges(textbook)]
-    given = GivenPictures(image=setting.pictures, reference=None, mask=None)
+    given = GivenPictures(image=setting.pictures)
     agreed = agreement(setting.pictures, images, edges, Names(), textbook)
     agreed = structs.replace(agreed, odd=(*agreed.odd, *unknown_noise(given)))
     return EngineSetting(

@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 PQ_PEAK = 10_000.0
 """ITU-R BT.2100: the largest luminance that the PQ curve encodes, cd/m²."""
 
+BLACK = 1e-5
+"""Display-linear: an image with no brighter pixel is black, and no difference can be seen in it."""
+
 MOST_PIXELS = 1000.0
 """Most pixels per degree: filters grow with it, and no eye resolves this many."""
 

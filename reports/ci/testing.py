@@ -216,12 +216,15 @@ class Fotismos:
         _, before = pictures.read(path)
         begin = perf_counter()
         level = self.significance if significance is None else significance
-        found = check_pictures(before, after, level)
-        fault = _drift(found) if within is None else _visible(before, after, within, max_visible)
+        if within is None:
+            fault = _drift(check_pictures(before, after, level))
+        else:
+            fault = _visible(before, after, within, max_visible)
         if fault and self.update:
             pictures.write(path, _noiseless(after), None)
         elif fault:
             folder = self._shown(name, before, after)
+            found = check_pictures(before, after, level)
             made = checks.of_pictures(path, name, status="failed", found=found, begin=begin)
             _, section = checks.picture_section(made, before, found)
             section = structs.replace(section, headline=fault, command="pytest --fotismos-update")

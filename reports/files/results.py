@@ -29,7 +29,6 @@ from filelock import FileLock, Timeout
 from msgspec import Meta
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.names import file_of, name_of
 from fotismos.heuristic.errors import InputError, OutputError
 from fotismos.reference.records import VERSION, Machine, Record, Versions
 
@@ -322,13 +321,6 @@ def clear(folder: Path, names: Iterable[str]) -> None:
 
 
 # --- The folder of a scene -------------------------------------------------------------------
-
-
-def places(folder: Path, scenes: Iterable[str]) -> dict[str, str]:
-    """Return the names of the scenes' folders, with the words that name the scenes."""
-    scenes = list(scenes)
-    folders = assigned(folder, [(name_of(scene), file_of(scene)) for scene in scenes])
-    return dict(zip(folders, scenes, strict=True))
 
 
 def assigned(folder: Path, subjects: Iterable[tuple[str, Path | None]]) -> list[str]:
