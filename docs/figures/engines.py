@@ -56,7 +56,7 @@ SCENES: Mapping[str, tuple[str | Callable[[], Any], str]] = {
     "outdoors": (str(DOCS / "scenes/outdoors.py"), SKY),
     "spheres": (str(DOCS / "scenes/spheres.py"), MAP),
 }
-"""Scenes by name, and the kind of their light."""
+"""Each scene by its name, with the kind of light that it has."""
 
 
 def _shaded(name: str, heuristic: str, shadows: bool = True) -> Method:

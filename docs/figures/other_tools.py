@@ -5,7 +5,7 @@ import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 from flip_evaluator import evaluate
@@ -18,9 +18,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.criterion import LIMIT, Verdict
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import as_files
 from fotismos.comparisons.prepared import prepare
-from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reports import verdict
 from fotismos.reports.terminal.words import number, percent
@@ -100,12 +98,8 @@ def changed(image: Sequence[Array]) -> dict[str, list[Array]]:
 
 def answers(pair: str, image: Sequence[Array], reference: Sequence[Array]) -> Answers:
     """Ask each tool about repeats (H, W, 3) of two pictures."""
-    halves = {"image": image, "reference": reference}
-    arrays = {f"{half}_{i}.npy": one for half in halves for i, one in enumerate(halves[half])}
-    names = {half: tuple(name for name in arrays if name.startswith(half)) for half in halves}
-    with as_files(arrays):
-        options = Options(image=names["image"], reference=names["reference"])
-        record = compare_pictures(options, pair).record
+    shown = fotismos.compare(name=pair, image=list(image), reference=list(reference))
+    record = shown.comparison.record
     first = [np.ascontiguousarray(repeats[0], np.float32) for repeats in (reference, image)]
     _, flip, _ = evaluate(*first, "HDR", inputsRGB=False, applyMagma=False)
     assert record.agreement is not None

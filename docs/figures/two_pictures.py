@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from io import BytesIO
 
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+import fotismos  # isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 from PIL import Image
@@ -11,9 +11,7 @@ from PIL import Image
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import as_files
 from fotismos.comparisons.prepared import prepare
-from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.reports import verdict
 from fotismos.reports.charts import figures
 from fotismos.reports.files.images import webp
@@ -29,12 +27,9 @@ def made() -> Comparison:
     """Compare repeats of a path tracer with repeats of other seeds, which lack a division by pi."""
     case = open_case(SCENE, Options(resolution=RESOLUTION, spp=SAMPLES))
     half = prepare(case.source, case.options).reference
-    theirs = {f"theirs_{seed}.npy": np.array(half.render(seed)) for seed in range(REPEATS)}
-    mine = {
-        f"mine_{seed}.npy": np.pi * np.array(half.render(REPEATS + seed)) for seed in range(REPEATS)
-    }
-    with as_files(theirs | mine):
-        return compare_pictures(Options(image=tuple(mine), reference=tuple(theirs)), "mine")
+    theirs = [np.array(half.render(seed)) for seed in range(REPEATS)]
+    mine = [np.pi * np.array(half.render(REPEATS + seed)) for seed in range(REPEATS)]
+    return fotismos.compare(name="mine", image=mine, reference=theirs).comparison
 
 
 def picture(comparison: Comparison) -> bytes:

@@ -64,7 +64,7 @@ def placeholders(path: Path) -> set[str]:
 class Script:
     """A function that runs a Python file and returns its scene, a dictionary.
 
-    ``values`` are arguments of the file's function, by name.
+    ``values`` are passed to the file's function as its arguments, by name.
     """
 
     path: Path

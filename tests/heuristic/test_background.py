@@ -186,7 +186,7 @@ def shade(point):
 
 
 def test_a_preparation_is_a_stage_of_its_own(rgb, written, run):
-    """What took 0.5 s is no part of a pass, and both halves of a record's time add up."""
+    """Its 0.5 s stand in the record, on the page, and in no pass."""
     name = written(SLOW)
     assert named(name).reads == ("material", "material.base_color")
     sky = scene(around={"type": "constant", "radiance": 0.5})

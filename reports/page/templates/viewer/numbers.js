@@ -15,8 +15,8 @@ const AS_GIVEN = -1;
 const vectorOf = light => light.position ?? light.direction ?? [0, 0, 0];
 
 /**
- * A scene's numbers by name and owner. The owner is the index of a light in `lights`, or that of a
- * material's name in `names`. It is 0 for what a scene has only one of.
+ * The numbers of a scene, by name and then by owner. For a light, the owner is its index in
+ * `lights`; for a material, the index of its name in `names`; for all else it is 0.
  */
 class Numbers {
   /** @param {Live} live @param {Points} points */
