@@ -31,6 +31,7 @@ from PIL import Image
 
 from fotismos.comparisons.departure.colour import BT709, CHROMATICITIES, Array, from_srgb
 from fotismos.comparisons.names import PICTURES, picture_parts
+from fotismos.comparisons.options import Options
 from fotismos.heuristic.errors import InputError, InstallationError, NonFiniteError, suggestion
 from fotismos.reference.rendering.finite import LARGEST_VALUE
 
@@ -107,6 +108,11 @@ def matching(patterns: Iterable[str]) -> tuple[str, ...]:
             )
         files += [f"{file}:{layer}" if layer else file for file in found or [str(path)]]
     return tuple(files)
+
+
+def with_files(options: Options) -> Options:
+    """Return options in which the files that match stand for the patterns of both halves."""
+    return options.changed(image=matching(options.image), reference=matching(options.reference))
 
 
 ARRAYS: dict[str, np.ndarray] = {}

@@ -34,7 +34,7 @@ from fotismos.comparisons.departure.metrics import declare as declare_metric
 from fotismos.comparisons.fit.fit import fit as fit_parameters
 from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.options import Options, OptionValues
-from fotismos.comparisons.picture_files import as_files, matching
+from fotismos.comparisons.picture_files import as_files, with_files
 from fotismos.comparisons.pixel_terms import PixelTerms
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.steps import steps
@@ -143,9 +143,7 @@ def compare(
     """
     values, arrays = _with_names(options)
     with as_files(arrays):
-        chosen = Options.of(values)
-        files = {half: matching(getattr(chosen, half)) for half in PICTURED}
-        chosen = chosen.changed(**files)
+        chosen = with_files(Options.of(values))
         if scene is None and chosen.image and chosen.reference:
             comparison = compare_pictures(chosen, name or "picture")
         else:
@@ -215,7 +213,7 @@ def fit(
     """
     values, arrays = _with_names(options)
     with as_files(arrays):
-        case = open_case(scene, Options.of(values), name)
+        case = open_case(scene, with_files(Options.of(values)), name)
         command = case.command("fit")
         return fit_parameters(case.source, case.options, loss, command=command).record
 

@@ -243,10 +243,10 @@ def _noise(record: ComparisonRecord, stop: NoiseTarget) -> str:
     asked = f"target {stop.target:g}"
     if stop.stopped_by == "samples":
         asked += f" not reached: stopped by the limit of {stop.limit_spp} samples per pixel"
-    return (
-        f"{record.scene}: 95 % of pixels have noise under {LEADING.label} = {stop.reached:.3g}"
-        f" after {record.plan.spp if record.plan else 0} samples per pixel ({asked})"
-    )
+    # A reference that is a picture has no samples.
+    after = f" after {record.plan.spp} samples per pixel" if record.plan else ""
+    noise = f"95 % of pixels have noise under {LEADING.label} = {stop.reached:.3g}"
+    return f"{record.scene}: {noise}{after} ({asked})"
 
 
 def _shares(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[Any]]:

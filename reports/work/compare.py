@@ -6,7 +6,7 @@ from pathlib import Path
 
 from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import matching
+from fotismos.comparisons.picture_files import with_files
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.errors import FotismosError
 from fotismos.reports.jobs import Job, open_page
@@ -27,8 +27,7 @@ def run(
 ) -> int:
     """Compare scenes or pictures, print the gates, write files for CI, return the exit code."""
     on_page = open_page if is_opened else None
-    image = matching(job.options.image)
-    options = job.options.changed(image=image, reference=matching(job.options.reference))
+    options = with_files(job.options)
     job = replace(job, options=options)
     subjects = _subjects(scenes, options)
     if max_visible is None and junit is None and summary_file is None:

@@ -11,7 +11,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.fit.fit import fit
 from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import matching
+from fotismos.comparisons.picture_files import with_files
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.materials import FORMS
 from fotismos.reference.records import plain
@@ -31,10 +31,8 @@ def run(
     as_json: bool,
 ) -> None:
     """Fit each scene, and print the tables or the records."""
-    options = options.changed(reference=matching(options.reference))
-    records = results_of(
-        pool, output / "fit", scenes=scenes, work=fitted, arguments=(options, loss, form)
-    )
+    arguments = (with_files(options), loss, form)
+    records = results_of(pool, output / "fit", scenes=scenes, work=fitted, arguments=arguments)
     if as_json:
         click.echo(json.dumps(plain([*records.values()]), indent=2, ensure_ascii=False))
         return
