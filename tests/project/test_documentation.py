@@ -104,4 +104,5 @@ def test_the_page_of_engines_has_the_numbers_of_its_files():
     for row in rows:
         cells = lines[row["approximation"]]
         cell = cells[list(engines.SCENES).index(row["scene"]) + 1]
-        assert cell == f"{number(row['de2000'])} ({row['stops']:+.2f})"
+        bias = f"{row['stops_direct']:+.2f}; {row['stops']:+.2f}"
+        assert cell == f"{number(row['de2000'])} ({bias})"
