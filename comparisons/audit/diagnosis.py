@@ -84,17 +84,18 @@ TermFit = tuple[Array, float]
 def describe(name: str) -> tuple[str, ...]:
     """Return the mistakes of a heuristic, in words.
 
-    There are none of a built-in one, or one that prepares a scene.
+    There are none of a built-in one.
     """
     heuristic = heuristics.named(name)
-    if heuristic.is_builtin or heuristic.prepare is not None:
+    if heuristic.is_builtin:
         return ()
     with mi.scoped_set_variant(DEFAULT_VARIANT):
         heuristic = heuristics.named(name)
         try:
             found = probes.findings(heuristic)
             sure = [words for name, words in found.items() if not probes.PROBES[name].vague]
-            sure += _compared(heuristic)
+            if heuristic.prepare is None:  # what it keeps may replace the textbook's ambient light
+                sure += _compared(heuristic)
         except Exception:  # a user's code may raise anything where it was not tried
             return ()
     return tuple(sure or found.values())
