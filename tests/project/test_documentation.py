@@ -12,7 +12,9 @@ from nbclient import NotebookClient
 from PIL import Image
 from pyarrow import csv, parquet
 
-from docs.figures import engines, hero
+from docs.figures import accuracy, engines, hero
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.options import Options
 from fotismos.reports import cli
 from fotismos.reports.terminal.words import number
 from tests.shared.programs import ROOT, python
@@ -86,6 +88,14 @@ def test_the_readme_shows_a_picture_with_the_command_that_makes_its_numbers():
     with Image.open(ROOT / "docs/hero.webp") as picture:
         assert picture.width >= 900
     assert (ROOT / "docs/hero.webp").stat().st_size < 150_000
+
+
+def test_the_scenes_of_studies_open_without_values():
+    page = (ROOT / "docs/accuracy.md").read_text()
+    for path in accuracy.LARGER:
+        assert f"scenes/{path.name}" in page
+        case = open_case(str(path), Options())
+        assert case.source.name == path.stem
 
 
 def test_the_page_of_engines_has_the_numbers_of_its_files():
