@@ -171,8 +171,8 @@ METAVARS = {
     "image": "FILE", "reference": "FILE", "mask": "FILE",
 }  # fmt: skip
 
-SHORT = {"image": "-t", "reference": "-r"}
-"""Short names of options, as other programs that compare pictures have them."""
+SHORT = {"image": "-t", "reference": "-r", "variant": "-m"}
+"""Short names of options, as other programs have them: Mitsuba, and those that compare pictures."""
 
 
 def option(name: str, command_default: str = "") -> Decorator:

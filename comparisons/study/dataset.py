@@ -4,14 +4,14 @@ Each field's metadata has ``unit`` and ``description``; the schema's has ``title
 TOML text) and ``versions`` (JSON). No time or place is recorded, so equal studies give equal files.
 """
 
+from __future__ import annotations
+
 import json
 from math import isclose
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from msgspec.structs import replace
 
 from fotismos.comparisons.atomic import require_regular
@@ -21,8 +21,12 @@ from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO
 from fotismos.comparisons.study.design import OWN, StudyFile
 from fotismos.comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
-from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.errors import InputError, InstallationError, unknown
+from fotismos.heuristic.program import installation
 from fotismos.reference.planning.effects import PRUNED
+
+if TYPE_CHECKING:
+    import pyarrow as pa  # loaded late: see arrow()
 
 Row: TypeAlias = dict[str, Any]
 """Values by column."""
@@ -136,8 +140,22 @@ def measure(
 # --- The file -------------------------------------------------------------------------------------
 
 
+def arrow() -> Any:
+    """Return the module pyarrow, an extra; `InstallationError` if it is not installed."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise InstallationError(
+            "pyarrow is not installed, and a study writes its dataset with it. Install it:"
+            f" {installation('pyarrow')}"
+        ) from error
+    return pyarrow
+
+
 def table(study: StudyFile, rows: list[Row]) -> pa.Table:
     """Return the rows of a study; columns without any value are omitted."""
+    pa = arrow()
     present = {name for row in rows for name, value in row.items() if value is not None}
     present |= {"part", "point", "error"}
     meanings = {True: "parameter that the heuristic declares",
@@ -160,17 +178,19 @@ def table(study: StudyFile, rows: list[Row]) -> pa.Table:
 
 def file_of(data: pa.Table) -> bytes:
     """Return the Parquet file of a table."""
+    pa = arrow()
     stream = pa.BufferOutputStream()
-    pq.write_table(data, stream, compression="zstd", write_page_checksum=True)
+    pa.parquet.write_table(data, stream, compression="zstd", write_page_checksum=True)
     content: bytes = stream.getvalue().to_pybytes()
     return content
 
 
 def read(path: str | Path) -> pa.Table:
     """Read a dataset; ``InputError`` if it is missing, damaged, or not one of a study."""
+    pa = arrow()
     try:
         require_regular(path)
-        data = pq.read_table(path, page_checksum_verification=True)
+        data = pa.parquet.read_table(path, page_checksum_verification=True)
         data.validate(full=True)
         missing = {"part", "point", "error"} - set(data.column_names)
         if missing:

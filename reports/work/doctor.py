@@ -1,8 +1,6 @@
 """The work of ``fotismos doctor``."""
 
 import platform
-import re
-import tomllib
 from collections.abc import Iterable, Iterator
 from importlib import metadata
 from importlib.util import find_spec
@@ -16,19 +14,11 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic import glsl, llvm
 from fotismos.heuristic.errors import InstallationError
-from fotismos.heuristic.program import ROOT, __version__, installation
+from fotismos.heuristic.mitsuba_version import other_version
+from fotismos.heuristic.program import __version__, installation
 from fotismos.reference.scene.graph import set_variant
 
 LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
-
-PROJECT = ROOT / "pyproject.toml"
-
-CHANGES = {
-    "mitsuba": "The documentation's figures, baselines and kept images were made with the pinned"
-    " one: images may differ, and `check` may report that they moved.",
-    "drjit": "Mitsuba works only with the Dr.Jit that it was built with, and may not even load.",
-}
-"""What another version than the pinned one changes."""
 
 
 def run(pool: Pool) -> None:
@@ -91,23 +81,9 @@ def compared() -> float:
     return apart
 
 
-def pinned() -> dict[str, str]:
-    """Return the versions that the installed package, or else the checkout, requires exactly."""
-    try:
-        required = metadata.requires("fotismos") or []
-    except metadata.PackageNotFoundError:
-        project = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
-        required = project["dependencies"]
-    matches = (re.fullmatch(r"([\w-]+) *== *([\w.]+)", text) for text in required)
-    return {match[1]: match[2] for match in matches if match}
-
-
 def version_lines() -> Iterator[str]:
-    """Yield a line per library, and one on what changes if it has another version than pinned."""
-    pins = pinned()
+    """Yield a line per library, and one where the documentation's numbers are of another."""
     for library in LIBRARIES:
-        version = metadata.version(library)
-        pin = pins.get(library, version)
-        yield f"{library:<15} {version}" + (f"; {pin} is pinned" if version != pin else "")
-        if version != pin:
-            yield f"{'':<15} {CHANGES[library]}"
+        yield f"{library:<15} {metadata.version(library)}"
+        if library == "mitsuba" and (change := other_version()):
+            yield f"{'':<15} {change}"

@@ -157,7 +157,7 @@ def test_a_file_with_tabulated_spectra_is_compared_spectrally(run, tmp_path):
     spectrum = '<spectrum name="radiance" value="400:0.1, 700:0.3"/>'
     path = tmp_path / "scene.xml"
     path.write_text(_changed('<rgb name="radiance" value="0.2"/>', spectrum))
-    asked = ("--variant", "llvm_ad_rgb")
+    asked = ("-m", "llvm_ad_rgb")
     for options, variant in (((), "llvm_ad_spectral"), (asked, "llvm_ad_rgb")):
         run("compare", path, "-o", tmp_path / "out", "--spp", 4, *options)
         assert read(tmp_path / "out/scene/comparison.json")["variant"] == variant
