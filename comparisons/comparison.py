@@ -82,7 +82,7 @@ class Significant(Record):
 
     fraction: Share
     undetermined: Annotated[
-        Share, Meta(description="Not shown to differ, though a visible difference may hide there.")
+        Share, Meta(description="Not certain to differ, but noise may hide a visible error there.")
     ]
     level: Annotated[
         float,
@@ -362,10 +362,10 @@ class ComparisonRecord(Record):
     ] = ""
     noise_target: NoiseTarget | None = None
     picture: Annotated[
-        PictureFiles | None, Meta(description="The pictures in place of the heuristic half.")
+        PictureFiles | None, Meta(description="The pictures in place of the textbook half.")
     ] = None
     reference_picture: Annotated[
-        PictureFiles | None, Meta(description="The pictures in place of the reference.")
+        PictureFiles | None, Meta(description="The pictures in place of the physical half.")
     ] = None
     agreement: Annotated[
         Agreement | None, Meta(description="How pictures agree with the other half.")
@@ -377,11 +377,11 @@ class ComparisonRecord(Record):
         ),
     ] = None
     mistakes: Annotated[
-        tuple[str, ...], Meta(description="Mistakes that the heuristic seems to make, in words.")
+        tuple[str, ...], Meta(description="Mistakes that the shader seems to make, in words.")
     ] = ()
     textbook: Annotated[
         Amount | None,
-        Meta(description="Mean dE2000 of Phong in place of a user's heuristic; null otherwise."),
+        Meta(description="Mean dE2000 of Phong in place of a user's shader; null otherwise."),
     ] = None
     colour_science: Deviations | None = None
     record_version: int = VERSION

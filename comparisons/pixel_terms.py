@@ -250,7 +250,7 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
     if half.integrator.occlusion:
         return "Shadow rays hide lights, and equation 8.10 has no shadows."
     if mi.is_spectral:
-        return "The heuristic half is rendered by wavelength, so its terms are not RGB."
+        return "The textbook half is rendered by wavelength, so its terms are not RGB."
     if any(bsdf.is_clear for bsdf in half.integrator.known(half.scene).materials.bsdfs):
         return "Some surfaces are transparent, so a pixel shows several of them at once."
     return ""
@@ -259,7 +259,7 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
 def _without_sum(half: Renderer, options: Options) -> str:
     """Return why a half has no terms in any form; empty if it has."""
     if options.image:
-        return "The heuristic half is a picture, which has no terms."
+        return "The textbook half is a picture, which has no terms."
     if options.heuristic not in MODELS:
         return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
     if len(half.scene.emitters()) > MOST_LIGHTS:

@@ -194,7 +194,7 @@ class Prepared:
                 " `allow_empty`."
             )
         if all(is_black):
-            return "Both halves are black, so their difference means nothing."
+            return "Both halves are black, so the error between them means nothing."
         if is_black[1]:
             return "The reference is black: check whether its lights reach what the camera sees."
         if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in sides):
@@ -286,7 +286,7 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
         spp = max(1, spp * passes // given.passes)
         passes = given.passes
     heuristic: Any = _heuristic_renderer(source, pair, chosen=chosen, spp=spp, options=options)
-    reference: Any = Renderer(physical, integrator, pass_spp=spp, label="reference image")
+    reference: Any = Renderer(physical, integrator, pass_spp=spp, label="physical picture")
     if given is not None and given.image is not None:
         heuristic = pictures.PictureHalf(given.image, passes, heuristic.variant, heuristic)
     if given is not None and given.reference is not None:
@@ -342,4 +342,4 @@ def _heuristic_renderer(
         if options.heuristic_variant:
             pair = pair_for(source, options)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        return Renderer(scene, None, pass_spp=spp, label="heuristic image")
+        return Renderer(scene, None, pass_spp=spp, label="textbook picture")

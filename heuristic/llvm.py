@@ -45,7 +45,7 @@ How to get it:
 
 _TOO_EARLY = (
     f"Dr.Jit was imported before fotismos, so the LLVM of the {WHEEL} wheel is not used: "
-    f"import heuristic first, or set {VARIABLE} before Python starts."
+    f"import fotismos first, or set {VARIABLE} before Python starts."
 )
 
 

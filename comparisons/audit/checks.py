@@ -102,7 +102,7 @@ class Audit(Record):
         tuple[str, ...], Meta(description="Values that light cannot have, and where.")
     ] = ()
     mistakes: Annotated[
-        tuple[str, ...], Meta(description="Mistakes that the heuristic seems to have, in words.")
+        tuple[str, ...], Meta(description="Mistakes that the shader seems to have, in words.")
     ] = ()
     command: str
     versions: Versions

@@ -274,7 +274,8 @@ class Baseline(Record, omit_defaults=True):
     passes: Annotated[int, Meta(ge=2, le=MOST_PASSES)]
     versions: Annotated[Versions, Meta(description="Of the software that measured it.")]
     images: Annotated[
-        str | None, Meta(description="An EXR beside it with both halves, for people to look at.")
+        str | None,
+        Meta(description="An EXR with both pictures, beside the baseline, for people to look at."),
     ] = None
     metrics: dict[str, MetricAmount]
     heuristic: Half

@@ -130,7 +130,7 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
             scene,
             eye,
             pass_spp=renderer.pass_spp,
-            label="heuristic samples",
+            label="textbook samples",
             is_traced=True,  # else it would see nothing
         )
         # The passes: each gives the fixed light as its image, and its samples.

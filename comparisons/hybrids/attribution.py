@@ -171,7 +171,7 @@ def find(
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
     reference = Renderer(
-        ready.scene, ready.reference.integrator, pass_spp=spp, label="reference image", size=size
+        ready.scene, ready.reference.integrator, pass_spp=spp, label="physical picture", size=size
     )
     try:
         while True:

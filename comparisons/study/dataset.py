@@ -36,7 +36,7 @@ Column: TypeAlias = tuple[str, str, type]
 """A column's unit (``1`` for pure numbers), its meaning, and its Python type."""
 
 STEPS = ("form", *(effect.label for effect in PRUNED))
-"""The steps between the halves, in the order in which they are added to the heuristic image: the
+"""The steps between the halves, in the order in which they are added to the textbook picture: the
 form of BSDFs and lights, then one effect after another."""
 
 DIMMED = {"quarter": 1 / 4, "sixteenth": 1 / 16}
@@ -66,14 +66,14 @@ def results() -> dict[str, Column]:
     name = LEADING.name
     label = LEADING.label
     numbers = {
-        "heuristic": f"mean of the heuristic image, {LUMINANCE}",
-        "reference": f"mean of the reference, {LUMINANCE}",
+        "heuristic": f"mean of the textbook picture, {LUMINANCE}",
+        "reference": f"mean of the physical picture, {LUMINANCE}",
         name: LEADING.heading,
         f"{name}_p95": f"{label}, 95th percentile",
         f"{name}_noise": f"{label} that the noise of the comparison alone would cause",
         f"{name}_shape": f"{label}, mean, after the best exposure",
         **{f"{name}_{part}": f"{label}, mean, under a {part} of the light" for part in DIMMED},
-        "exposure": f"factor on the heuristic image that minimises {label}",
+        "exposure": f"factor on the textbook picture that minimises {label}",
         **{name: metric.heading for name, metric in METRICS.items()},
     }
     changes = {
@@ -82,7 +82,7 @@ def results() -> dict[str, Column]:
     }
     return {
         **{key: ("1", meaning, float) for key, meaning in numbers.items()},
-        RATIO.name: (RATIO.unit, "mean ratio of luminances, heuristic to reference", float),
+        RATIO.name: (RATIO.unit, "mean ratio of luminances, textbook to physical", float),
         **{key: ("1", meaning, float) for key, meaning in changes.items()},
         "dominant": ("", f"the largest of {', '.join(STEPS[:-1])} and {STEPS[-1]}", str),
         **{

@@ -228,7 +228,7 @@ def _rendered(point: StudyPoint) -> Row:
     plans = _plans(ready.plan)
     for stage in plans.values():
         integrator = physical_integrator(stage, scene, ready.pair.hide_emitters)
-        renderers.append(Renderer(scene, integrator, pass_spp=spp, label="reference image"))
+        renderers.append(Renderer(scene, integrator, pass_spp=spp, label="physical picture"))
     sums = [Accumulator() for _ in renderers]
     difference = Accumulator()
     for rendered in passes(renderers, part.options.seed, PASSES):

@@ -202,7 +202,7 @@ def define() -> dict[str, Any]:
                     lights.append(emitter.light(si, active))
                 elif not (emitter.is_environment() or hasattr(emitter, "k_a")):
                     raise InputError(
-                        f"emitter {emitter.id()!r} ({emitter.class_name()}) has no heuristic form."
+                        f"emitter {emitter.id()!r} ({emitter.class_name()}) has no textbook form."
                         " The integrator heuristic renders the heuristic half of a pair, which"
                         " fotismos.reference.pair makes."
                     )

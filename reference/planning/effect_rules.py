@@ -100,7 +100,7 @@ def is_attenuated(facts: Facts) -> tuple[bool, str]:
         is_even = (props.get("k1", 0.0), props.get("k2", 0.0)) == (0.0, 0.0)
         if lights.of(graph.plugin(index)).has("attenuation") and not is_even:
             return True, f"{graph.label(index)} falls off with distance"
-    return False, "no light of the heuristic half falls off with distance"
+    return False, "no light of the textbook half falls off with distance"
 
 
 def has_cone(facts: Facts) -> tuple[bool, str]:

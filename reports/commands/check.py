@@ -104,7 +104,7 @@ def check(
     of a renderer without noise are equal, and any change is a drift; --within and --max-visible
     allow what nobody sees, such as another GPU's rounding.
 
-    A scene or heuristic in Python is code, and so is a baseline that names one: it is executed.
+    A scene or shader in Python is code, and so is a baseline that names one: it is executed.
 
     \b
     Examples:

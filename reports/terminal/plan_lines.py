@@ -79,7 +79,7 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
         yield ""
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
     reads = ", ".join(plan.heuristic_reads) or "nothing"
-    yield f"heuristic     {plan.shading}, which reads {reads}"
+    yield f"textbook      {plan.shading}, which reads {reads}"
     yield f"kernel terms  {', '.join(plan.kernel_terms) or 'none'}"
     yield f"variant       {plan.variant}"
     yield f"integrator    {plan.simulation}"
@@ -90,7 +90,7 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
 
 
 def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
-    yield "effect", "called for", "rule", "evidence", "cost"
+    yield "effect", "needed", "rule", "evidence", "cost"
     for effect in plan.effects:
         called = "yes" if effect.called_for else "no"
         yield effect.name, called, effect.rule, effect.evidence, effect.cost

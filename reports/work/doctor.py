@@ -60,7 +60,7 @@ def shaded() -> str:
     """
     if find_spec("moderngl") is None:
         command = installation("moderngl")
-        return f"is an extra, which only --heuristic FILE.glsl needs. To install it: {command}"
+        return f"is an extra that only --heuristic FILE.glsl needs. To install it: {command}"
 
     try:
         renderer, is_software = glsl.device()
