@@ -210,12 +210,12 @@ class Options(
 
     @property
     def first_half(self) -> str:
-        """What the first half is, as records name it."""
+        """What stands for the textbook half, as records name it."""
         return f"picture {', '.join(self.image)}" if self.image else self.heuristic
 
     @property
     def polygon_shading(self) -> Interpolation:
-        """How the heuristic half shades polygons."""
+        """How the textbook half shades polygons."""
         # Loaded late: help needs no Mitsuba.
         from fotismos.heuristic.heuristics import Interpolation
 

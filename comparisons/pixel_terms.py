@@ -222,7 +222,7 @@ def _colour(values: object) -> Colour:
 
 
 def trace(half: Renderer, options: Options) -> TermGrid | Missing:
-    """Return the terms of a heuristic half, or why there are none."""
+    """Return the terms of a textbook half, or why there are none."""
     with variant(half.variant):
         if reason := _without(half, options, Interpolation.PHONG):
             return Missing(reason)
@@ -230,7 +230,7 @@ def trace(half: Renderer, options: Options) -> TermGrid | Missing:
 
 
 def live(half: Renderer, options: Options) -> LivePoints | Missing:
-    """Return what a page needs to shade a heuristic half again, or why it cannot.
+    """Return what a page needs to shade a textbook half again, or why it cannot.
 
     Flat shading has the face's normal, at each point in place of the face's centre.
     """
@@ -479,7 +479,7 @@ TERMS = dict(zip(("emission", "ambient", "diffuse", "specular"), COEFFICIENTS, s
 
 
 def layers(half: Renderer, options: Options, whole: Floats) -> dict[str, Floats]:
-    """Return the terms of a heuristic half as layers that add up to its image ``whole``, (H, W, 3).
+    """Return the terms of a textbook half as layers that add up to its image ``whole``, (H, W, 3).
 
     Each has its share of the half's first pass, rendered once more: all passes would add a quarter
     to some runs, and AOVs lengthen the passes, whose times are compared. Backgrounds are emission.

@@ -110,7 +110,7 @@ class Prepared:
         return alignment.geometry_edges(gbuffer(self.scene, fine), width, height)
 
     def shaded_by(self, heuristic: str) -> Renderer:
-        """Return what renders the first half with another heuristic."""
+        """Return what renders the textbook half with another heuristic."""
         options = self.options.changed(heuristic=heuristic)
         pair = pair_for(self.source, options)
         renderer: Renderer = _heuristic_renderer(
@@ -337,7 +337,7 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
 def _heuristic_renderer(
     source: Source, pair: Pair, chosen: Plan, spp: int, options: Options
 ) -> Renderer:
-    """Make the heuristic half ready to render, in its own variant if it has one."""
+    """Make the textbook half ready to render, in its own variant if it has one."""
     with variant(options.heuristic_variant or mi.variant()):
         if options.heuristic_variant:
             pair = pair_for(source, options)

@@ -1,4 +1,4 @@
-"""Heuristics in GLSL, run by OpenGL 4.3, which a command names as ``FILE.glsl``.
+"""Shaders in GLSL, which a command names as ``FILE.glsl``; OpenGL 4.3 runs them.
 
 The file holds ``vec3 shade(Point point)``. Its text is put between declarations of the record and a
 ``main``, compiled in a context without a window and called for arrays of points. The background is

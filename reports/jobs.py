@@ -394,7 +394,7 @@ class Job:
     """What a command does with each of its scenes.
 
     ``options`` say how to render; ``fresh`` renders finished scenes again; pixels differ
-    visibly above the ΔE2000 ``within``. Of the scenes ``ladders`` methods are measured, too.
+    visibly above the ΔE2000 ``within``. The methods of the scenes ``ladders`` are measured, too.
     """
 
     options: Options

@@ -176,7 +176,7 @@ def measure_scene(
 
 
 def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
-    """Measure passes (n, 2, H, W, 3) of the heuristic half and the reference.
+    """Measure passes (n, 2, H, W, 3) of the textbook half and the reference.
 
     Metrics compare the mean images over the pixels of ``counted`` (H, W); their standard errors are
     the jackknife's. Metrics are not linear, and noise raises them: compare only measurements with

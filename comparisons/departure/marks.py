@@ -1,4 +1,4 @@
-"""Mark the pixels that are shown to differ, and those left undetermined.
+"""Mark the pixels that are certain to differ, and those left undetermined.
 
 **The guarantee.** The expected share of wrong marks among all marks is at most `LEVEL`. If the two
 images do not differ at all, the chance of any mark is at most `LEVEL`.

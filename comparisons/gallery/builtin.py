@@ -29,9 +29,9 @@ THREE_LIGHTS = (
 class BuiltIn:
     """A built-in scene: a sentence on what it shows, and a function that makes its dictionary.
 
-    ``variant`` is the variant that it needs, ``heuristic_variant`` the heuristic half's if
+    ``variant`` is the variant that it needs, ``heuristic_variant`` the textbook half's if
     different: RGB against the spectral reference. ``interpolation``, ``tessellation`` and
-    ``vertex_weights`` are the heuristic half's.
+    ``vertex_weights`` are the textbook half's.
     """
 
     name: str

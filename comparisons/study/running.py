@@ -223,7 +223,7 @@ def _rendered(point: StudyPoint) -> Row:
     for name, value in tuned.items():
         parameters[name] = value
     parameters.update()
-    # The heuristic half, then one image per step; the last is the reference.
+    # The textbook half, then one image per step; the last is the reference.
     renderers = [heuristic]
     plans = _plans(ready.plan)
     for stage in plans.values():

@@ -203,7 +203,7 @@ def define() -> dict[str, Any]:
                 elif not (emitter.is_environment() or hasattr(emitter, "k_a")):
                     raise InputError(
                         f"emitter {emitter.id()!r} ({emitter.class_name()}) has no textbook form."
-                        " The integrator heuristic renders the heuristic half of a pair, which"
+                        " The integrator heuristic renders the textbook half of a pair, which"
                         " fotismos.reference.pair makes."
                     )
             return lights

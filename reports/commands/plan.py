@@ -1,4 +1,4 @@
-"""``fotismos plan``: which effects a scene calls for."""
+"""``fotismos plan``: which effects a scene needs."""
 
 from typing import Any
 

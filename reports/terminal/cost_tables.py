@@ -94,7 +94,7 @@ def together(record: Cost) -> str:
     kernel = whole.kernel_s.value
     added = sum(effect.adds_s.value for effect in whole.effects)
     return (
-        f"A sample of the full plan takes {number(whole.plan_s.value / kernel)} times as long as"
+        f"A sample with all effects takes {number(whole.plan_s.value / kernel)} times as long as"
         f" the kernel's: 1, {number(added / kernel)} for the effects, and"
         f" {number(whole.renderer_s.value / kernel)} for Mitsuba's integrator in place of the"
         " kernel."

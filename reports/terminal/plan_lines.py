@@ -15,7 +15,7 @@ from fotismos.reports.terminal.tables import printed
 
 
 class PlannedEffect(Record):
-    """Whether a scene calls for an effect, why, and what simulates it on either side."""
+    """Whether a scene needs an effect, why, and what simulates it on either side."""
 
     name: str
     called_for: bool
