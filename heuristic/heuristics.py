@@ -341,7 +341,7 @@ class Heuristic:
         wavelengths: Array = (),
         environment: Callable[[Array], Array] | None = None,
     ) -> Array:
-        """Return the colour at points; InputError if a user's function fails or returns no colour."""
+        """Return the colour at points; InputError if a user's function fails or gives none."""
         tuned = SimpleNamespace(**parameters)
         point = Point(
             needs=self.needs,

@@ -314,8 +314,8 @@ two rightly differ."""
 
 FAINT = 1e-3
 NOTHING = 1e-5
-"""Derivatives below the former share of the largest are judged by their absolute difference; if all
-are below the latter, they are rounding errors."""
+"""A derivative below FAINT times the largest is judged by its absolute difference. If all are below
+NOTHING, they are rounding errors."""
 
 OPPOSITE = 2.0
 """The largest possible relative difference; it also stands for derivatives that are not finite."""

@@ -37,8 +37,8 @@ from fotismos.reference.scene.source import Source
 
 PASSES = 16
 MOST_PASSES = 1024
-"""The former are enough for a t-test, corrected for a hundred quantities, to detect five standard
-errors; images of the latter are in memory at once."""
+"""PASSES are enough for a t-test, corrected for a hundred quantities, to detect five standard
+errors. There are at most MOST_PASSES, since the images of all passes are in memory at once."""
 
 GRID = 4
 """Blocks along each side of the image: few enough to read, small enough to locate a change."""

@@ -57,8 +57,8 @@ FINE = 128
 """Nodes along each axis of a rule: few into the denser side, many out of it."""
 
 LEAST_SPREAD = 0.01
-"""Least roughness for the nodes of the diffuse part. Nodes of a smoother lobe crowd in the lobe, and
-too few are left beside it."""
+"""Least roughness for the nodes of the diffuse part. Those of a smoother lobe crowd in the lobe,
+and too few are left beside it."""
 
 LITERAL_IOR = 1.5
 SMALLEST_IOR = exp(1e-4)
