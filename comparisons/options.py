@@ -90,7 +90,7 @@ class Options(
               " textbook half become meshes with such normals.",
               "the scene's own, else a mesh's normals, or angle if it has none"),
     ] = None  # fmt: skip
-    everything: Annotated[bool, _help("Switch off all pruning: simulate every effect.")] = False
+    everything: Annotated[bool, _help("Simulate every effect, and leave out nothing.")] = False
     pairing: Annotated[
         Literal["literal", "matched"], _help("How roughplastic and phong are paired.")
     ] = "matched"

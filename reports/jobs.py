@@ -242,7 +242,7 @@ scene_options = options_of_scenes()
 
 timeout_option = click.option(
     "--timeout",
-    default=1800.0,
+    default=1800,
     show_default=True,
     type=Within(min=0, min_open=True),
     metavar="SECONDS",
@@ -282,7 +282,7 @@ def percentage(text: str) -> float:
 within_option = click.option(
     "--within",
     type=float,
-    default=2.0,
+    default=2,
     show_default=True,
     metavar="DE",
     help="Pixels differ visibly if ΔE2000 is above this: 1 to 10 in steps of 0.25.",

@@ -29,7 +29,7 @@ from fotismos.reports import jobs
     "--why/--no-why",
     "with_causes",
     default=True,
-    help="Find causes and remedies, at a small size; of a picture, none. [default: why]",
+    help="Find which effects are missing, at a small size; not of a picture. [default: why]",
 )
 @jobs.open_option
 @jobs.within_option
