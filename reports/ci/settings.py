@@ -60,9 +60,9 @@ def parameters(path: Path, table: dict[str, Any]) -> dict[str, str]:
         if not isinstance(value, str if is_folder else (str, int, float)):
             allowed = "a folder" if is_folder else "a number or a text"
             raise InputError(f"{path}: {TABLE} {key} = {value!r} is not {allowed}. Correct it.")
+        text = str(value)
         # Printed paths and commands are then as short as the user's own.
-        text = os.path.relpath(path.parent / value) if is_folder else str(value)
-        values[FOLDERS.get(key, key)] = text
+        values[FOLDERS.get(key, key)] = os.path.relpath(path.parent / text) if is_folder else text
     return values
 
 
