@@ -129,7 +129,7 @@ def measure(
     """Return fields of the record, and maps over the pixels that count, (H, W).
 
     ``surface`` is what they see; two pictures have none. ``exact`` says that the difference has no
-    noise, and ``is_random`` is false if passes do not show it
+    noise, and not ``is_random`` that passes do not show it
     (:func:`fotismos.comparisons.departure.marks.find`).
     """
     test = estimates.heuristic

@@ -194,7 +194,7 @@ class Prepared:
                 " `allow_empty`."
             )
         if all(is_black):
-            return "Both halves are black, so the error between them means nothing."
+            return "Both halves are black, so their difference means nothing."
         if is_black[1]:
             return "The reference is black: check whether its lights reach what the camera sees."
         if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in sides):

@@ -106,7 +106,7 @@ def test_black_pictures_never_pass_in_silence(rgb, tmp_path):
         with pytest.raises(InputError, match=r"both halves are black.*`allow_empty`"):
             work(case.source, case.options)
     case = case.changed(allow_empty=True)
-    said = "Both halves are black, so the error between them means nothing."
+    said = "Both halves are black, so their difference means nothing."
     record = compare(case.source, case.options).record
     assert record.caution == said
     assert measure_scene(case.source, case.options).caution == said
