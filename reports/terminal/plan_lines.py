@@ -70,7 +70,7 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
     yield from printed(_effects(plan))
     yield ""
     if plan.rules:
-        headings = "pruning rule", "applies", "premise not shown", "evidence"
+        headings = "pruning rule", "applies", "premise that may fail", "evidence"
         rules = [
             (rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence)
             for rule in plan.rules

@@ -138,7 +138,7 @@ def test_a_scene_that_fails_is_named_and_the_others_are_compared(run, scene_file
 def test_plan_prints_a_table_and_json(run):
     code, printed, _ = run("plan", "cornell-box")
     assert code == 0
-    for words in ("occlusion", "premise not shown", "integrator    path", "k_a, k_d"):
+    for words in ("occlusion", "premise that may fail", "integrator    path", "k_a, k_d"):
         assert words in printed
     rules = {
         each["name"]: each for each in json.loads(run("plan", "cornell-box", "--json")[1])["rules"]
