@@ -77,7 +77,8 @@ class Configured(jobs.Helped):
         **extra: Any,
     ) -> click.Context:
         """Read the table, then the command line."""
-        found = None if extra.get("resilient_parsing") else find(Path.cwd())
+        is_needed = not extra.get("resilient_parsing") and not {"-h", "--help"} & set(args)
+        found = find(Path.cwd()) if is_needed else None
         if found is None:
             return super().make_context(info_name, args, parent, **extra)
         path, table = found

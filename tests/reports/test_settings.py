@@ -74,6 +74,7 @@ def test_what_is_wrong_in_the_table_is_named_with_its_file(table, message, tmp_p
     with pytest.raises(InputError, match=message) as caught:
         commands.check.make_context("check", ["kept"])
     assert str(tmp_path / "pyproject.toml") in str(caught.value)
+    assert command_line("check", "--help")[0] == 0
 
 
 def test_without_a_table_the_baselines_must_be_named(tmp_path, monkeypatch):
