@@ -270,7 +270,7 @@ def sampling(subject: Subject) -> Checked:
     bound = 1 - (1 - LEVEL) ** (1 / len(furnace.both_sides(INCIDENT, subject.eta)))  # Šidák
     expected = f"p of χ² at least {bound:.2g}"
     if not isinstance(subject, ScatteringSubject):
-        return _checked("sampling", None, None, expected, "a heuristic is not sampled")
+        return _checked("sampling", None, None, expected, "textbook shading is not sampled")
     if (least := subject.sampling()) is None:
         return _checked("sampling", None, None, expected, "it scatters nothing")
     return _checked("sampling", least[0] >= bound, least[0], expected, least[1])

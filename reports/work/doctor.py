@@ -18,32 +18,38 @@ from fotismos.heuristic.mitsuba_version import other_version
 from fotismos.heuristic.program import __version__, installation
 from fotismos.reference.scene.graph import set_variant
 
+WIDTH = max(map(len, llvm.VARIANTS))
 LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
 
 
 def run(pool: Pool) -> None:
     """Print the lines on the installation."""
-    for line in examine(pool, llvm.VARIANTS):
-        click.echo(line)
+    for found in examine(pool, llvm.VARIANTS):
+        click.echo(found)
 
 
 def examine(pool: Pool, variants: Iterable[str]) -> Iterator[str]:
     """Yield lines on versions, LLVM, test renderings, OpenGL and metrics."""
-    yield f"fotismos        {__version__}"
-    yield f"python          {platform.python_version()} on {platform.platform()}"
+    yield line("fotismos", __version__)
+    yield line("python", f"{platform.python_version()} on {platform.platform()}")
     yield from version_lines()
     info = llvm.check()
     version = ".".join(map(str, info.version or ()))
-    yield f"LLVM            {version}, from {info.source}: {info.path or 'path unknown'}"
+    yield line("LLVM", f"{version}, from {info.source}: {info.path or 'path unknown'}")
     for variant in variants:
-        yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
+        yield line(variant, pool.do(Task(variant, rendered, (variant,))))
     state = pool.do(Task("GLSL", shaded, ()))
-    yield f"{'GLSL':<15} {state}"
+    yield line("GLSL", state)
     apart = pool.do(Task("colour differences", compared, ()))
-    yield f"metrics         at most {apart:.0e} from those of colour-science"
+    yield line("metrics", f"at most {apart:.0e} from those of colour-science")
     yield ""
     works = not state.startswith("cannot be run")
     yield "fotismos works here" + ("." if works else ", except for GLSL: see above for what to do.")
+
+
+def line(name: str, text: str) -> str:
+    """Return a line of two columns, the first as wide as the longest variant's name."""
+    return f"{name:<{WIDTH}}  {text}"
 
 
 def rendered(variant: str) -> str:
@@ -84,6 +90,6 @@ def compared() -> float:
 def version_lines() -> Iterator[str]:
     """Yield a line per library, and one where the documentation's numbers are of another."""
     for library in LIBRARIES:
-        yield f"{library:<15} {metadata.version(library)}"
+        yield line(library, metadata.version(library))
         if library == "mitsuba" and (change := other_version()):
-            yield f"{'':<15} {change}"
+            yield line("", change)
