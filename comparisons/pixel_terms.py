@@ -222,7 +222,7 @@ def _colour(values: object) -> Colour:
 
 
 def trace(half: Renderer, options: Options) -> TermGrid | Missing:
-    """Return the terms of a textbook half, or why there are none."""
+    """Return the terms of a heuristic half, or why there are none."""
     with variant(half.variant):
         if reason := _without(half, options, Interpolation.PHONG):
             return Missing(reason)

@@ -186,7 +186,7 @@ class Source:
             Parser.transform_resolve_references(config, state)
         except (RuntimeError, ValueError) as error:
             if unused := UNUSED.search(str(error)):
-                known = {name for file in files for name in placeholders(file)}
+                known = set().union(*map(placeholders, files))
                 raise InputError(
                     f"-D {unused[1]}: {self.name} has no such placeholder"
                     f"{suggestion(unused[1], known)}; it has {', '.join(sorted(known)) or 'none'}."
