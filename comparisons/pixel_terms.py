@@ -230,7 +230,7 @@ def trace(half: Renderer, options: Options) -> TermGrid | Missing:
 
 
 def live(half: Renderer, options: Options) -> LivePoints | Missing:
-    """Return what a page needs to shade a heuristic half again, or why it cannot.
+    """Return what a page needs to shade a textbook half again, or why it cannot.
 
     Flat shading has the face's normal, at each point in place of the face's centre.
     """
@@ -250,7 +250,7 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
     if half.integrator.occlusion:
         return "Shadow rays hide lights, and equation 8.10 has no shadows."
     if mi.is_spectral:
-        return "The heuristic half is rendered by wavelength, so its terms are not RGB."
+        return "The textbook half is rendered by wavelength, so its terms are not RGB."
     if any(bsdf.is_clear for bsdf in half.integrator.known(half.scene).materials.bsdfs):
         return "Some surfaces are transparent, so a pixel shows several of them at once."
     return ""
@@ -259,7 +259,7 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
 def _without_sum(half: Renderer, options: Options) -> str:
     """Return why a half has no terms in any form; empty if it has."""
     if options.image:
-        return "The heuristic half is a picture, which has no terms."
+        return "The textbook half is a picture, which has no terms."
     if options.heuristic not in MODELS:
         return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
     if len(half.scene.emitters()) > MOST_LIGHTS:
@@ -479,7 +479,7 @@ TERMS = dict(zip(("emission", "ambient", "diffuse", "specular"), COEFFICIENTS, s
 
 
 def layers(half: Renderer, options: Options, whole: Floats) -> dict[str, Floats]:
-    """Return the terms of a heuristic half as layers that add up to its image ``whole``, (H, W, 3).
+    """Return the terms of a textbook half as layers that add up to its image ``whole``, (H, W, 3).
 
     Each has its share of the half's first pass, rendered once more: all passes would add a quarter
     to some runs, and AOVs lengthen the passes, whose times are compared. Backgrounds are emission.

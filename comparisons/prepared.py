@@ -110,7 +110,7 @@ class Prepared:
         return alignment.geometry_edges(gbuffer(self.scene, fine), width, height)
 
     def shaded_by(self, heuristic: str) -> Renderer:
-        """Return what renders the first half with another heuristic."""
+        """Return what renders the textbook half with another heuristic."""
         options = self.options.changed(heuristic=heuristic)
         pair = pair_for(self.source, options)
         renderer: Renderer = _heuristic_renderer(
@@ -286,7 +286,7 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
         spp = max(1, spp * passes // given.passes)
         passes = given.passes
     heuristic: Any = _heuristic_renderer(source, pair, chosen=chosen, spp=spp, options=options)
-    reference: Any = Renderer(physical, integrator, pass_spp=spp, label="reference image")
+    reference: Any = Renderer(physical, integrator, pass_spp=spp, label="physical picture")
     if given is not None and given.image is not None:
         heuristic = pictures.PictureHalf(given.image, passes, heuristic.variant, heuristic)
     if given is not None and given.reference is not None:
@@ -337,9 +337,9 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
 def _heuristic_renderer(
     source: Source, pair: Pair, chosen: Plan, spp: int, options: Options
 ) -> Renderer:
-    """Make the heuristic half ready to render, in its own variant if it has one."""
+    """Make the textbook half ready to render, in its own variant if it has one."""
     with variant(options.heuristic_variant or mi.variant()):
         if options.heuristic_variant:
             pair = pair_for(source, options)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        return Renderer(scene, None, pass_spp=spp, label="heuristic image")
+        return Renderer(scene, None, pass_spp=spp, label="textbook picture")

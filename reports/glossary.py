@@ -11,7 +11,7 @@ RESULTS: Terms = {
         " no exposure would remove it."
     ),
     ("level", "level mean − shape"): (
-        "The part of the mean that the best exposure removes: a difference in brightness alone."
+        "The part of the mean that the best exposure removes: an error of brightness alone."
     ),
     ("best exposure", "factor"): (
         "The one factor on the textbook image that makes the metric’s mean smallest."
@@ -22,7 +22,7 @@ RESULTS: Terms = {
     ),
     ("without noise", "without noise 95 %"): (
         "The mean without the part that is due to noise, with a 95 % interval. If it contains 0,"
-        " there may be no departure."
+        " there may be no error."
     ),
     ("significant", "significant pixels", "shown to differ"): (
         "Pixels whose linear difference is more than noise, however small. At most 5 % of these"
@@ -45,7 +45,7 @@ RESULTS: Terms = {
     ),
     ("of the departure", "of the error"): "Its part of the sum of ΔE2000 over all pixels.",
     ("mostly", "mostly missing", "effect", "worth most", "cause", "causes"): (
-        "The difference between the two halves that adds most to the departure there."
+        "The effect that adds most to the error there."
     ),
     ("time", "price"): (
         "The time of what makes the scene look right, over that of the textbook picture with 4"

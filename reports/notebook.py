@@ -175,7 +175,7 @@ def _with_names(options: OptionValues) -> tuple[dict[str, Any], dict[str, Any]]:
 
 @_alone
 def plan(scene: Scene, name: str | None = None, **options: Unpack[OptionValues]) -> PlanReport:
-    """Return which effects a scene calls for, and what will be simulated.
+    """Return which effects a scene needs, and what will be simulated.
 
     Arguments and errors are those of :func:`compare`; only the plan's probe is rendered.
     """

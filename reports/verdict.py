@@ -64,7 +64,7 @@ class HalfNames:
 
 
 def judged(record: ComparisonRecord) -> HalfNames:
-    """Return the names of a comparison's first half; a shader in a file is called as its file."""
+    """Return the names of what is compared; a shader in a file is called as its file."""
     if record.picture:
         return HalfNames(subject="The picture", title="Picture", name="picture")
     if record.heuristic in TEXTBOOK:
@@ -74,7 +74,7 @@ def judged(record: ComparisonRecord) -> HalfNames:
 
 
 def truth(record: ComparisonRecord) -> HalfNames:
-    """Return the names of a comparison's second half."""
+    """Return the names of what it is compared with."""
     if record.reference_picture:
         return HalfNames(subject="Reference picture", title="Reference", name="reference")
     return HalfNames(subject="Physical reference", title="Physical", name="physical")
@@ -370,7 +370,7 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
     if not records:
         return "No scene was compared."
     subjects = {judged(record).subject for record in records}
-    subject = subjects.pop() if len(subjects) == 1 else "The first half"
+    subject = subjects.pop() if len(subjects) == 1 else "Shading"
     decisions = Counter(decision(record, threshold) for record in records)
     if len(records) > 1:
         undecided = decisions["undecided"]

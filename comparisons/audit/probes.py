@@ -84,8 +84,8 @@ Find = Callable[[Values], str | None]
 class Probe:
     """What is varied, and what is found.
 
-    It is asked if all is well with the probes ``after`` which it comes. A ``vague`` one is heard if
-    nothing else is found.
+    It runs if the probes in ``after`` found nothing. What a ``vague`` probe finds counts only if no
+    other finds anything.
     """
 
     find: Find

@@ -228,7 +228,7 @@ def checked_pair(test: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
             " give both as (height, width, 3)."
         )
     require_finite(test, "test image")
-    require_finite(reference, "reference image")
+    require_finite(reference, "reference picture")
     return test, reference
 
 

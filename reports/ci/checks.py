@@ -133,6 +133,17 @@ class CheckRecord(Record, omit_defaults=True):
         return program.command("check", self.baseline, "--update", *picture)
 
     @property
+    def other_mitsuba(self) -> str:
+        """What to know if the baseline is of another Mitsuba than the installed; else empty."""
+        change = (self.versions or {}).get("mitsuba")
+        if change is None:
+            return ""
+        return (
+            f"Mitsuba {change.after} renders here, and {change.before} made the baselines: what"
+            " moved may be its noise."
+        )
+
+    @property
     def versions_line(self) -> str:
         """Which versions changed since the baseline; empty for none."""
         changed = (self.versions or {}).items()

@@ -49,7 +49,7 @@ def cost(
 ) -> None:
     """Measure what each step of accuracy costs in time, and which effect is worth paying for.
 
-    Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
+    Renders with methods from flat shading to all effects, at several sample counts each, and
     attributes error and time to each effect in which textbook shading differs. Writes a page,
     cost.json, cost.svg and pictures to OUTPUT/cost/SCENE. Without --resolution the film is reduced
     to a width of 128 pixels; --spp gives the largest count of samples per pixel, 64 if omitted.

@@ -94,7 +94,7 @@ def together(record: Cost) -> str:
     kernel = whole.kernel_s.value
     added = sum(effect.adds_s.value for effect in whole.effects)
     return (
-        f"A sample of the full plan takes {number(whole.plan_s.value / kernel)} times as long as"
+        f"A sample with all effects takes {number(whole.plan_s.value / kernel)} times as long as"
         f" the kernel's: 1, {number(added / kernel)} for the effects, and"
         f" {number(whole.renderer_s.value / kernel)} for Mitsuba's integrator in place of the"
         " kernel."
@@ -180,9 +180,9 @@ def closure(record: Cost) -> str:
     closes = left.low <= 0
     verdict = "no more than noise" if closes else "more than noise: some effect is missing"
     return (
-        f"With all effects simulated ΔE2000 = {left.value:.2g} is left ({left.low:.2g} to"
-        f" {left.high:.2g}; {verdict}). What the effects remove and what is left add up to the"
-        f" departure, ΔE2000 = {departure:.4g}."
+        f"With all effects simulated, an error of ΔE2000 = {left.value:.2g} is left"
+        f" ({left.low:.2g} to {left.high:.2g}; {verdict}). What the effects remove and"
+        f" what is left add up to the error of the textbook picture, ΔE2000 = {departure:.4g}."
     )
 
 

@@ -27,7 +27,7 @@ def scene(tmp_path):
 
 def test_what_a_scene_does_not_have_is_refused_by_name(run, scene, tmp_path):
     out, grey, gray = ("-o", tmp_path / "out"), ("-D", "grey=0.5"), ("-D", "gray=0.2")
-    hint = "Found unused parameters"
+    hint = "-D gray: grey has no such placeholder (did you mean grey?); it has grey."
     for command, words, message in (
         ("compare", out, "grey"),
         ("compare", (*grey, *gray, *out), hint),

@@ -139,7 +139,7 @@ def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
     names = {path.name for path in (failure.out / "fig-8-6b").iterdir()}
     assert {"check.json", "comparison.json", "comparison.exr", "reference.png"} <= names
     record = json.loads((failure.out / "fig-8-6b/check.json").read_text())
-    assert record["causes"][0].startswith("Only the reference moved")
+    assert record["causes"][0].startswith("Only the physical half moved")
     (move,) = record["moved"]
     assert (move["half"], move["block"]) == ("reference", [2, 3])
     assert move["before"] == pytest.approx(1.5 * move["after"], rel=1e-6)
@@ -309,7 +309,7 @@ def test_what_moved_most_is_the_largest_not_the_most_certain():
 def test_causes_name_the_half_the_place_and_the_colour():
     found = check_of(reference=redder)
     causes = " ".join(found.causes())
-    assert "Only the reference moved" in causes
+    assert "Only the physical half moved" in causes
     assert "in 1 of 16 blocks, most in row 2, column 3, from luminance 0.5" in causes
     level = " ".join(check_of(heuristic=lambda image: 1.3 * image).causes())
     assert "1.3 times the light everywhere" in level
