@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+import fotismos
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost import engine, times
 from fotismos.comparisons.cost.cost import require_other_names, truth
@@ -304,6 +305,22 @@ def test_the_command_puts_pictures_on_a_front_at_their_size(rgb, run, tmp_path, 
         assert reason in error
     code, _, error = run("cost", "lambert-sphere", "--over", "black")
     assert (code, "--over: it says how pictures are read" in error) == (2, True)
+
+
+def test_python_puts_arrays_on_a_front_beside_a_scene():
+    """A reference, which the scene has, is refused."""
+    grey = np.full((8, 8, 3), 0.5)
+    pictures = {"low @ 6.3ms": [0.9 * grey, grey], "high @ 9ms": 1.1 * grey}
+    record = fotismos.cost("lambert-sphere", spp=4, pictures=pictures, kernel_time="2.1ms")
+    assert record.resolution == (8, 8)
+    low, high = record.engine.settings
+    assert (low.method, low.picture.repeats, low.ratio) == ("low", 2, pytest.approx(3.0))
+    assert high.picture.files == ("high @ 9ms 1.npy",)
+    with pytest.raises(InputError, match="`reference` is for pictures without a scene"):
+        fotismos.cost("lambert-sphere", pictures=pictures, reference=grey)
+    clear = np.concatenate([grey, 0 * grey[..., :1]], axis=-1)
+    with pytest.raises(InputError, match="Give the colour behind"):
+        fotismos.cost("lambert-sphere", pictures={"clear @ 1ms": clear})
 
 
 def test_repeats_of_one_seed_are_refused_and_equal_ones_have_no_noise(found, tmp_path):

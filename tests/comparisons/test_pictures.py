@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from fotismos.comparisons import alignment, picture_files, picture_mistakes, pictures
+from fotismos.comparisons import alignment, picture_files, picture_mistakes
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
@@ -421,7 +421,8 @@ def test_sizes_and_repeats_must_fit(rgb, tmp_path):
         (
             (eight, nine),
             {},
-            r"pictures of 8x8 \(.*8.exr\), 9x9 \(.*9.exr\): the last is 1.12 times as wide and 1.12 times as high",
+            r"pictures of 8x8 \(.*8.exr\), 9x9 \(.*9.exr\): the last is 1.12 times as wide and"
+            " 1.12 times as high",
         ),
         ((eight, other, eight), {}, r"8.exr is given 2 times. Give each repeat once"),
         ((eight, other), {"noise": 1.0, "spp": None}, r"noise = 1 and 2 repeats: .* Give `spp`"),
