@@ -21,7 +21,8 @@ def caution(
     if not test.size:
         return ""
     sides = [np.abs(values) for values in (test, reference)]
-    test_is_black, reference_is_black = (float(values.max()) < BLACK for values in sides)
+    test_is_black = float(sides[0].max()) < BLACK
+    reference_is_black = float(sides[1].max()) < BLACK
     if test_is_black and reference_is_black:
         if not allow_empty:
             raise InputError(

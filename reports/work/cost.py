@@ -10,7 +10,7 @@ import click
 from fotismos.comparisons.cost import engine as engines
 from fotismos.comparisons.cost.engine_record import EngineCost
 from fotismos.comparisons.cost.timed_pictures import EngineTimes
-from fotismos.comparisons.departure.criterion import checked_threshold
+from fotismos.comparisons.departure.criterion import TOLERANCE, checked_threshold
 from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import matching
@@ -79,7 +79,8 @@ def judged(
     name: str, options: Options, engine: EngineTimes, within: float, target: Path, progress: Any
 ) -> EngineCost:
     """Judge the pictures of an engine's settings without a scene, and write the files."""
-    command = options.command("cost", "", **engine.as_options())
+    chosen = None if within == TOLERANCE else within
+    command = options.command("cost", "", **engine.as_options(), within=chosen)
     study = engines.front_of_pictures(options, engine, name, command)
     cost_files.write(target, study, cost_files.view_of_pictures(study, within))
     return study.record
@@ -96,10 +97,9 @@ def measured(
     progress: Any,
 ) -> Cost:
     """Study what each step of accuracy costs, and write its files."""
-    # Loaded late: pictures without a scene need no Mitsuba.
-    from fotismos.comparisons.case import open_case
-    from fotismos.comparisons.cost.cost import cost
-    from fotismos.comparisons.cost.measure import Effort
+    from fotismos.comparisons.case import open_case  # loaded late: pictures need no Mitsuba
+    from fotismos.comparisons.cost.cost import cost  # as late
+    from fotismos.comparisons.cost.measure import Effort  # as late
 
     case = open_case(name, options)
     effort = Effort() if rounds is None else Effort(rounds=rounds)
