@@ -381,7 +381,9 @@ def same_files(given: GivenPictures) -> Iterator[str]:
     theirs = list(zip(given.reference.files, given.reference.names, strict=True))
     for file, name in ours:
         for other, other_name in theirs:
-            if file.digest == other.digest:
+            if name == other_name:
+                yield f"{name} is also the reference."
+            elif file.digest == other.digest:
                 yield f"{name} and {other_name} are the same file, byte for byte."
 
 

@@ -69,10 +69,11 @@ def write(folder: Path, study: AnyStudy, shown: CostView) -> None:
     """
     results.own(folder)
     made = documents(study)
+    by = ", judged by" if shown.judged else " on"
     page = rendered(
         "cost_page.html.j2",
         HELP,
-        title=f"What accuracy costs on {study.record.scene}",
+        title=f"What accuracy costs{by} {study.record.scene}",
         data={"terms": glossary.meanings()},
         cost=shown,
         r=study.record,

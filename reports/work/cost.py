@@ -79,7 +79,7 @@ def judged(
     name: str, options: Options, engine: EngineTimes, within: float, target: Path, progress: Any
 ) -> EngineCost:
     """Judge the pictures of an engine's settings without a scene, and write the files."""
-    chosen = None if within == TOLERANCE else within
+    chosen = None if within == TOLERANCE else f"{within:g}"
     command = options.command("cost", "", **engine.as_options(), within=chosen)
     study = engines.front_of_pictures(options, engine, name, command)
     cost_files.write(target, study, cost_files.view_of_pictures(study, within))
