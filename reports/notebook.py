@@ -210,8 +210,12 @@ def cost(
     :func:`compare`.
     """
     values, arrays = _with_names(options, PICTURED)
-    shots, more = _with_names(pictures or {}, pictures or ())
-    times = EngineTimes.given([_setting(*shot) for shot in shots.items()], machine, kernel_time)
+    # Names of settings may be anything: arrays are called by their numbers.
+    words = pictures or {}
+    shots = {f"picture {number}": shot for number, shot in enumerate(words.values(), start=1)}
+    shots, more = _with_names(shots, tuple(shots))
+    settings = [_setting(word, shot) for word, shot in zip(words, shots.values(), strict=True)]
+    times = EngineTimes.given(settings, machine, kernel_time)
     with as_files(arrays | more):
         chosen = Options.of(values)
         if scene is None and chosen.reference and times:

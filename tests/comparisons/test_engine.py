@@ -315,7 +315,7 @@ def test_python_puts_arrays_on_a_front_beside_a_scene():
     assert record.resolution == (8, 8)
     low, high = record.engine.settings
     assert (low.method, low.picture.repeats, low.ratio) == ("low", 2, pytest.approx(3.0))
-    assert high.picture.files == ("high @ 9ms 1.npy",)
+    assert high.picture.files == ("picture 2 1.npy",)
     with pytest.raises(InputError, match="`reference` is for pictures without a scene"):
         fotismos.cost("lambert-sphere", pictures=pictures, reference=grey)
     clear = np.concatenate([grey, 0 * grey[..., :1]], axis=-1)

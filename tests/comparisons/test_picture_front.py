@@ -273,6 +273,8 @@ def test_python_takes_arrays_repeats_and_patterns(files):
     assert [one.picture.repeats for one in settings.values()] == [1, 3, 4, 1]
     assert [one.seconds.value for one in settings.values()] == [1e-3, 2e-3, 3e-3, 4e-3]
     grey = np.full((8, 8, 3), 0.5)
+    for name in ("a\0", "<b>*?[", "a" * 3000, "x.exr:layer"):
+        assert list(settings_of(grey, {f"{name} @ 1ms": grey})) == [name]
     for pictures, options, reason in (
         ({"a": grey}, {}, "has no time"),
         ({"a @ 0s": grey}, {}, "'0s' is not a time"),
