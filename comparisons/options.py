@@ -151,11 +151,6 @@ class Options(
             raise InputError(
                 f"heuristic {self.heuristic} and image {self.image[0]}: give one of them."
             )
-        if self.tone_map and not self.image:
-            raise InputError(
-                f"tone_map = {self.tone_map} and no image: it is the curve of a picture. Give an"
-                " `image`, or omit it."
-            )
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> Options:

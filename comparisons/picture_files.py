@@ -140,7 +140,7 @@ def read_file(
     """
     path, layer_name = picture_parts(word)
     if word in ARRAYS:
-        layer = _layer(path, np.asarray(ARRAYS[word], float))
+        layer = _of_values(path, np.asarray(ARRAYS[word]))
     elif not path.is_file():
         fault = "it is not a regular file" if path.exists() else "there is no such file"
         raise InputError(f"{path}: {fault}. Give a {' or '.join(PICTURES)} picture.")
@@ -440,6 +440,11 @@ def _array(path: Path) -> Layer:
             values = np.lib.format.read_array(stream, allow_pickle=False)
     except (ValueError, OSError, EOFError, MemoryError) as error:
         raise _unreadable(path, "NPY", error) from error
+    return _of_values(path, values)
+
+
+def _of_values(path: Path, values: NDArray[Any]) -> Layer:
+    """Return an array as a layer; InputError if its shape or type is not a picture's."""
     values = values[..., None] if values.ndim == 2 else values
     if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or values.dtype.kind not in "fiu":
         raise InputError(

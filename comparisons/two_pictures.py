@@ -2,9 +2,8 @@
 
 from time import perf_counter
 
-import numpy as np
-
 from fotismos.comparisons import pictures
+from fotismos.comparisons.caution import caution
 from fotismos.comparisons.comparison import (
     PICTURE_LIBRARIES,
     Comparison,
@@ -12,19 +11,9 @@ from fotismos.comparisons.comparison import (
     TimeSpent,
     versions,
 )
-from fotismos.comparisons.departure.colour import BLACK
 from fotismos.comparisons.estimates import PassSums, measure
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.errors import InputError
-
-FEWEST = 2
-"""Passes of two single pictures, which are equal."""
-
-USED = {
-    "image", "reference", "mask", "transfer", "over", "tone_map", "pixels_per_degree",
-    "colour_science", "allow_empty", "seed",
-}  # fmt: skip
-"""Options that serve pictures; the others are of a scene."""
 
 
 def compare_pictures(options: Options, name: str, command: str = "") -> Comparison:
@@ -39,16 +28,12 @@ def compare_pictures(options: Options, name: str, command: str = "") -> Comparis
     given = pictures.read_all(options)
     if given.image is None or given.reference is None:
         raise InputError("two pictures are needed: give `image` and `reference`.")
-    if others := sorted(set(options.stated()) - USED - {"pairing"}):
-        raise InputError(
-            f"{', '.join(others)}: this needs a scene, and two pictures have none. Omit it, or give"
-            " a scene."
-        )
+    pictures.require_no_scene(options)
     stages["reading"] = perf_counter() - begin
 
     begin = perf_counter()
     counted = given.where()
-    passes = given.passes or FEWEST
+    passes = given.passes or pictures.FEWEST
     first = pictures.PictureHalf(given.image, passes)
     second = pictures.PictureHalf(given.reference, passes)
     sums = PassSums(counted, options.tone_map)
@@ -66,22 +51,13 @@ def compare_pictures(options: Options, name: str, command: str = "") -> Comparis
         time=TimeSpent(heuristic=first.pass_times(), reference=second.pass_times(), stages=stages),
         versions=versions(PICTURE_LIBRARIES),
         command=command,
-        caution=_caution(images.heuristic[counted], images.reference[counted], options),
+        caution=caution(
+            images.heuristic[counted],
+            images.reference[counted],
+            name=name,
+            allow_empty=options.allow_empty,
+            is_picture=True,
+        ),
         **numbers,
     )
     return pictures.with_records(Comparison(record=record, images=images), given)
-
-
-def _caution(image: np.ndarray, reference: np.ndarray, options: Options) -> str:
-    """Return what makes the difference of two pictures (N, 3) meaningless; often empty."""
-    black = [bool(np.abs(values).max() < BLACK) for values in (image, reference)]
-    if all(black) and not options.allow_empty:
-        raise InputError(
-            f"both pictures are black: no pixel that counts is brighter than {BLACK} of display"
-            " white. Check the files, or allow it with `allow_empty`."
-        )
-    if any(black):
-        return f"The {'picture' if black[0] else 'reference'} is black."
-    if all(np.ptp(values, axis=0).max() == 0 for values in (image, reference)):
-        return "Each picture is one colour, so nothing shows whether they belong together."
-    return ""

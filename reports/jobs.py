@@ -95,6 +95,9 @@ command = partial(click.command, cls=Helped)
 # --- Options ---------------------------------------------------------------------------------
 
 scene_argument = click.argument("scene", metavar="SCENE", shell_complete=complete_scene)
+scene_or_pictures_argument = click.argument(
+    "scene", metavar="[SCENE]", required=False, shell_complete=complete_scene
+)
 scenes_argument = click.argument(
     "scenes", nargs=-1, required=True, metavar="SCENE...", shell_complete=complete_scene
 )

@@ -20,7 +20,7 @@ from fotismos.comparisons.check.pictures import (
     picture_gate,
 )
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import versions
+from fotismos.comparisons.comparison import PictureFiles, versions
 from fotismos.comparisons.departure.blocks import averaged
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
@@ -91,6 +91,9 @@ class CheckRecord(Record, omit_defaults=True):
     ] = ()
     pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
     smallest_changes: SmallestChanges | None = None
+    picture: Annotated[PictureFiles | None, Meta(description="The pictures that were checked.")] = (
+        None
+    )
     gate: Annotated[
         PictureGate | None, Meta(description="The tolerance that decided, in place of drift.")
     ] = None
@@ -315,7 +318,7 @@ def examine_pictures(
     """Check pictures that match a pattern against their baseline, for drift or by a tolerance."""
     begin = perf_counter()
     baseline, before = pictures.read(path)
-    after = pictures.read_repeats(pattern, baseline.transfer, baseline.over)
+    after, files = pictures.read_repeats(pattern, baseline.transfer, baseline.over)
     found = check_pictures(before, after, level)
     gate = None
     has_failed = bool(found.moved)
@@ -323,7 +326,7 @@ def examine_pictures(
         gate = picture_gate(before, after, tolerance.within, tolerance.bound)
         has_failed = gate.state != "pass"
     status = "failed" if has_failed else "passed"
-    made = of_pictures(path, pattern, status=status, found=found, begin=begin)
+    made = of_pictures(path, pattern, status=status, found=found, begin=begin, files=files)
     if gate is not None:
         made = structs.replace(made, gate=gate, message=gate.sentence)
     if not has_failed:
@@ -356,16 +359,22 @@ def update_pictures(
         known = pictures.record_of(path)
         transfer = transfer or known.transfer
         over = over or known.over
-    repeats = pictures.read_repeats(pattern, transfer, over)
+    repeats, files = pictures.read_repeats(pattern, transfer, over)
     pictures.write(path, repeats, transfer, over)
     found = check_pictures(repeats, repeats, level)
-    return of_pictures(path, pattern, status=status, found=found, begin=begin), None
+    made = of_pictures(path, pattern, status=status, found=found, begin=begin, files=files)
+    return made, None
 
 
 def of_pictures(
-    path: Path, pattern: str, status: Any, found: PictureCheck, begin: float
+    path: Path,
+    pattern: str,
+    status: Any,
+    found: PictureCheck,
+    begin: float,
+    files: PictureFiles | None = None,
 ) -> CheckRecord:
-    """Return the record of a check of pictures that match a pattern."""
+    """Return the record of a check of pictures that match a pattern, in ``files`` if in any."""
     changes = found.smallest_changes()
     return CheckRecord(
         baseline=path.as_posix(),
@@ -377,6 +386,7 @@ def of_pictures(
         significance=found.level,
         moved=found.moved,
         smallest_changes=changes,
+        picture=files,
     )
 
 

@@ -69,12 +69,13 @@ class EngineView(Record):
     """A page's sentences on an engine's settings, and their shares above the usual threshold.
 
     ``judgements`` are one for each, ``stated`` says what their times are of, and ``odd`` what is
-    odd about the pictures.
+    odd about the pictures. ``shares`` are those of the pixels above the ΔE2000 ``within``.
     """
 
     judgements: tuple[str, ...]
     stated: str
     odd: tuple[str, ...]
+    within: float
     shares: tuple[Any, ...]
 
 
@@ -84,16 +85,19 @@ class CostView(Record):
     ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, whose type few pages need
     to load. ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are
     sentences on its sums and on the machine, ``answer`` one on the cheapest method that looks
-    right; ``colours`` are those of the effects; ``engine`` is None without given pictures.
+    right; ``colours`` are those of the effects; ``engine`` is None without given pictures. Without
+    a scene, ``judged`` says by which ``reference``, and ``record`` is an ``EngineCost``.
     """
 
     record: Any
     images: dict[str, bytes]
-    said: str
-    busy: str
     answer: str
-    colours: tuple[str, ...]
+    said: str = ""
+    busy: str = ""
+    colours: tuple[str, ...] = ()
     engine: EngineView | None = None
+    reference: bytes | None = None
+    judged: str = ""
 
 
 class Before(Record):

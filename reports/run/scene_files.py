@@ -17,7 +17,8 @@ from fotismos.reports.page import embedding
 from fotismos.reports.page.scene_view import LiveView, SceneView, TermsView
 
 if TYPE_CHECKING:  # few scenes have one
-    from fotismos.comparisons.cost.cost import Study
+    from fotismos.comparisons.cost.cost_record import Cost
+    from fotismos.comparisons.cost.engine import Study
 
 RECORD = "comparison.json"
 PICTURE = "comparison.exr"
@@ -65,7 +66,7 @@ def write(
     folder: Path,
     name: str,
     comparison: Comparison,
-    costs: "Study | None" = None,
+    costs: "Study[Cost] | None" = None,
     key: str | None = None,
 ) -> SceneView:
     """Write the files of one comparison to ``folder/name``, and return its part of the page.

@@ -12,7 +12,7 @@ from msgspec import structs
 from playwright.sync_api import sync_playwright
 
 from fotismos.comparisons.comparison import Comparison
-from fotismos.comparisons.cost.cost import Study
+from fotismos.comparisons.cost.engine import Study
 from fotismos.comparisons.departure import regions
 from fotismos.comparisons.departure.metrics import THRESHOLDS, drawn, log2_luminance_ratio
 from fotismos.comparisons.departure.regions import Region

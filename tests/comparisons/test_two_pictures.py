@@ -207,12 +207,12 @@ BAD = (
     (
         {"image": [GREY], "reference": [np.full((8, 16, 3), 0.5)]},
         {},
-        "8x8, 16x8: the last is 2 times as wide as",
+        r"8x8 \(image 0.npy\), 16x8 \(reference 0.npy\): the last is 2 times as wide as",
     ),
     ({"image": [0 * GREY], "reference": [0 * GREY]}, {}, "both pictures are black"),
     ({"image": [GREY], "reference": []}, {}, "two pictures are needed"),
     ({"image": [GREY], "reference": [GREY]}, {"mask": "none.png"}, "none.png: there is no such"),
-    ({"image": [GREY], "reference": [GREY]}, {"spp": 4}, "spp: this needs a scene"),
+    ({"image": [GREY], "reference": [GREY]}, {"spp": 4}, "`spp`: this needs a scene"),
 )
 
 
@@ -264,7 +264,7 @@ def test_a_picture_that_equals_the_textbook_half_is_said_to(run, tmp_path, monke
     file = "own/fig-8-9/comparison.exr:heuristic"
     said = run(*words, "--image", file)[1]
     assert "The picture equals the textbook half to ΔE2000 0.01, away from edges." in said
-    brighter = 1.05 * pictures.read(file)
+    brighter = 1.05 * read_file(file).image
     np.save("brighter.npy", brighter)
     assert "equals the textbook" not in run(*words, "--image", "brighter.npy")[1]
 
