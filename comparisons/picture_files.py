@@ -153,13 +153,13 @@ def read_file(
     else:
         layer = _bitmap(path, path.suffix.lower())
     # A NaN would pass the later tests: it is neither above nor below.
-    wrong = np.asarray(~np.isfinite(layer.colours).all(axis=-1))
+    wrong = ~np.isfinite(layer.colours)
     if layer.alpha is not None:
-        wrong |= ~np.isfinite(layer.alpha)
+        wrong |= ~np.isfinite(layer.alpha)[..., None]
     if wrong.any():
         raise NonFiniteError(f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture.")
     decode = {"srgb": from_srgb, "linear": None}.get(transfer or "", layer.transfer)
-    image = layer.colours if decode is None else decode(layer.colours)
+    image = layer.colours if decode is None else decode(layer.colours.astype(float))
     behind = None if over is None else colour_over(over)
     opaque = np.ones(image.shape[:2], bool)
     notes = [layer.encoding if transfer is None else "", *layer.notes]
@@ -169,13 +169,13 @@ def read_file(
             notes.append(f"{np.count_nonzero(~opaque)} pixels with alpha below 1 do not count")
     else:
         image = _opaque(path, image, layer, behind)
-    wrong = np.any(image > LARGEST_VALUE, axis=-1)
+    wrong = image > LARGEST_VALUE
     if wrong.any():
         raise InputError(
             f"{word}: {_counted(wrong)} above {LARGEST_VALUE:g}, which is too bright. Divide the"
             " picture and all lights by the same number."
         )
-    wrong = np.any(image < MOST_NEGATIVE, axis=-1)
+    wrong = image < MOST_NEGATIVE
     if wrong.any():
         raise InputError(
             f"{word}: {_counted(wrong)} negative. Colours outside BT.709 are, if the file does not"
@@ -254,7 +254,7 @@ def _exr(path: Path, name: str) -> Layer:
     prefix = f"{name}." if name else ""
     if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
         raise _without_colours(path, name, channels)
-    colours = np.stack([channels[f"{prefix}{c}"].astype(float) for c in "RGB"], axis=-1)
+    colours = np.stack([channels[f"{prefix}{c}"].astype(np.float32) for c in "RGB"], axis=-1)
     alpha = channels.get(f"{prefix}A")
     notes = []
     data = np.array(header["dataWindow"]).tolist()
@@ -464,7 +464,9 @@ def _unreadable(path: Path, kind: str, error: Exception) -> InputError:
     return InputError(f"{path}: not a readable {kind} file: {fault}. Save the picture again.")
 
 
-def _counted(wrong: NDArray[np.bool_]) -> str:
+def _counted(channels: NDArray[np.bool_]) -> str:
+    """Return how many pixels are wrong in any channel (H, W, C), and which is the first."""
+    wrong = channels.any(axis=-1)
     y, x = np.unravel_index(np.argmax(wrong), wrong.shape)
     count = int(np.count_nonzero(wrong))
     return f"{count} of {wrong.size} pixels, the first at (x, y) = ({x}, {y}), are"

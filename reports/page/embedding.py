@@ -93,7 +93,8 @@ def packed(planes: Mapping[str, Codes], block: int = 1) -> Embedded:
     # 0, -1, 1, -2 become 0, 1, 2, 3: the high bytes are mostly 0.
     signed = ((steps << 1) ^ (steps >> 15)).view(np.uint16)  # small steps of both signs are small
     halves = np.stack([signed & 0xFF, signed >> 8]).astype(np.uint8)
-    data = base64.b64encode(zlib.compress(halves.tobytes())).decode("ascii")
+    # Level 4: two thirds of the time of 6 for pages 1 % larger.
+    data = base64.b64encode(zlib.compress(halves.tobytes(), 4)).decode("ascii")
     return Embedded(width=width, height=height, block=block, names=tuple(planes), data=data)
 
 
