@@ -29,10 +29,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from fotismos.comparisons import picture_formats
 from fotismos.comparisons.departure.colour import BT709, CHROMATICITIES, Array, from_srgb
 from fotismos.comparisons.names import PICTURES, picture_parts
 from fotismos.comparisons.options import Options
-from fotismos.heuristic.errors import InputError, InstallationError, NonFiniteError, suggestion
+from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
 from fotismos.reference.rendering.finite import LARGEST_VALUE
 
 SAME_PRIMARIES = 2e-3
@@ -364,7 +365,10 @@ def _converted(path: Path, colours: Array, primaries: Any) -> Array:
 
 
 BEGINNINGS = {".hdr": (b"#?",), ".pfm": (b"PF", b"Pf")}
-"""What files that Mitsuba reads begin with; it also reads others by these names, wrongly."""
+"""What files begin with; a PNG or JPEG is told by its content."""
+
+READERS = {".hdr": picture_formats.hdr, ".pfm": picture_formats.pfm}
+"""How files are read that Pillow does not read."""
 
 PNG_HEADER = 26
 """Bytes that a PNG file begins with; the last two are its bit depth and its kind of colours."""
@@ -374,16 +378,16 @@ MODES = ("L", "LA", "RGB", "RGBA", "I;16")
 
 
 def _bitmap(path: Path, suffix: str) -> Layer:
-    """Read a file by Pillow, or by Mitsuba, which also reads HDR, PFM and 16 bits of colours."""
+    """Read a file by Pillow, or by :mod:`fotismos.comparisons.picture_formats`."""
     kind = (suffix or path.name).removeprefix(".").upper()
     with path.open("rb") as stream:
         header = stream.read(PNG_HEADER)
     if not header.startswith(BEGINNINGS.get(suffix, (b"",))):
         raise _unreadable(path, kind, ValueError("it does not begin as one"))
     is_deep = suffix == ".png" and header[24:25] == b"\x10" and header[25:26] != b"\0"
-    is_for_mitsuba = is_deep or suffix in (".hdr", ".pfm")
+    read = picture_formats.deep_png if is_deep else READERS.get(suffix, _by_pillow)
     try:
-        pixels = _by_mitsuba(path, kind) if is_for_mitsuba else _by_pillow(path)
+        pixels = read(path)
     except (OSError, RuntimeError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise _unreadable(path, kind, error) from error
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
@@ -419,19 +423,6 @@ def _by_pillow(path: Path) -> NDArray[Any]:
         if file.mode not in MODES:
             raise InputError(f"{path}: its colours are {file.mode}. Save it as RGB.")
         return np.array(file)
-
-
-def _by_mitsuba(path: Path, kind: str) -> NDArray[Any]:
-    try:
-        import fotismos.reference.scene  # noqa: F401  loaded late: few pictures need Mitsuba
-    except ImportError as error:
-        raise InstallationError(
-            f"{path}: Mitsuba reads such {kind} files, and cannot be loaded: {error}. Convert it to"
-            " EXR, or install Mitsuba."
-        ) from error
-    import mitsuba as mi
-
-    return np.array(mi.Bitmap(str(path)))
 
 
 def _array(path: Path) -> Layer:

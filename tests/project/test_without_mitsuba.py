@@ -26,6 +26,8 @@ MODULES = (
     "fotismos.comparisons.names",
     "fotismos.comparisons.options",
     "fotismos.comparisons.picture_files",
+    "fotismos.comparisons.picture_formats",
+    "fotismos.comparisons.two_pictures",
     "fotismos.comparisons.price_record",
     "fotismos.reference",
     "fotismos.reference.pairing.pairing_record",
@@ -46,6 +48,7 @@ MODULES = (
     "fotismos.reports.page.page",
     "fotismos.reports.page.scene_view",
     "fotismos.reports.run.batch",
+    "fotismos.reports.run.pictures",
     "fotismos.reports.terminal.tables",
     "fotismos.reports.verdict",
 )
