@@ -102,7 +102,7 @@ class Batch:
         if is_interrupted:
             state = f"Interrupted: {done}; the same command resumes the run."
         elif self.done < len(self.places) and self.first_views:
-            state = "In progress: other metrics and mistakes follow; this page loads them."
+            state = "In progress: other metrics and mistakes follow; the page reloads by itself."
         elif self.done < len(self.places):
             state = f"In progress: {done}; reload to see more."
         # Details first: the page links them.
