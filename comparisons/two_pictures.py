@@ -1,6 +1,9 @@
 """Comparing two pictures without a scene: neither has a plan, a price, effects or terms."""
 
+from dataclasses import dataclass, replace
 from time import perf_counter
+
+from msgspec import structs
 
 from fotismos.comparisons import pictures
 from fotismos.comparisons.caution import caution
@@ -11,9 +14,23 @@ from fotismos.comparisons.comparison import (
     TimeSpent,
     versions,
 )
-from fotismos.comparisons.estimates import PassSums, measure
+from fotismos.comparisons.departure.metrics import LEADING, METRICS, declared
+from fotismos.comparisons.estimates import Estimates, PassSums, measure, summarised
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.errors import InputError
+
+
+@dataclass(frozen=True)
+class FirstLook:
+    """Two pictures, of which only what a page shows first is measured.
+
+    ``comparison`` has the leading metric and the declared ones, and no mistakes.
+    """
+
+    options: Options
+    given: pictures.GivenPictures
+    estimates: Estimates
+    comparison: Comparison
 
 
 def compare_pictures(options: Options, name: str, command: str = "") -> Comparison:
@@ -23,6 +40,11 @@ def compare_pictures(options: Options, name: str, command: str = "") -> Comparis
     ``command`` repeats it. Raises `InputError` if a picture cannot be read, if they differ in size,
     or if both are black.
     """
+    return finish(look(options, name, command))
+
+
+def look(options: Options, name: str, command: str = "") -> FirstLook:
+    """Read two pictures, and measure what a page shows first; see :func:`compare_pictures`."""
     stages: dict[str, float] = {}
     begin = perf_counter()
     given = pictures.read_all(options)
@@ -40,7 +62,13 @@ def compare_pictures(options: Options, name: str, command: str = "") -> Comparis
     for number in range(passes):
         sums.add(first.render(number), second.render(number))
     estimates = sums.estimates()
-    numbers, images = measure(estimates, counted, options, is_random=given.passes is not None)
+    numbers, images = measure(
+        estimates,
+        counted,
+        options,
+        is_random=given.passes is not None,
+        names=(LEADING.name, *declared()),
+    )
     stages["metrics"] = perf_counter() - begin
 
     record = ComparisonRecord(
@@ -58,6 +86,27 @@ def compare_pictures(options: Options, name: str, command: str = "") -> Comparis
             allow_empty=options.allow_empty,
             is_picture=True,
         ),
+        picture=given.image.record(),
+        reference_picture=given.reference.record(),
         **numbers,
     )
-    return pictures.with_records(Comparison(record=record, images=images), given)
+    return FirstLook(
+        options=options,
+        given=given,
+        estimates=estimates,
+        comparison=Comparison(record=record, images=images),
+    )
+
+
+def finish(first: FirstLook) -> Comparison:
+    """Return the whole comparison: with all metrics, and what is odd about the pictures."""
+    begin = perf_counter()
+    record = first.comparison.record
+    images = first.comparison.images
+    rest = [name for name in METRICS if name not in record.metrics]
+    summaries, maps = summarised(first.estimates, images.counted, first.options, rest)
+    summaries |= record.metrics
+    record = structs.replace(record, metrics={name: summaries[name] for name in METRICS})
+    whole = Comparison(record=record, images=replace(images, maps=images.maps | maps))
+    spent = record.time.stages["metrics"] + perf_counter() - begin
+    return pictures.with_records(whole.timed("metrics", spent), first.given)

@@ -14,11 +14,11 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from fotismos.comparisons.audit import probes
 from fotismos.comparisons.audit.subjects import shaded
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
+from fotismos.comparisons.departure.minimum import minimum
 from fotismos.comparisons.picture_mistakes import factor_of_pi
 from fotismos.comparisons.textbook import clamped, dot, halfway, lobe, mirrored, unit
 from fotismos.heuristic import heuristics
@@ -138,8 +138,7 @@ def _best(mistake: Mistake, model: Model, seen: Array) -> tuple[str, TermFit]:
     # The remainder may have several minima: a grid finds the valley, a search its bottom.
     grid, step = np.linspace(-LARGEST_LOG, LARGEST_LOG, 32, retstep=True)
     start = grid[np.argmin([fit(log)[1] for log in grid])]
-    bounds = start - step, start + step
-    best = minimize_scalar(lambda log: fit(log)[1], bounds=bounds, options={"xatol": 1e-5}).x
+    best, _ = minimum(lambda log: fit(log)[1], start - step, start + step)
     return description.format(f"{np.exp(best):.3g}"), fit(best)
 
 

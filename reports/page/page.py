@@ -26,7 +26,7 @@ from fotismos.comparisons.departure.metrics import (
     METRICS,
     RATIO,
     THRESHOLDS,
-    drawn,
+    declared,
 )
 from fotismos.reference.records import plain
 from fotismos.reports import glossary, verdict
@@ -83,11 +83,13 @@ def render(
     state: str = "",
     threshold: float = TOLERANCE,
     moved: Sequence[Before] = (),
+    reloads: bool = False,
 ) -> str:
     """One HTML page of all scenes, worst first, that begins at a threshold.
 
     `failures` are the scenes that could not be compared; `state` is a sentence on an unfinished
-    run; `moved` are pictures without a scene that moved.
+    run; `moved` are pictures without a scene that moved. The page ``reloads`` itself until one
+    that does not takes its place.
     """
     page_title = title or title_of([view.record for view in views])
     taken: set[str] = set()
@@ -133,6 +135,7 @@ def render(
         details=DETAILS,
         state=state,
         moved=moved,
+        reloads=reloads,
     )
 
 
@@ -255,13 +258,15 @@ def _board(why: WhyView | None, found: Attribution | None) -> dict[str, Any] | N
 
 def _drawing() -> dict[str, Any]:
     """Return the maps, their colours, and XYZ of linear RGB, under the script's names."""
-    declared = [metric for metric in drawn().values() if not METRICS.is_builtin(metric)]
     maps = (
         (LEADING.name, LEADING.label, "difference", 0),
         ("effects", EFFECTS_TITLE, "effects", 0),
         (RATIO.name, RATIO.label, "ratio", RATIO.limit),
         ("significant", "Shown to differ", "mask", 0),
-        *((metric.name, metric.label, "metric", metric.map_range[1]) for metric in declared),
+        *(
+            (metric.name, metric.label, "metric", metric.map_range[1])
+            for metric in declared().values()
+        ),
     )
     return {
         "maps": [dict(zip(("name", "title", "kind", "top"), shown, strict=True)) for shown in maps],

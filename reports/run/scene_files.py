@@ -68,11 +68,13 @@ def write(
     comparison: Comparison,
     costs: "Study[Cost] | None" = None,
     key: str | None = None,
+    view: SceneView | None = None,
 ) -> SceneView:
     """Write the files of one comparison to ``folder/name``, and return its part of the page.
 
     The record is removed first and written last. Files of an earlier result that this one does not
-    have are deleted. With a key, :func:`load` finds the result.
+    have are deleted. With a key, :func:`load` finds the result. ``view`` is that of the same images
+    with an earlier record.
     """
     target = folder / name
     record = comparison.record
@@ -80,7 +82,7 @@ def write(
     # The view names the earlier files, and is about to go.
     earlier = _files(target)
     results.clear(target, (RECORD, VIEW))
-    view = view_of(comparison)
+    view = structs.replace(view, record=record) if view else view_of(comparison)
     made = {
         f"{picture}.png": png
         for picture, png in images.pictures(comparison.images, record.viewing.exposure).items()
@@ -170,7 +172,7 @@ def _layers(shown: Images) -> dict[str, Any]:
         "reference": shown.reference,
         "reference_stderr": shown.reference_stderr,
         **({"P": shown.position, "N": shown.normal} if shown.position is not None else {}),
-        **{name: shown.maps[name] for name in drawn()},
+        **{name: shown.maps[name] for name in drawn() if name in shown.maps},
         "significant": shown.significant,
         **shown.terms,
     }
