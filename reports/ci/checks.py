@@ -438,7 +438,7 @@ def _each(
             )
             for call in calls
         ]
-        for task, outcome in pool.each(tasks):
+        for task, outcome in bar.each(pool, tasks, "baselines"):
             path = task.arguments[0]
             error = outcome.exception()
             results[path] = (failed(path, error), None) if error else outcome.result()
