@@ -84,7 +84,8 @@ class CostView(Record):
     ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, whose type few pages need
     to load. ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are
     sentences on its sums and on the machine, ``answer`` one on the cheapest method that looks
-    right; ``colours`` are those of the effects; ``engine`` is None without given pictures.
+    right; ``colours`` are those of the effects; ``left_out`` are sentences on methods. ``engine``
+    is None without given pictures; ``reference`` is a small WebP file.
     """
 
     record: Any
@@ -94,6 +95,8 @@ class CostView(Record):
     answer: str
     colours: tuple[str, ...]
     engine: EngineView | None = None
+    left_out: tuple[str, ...] = ()
+    reference: bytes = b""
 
 
 class Before(Record):

@@ -13,6 +13,7 @@ from fotismos.reference import records
 from fotismos.reports.charts import vega
 from fotismos.reports.charts.theme import FAINT, Spec
 from fotismos.reports.files import results
+from fotismos.reports.page.head import head
 from fotismos.reports.page.templating import rendered
 from fotismos.reports.terminal import tables
 from fotismos.reports.terminal.words import number
@@ -110,15 +111,16 @@ def write(folder: Path, record: Audit) -> None:
     """Write ``audit.svg``, ``index.html`` and ``audit.json`` to a folder; the record comes last."""
     results.own(folder)
     results.write(folder / "audit.svg", vega.paper(lobes(record)))
-    results.write(folder / results.PAGE, render(record))
+    results.write(folder / results.PAGE, render(record, folder))
     results.write(folder / "audit.json", records.to_json(record))
 
 
-def render(record: Audit) -> str:
-    """Return the page of an audit: one file, without scripts."""
+def render(record: Audit, folder: Path | None = None) -> str:
+    """Return the page of an audit in a folder: one file, without scripts."""
     return rendered(
         "audit.html.j2",
         title=headline(record),
+        head=head("audit", folder),
         record=record,
         found=value_of,
         lobes=vega.figure("Lobes", lobes(record)),

@@ -11,6 +11,7 @@ from fotismos.reference import records
 from fotismos.reports import glossary
 from fotismos.reports.charts import cost_charts, theme, vega
 from fotismos.reports.files import images, results
+from fotismos.reports.page.head import head
 from fotismos.reports.page.scene_view import CostView, EngineView
 from fotismos.reports.page.templating import HELP, rendered
 from fotismos.reports.terminal.cost_tables import (
@@ -18,10 +19,12 @@ from fotismos.reports.terminal.cost_tables import (
     busy,
     closure,
     judgements,
+    left_out,
     oddities,
     stated,
     together,
 )
+from fotismos.reports.terminal.words import as_typed
 
 if TYPE_CHECKING:
     from fotismos.comparisons.cost.cost import Study
@@ -60,6 +63,7 @@ def write(folder: Path, study: Study) -> None:
         "cost_page.html.j2",
         HELP,
         title=f"What accuracy costs on {study.record.scene}",
+        head=head("cost", folder, study.record.scene),
         data={"terms": glossary.meanings()},
         cost=view(study),
         r=study.record,
@@ -103,6 +107,8 @@ def view(study: Study) -> CostView:
         engine=engine,
         said=re.sub(r"(?<!\d)-(?=\d)", "−", " ".join(said)),
         busy=busy(record) if record.is_busy else "",
-        answer=answer(record),
+        answer=as_typed(answer(record)),
+        left_out=tuple(map(as_typed, left_out(record))),
+        reference=images.webp(images.tonemap(study.reference, exposure)),
         colours=tuple(theme.EFFECT_COLOURS[effect.effect] for effect in effects),
     )

@@ -53,8 +53,7 @@ def lines(record: Cost) -> Iterator[str]:
         )
     # The names of the others say what they are.
     yield from _explained(method.name for method in record.methods if method.family == "physical")
-    for name, reason in record.left_out.items():
-        yield f"left out: {name}: {reason}"
+    yield from left_out(record)
     if record.engine:
         yield from _section(f"Given pictures: {stated(record.engine)}", _settings(record.engine))
         yield from oddities(record.engine)
@@ -73,6 +72,14 @@ def lines(record: Cost) -> Iterator[str]:
         yield from _section(title, _predicted(record))
     if record.measured:
         yield from _section("Predicted and measured there, fewest samples", _off(record))
+
+
+def left_out(record: Cost) -> Iterator[str]:
+    """Yield a line for each reason why methods were left out."""
+    names: dict[str, list[str]] = {}
+    for name, reason in record.left_out.items():
+        names.setdefault(reason, []).append(name)
+    return (f"Left out: {', '.join(named)}, {reason}" for reason, named in names.items())
 
 
 def sized(resolution: tuple[int, int]) -> str:
