@@ -48,12 +48,8 @@ class Bar:
             line = f"{name}: {stage} {done} of {total} {self._unit}"
             line += f", {after[0]} next" if after else ""
             self._progress.update(task, completed=done, total=total, description=line)
-            is_counted = self._unit != "passes"
-            if (
-                is_counted
-                and self._has_lines
-                and LINES * done // total > LINES * (done - 1) // total
-            ):
+            is_counted = self._has_lines and self._unit != "passes" and done > 0
+            if is_counted and LINES * done // total > LINES * (done - 1) // total:
                 echo(f"{name}: {done} of {total} {self._unit}", err=True)
 
         self._tasks[update] = task
