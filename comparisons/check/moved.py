@@ -44,7 +44,7 @@ CAUSES = {
     " or how metrics are computed.",
     ("heuristic",): "Only the textbook half moved: look at its shading, or at how materials and"
     " lights are paired.",
-    ("reference",): "Only the reference moved: look at the physical materials and lights, the"
+    ("reference",): "Only the physical half moved: look at its materials and lights, the"
     " integrator, or the version of Mitsuba.",
     HALVES: "Both halves moved: look at what they share, such as geometry, camera, materials or"
     " lights.",
@@ -78,6 +78,11 @@ class Move(Record):
     p_corrected: Share
 
     @property
+    def name(self) -> str:
+        """What readers call the quantity: halves are textbook and physical."""
+        return self.quantity.replace("heuristic", "textbook").replace("reference", "physical")
+
+    @property
     def size(self) -> float:
         """How much it moved: metrics, which differ in unit, by their share, colours in light."""
         change = abs(self.after - self.before)
@@ -95,7 +100,7 @@ class Move(Record):
         """Return cells of a table: name, from, to, standard errors and p-value."""
         errors = self.standard_errors
         return (
-            self.quantity,
+            self.name,
             f"{self.before:.6g}",
             f"{self.after:.6g}",
             "no noise" if errors is None else f"{errors:+.1f}",
@@ -221,7 +226,7 @@ class Check:
         halves = tuple(half for half in HALVES if any(move.half == half for move in self.moved))
         sentences = [CAUSES[halves]]
         for half in halves:
-            name = "textbook half" if half == "heuristic" else half
+            name = "textbook half" if half == "heuristic" else "physical half"
             moves = [move for move in self.moved if move.half == half]
             sentences.append(f"The {name} {self._where(half, moves)}.")
         return sentences
