@@ -242,7 +242,7 @@ scene_options = options_of_scenes()
 
 timeout_option = click.option(
     "--timeout",
-    default=1800.0,
+    default=1800,
     show_default=True,
     type=Within(min=0, min_open=True),
     metavar="SECONDS",

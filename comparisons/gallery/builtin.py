@@ -8,6 +8,7 @@ from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError, suggestion
 
 if TYPE_CHECKING:  # names are listed without importing Mitsuba
@@ -54,8 +55,8 @@ def builtin(name: str) -> BuiltIn:
     """Return the built-in scene with a name."""
     if name not in SCENES:
         raise InputError(
-            f"{name!r} is neither a file nor a built-in scene{suggestion(name, SCENES)}. Built-in"
-            f" scenes: {', '.join(SCENES)}."
+            f"{name!r} is neither a file nor a built-in scene{suggestion(name, SCENES)};"
+            f" `{program.command('scenes')}` lists those."
         )
     return SCENES[name]
 

@@ -181,12 +181,23 @@ class Source:
             Parser.transform_upgrade(config, state)
             Parser.transform_resolve_references(config, state)
         except (RuntimeError, ValueError) as error:
-            raise InputError(f"{self.name}: {plain_message(error)}") from error
+            raise InputError(self._refusal(error)) from error
         if state.root.type != mi.ObjectType.Scene:
             raise InputError(f"{self.name}: its outermost element must be <scene>.")
         graph = Graph(self.name, config, state)
         graph.resolver = resolver
         return graph
+
+    def _refusal(self, error: Exception) -> str:
+        """Return Mitsuba's message, or which placeholders no file of the scene has."""
+        unused = re.findall(r"(?m)^ *- \$(\w+)=", str(error))
+        if not unused:
+            return f"{self.name}: {plain_message(error)}"
+        near = suggestion(unused[0], placeholders(Path(str(self.content))))
+        return (
+            f"-D {', '.join(unused)}: {self.name} has no such placeholder{near}. Write"
+            f" ${unused[0]} into the file, or leave the option out."
+        )
 
 
 def _require_regular(

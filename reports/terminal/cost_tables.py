@@ -48,8 +48,8 @@ def lines(record: Cost) -> Iterator[str]:
     bent = [method.name for method in record.methods if abs(method.bend) > BENT]
     if bent:
         yield (
-            f"Times of {', '.join(bent)} do not lie on a straight line over samples: what is"
-            " predicted from them is rough."
+            f"Time per sample is unsteady in {', '.join(bent)}, as on a busy machine: predicted"
+            " times are rough."
         )
     # The names of the others say what they are.
     yield from _explained(method.name for method in record.methods if method.family == "physical")

@@ -39,18 +39,18 @@ def run(pool: Pool) -> None:
 
 def examine(pool: Pool, variants: Iterable[str]) -> Iterator[str]:
     """Yield lines on versions, LLVM, test renderings, OpenGL and metrics."""
-    yield f"fotismos        {__version__}"
-    yield f"python          {platform.python_version()} on {platform.platform()}"
+    yield f"{'fotismos':<17} {__version__}"
+    yield f"{'python':<17} {platform.python_version()} on {platform.platform()}"
     yield from version_lines()
     info = llvm.check()
     version = ".".join(map(str, info.version or ()))
-    yield f"LLVM            {version}, from {info.source}: {info.path or 'path unknown'}"
+    yield f"{'LLVM':<17} {version}, from {info.source}: {info.path or 'path unknown'}"
     for variant in variants:
-        yield f"{variant:<15} {pool.do(Task(variant, rendered, (variant,)))}"
+        yield f"{variant:<17} {pool.do(Task(variant, rendered, (variant,)))}"
     state = pool.do(Task("GLSL", shaded, ()))
-    yield f"{'GLSL':<15} {state}"
+    yield f"{'GLSL':<17} {state}"
     apart = pool.do(Task("colour differences", compared, ()))
-    yield f"metrics         at most {apart:.0e} from those of colour-science"
+    yield f"{'metrics':<17} at most {apart:.0e} from those of colour-science"
     yield ""
     works = not state.startswith("cannot be run")
     yield "fotismos works here" + ("." if works else ", except for GLSL: see above for what to do.")
@@ -108,6 +108,6 @@ def version_lines() -> Iterator[str]:
     for library in LIBRARIES:
         version = metadata.version(library)
         pin = pins.get(library, version)
-        yield f"{library:<15} {version}" + (f"; {pin} is pinned" if version != pin else "")
+        yield f"{library:<17} {version}" + (f"; {pin} is pinned" if version != pin else "")
         if version != pin:
-            yield f"{'':<15} {CHANGES[library]}"
+            yield f"{'':<17} {CHANGES[library]}"
