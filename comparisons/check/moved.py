@@ -40,8 +40,8 @@ DARK = 1e-3
 """Luminance below which a block has no meaningful factor."""
 
 CAUSES = {
-    (): "The colours of neither half moved, only their difference: look at the noise, the samples,"
-    " or how metrics are computed.",
+    (): "The colours of neither half moved, only the error between them: look at the noise, the"
+    " samples, or how metrics are computed.",
     ("heuristic",): "Only the textbook half moved: look at its shading, or at how materials and"
     " lights are paired.",
     ("reference",): "Only the physical half moved: look at its materials and lights, the"
@@ -226,9 +226,9 @@ class Check:
         halves = tuple(half for half in HALVES if any(move.half == half for move in self.moved))
         sentences = [CAUSES[halves]]
         for half in halves:
-            name = "textbook half" if half == "heuristic" else "physical half"
+            name = {"heuristic": "textbook", "reference": "physical"}[half]
             moves = [move for move in self.moved if move.half == half]
-            sentences.append(f"The {name} {self._where(half, moves)}.")
+            sentences.append(f"The {name} half {self._where(half, moves)}.")
         return sentences
 
     def _where(self, half: str, moves: Sequence[Move]) -> str:

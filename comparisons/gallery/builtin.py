@@ -30,9 +30,9 @@ THREE_LIGHTS = (
 class BuiltIn:
     """A built-in scene: a sentence on what it shows, and a function that makes its dictionary.
 
-    ``variant`` is the variant that it needs, ``heuristic_variant`` the heuristic half's if
+    ``variant`` is the variant that it needs, ``heuristic_variant`` the textbook half's if
     different: RGB against the spectral reference. ``interpolation``, ``tessellation`` and
-    ``vertex_weights`` are the heuristic half's.
+    ``vertex_weights`` are the textbook half's.
     """
 
     name: str
@@ -55,8 +55,8 @@ def builtin(name: str) -> BuiltIn:
     """Return the built-in scene with a name."""
     if name not in SCENES:
         raise InputError(
-            f"{name!r} is neither a file nor a built-in scene{suggestion(name, SCENES)};"
-            f" `{program.command('scenes')}` lists those."
+            f"{name!r} is neither a file nor a built-in scene{suggestion(name, SCENES)}."
+            f" `{program.command('scenes')}` lists the built-in scenes."
         )
     return SCENES[name]
 

@@ -37,6 +37,9 @@ Parser = mi.parser
 Content = str | PathLike[str] | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
 Edit = Callable[[Graph], None]
 
+UNUSED = re.compile(r"Found unused parameters:\s*- \$(\w+)=")
+"""In Mitsuba's message on a value for which a file has no placeholder: its name."""
+
 
 def text_of(path: Path) -> str:
     """Return the text of a scene file, without its includes."""
@@ -164,6 +167,7 @@ class Source:
         config = Parser.ParserConfig(variant)
         content = self.content
         resolver = None
+        files: set[Path] = set()  # the scene's, with its includes
         if callable(content):
             self.made[:] = self.made or [content()]
             content = self.made[0]
@@ -174,30 +178,26 @@ class Source:
                 path = Path(content)
                 resolver = mi.FileResolver(mi.file_resolver())
                 resolver.prepend(str(path.resolve().parent))  # first, as for Mitsuba's command
-                _require_regular(path, resolver, parameters=self.parameters, seen=set())
+                _require_regular(path, resolver, parameters=self.parameters, seen=files)
                 with resolving(resolver):
                     state = Parser.parse_file(config, str(path), **self.parameters)
                 _require_text(self.name, state)
             Parser.transform_upgrade(config, state)
             Parser.transform_resolve_references(config, state)
         except (RuntimeError, ValueError) as error:
-            raise InputError(self._refusal(error)) from error
+            if unused := UNUSED.search(str(error)):
+                known = set().union(*map(placeholders, files))
+                raise InputError(
+                    f"-D {unused[1]}: {self.name} has no such placeholder"
+                    f"{suggestion(unused[1], known)}; it has {', '.join(sorted(known)) or 'none'}."
+                    " Correct the name, or omit it."
+                ) from error
+            raise InputError(f"{self.name}: {plain_message(error)}") from error
         if state.root.type != mi.ObjectType.Scene:
             raise InputError(f"{self.name}: its outermost element must be <scene>.")
         graph = Graph(self.name, config, state)
         graph.resolver = resolver
         return graph
-
-    def _refusal(self, error: Exception) -> str:
-        """Return Mitsuba's message, or which placeholders no file of the scene has."""
-        unused = re.findall(r"(?m)^ *- \$(\w+)=", str(error))
-        if not unused:
-            return f"{self.name}: {plain_message(error)}"
-        near = suggestion(unused[0], placeholders(Path(str(self.content))))
-        return (
-            f"-D {', '.join(unused)}: {self.name} has no such placeholder{near}. Write"
-            f" ${unused[0]} into the file, or leave the option out."
-        )
 
 
 def _require_regular(

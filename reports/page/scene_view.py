@@ -96,7 +96,7 @@ class CostView(Record):
     colours: tuple[str, ...]
     engine: EngineView | None = None
     left_out: tuple[str, ...] = ()
-    reference: bytes = b""
+    reference: bytes | None = None
 
 
 class Before(Record):
