@@ -130,11 +130,7 @@ def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "
 
 
 def _audited(kind: Kind, name: str, parameters: Mapping[str, Any], command: str) -> Audit:
-    subject: Subject
-    if kind == "bsdf":
-        subject = ScatteringSubject(name, parameters)
-    else:
-        subject = ShadingSubject(heuristics.named(name), parameters)
+    subject = subject_of(kind, name, parameters)
     curves = tuple(curve(subject, material) for material in subject.materials)
     derivatives = {by: disagreement(value, shade) for by, value, shade in subject.numbers()}
     return Audit(
@@ -153,6 +149,13 @@ def _audited(kind: Kind, name: str, parameters: Mapping[str, Any], command: str)
         command=command,
         versions=versions(),
     )
+
+
+def subject_of(kind: Kind, name: str, parameters: Mapping[str, Any]) -> Subject:
+    """Return what is audited, with its white materials."""
+    if kind == "bsdf":
+        return ScatteringSubject(name, parameters)
+    return ShadingSubject(heuristics.named(name), parameters)
 
 
 def all_checks(

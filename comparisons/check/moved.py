@@ -78,6 +78,11 @@ class Move(Record):
     p_corrected: Share
 
     @property
+    def name(self) -> str:
+        """What readers call the quantity: halves are textbook and physical."""
+        return self.quantity.replace("heuristic", "textbook").replace("reference", "physical")
+
+    @property
     def size(self) -> float:
         """How much it moved: metrics, which differ in unit, by their share, colours in light."""
         change = abs(self.after - self.before)
@@ -95,7 +100,7 @@ class Move(Record):
         """Return cells of a table: name, from, to, standard errors and p-value."""
         errors = self.standard_errors
         return (
-            self.quantity,
+            self.name,
             f"{self.before:.6g}",
             f"{self.after:.6g}",
             "no noise" if errors is None else f"{errors:+.1f}",

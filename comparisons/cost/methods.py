@@ -345,8 +345,7 @@ class Ladder:
                     # On other shapes, a time would compare meshes rather than shading.
                     if self._shapes(interpolation) != smooth:
                         refused[interpolation.value] = (
-                            "it needs a mesh, and the others have the scene's own shapes: give"
-                            " `tessellation` to measure all on one mesh"
+                            "for meshes only: give `tessellation` to measure all on one mesh"
                         )
                 except InputError as error:
                     refused[interpolation.value] = str(error)

@@ -189,9 +189,8 @@ def find(
                 replicate_spp=reference.pass_spp,
                 seed=options.seed,
                 size=size,
+                progress=progress,
             )
-            if progress:
-                progress(CAUSES, 0, 1)
             found = attribute(
                 images,
                 meter,
@@ -209,8 +208,6 @@ def find(
     finally:
         # The scene is the comparison's: it gets its size back.
         resize(ready.scene, (width, height))
-    if progress:
-        progress(CAUSES, 1, 1)
     return found
 
 

@@ -19,6 +19,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from fotismos.comparisons.comparison import CAUSES
 from fotismos.comparisons.departure.blocks import averaged, ratio
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, pair_for, pair_options
@@ -41,7 +42,7 @@ from fotismos.reference.planning.plan import physical_integrator
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.rendering import direct
 from fotismos.reference.rendering.gbuffer import image_size, resize
-from fotismos.reference.rendering.renderer import Renderer, Stream, passes, variant
+from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, passes, variant
 from fotismos.reference.rendering.sampler import with_sampler
 from fotismos.reference.rendering.transport import Transport
 from fotismos.reference.scene.graph import properties
@@ -204,7 +205,8 @@ class HybridImages:
 
     Of each image there are ``replicates``, at least 3, with ``replicate_spp`` samples per pixel,
     and of a ``size`` of (width, height). ``scenes`` are in the reference's variant. Images are
-    arrays (R, f H, f W, 3) of ``finer`` pixels, ``f`` per pixel in each direction.
+    arrays (R, f H, f W, 3) of ``finer`` pixels, ``f`` per pixel in each direction. ``progress`` is
+    called with the passes of :meth:`render`.
     """
 
     def __init__(
@@ -215,6 +217,7 @@ class HybridImages:
         replicate_spp: int,
         seed: int,
         size: tuple[int, int],
+        progress: Progress | None = None,
     ) -> None:
         self.replicates = replicates
         self.replicate_spp = replicate_spp
@@ -222,6 +225,7 @@ class HybridImages:
         self._pairs = pairs
         self._ready = pairs.ready
         self._seed = seed
+        self._progress = progress
         self._variant = pairs.ready.reference.variant
         self._scenes = {self._variant: scenes}
         self._known: dict[frozenset[Effect], Floats] = {}
@@ -239,6 +243,13 @@ class HybridImages:
         groups: dict[tuple[str, frozenset[Effect]], list[frozenset[Effect]]] = {}
         for simulated in dict.fromkeys(frozenset(simulated) - OF_KERNEL for simulated in sets):
             groups.setdefault(self._group(simulated), []).append(simulated)
+        total = self.replicates * len(groups)
+        before = 0
+
+        def report(stage: str, done: int, _: int) -> None:
+            if self._progress:
+                self._progress(stage, before + done, total)
+
         # Sorted by variant: a change of it takes as long as a small image.
         for (name, _), group in sorted(groups.items(), key=lambda found: found[0][0]):
             # In one order of transports: scenes that differ only in data share a kernel.
@@ -248,7 +259,8 @@ class HybridImages:
                 ]
             )
             with variant(name):
-                self._known |= zip(group, self._rendered(group), strict=True)
+                self._known |= zip(group, self._rendered(group, report), strict=True)
+            before += self.replicates
 
     def plugin(self, effects: Set[Effect]) -> Floats:
         """Return the image of Mitsuba's plugins in which some of ``effects`` are simulated.
@@ -313,14 +325,14 @@ class HybridImages:
         is_weighted = "spectral" in name or scenes.facts.camera.plugin not in UNWEIGHTED
         return name, effects if is_weighted else scenes.key(effects)
 
-    def _rendered(self, sets: Sequence[frozenset[Effect]]) -> list[Floats]:
+    def _rendered(self, sets: Sequence[frozenset[Effect]], progress: Progress) -> list[Floats]:
         """Render images of one scene, in their variant, which is current."""
         if mi.variant() not in self._scenes:
             pair = self._pairs.plain()
             physical = with_sampler(pair.physical, self._ready.plan.sampler).instantiate()
             self._scenes[mi.variant()] = HybridScenes(pair, self._ready.plan, physical)
         scenes = self._scenes[mi.variant()]
-        found = self._passes(scenes.transport(sets, self._pass_spp), len(sets))
+        found = self._passes(scenes.transport(sets, self._pass_spp), len(sets), progress)
         # A group has one scene, so all its sets have the same effects of emission.
         key = mi.variant(), frozenset(IN_EMISSION) & sets[0]
         if key not in self._emission:
@@ -333,7 +345,9 @@ class HybridImages:
     def _pass_spp(self) -> int:
         return self.replicate_spp // self.finer**2
 
-    def _passes(self, renderer: Renderer, count: int = 1) -> list[Floats]:
+    def _passes(
+        self, renderer: Renderer, count: int = 1, progress: Progress | None = None
+    ) -> list[Floats]:
         """Render the replicates on a film of the preview's size, then restore the film's.
 
         The channels of a pass are those of ``count`` images.
@@ -342,7 +356,10 @@ class HybridImages:
         whole = image_size(renderer.scene)
         renderer.size = self.finer * width, self.finer * height
         try:
-            loop = passes([renderer], self._seed, self.replicates, stream=Stream.REPLICATES)
+            loop = passes(
+                [renderer], self._seed, self.replicates, stream=Stream.REPLICATES,
+                progress=progress, stage=CAUSES,
+            )  # fmt: skip
             # (R, f H, f W, 3 count): the channels of an image are neighbours.
             made = np.stack([np.array(rendered.images[0]) for rendered in loop])
         finally:

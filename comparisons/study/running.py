@@ -25,7 +25,7 @@ from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.names import is_script
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.processes.pool import Pool, Task
-from fotismos.comparisons.study import dataset, scenes
+from fotismos.comparisons.study import dataset, scenes, sheet
 from fotismos.comparisons.study.dataset import STEPS, Row, measure
 from fotismos.comparisons.study.design import OWN, StudyFile, StudyPart
 from fotismos.comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, largest_miss
@@ -156,10 +156,16 @@ def run(
     report = progress or (lambda *_: None)
     begin = total - len(left)
     report("points", begin, total)
+    sheets = {part.name: sheet.sheet_of(part) for part in study.parts}
+    shown = {
+        point.key
+        for point in points
+        if (found := sheets[point.part.name]) is not None and point.number in found.points
+    }
     tasks = [
         Task(
             name=f"points of {point.part.name}",
-            function=row,
+            function=evaluated,
             arguments=(point,),
             ends_process=is_script(point.part.scene),
         )
@@ -168,7 +174,12 @@ def run(
     for done, (task, outcome) in enumerate((pool or Pool(0)).each(tasks), start=begin + 1):
         (point,) = task.arguments
         error = outcome.exception()
-        results[point.key] = point.row({"error": str(error)}) if error else outcome.result()
+        if error:
+            results[point.key] = point.row({"error": str(error)})
+        else:
+            results[point.key], pictures = outcome.result()
+            if pictures is not None and point.key in shown:
+                sheet.save(store / f"{point.key}.npy", pictures)
         if point.reusable:
             entries[point.key].save({"row": results[point.key]})
         report("points", done, total)
@@ -176,32 +187,44 @@ def run(
     return dataset.table(study, [point.row(results[point.key]) for point in points]), len(left)
 
 
+def kept_pictures(points: list[StudyPoint], folder: Path) -> dict[int, sheet.Pictures]:
+    """Return the pictures that a study's folder has of points of one part, by their numbers."""
+    found = ((p.number, sheet.load(folder / POINTS / f"{p.key}.npy")) for p in points)
+    return {number: pictures for number, pictures in found if pictures is not None}
+
+
 def row(point: StudyPoint) -> Row:
     """Evaluate a point, the same in any process.
 
     The row of a point that fails has its parameters and, in the column ``error``, the reason.
     """
+    return evaluated(point)[0]
+
+
+def evaluated(point: StudyPoint) -> tuple[Row, sheet.Pictures | None]:
+    """Return the row of a point, and small pictures of it if it is rendered and did not fail."""
     _set_up()
+    pictures = None
     try:
         convention = Convention(point.part.options.pairing)
         if point.part.scene == "lobe":
             columns, image, truth = scenes.lobe(point.values, convention)
             columns |= measure(image, truth, np.ones(image.shape[:2], bool))
         else:
-            columns = _rendered(point)
+            columns, pictures = _rendered(point)
         if point.part.scene in SCENES:
             columns |= scenes.columns(point.values, convention)
     # A failing point must not end a study of thousands.
     except Exception as failure:
         kind = "" if isinstance(failure, FotismosError) else f"{type(failure).__name__}: "
-        return point.row({"error": f"{kind}{failure}"})
-    return point.row(columns | {"error": None})
+        return point.row({"error": f"{kind}{failure}"}), None
+    return point.row(columns | {"error": None}), pictures
 
 
 # --- Renderings --------------------------------------------------------------------------------
 
 
-def _rendered(point: StudyPoint) -> Row:
+def _rendered(point: StudyPoint) -> tuple[Row, sheet.Pictures]:
     """Render both halves with the same camera rays, and the steps between them.
 
     The columns :data:`fotismos.comparisons.study.dataset.STEPS` are the root mean square changes of
@@ -244,7 +267,7 @@ def _rendered(point: StudyPoint) -> Row:
         sizes[name] = float(np.sqrt(np.mean(change**2)))
     result |= sizes | {"dominant": max(sizes, key=sizes.__getitem__)}
     result["miss"] = largest_miss(ready.pair.pairing.misses)
-    return result
+    return result, sheet.small(images[0], images[-1])
 
 
 def split(point: Point) -> tuple[Point, Point]:

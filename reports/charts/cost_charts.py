@@ -11,9 +11,11 @@ import numpy as np
 from scipy.optimize import isotonic_regression
 
 from fotismos.comparisons.cost.engine_record import Engine, EngineCost
+from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.reports.charts.theme import FAINT, Spec
 from fotismos.reports.charts.vega import specification
 from fotismos.reports.terminal.cost_tables import OWN_FRONT, stated
+from fotismos.reports.terminal.words import number
 
 if TYPE_CHECKING:  # pictures without a scene need no Mitsuba
     from fotismos.comparisons.cost.cost_record import Cost
@@ -23,7 +25,7 @@ HEIGHT = 380
 """Pixels of the plot, without the names to its right."""
 
 LABEL_GAP = 15
-LONGEST_NAME = 220
+LONGEST_NAME = 260
 """Least distance of two names, and the length at which one is cut, in pixels."""
 
 LEAST_ERROR = 1e-3
@@ -86,6 +88,7 @@ def error_over_time(record: Cost | EngineCost, ground: str = "transparent") -> S
             shape=_by_family(alt.Shape, 1),
             fill=alt.condition("datum.front", colour, alt.value(ground)),
         ),
+        chart.mark_point(size=260, shape="circle", strokeWidth=1).transform_filter("datum.right"),
     ]
     # Names may be wider in the reader's font than in the font of the picture.
     padding = {"left": 5, "right": 30, "top": 5, "bottom": 5}
@@ -106,6 +109,7 @@ def reading(record: Cost | EngineCost) -> list[str]:
     lines = [
         "filled: front (nothing else is clearly faster or better); bars: 95 % intervals of times",
         f"{slope}dotted: noise of the reference itself",
+        f"passes at: what 5 % of the pixels exceed with most samples; circled: at {TOLERANCE:g}",
     ]
     if record.engine:
         lines.append(f"diamonds: given pictures, {stated(record.engine)}{OWN_FRONT}")
@@ -124,6 +128,8 @@ def _measured(record: Cost) -> list[dict[str, Any]]:
             "fastest": 1e3 * max(point.seconds.low, point.seconds.value / 10),
             "slowest": 1e3 * point.seconds.high,
             "error": point.error.value,
+            "passes": f"passes at {number(point.tolerance.value)}",
+            "right": point.tolerance.high <= TOLERANCE,
             "front": point.front,
         }
         for point in record.points
@@ -141,10 +147,16 @@ def _given(engine: Engine) -> list[dict[str, Any]]:
             "fastest": 1e3 * setting.seconds.low,
             "slowest": 1e3 * setting.seconds.high,
             "error": setting.error.value,
+            "passes": _passing(setting.passes_at),
+            "right": setting.passes_at is not None and setting.passes_at <= TOLERANCE,
             "front": setting.front,
         }
         for setting in engine.settings
     ]
+
+
+def _passing(threshold: float | None) -> str:
+    return "does not pass" if threshold is None else f"passes at {number(threshold)}"
 
 
 def _by_family(channel: Callable[..., Any], column: int) -> Any:
@@ -198,23 +210,31 @@ def _guide(ends: Sequence[float], times: Ends, errors: Ends, dash: list[int]) ->
 
 
 def _names_beside(rows: Rows, times: Ends, errors: Ends) -> list[alt.Chart]:
-    """Return the methods' names to the right of the plot, with lines to their slowest points."""
+    """Return names and where they pass, right of the plot, with lines to their slowest points."""
     low, high = errors
     last = {row["method"]: row for row in sorted(rows, key=lambda row: row["time"])}
     ordered = sorted(last.values(), key=lambda row: -row["error"])
     # Pixels from the top, in which `spread` works; `beside` is the way back to an error.
     heights = [HEIGHT * log10(high / max(row["error"], low)) / log10(high / low) for row in ordered]
     named = [
-        {**row, "beside": high * (low / high) ** (y / HEIGHT)}
+        {
+            **row,
+            "beside": high * (low / high) ** (y / HEIGHT),
+            "name": f"{row['method']}, {row['passes']}",
+        }
         for row, y in zip(ordered, spread(heights, LABEL_GAP, HEIGHT), strict=True)
     ]
     chart = _charted(named, times, errors)
     beside = _error("beside", errors)
-    leading: Spec = {"color": "#9a9a9a", "strokeWidth": 0.7, "opacity": 0.6, "xOffset": 6}
+    leading: Spec = {"color": "#9a9a9a", "strokeWidth": 0.7, "opacity": 0.6}
     return [
-        chart.mark_rule(**leading).encode(x2=alt.value(WIDTH + 10), y2="beside"),
+        # Level to the border, and only then to the names: such lines cross none of the others.
+        chart.mark_rule(xOffset=6, **leading).encode(x2=alt.value(WIDTH)),
+        chart.mark_rule(**leading).encode(
+            x=alt.value(WIDTH), x2=alt.value(WIDTH + 18), y2="beside"
+        ),
         chart.mark_text(align="left", fontSize=12, limit=LONGEST_NAME).encode(
-            x=alt.value(WIDTH + 14), y=beside, text="method:N"
+            x=alt.value(WIDTH + 22), y=beside, text="name:N"
         ),
     ]
 

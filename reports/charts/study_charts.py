@@ -42,7 +42,7 @@ DASHES = ([1, 0], [6, 3], [2, 2], [8, 2, 2, 2])
 
 
 def all_figures(study: StudyFile) -> Iterator[StudyFigure]:
-    """Yield a study's figures; a part without one gets the departure over its parameters."""
+    """Yield a study's figures; a part without one gets the error over its parameters."""
     yield from study.figures
     shown = {figure.part for figure in study.figures}
     for part in study.parts:
@@ -72,7 +72,7 @@ def chart(figure: StudyFigure, table: pa.Table, study: StudyFile) -> Spec:
     over = [name for name in part.varying if name not in shown]
     title = {"text": figure.title}
     if over and part.design == "grid":
-        title["subtitle"] = f"mean over {', '.join(map(_label, over))}"
+        title["subtitle"] = f"mean over {', '.join(map(label, over))}"
     make = {"map": _map, "lines": _lines}[figure.kind]
     spec = specification(make(figure, table, part, data))
     return spec | {"title": title, "description": figure.title, "padding": 8}
@@ -101,7 +101,7 @@ def _map(
     else:
         scale = alt.Scale(scheme="magma" if column.startswith("dE") else "viridis")
         # A title as a list has a line for each word, which keeps the legend narrow.
-        colour = alt.Color("value:Q", title=_label(column).split(" "), scale=scale)
+        colour = alt.Color("value:Q", title=label(column).split(" "), scale=scale)
     x = _axis(alt.X, table, names[0])
     y = _axis(alt.Y, table, names[1])
     if is_grid:
@@ -115,7 +115,7 @@ def _map(
     marks = chart.mark_rect() if is_grid else chart.mark_circle(size=60, opacity=1)
     layers = [marks.encode(color=colour)]
     if is_word and is_grid:
-        layers.append(chart.mark_text().encode(text="letter:N"))
+        layers.append(chart.mark_text(color="black").encode(text="letter:N"))
     return alt.layer(*layers).properties(width=420, height=300)
 
 
@@ -126,27 +126,27 @@ def _lines(
     series = figure.series
     keys = (figure.x, series) if series else (figure.x,)
     values = [
-        {**cell, "quantity": _label(column)}
+        {**cell, "quantity": label(column)}
         for column in columns
         for cell in _mean(data, keys, column)
     ]
     # Of several columns, the words that their names share, such as `albedo` of both halves.
     parts_of_names = [column.split("_") for column in columns]
     shared = [word for word in parts_of_names[0] if all(word in other for other in parts_of_names)]
-    label = _label(columns[0]) if len(columns) == 1 else " ".join(shared) or "value"
+    named = label(columns[0]) if len(columns) == 1 else " ".join(shared) or "value"
     scales: list[Spec] = [
         {"type": "log"} if axis in figure.log else {"zero": axis == "y"} for axis in "xy"
     ]
-    y = alt.Y("value:Q", title=_with_unit(label, table, columns[0])).scale(**scales[1])
+    y = alt.Y("value:Q", title=_with_unit(named, table, columns[0])).scale(**scales[1])
     x = _axis(alt.X, table, figure.x).scale(nice=False, **scales[0])
     chart = alt.Chart().mark_line(strokeWidth=2).encode(x=x, y=y)
     if series:
         # Viridis without its light end, which is invisible on white.
         inks = alt.Scale(scheme=alt.SchemeParams("viridis", extent=[0, 0.8]))
-        title = _with_unit(_label(series), table, series)
+        title = _with_unit(label(series), table, series)
         chart = chart.encode(color=alt.Color("y:O", title=title, scale=inks))
     if len(columns) > 1:
-        dash = alt.StrokeDash("quantity:N", title=None, sort=[_label(name) for name in columns])
+        dash = alt.StrokeDash("quantity:N", title=None, sort=[label(name) for name in columns])
         dash = dash.scale(range=DASHES[: len(columns)]).legend(labelLimit=300, symbolSize=400)
         chart = chart.encode(strokeDash=dash)
     layers = [chart]
@@ -173,14 +173,15 @@ def _mean(data: Sequence[Row], keys: Sequence[str], column: str) -> list[Cell]:
 
 def _axis(channel: Any, table: pa.Table, name: str) -> Any:
     field = {alt.X: "x", alt.Y: "y"}[channel]
-    title = _with_unit(_label(name), table, name)
+    title = _with_unit(label(name), table, name)
     return channel(f"{field}:Q", title=title).axis(format=".3~g")
 
 
-def _with_unit(label: str, table: pa.Table, column: str) -> str:
+def _with_unit(name: str, table: pa.Table, column: str) -> str:
     unit = dataset.unit(table, column)
-    return f"{label} ({unit})" if unit not in ("", "1") else label
+    return f"{name} ({unit})" if unit not in ("", "1") else name
 
 
-def _label(column: str) -> str:
+def label(column: str) -> str:
+    """Return how charts call a column."""
     return SYMBOLS.get(column, column.replace("_", " "))

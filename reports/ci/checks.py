@@ -47,6 +47,9 @@ Judging = Callable[..., tuple["CheckRecord", SceneView | Before | None]]
 LARGEST_ERROR = 2.0
 """ΔE2000 at which the map's colours end: changes are often hardly noticeable."""
 
+READERS = {"heuristic": "textbook", "reference": "physical"}
+"""What captions call the halves."""
+
 
 @dataclass(frozen=True)
 class Tolerance:
@@ -122,7 +125,7 @@ class CheckRecord(Record, omit_defaults=True):
         others = len(self.moved or ()) - 1
         more = f", and {others} more" if others else ""
         values = f"from {most.before:.4g} to {most.after:.4g} ({most.change})"
-        return f"{most.quantity} moved {values}{more}."
+        return f"{most.name} moved {values}{more}."
 
     @property
     def exit_code(self) -> int:
@@ -283,11 +286,15 @@ def _record(file: BaselineFile, status: Any, found: Check, begin: float) -> Chec
 def _before(made: CheckRecord, before: baselines.Kept, after: baselines.Kept) -> Before:
     """Return the section of the page on what moved, with images before and now by their names."""
     shown = {}
-    for name, old in before.items():
-        now = averaged(after[name], old.shape)
-        error = images.error_map(LEADING(now, old), LARGEST_ERROR)
-        shown[f"{name}, before"], shown[f"{name}, now"] = images.tonemap(old), images.tonemap(now)
-        shown[f"{name}, {LEADING.label} between them"] = error
+    later = {name: averaged(after[name], old.shape) for name, old in before.items()}
+    errors = {name: LEADING(later[name], old) for name, old in before.items()}
+    # What moved most comes first.
+    for name in sorted(errors, key=lambda name: -errors[name].mean()):
+        caption = READERS.get(name, name)
+        shown[f"{caption}, before"] = images.tonemap(before[name])
+        shown[f"{caption}, now"] = images.tonemap(later[name])
+        error = f"{caption}, {LEADING.label} between them, 0 to {LARGEST_ERROR:g}"
+        shown[error] = images.error_map(errors[name], LARGEST_ERROR)
     return Before(
         name=made.name,
         headline=made.headline,
@@ -459,7 +466,7 @@ def _each(
             )
             for call in calls
         ]
-        for task, outcome in pool.each(tasks):
+        for task, outcome in bar.each(pool, tasks, "baselines"):
             path = task.arguments[0]
             error = outcome.exception()
             results[path] = (failed(path, error), None) if error else outcome.result()

@@ -1,4 +1,4 @@
-"""``fotismos study``: how the departure behaves over a space of scenes."""
+"""``fotismos study``: how the error behaves over a space of scenes."""
 
 from pathlib import Path
 
@@ -17,8 +17,9 @@ def study(
 ) -> None:
     """Compare over a grid or a Sobol design of scenes: one dataset, and maps.
 
-    FILE.toml says which parameters of which scenes vary. Writes NAME.parquet and figures/*.svg to
-    OUTPUT/study/NAME. Finished points are kept: the same command resumes a study that ended early.
+    FILE.toml says which parameters of which scenes vary. Writes a page, NAME.parquet, and figures,
+    among them pictures over the parameters, to OUTPUT/study/NAME. Finished points are kept: the
+    same command resumes a study that ended early.
 
     \b
     Examples:

@@ -97,7 +97,7 @@ def render(
     records = [view.record for view in views]
     scenes = [_scene(view, taken, threshold) for view in views]
     scenes.sort(key=lambda scene: -scene.shares[usual])
-    failed = {_identifier(failure.scene, taken): failure for failure in failures}
+    failed = {identifier(failure.scene, taken): failure for failure in failures}
     # On the page of a check, what moved takes the place of the verdict.
     since = [*(view.before for view in views if view.before), *moved]
     headline = " ".join(
@@ -179,7 +179,7 @@ def _scene(view: SceneView, taken: set[str], usual: float) -> PageScene:
     visible = record.metrics[LEADING.name].visible
     return PageScene(
         **structs.asdict(view),
-        id=_identifier(record.scene, taken),
+        id=identifier(record.scene, taken),
         parts=tuple(
             (effect, EFFECT_COLOURS[effect], part)
             for effect, part in verdict.missing(record).items()
@@ -281,7 +281,7 @@ def _drawing() -> dict[str, Any]:
     }
 
 
-def _identifier(name: str, taken: set[str]) -> str:
+def identifier(name: str, taken: set[str]) -> str:
     """Return a name for a scene in the page's address: plain characters; added to `taken`."""
     word = "".join(c if (c.isascii() and c.isalnum()) or c in "-_." else "-" for c in name)
     chosen = word or "scene"

@@ -85,8 +85,9 @@ class CostView(Record):
     ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, whose type few pages need
     to load. ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are
     sentences on its sums and on the machine, ``answer`` one on the cheapest method that looks
-    right; ``colours`` are those of the effects; ``engine`` is None without given pictures. Without
-    a scene, ``judged`` says by which ``reference``, and ``record`` is an ``EngineCost``.
+    right; ``colours`` are those of the effects; ``left_out`` are sentences on methods. ``engine``
+    is None without given pictures; ``reference`` is a small WebP file. Without a scene, ``judged``
+    says by which reference, and ``record`` is an ``EngineCost``.
     """
 
     record: Any
@@ -96,6 +97,7 @@ class CostView(Record):
     busy: str = ""
     colours: tuple[str, ...] = ()
     engine: EngineView | None = None
+    left_out: tuple[str, ...] = ()
     reference: bytes | None = None
     judged: str = ""
 

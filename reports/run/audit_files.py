@@ -1,6 +1,6 @@
 """The files of an audit: its record, its page with a chart of the lobes; and its lines."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from math import cos, radians, sin
 from pathlib import Path
 from typing import Any
@@ -8,11 +8,14 @@ from typing import Any
 import altair as alt
 
 from fotismos.comparisons.audit.checks import Audit, Checked
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.heuristics import in_file
 from fotismos.reference import records
 from fotismos.reports.charts import vega
 from fotismos.reports.charts.theme import FAINT, Spec
 from fotismos.reports.files import results
+from fotismos.reports.files.images import tonemap, webp
+from fotismos.reports.page.head import head
 from fotismos.reports.page.templating import rendered
 from fotismos.reports.terminal import tables
 from fotismos.reports.terminal.words import number
@@ -106,21 +109,25 @@ def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerCha
     return alt.LayerChart(layer=[below, above], width=WIDTH, height=WIDTH // 2)
 
 
-def write(folder: Path, record: Audit) -> None:
+def write(folder: Path, record: Audit, spheres: Mapping[str, Floats]) -> None:
     """Write ``audit.svg``, ``index.html`` and ``audit.json`` to a folder; the record comes last."""
     results.own(folder)
     results.write(folder / "audit.svg", vega.paper(lobes(record)))
-    results.write(folder / results.PAGE, render(record))
+    results.write(folder / results.PAGE, render(record, folder, spheres))
     results.write(folder / "audit.json", records.to_json(record))
 
 
-def render(record: Audit) -> str:
-    """Return the page of an audit: one file, without scripts."""
+def render(
+    record: Audit, folder: Path | None = None, spheres: Mapping[str, Floats] | None = None
+) -> str:
+    """Return the page of an audit in a folder, with linear pictures by material; no scripts."""
     return rendered(
         "audit.html.j2",
         title=headline(record),
+        head=head("audit", folder),
         record=record,
         found=value_of,
+        spheres={name: webp(tonemap(picture)) for name, picture in (spheres or {}).items()},
         lobes=vega.figure("Lobes", lobes(record)),
         furnace=vega.figure("White furnace", furnace(record)),
     )

@@ -33,10 +33,6 @@ from fotismos.reports.terminal.words import as_typed, remark, tell, tell_where
 if TYPE_CHECKING:  # a comparison has no hard cases
     from fotismos.comparisons.hard_cases import HardCases
 
-SCENE = 8.0
-HARD_CASES = 1.0
-"""Relative times of a scene and of the hard cases, to estimate the time left."""
-
 SHARE = 0.1
 """Greatest share of the time that writing unfinished pages may take."""
 
@@ -204,9 +200,8 @@ def run(
         }
         if subjects.are_shown_early:
             calls = {target: (*call, batch.show) for target, call in calls.items()}
-        total = SCENE * len(places) + (HARD_CASES if hard_cases else 0.0)
         try:
-            with progress.shown(total=total) as bar:
+            with progress.shown() as bar:
                 stages = ("rendering", "causes") if job.with_causes else ("rendering",)
                 _compare(pool, batch, subjects.compare, calls, bar, hard_cases, stages)
         except KeyboardInterrupt:
@@ -268,11 +263,11 @@ def _compare(
         )
         for target, call in calls.items()
     ]
-    bar.begin("scenes", len(tasks), SCENE)
-    for task, outcome in pool.each([*tasks, *([hard_cases] if hard_cases else ())]):
+    if hard_cases:
+        tasks.append(hard_cases)
+    for task, outcome in bar.each(pool, tasks, "scenes"):
         if task is hard_cases:
             batch.hard_cases, batch.stages[task.name] = outcome.result()
-            bar.over(None, HARD_CASES)
             continue
         try:
             view, spent = outcome.result()
@@ -285,8 +280,6 @@ def _compare(
             for stage, seconds in spent.items():
                 batch.stages[stage] += seconds
             remark(tables.details(view.record))
-        finally:
-            bar.over(task.progress)
         batch.grow_page()
 
 

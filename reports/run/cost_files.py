@@ -16,6 +16,7 @@ from fotismos.reference import records
 from fotismos.reports import glossary
 from fotismos.reports.charts import cost_charts, theme, vega
 from fotismos.reports.files import images, results
+from fotismos.reports.page.head import head
 from fotismos.reports.page.scene_view import CostView, EngineView
 from fotismos.reports.page.templating import HELP, rendered
 from fotismos.reports.terminal.cost_tables import (
@@ -25,11 +26,13 @@ from fotismos.reports.terminal.cost_tables import (
     busy,
     closure,
     judgements,
+    left_out,
     oddities,
     reference_of,
     stated,
     together,
 )
+from fotismos.reports.terminal.words import as_typed
 
 if TYPE_CHECKING:  # pictures without a scene need no Mitsuba
     from fotismos.comparisons.cost.cost_record import Cost
@@ -74,6 +77,7 @@ def write(folder: Path, study: AnyStudy, shown: CostView) -> None:
         "cost_page.html.j2",
         HELP,
         title=f"What accuracy costs{by} {study.record.scene}",
+        head=head("cost", folder, study.record.scene),
         data={"terms": glossary.meanings()},
         cost=shown,
         r=study.record,
@@ -142,6 +146,8 @@ def view(study: Study[Cost]) -> CostView:
         engine=_engine(record.engine, more=OWN_FRONT) if record.engine else None,
         said=re.sub(r"(?<!\d)-(?=\d)", "−", " ".join(said)),
         busy=busy(record) if record.is_busy else "",
-        answer=answer(record),
+        answer=as_typed(answer(record)),
+        left_out=tuple(map(as_typed, left_out(record))),
+        reference=_small(study.reference, record.viewing.exposure),
         colours=tuple(theme.EFFECT_COLOURS[effect.effect] for effect in effects),
     )

@@ -49,13 +49,12 @@ def lines(record: Cost) -> Iterator[str]:
     bent = [method.name for method in record.methods if abs(method.bend) > BENT]
     if bent:
         yield (
-            f"Times of {', '.join(bent)} do not lie on a straight line over samples: what is"
-            " predicted from them is rough."
+            f"Time per sample is unsteady in {', '.join(bent)}, as on a busy machine: predicted"
+            " times are rough."
         )
     # The names of the others say what they are.
     yield from _explained(method.name for method in record.methods if method.family == "physical")
-    for name, reason in record.left_out.items():
-        yield f"left out: {name}: {reason}"
+    yield from left_out(record)
     if record.engine:
         yield from _pictures(record.engine, OWN_FRONT)
     # Errors, and what each effect contributes.
@@ -105,6 +104,14 @@ def reference_of(record: EngineCost) -> str:
         f"judged by {record.reference_picture.repeats} reference pictures; the noise of their mean"
         f" gives {LEADING.label} {number(record.noise_floor)}"
     )
+
+
+def left_out(record: Cost) -> Iterator[str]:
+    """Yield a line for each reason why methods were left out."""
+    names: dict[str, list[str]] = {}
+    for name, reason in record.left_out.items():
+        names.setdefault(reason, []).append(name)
+    return (f"Left out: {', '.join(named)}, {reason}" for reason, named in names.items())
 
 
 def sized(resolution: tuple[int, int]) -> str:

@@ -1,35 +1,37 @@
-"""Progress while a command runs: each scene's stage, what comes next, and the time left."""
+"""Progress while a command runs: each scene's stage, what comes next, and the time left.
 
-from collections.abc import Callable, Iterator
+Where standard error is no terminal, a line says what is finished.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
 from contextlib import contextmanager
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeRemainingColumn
 
-from fotismos.reports.terminal.words import level, visible
+from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.reports.terminal.words import echo, is_quiet, visible
 
 SPEED_OVER_S = 600.0
 """Seconds over which the speed is averaged to estimate the time left: scenes differ."""
 
+LINES = 10
+"""Most lines on what one task counts, such as a study its points."""
+
 
 class Bar:
-    """Progress bars on standard error, one per scene; silent where no person is watching.
+    """Progress bars on standard error, one per task and one for all of several; or lines.
 
-    A scene's bar counts ``unit``. The whole run has one if there is a ``total``, in the weights
-    given to :meth:`begin`.
+    A task's bar counts ``unit``: the passes of a scene, or what users count themselves.
     """
 
-    def __init__(
-        self, progress: Progress, unit: str = "passes", total: float | None = None
-    ) -> None:
+    def __init__(self, progress: Progress, unit: str = "passes") -> None:
         self._progress = progress
+        self._has_lines = progress.disable and not is_quiet()
         self._unit = unit
-        self._whole = progress.add_task("", total=total) if total else None
         self._tasks: dict[Callable[..., None], TaskID] = {}
-        self._stage = ""
-        self._done = 0
-        self._count = 0
-        self._weight = 0.0
 
     def of(self, scene: str, stages: tuple[str, ...] = ()) -> Callable[[str, int, int], None]:
         """Return the callback ``(stage, done, total)`` for one scene; ``stages`` are to come."""
@@ -46,45 +48,43 @@ class Bar:
             line = f"{name}: {stage} {done} of {total} {self._unit}"
             line += f", {after[0]} next" if after else ""
             self._progress.update(task, completed=done, total=total, description=line)
+            is_counted = self._has_lines and self._unit != "passes" and done > 0
+            if is_counted and LINES * done // total > LINES * (done - 1) // total:
+                echo(f"{name}: {done} of {total} {self._unit}", err=True)
 
         self._tasks[update] = task
         return update
 
-    def begin(self, stage: str, count: int, weight: float) -> None:
-        """Begin a stage of the run: ``count`` tasks of a weight each."""
-        self._stage = stage
-        self._done = 0
-        self._count = count
-        self._weight = weight
-        self._advance(0.0)
-
-    def over(self, update: Callable[..., None] | None, weight: float | None = None) -> None:
-        """End the task with this callback: remove its bar, and advance the run's.
-
-        A task with its own weight is not one of the stage's.
-        """
-        if update in self._tasks:
-            self._progress.remove_task(self._tasks.pop(update))
-        self._done += weight is None
-        self._advance(self._weight if weight is None else weight)
-
-    def _advance(self, weight: float) -> None:
-        if self._whole is not None:
-            state = f"{self._stage}, {self._done} of {self._count}"
-            self._progress.update(self._whole, advance=weight, description=state)
+    def each(
+        self, pool: Pool, tasks: Sequence[Task], what: str
+    ) -> Iterator[tuple[Task, Future[Any]]]:
+        """Do tasks in a pool, and yield each with its outcome; ``what`` they are all called."""
+        total = len(tasks)
+        is_one = total == 1
+        whole = None if is_one else self._progress.add_task(f"{what}, 0 of {total}", total=total)
+        for done, (task, outcome) in enumerate(pool.each(tasks), start=1):
+            if task.progress in self._tasks:
+                self._progress.remove_task(self._tasks.pop(task.progress))
+            if whole is not None:
+                state = f"{what}, {done} of {total}"
+                self._progress.update(whole, advance=1, description=state)
+                if self._has_lines:
+                    ending = "failed" if outcome.exception() else "finished"
+                    echo(f"{task.name}: {ending}, {done} of {total}", err=True)
+            yield task, outcome
 
 
 @contextmanager
-def shown(unit: str = "passes", total: float | None = None) -> Iterator[Bar]:
-    """Show progress on standard error during the block, if that is a terminal; see :class:`Bar`."""
+def shown(unit: str = "passes") -> Iterator[Bar]:
+    """Show progress on standard error during the block; see :class:`Bar`."""
     console = Console(stderr=True)
     with Progress(
         TextColumn("{task.description}", markup=False),  # a name may hold brackets
-        BarColumn(),
+        BarColumn(style="bright_black", complete_style="cyan", finished_style="green"),
         TimeRemainingColumn(),
         console=console,
         transient=True,
         speed_estimate_period=SPEED_OVER_S,
-        disable=not console.is_terminal or level() < 0,
+        disable=not console.is_terminal or is_quiet(),
     ) as progress:
-        yield Bar(progress, unit, total)
+        yield Bar(progress, unit)

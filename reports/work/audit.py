@@ -5,7 +5,8 @@ from typing import Any
 
 import click
 
-from fotismos.comparisons.audit.checks import Audit, Kind, audit
+from fotismos.comparisons.audit.checks import Audit, Kind, audit, subject_of
+from fotismos.comparisons.audit.spheres import pictures
 from fotismos.comparisons.case import RGB
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic import plugins
@@ -48,5 +49,7 @@ def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, tar
     set_variant(RGB)
     plugins.register()
     record = audit(kind, name, parameters, command)
-    audit_files.write(target, record)
+    shown = [curve.material for curve in record.curves if curve.lobes]
+    spheres = pictures(subject_of(kind, name, parameters), shown)
+    audit_files.write(target, record, spheres)
     return record

@@ -41,4 +41,5 @@ def results_of(
             )
             for target, scene in zip(places, scenes, strict=True)
         ]
-        return {folder / task.name: done.result() for task, done in pool.each(tasks)}
+        ended = bar.each(pool, tasks, "scenes")
+        return {folder / task.name: done.result() for task, done in ended}

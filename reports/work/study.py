@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.comparisons.study import dataset, design, running
+from fotismos.comparisons.study.dataset import Row
 from fotismos.comparisons.study.design import StudyFile
+from fotismos.comparisons.study.running import StudyPoint
+from fotismos.comparisons.study.sheet import sheet_of
 from fotismos.reports.charts import study_charts, vega
+from fotismos.reports.charts.contact_sheet import contact_sheet
 from fotismos.reports.files import results
-from fotismos.reports.files.results import hold_results, own
+from fotismos.reports.files.results import PAGE, hold_results, own
 from fotismos.reports.jobs import command_line
-from fotismos.reports.terminal import progress
+from fotismos.reports.page.head import head
+from fotismos.reports.page.templating import rendered
+from fotismos.reports.terminal import progress, tables
 from fotismos.reports.terminal.words import tell
 
 if TYPE_CHECKING:
@@ -41,37 +47,69 @@ def run(pool: Pool, file: Path, output: Path, many: Callable[[int], Pool]) -> No
             own(part)  # a study replaces only its own results
         with many(tasks) as renderers, progress.shown("points") as bar:
             table, done = running.run(chosen, folder, renderers, bar.of(chosen.name), points)
-        places = write(chosen, table, folder)
+        written = write(chosen, table, points, folder)
     tell([*summary(chosen, table, done), ""])
-    for path in places:
+    for path in written:
         click.echo(os.fsencode(path))
 
 
-def write(study: StudyFile, table: pa.Table, folder: Path) -> tuple[Path, Path]:
-    """Write dataset and figures, and return their places."""
+def write(
+    study: StudyFile, table: pa.Table, points: list[StudyPoint], folder: Path
+) -> tuple[Path, ...]:
+    """Write dataset, figures, contact sheets and page, and return their places."""
     data = folder / f"{study.name}.parquet"
-    figures = folder / FIGURES
     results.write(data, dataset.file_of(table))
-    with_result = {row["part"] for row in table.to_pylist() if row["error"] is None}
+    rows = table.to_pylist()
+    with_result = {row["part"] for row in rows if row["error"] is None}
+    figures = []
     for figure in study_charts.all_figures(study):
         if figure.part in with_result:
-            svg = vega.paper(study_charts.chart(figure, table, study))
-            results.write(figures / f"{figure.name}.svg", svg)
-    return data, figures
+            spec = study_charts.chart(figure, table, study)
+            results.write(folder / FIGURES / f"{figure.name}.svg", vega.paper(spec))
+            figures.append(vega.figure(figure.title, spec))
+    sheets = {}
+    for part in study.parts:
+        layout = sheet_of(part)
+        pictures = running.kept_pictures([p for p in points if p.part.name == part.name], folder)
+        if layout and pictures:
+            sheets[part.name] = contact_sheet(part, layout, pictures)
+            results.write(folder / FIGURES / f"sheet-{part.name}.webp", sheets[part.name])
+    html = rendered(
+        "study.html.j2",
+        title=study.title,
+        head=head("study", folder),
+        ranges=[_range(part.name, rows) for part in study.parts],
+        sheets=sheets,
+        figures=figures,
+        command=command_line(),
+    )
+    results.write(folder / PAGE, html)
+    return data, folder / FIGURES, folder / PAGE
+
+
+def _range(part: str, rows: Sequence[Row]) -> dict[str, Any]:
+    """Return how many points a part has, how many failed, and its least, median and most error."""
+    of_part = [row for row in rows if row["part"] == part]
+    good = sorted(row["dE2000"] for row in of_part if row["error"] is None)
+    errors = (good[0], good[len(good) // 2], good[-1]) if good else ()
+    return {
+        "name": part,
+        "points": len(of_part),
+        "failed": len(of_part) - len(good),
+        "errors": [f"{error:.2f}" for error in errors],
+    }
 
 
 def summary(study: StudyFile, table: pa.Table, done: int) -> Iterator[str]:
-    """Yield a line for each part: points, failures, and the range of the departure."""
-    width = max(len(name) for name in ["part", *(part.name for part in study.parts)])
-    yield f"{'part':<{width}}  points  failed  mean ΔE2000: least  median   most"
+    """Yield a line for each part: points, failures, and the range of the error."""
     rows = table.to_pylist()
-    for part in study.parts:
-        of_part = [row for row in rows if row["part"] == part.name]
-        good = sorted(row["dE2000"] for row in of_part if row["error"] is None)
-        line = f"{part.name:<{width}}  {len(of_part):>6}  {len(of_part) - len(good):>6}"
-        if good:
-            line += f"  {good[0]:>18.2f}  {good[len(good) // 2]:>6.2f}  {good[-1]:>5.2f}"
-        yield line
+    headings = "part", "points", "failed", "mean ΔE2000: least", "median", "most"
+    parts = [_range(part.name, rows) for part in study.parts]
+    lines = [
+        (part["name"], str(part["points"]), str(part["failed"]), *(part["errors"] or 3 * ["–"]))
+        for part in parts
+    ]
+    yield from tables.printed([headings, *lines], right=1)
     if done < len(rows):
         yield f"{len(rows) - done} points were kept from an earlier run, or are shared."
     for row in [row for row in rows if row["error"] is not None][:3]:

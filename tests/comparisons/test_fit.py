@@ -11,6 +11,7 @@ import mitsuba as mi
 import numpy as np
 import pytest
 from drjit.llvm.ad import Array3f64
+from msgspec import structs
 
 from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING
@@ -27,6 +28,7 @@ from fotismos.heuristic.terms import normalisation
 from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.scene.source import Source
+from fotismos.reports.run import fit_files
 from fotismos.reports.terminal.words import percent
 from tests.shared.misplanned import scene as described
 from tests.shared.parts import look_at, moved, rgb_of
@@ -323,7 +325,8 @@ SMALL = ("--resolution", "16x12", "--spp", 4)
 def test_the_command_writes_a_record_and_a_picture_and_repeats_itself(run, tmp_path):
     words = ("fig-8-6a", "fig-8-5a", "--seed", 5, *SMALL)
     code, printed, messages = run("fit", *words, "-o", tmp_path / "a")
-    assert (code, messages) == (0, "")
+    names = {line.partition(":")[0] for line in messages.splitlines()}
+    assert (code, names, "2 of 2" in messages) == (0, {"fig-8-5a", "fig-8-6a"}, True)
     file = Path("fit/fig-8-6a/fit.json")
     data = json.loads((tmp_path / "a" / file).read_text())
     jsonschema.validate(data, schema("fit"))
@@ -331,10 +334,10 @@ def test_the_command_writes_a_record_and_a_picture_and_repeats_itself(run, tmp_p
     losses = [one["loss"] for one in data["fits"]]
     assert losses[data["best"]] == min(losses)
     assert "fig-8-5a: the paired parameters are exact" in printed
-    for word in ("paired", "blinn", "noise floor", "parameter error", "model error"):
+    for word in ("paired", "blinn", "noise alone", "parameter error", "model error"):
         assert word in printed
     page = (tmp_path / "a/fit/fig-8-6a/index.html").read_text(encoding="utf-8")
-    assert len(set(re.findall(r'src="data:image/webp[^"]*"', page))) == 4
+    assert len(set(re.findall(r'src="data:image/webp[^"]*"', page))) == 5
     paired, fitted = (share["value"] for share in data["fits"][data["best"]]["differ"])
     assert paired > fitted > 0.05
     judged = f"ΔE2000 2: paired {percent(paired)} (fail), fitted {percent(fitted)} (fail)."
@@ -342,8 +345,8 @@ def test_the_command_writes_a_record_and_a_picture_and_repeats_itself(run, tmp_p
     assert "paired 0 % (pass), fitted 0 % (pass)." in printed  # the exact one
     for word in (
         "the best parameters remove",
-        "noise floor",
-        "95 %, by noise",
+        "noise alone",
+        "95 %, by noise alone",
         data["command"],
         judged,
     ):
@@ -351,6 +354,26 @@ def test_the_command_writes_a_record_and_a_picture_and_repeats_itself(run, tmp_p
     code, printed, _ = run(*shlex.split(data["command"])[1:], "--json", "-o", tmp_path / "b")
     (again,) = json.loads(printed)
     assert (code, again["fits"]) == (0, data["fits"])
+
+
+def test_intervals_have_enough_digits_and_the_exponent_of_blinn_is_explained(rgb):
+    found = fit(builtin("fig-8-9").source(), Options(resolution=(8, 8), spp=4), forms=["blinn"])
+    form = found.record.nearest
+    material = form.materials[0]
+
+    def printed(interval):
+        parameters = [structs.replace(one, interval=interval) for one in material.parameters]
+        changed = structs.replace(material, parameters=tuple(parameters))
+        fits = (structs.replace(form, materials=(changed,)),)
+        return "\n".join(fit_files.lines(structs.replace(found.record, fits=fits)))
+
+    assert "below the last digit" in printed((0.30591, 0.30592))
+    assert "0.3059 to 0.306" in printed((0.30591, 0.306))
+    n = float(builtin("fig-8-9").make()["sphere"]["bsdf"]["n"])
+    assert (
+        f"paired n {4 * n:g} of blinn: its lobe is as wide as that of n {n:g} of phong"
+        in printed(None)
+    )
 
 
 def test_what_cannot_be_fitted_is_refused(run, rgb, written, tmp_path):

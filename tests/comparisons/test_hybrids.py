@@ -73,7 +73,12 @@ def test_a_clamped_fall_off_is_a_cause(rgb):
     }
     source = Source("clamped", description)
     ready = guarded(source, Options())
-    record = attribution.find(ready, source, Options()).record
+    told = []
+    record = attribution.find(ready, source, Options(), lambda *state: told.append(state)).record
+    causes = [state[1:] for state in told if state[0] == "causes"]
+    (total,) = {total for _, total in causes}
+    assert [done for done, _ in causes] == sorted(done for done, _ in causes)
+    assert {done for done, _ in causes} == {*range(total + 1)}
     assert record.departure > 0.5
     assert [entry.effect for entry in record.effects] == ["distance attenuation"]
     assert abs(record.closure.value) < 0.01 * record.departure

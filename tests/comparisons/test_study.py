@@ -5,12 +5,13 @@ import re
 
 import numpy as np
 import pytest
+from PIL import Image
 from scipy.special import erf
 
 from docs.figures import findings
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.processes.pool import Pool
-from fotismos.comparisons.study import dataset, design, running, scenes
+from fotismos.comparisons.study import dataset, design, running, scenes, sheet
 from fotismos.heuristic import user_shaders
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.charts import study_charts
@@ -353,8 +354,9 @@ def test_the_command_writes_dataset_and_figures(run, tmp_path):
     file, out = tmp_path / "small.toml", tmp_path / "out"
     file.write_text(part("alpha = [0.2, 0.4]\nlight_angle = [0, 60]"))
     code, printed, messages = run("study", file, "-o", out)
-    assert (code, messages) == (0, "")
+    assert (code, messages.splitlines()[-1]) == (0, "small: 4 of 4 points")
     assert dataset.read(out / "study/small/small.parquet").num_rows == 4
+    assert "least ΔE2000" in (out / "study/small/index.html").read_text(encoding="utf-8")
     assert "<svg" in (out / "study/small/figures/lobe.svg").read_text()
     assert "4       0" in printed
     code, printed, _ = run("study", file, "-o", out)
@@ -448,3 +450,46 @@ def test_every_figure_has_its_points_and_says_what_it_averages(shipped):
     cell = spec["data"]["values"][9]
     found = dataset.rows(table, "energy", {"k_s": cell["x"], "n": cell["y"]})
     assert cell["value"] == pytest.approx(np.mean([row["dE2000"] for row in found]))
+
+
+# --- Contact sheets -------------------------------------------------------------------------------
+
+
+def test_a_sheet_has_six_levels_of_two_parameters_and_the_middle_of_others():
+    many = "alpha = {from = 0.1, to = 1, steps = 19}\nreflectance = [0.1, 0.4, 0.9]\n"
+    chosen = design.parse(part(f"{many}light_angle = [0, 60]", "sphere")).parts[0]
+    found = sheet.sheet_of(chosen)
+    assert (found.down, found.across, found.points.shape) == ("alpha", "light_angle", (6, 2))
+    shown = np.array(chosen.points())[found.points]
+    assert {point["reflectance"] for point in shown.ravel()} == {0.4}
+    for row, level in zip(shown, (0.1, 0.3, 0.45, 0.65, 0.8, 1), strict=True):
+        assert [point["light_angle"] for point in row] == [0, 60]
+        assert row[0]["alpha"] == row[1]["alpha"] == pytest.approx(level, abs=0.06)
+    for words in (("alpha = [0.1, 0.2]", "lobe"), ("alpha = 0.2", "sphere")):
+        assert sheet.sheet_of(design.parse(part(*words)).parts[0]) is None
+
+
+def test_a_sheet_shows_both_halves_of_each_point_where_its_labels_are(rgb, run, tmp_path):
+    file = tmp_path / "small.toml"
+    file.write_text(part("reflectance = [0, 1]\nlight_angle = [0, 80]", "sphere", SMALL))
+    code, _, _ = run("study", file, "-o", tmp_path)
+    folder = tmp_path / "study/small"
+    study = design.read(file)
+    kept = running.kept_pictures(running.all_points(study), folder)
+    assert (code, sorted(kept)) == (0, [0, 1, 2, 3])
+    dark, _, bright, aside = (kept[number].mean(axis=(1, 2, 3)) for number in range(4))
+    assert (bright > dark + 20).all()
+    assert (bright > aside + 20).all()
+    with Image.open(folder / "figures/sheet-sphere.webp") as opened:
+        whole = np.asarray(opened.convert("L"), float)
+    # The brightest of the four cells is above at the left: reflectance 1, light from the viewer.
+    is_cell = whole < 250
+    rows, columns = np.nonzero(is_cell & (whole < 40))
+    middle = (rows.min() + rows.max()) // 2, (columns.min() + columns.max()) // 2
+    quarters = [
+        part_of[:, side].sum()
+        for part_of in (whole[rows.min() : middle[0]], whole[middle[0] : rows.max()])
+        for side in (slice(columns.min(), middle[1]), slice(middle[1], columns.max()))
+    ]
+    assert np.argmax(quarters) == 0
+    assert "sheet" in (folder / "index.html").read_text(encoding="utf-8")

@@ -119,9 +119,9 @@ def failure(made_baselines, tmp_path_factory):
 def test_what_moved_fails_with_a_table_and_the_others_are_checked(failure):
     assert failure.code == 2, "one baseline could not be read"
     assert "1 of 3 moved" in failure.printed
-    assert "fig-8-6b: failed. reference R, block 2,3 moved from " in failure.printed
+    assert "fig-8-6b: failed. physical R, block 2,3 moved from " in failure.printed
     assert "1 could not be checked" in failure.printed
-    assert re.search(r"reference R, block 2,3 +\S+ +\S+ +-33 % +-\S+ +\S+", failure.printed)
+    assert re.search(r"physical R, block 2,3 +\S+ +\S+ +-33 % +-\S+ +\S+", failure.printed)
     accepting = f"fotismos check {failure.baselines / 'fig-8-6b.json'} --update"
     assert accepting in failure.printed
     assert re.search(r"error: .*broken\.json: this is not JSON", failure.messages)
@@ -131,10 +131,10 @@ def test_what_moved_fails_with_a_table_and_the_others_are_checked(failure):
 def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
     html = (failure.out / "index.html").read_text()
     headline = re.search(r'<h1 id="headline">(.*?)</h1>', html)[1]
-    assert "fig-8-6b: reference R, block 2,3 moved from " in headline
+    assert "fig-8-6b: physical R, block 2,3 moved from " in headline
     assert "-33 %" in headline
     assert "differ visibly</h1>" not in html
-    for part in ("1 of 3 moved", "row 2, column 3", "reference, before", "--update"):
+    for part in ("1 of 3 moved", "row 2, column 3", "physical, before", "--update"):
         assert part in html, part
     names = {path.name for path in (failure.out / "fig-8-6b").iterdir()}
     assert {"check.json", "comparison.json", "comparison.exr", "reference.png"} <= names
@@ -148,7 +148,7 @@ def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
 
 def test_once_it_passes_nothing_speaks_of_the_failure(failure):
     code, printed, messages = failure.again
-    assert (code, messages) == (0, "")
+    assert (code, "finished, 2 of 2" in messages, "error" in messages) == (0, True, False)
     assert "2 of 2 unmoved" in printed
     assert list((failure.folder / "out").iterdir()) == []
 
@@ -157,10 +157,10 @@ def test_ci_reads_what_moved_and_what_was_not_checked(failure):
     suite = ElementTree.parse(failure.folder / "j.xml").getroot().find("testsuite")
     assert [suite.get(key) for key in ("tests", "failures", "errors")] == ["3", "1", "1"]
     (message,) = suite.findall("testcase/failure")
-    assert message.get("message").startswith("reference R, block 2,3 moved from ")
+    assert message.get("message").startswith("physical R, block 2,3 moved from ")
     assert "standard errors" in message.text
     text = (failure.folder / "s.md").read_text()
-    assert "| fig-8-6b | failed | reference R, block 2,3, -33 % (1 in all) |" in text
+    assert "| fig-8-6b | failed | physical R, block 2,3, -33 % (1 in all) |" in text
     assert f"`{failure.folder / 'out/check/index.html'}`" in text
 
 
@@ -233,7 +233,7 @@ def test_an_update_rewrites_what_moved_and_nothing_else(run, baselines_folder):
     change(baselines_folder / "fig-8-6b.json")
     code, printed, _ = run("check", baselines_folder, "--update")
     assert code == 0
-    for words in ("fig-8-6b: updated", "reference R, block 2,3", "1 of 2 baselines written"):
+    for words in ("fig-8-6b: updated", "physical R, block 2,3", "1 of 2 baselines written"):
         assert words in printed
     assert content() == whole
 

@@ -16,6 +16,7 @@ import pytest
 
 from fotismos.comparisons.cost import measure
 from fotismos.comparisons.fit import fit as fitting
+from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import InputError
 from fotismos.reports import cli
 from fotismos.reports.terminal import progress
@@ -271,6 +272,38 @@ def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(monkey
         assert re.search(r"\d:\d\d:\d\d", shown)
         assert ("\x1b[38;5;" in shown or "\x1b[3" in shown) is is_coloured
         monkeypatch.setenv("NO_COLOR", "1")
+
+
+def work(number):
+    if number == 1:
+        raise InputError("no")
+    return number
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_pipe_gets_a_line_for_each_task_of_several_and_a_terminal_a_bar(monkeypatch, count):
+    tasks = [Task(f"scene-{number}", work, (number,)) for number in range(count)]
+    monkeypatch.setenv("TERM", "xterm-256color")
+    for stream in (StringIO(), Terminal()):
+        monkeypatch.setattr(sys, "stderr", stream)
+        with Pool(0) as pool, progress.shown() as bar:
+            assert len([*bar.each(pool, tasks, "scenes")]) == count
+        shown = stream.getvalue()
+        if stream.isatty():
+            assert ("scenes, 3 of 3" in shown, "scenes" in shown) == (count == 3, count == 3)
+        else:
+            lines = ["scene-0: finished", "scene-1: failed", "scene-2: finished"]
+            numbered = [f"{line}, {n} of 3\n" for n, line in enumerate(lines, start=1)]
+            assert shown == ("".join(numbered) if count == 3 else "")
+
+
+def test_a_pipe_gets_ten_lines_on_the_points_of_a_study(capsys):
+    with progress.shown("points") as bar:
+        update = bar.of("gloss")
+        for done in range(401):
+            update("points", done, 400)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [f"gloss: {done} of 400 points" for done in range(40, 401, 40)]
 
 
 def test_a_backend_of_jupyter_that_is_not_installed_does_not_matter(tmp_path):

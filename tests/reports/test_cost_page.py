@@ -1,6 +1,7 @@
 """What page, files and charts show of a study of cost: the record's figures, and its front."""
 
 import json
+import re
 from dataclasses import replace
 from math import ceil
 
@@ -16,7 +17,7 @@ from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import cost_files, scene_files
 from fotismos.reports.terminal import cost_tables
-from fotismos.reports.terminal.words import seconds
+from fotismos.reports.terminal.words import number, seconds
 from tests.browser.conftest import noisy
 from tests.shared import cost_records, records
 from tests.shared.pages import HOSTILE, Page
@@ -238,3 +239,27 @@ def test_a_chart_names_axes_units_and_every_method():
         for word in ("time for one image (ms", "mean ΔE2000", *(p.method for p in points)):
             assert word in svg
         assert "NaN" not in svg
+
+
+def test_lines_to_the_names_in_a_chart_do_not_cross_and_names_say_where_methods_pass():
+    """Straight lines from fast methods of a little more error would cross those of slow ones."""
+    fast = [point(f"fast {n}", 4, 0.001 * n, 2.0 + n / 50) for n in range(4)]
+    slow = [point(f"slow {n}", 4, 0.2 * (n + 1), 1.9 - n / 50) for n in range(4)]
+    last = slow.pop()
+    slow.append(structs.replace(last, tolerance=structs.replace(last.tolerance, high=1.5)))
+    first = cost_records.record("synthetic").methods[0]
+    methods = tuple(structs.replace(first, name=one.method) for one in (*fast, *slow))
+    shown = record([*fast, *slow], methods=methods)
+    svg = vl_convert.vegalite_to_svg(cost_charts.titled(shown))
+    found = re.findall(
+        r'translate\(([\d.]+),([\d.]+)\)" x2="([-\d.]+)" y2="([-\d.]+)" stroke="#9a9a9a"', svg
+    )
+    lines = [tuple(map(float, ends)) for ends in found]
+    level = [(x, y) for x, y, _, down in lines if down == 0 and x < cost_charts.WIDTH]
+    beside = sorted((y, y + down) for x, y, _, down in lines if x == cost_charts.WIDTH)
+    assert (len(level), len(beside)) == (8, 8)
+    assert sorted(y for _, y in level) == pytest.approx([y for y, _ in beside])
+    assert [end for _, end in beside] == sorted(end for _, end in beside)
+    for one in (*fast, *slow):
+        assert f"{one.method}, passes at {number(one.tolerance.value)}" in svg
+    assert len(re.findall('d="M8.062,0A', svg)) == 1  # the ring of the one that passes at 2

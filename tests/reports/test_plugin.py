@@ -105,7 +105,7 @@ def test_a_suite_fails_updates_and_passes(suite, tmp_path):
     (tmp_path / "tests/scenes/scene.xml").write_text(redder)
     code, printed = suite("-k", "unchanged or variants and rgb")
     assert "2 failed, 2 passed" in printed
-    for words in ("scene.json: ", "moved", "standard errors", "reference R, block", "page: "):
+    for words in ("scene.json: ", "moved", "standard errors", "physical R, block", "page: "):
         assert words in printed
 
 
