@@ -1,0 +1,107 @@
+"""One quantity has one value on the page of a scene, wherever it stands."""
+
+import pytest
+
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.reports.page import templating
+from fotismos.reports.terminal import words
+from tests.browser.conftest import NOISY, NOISY_ID
+
+SCENE = f"#scene={NOISY_ID}"
+
+LABELLED = r"""() => {
+  const whole = document.querySelector(".scene.open");
+  const place = whole.querySelector("#inspector [data-value=position]").textContent.split(": ")[1];
+  const terms = /at (\d+, \d+)/.exec(whole.querySelector("#terms h3").textContent)[1];
+  const found = [];
+  for (const row of whole.querySelectorAll("#inspector tr, #distribution tr, #terms .sum")) {
+    if (!row.checkVisibility() || row.closest("thead")) continue;
+    const [label, ...cells] = [...row.querySelectorAll("th, td:not(.text)")];
+    const values = cells.map(cell => cell.textContent.trim()).join(" ");
+    const where = row.closest("#terms") ? terms : row.closest("#inspector") ? place : "whole";
+    found.push([`${where}: ${label.textContent.trim().toLowerCase()}`, values]);
+  }
+  return found;
+}"""
+
+
+def test_a_label_has_one_value_and_the_value_is_the_records(visitor, report):
+    page = visitor.open(SCENE)
+    found = {}
+    for label, value in page.evaluate(LABELLED):
+        assert found.setdefault(label, value) == value, label
+    lead = report.records[NOISY]["metrics"][LEADING.name]
+    (usual,) = (share["value"] for share in lead["visible"] if share["threshold"] == 2)
+    pixel = page.locator("[data-value=position]").text_content().removeprefix("Worst pixel: ")
+    assert found[f"{pixel}: δe2000"] == words.difference(lead["max"])
+    assert found["whole: mean, with noise"] == words.difference(lead["mean"])
+    assert found["whole: differ visibly, with noise"] == words.percent(usual)
+    assert words.percent(usual) in page.locator(".scene.open h1").text_content()
+    assert f"{pixel}: textbook at the centre" in found  # the terms are those of the worst pixel
+    visitor.unfold()
+    row = page.locator(".scene.open .folded tr").filter(has_text=LEADING.label).first
+    mean, *_, largest = row.locator("td").all_text_contents()[:4]
+    assert mean.split()[0] == found["whole: mean, with noise"]
+    assert largest == found[f"{pixel}: δe2000"]
+
+
+@pytest.mark.parametrize("visitor", [{"viewport": {"width": 1440, "height": 900}}], indirect=True)
+def test_all_maps_of_the_error_have_one_scale(visitor):
+    page = visitor.open(f"{SCENE}&on=0")
+    ends = page.locator(".legend .labels span:last-child, #distribution [data-part=end]")
+    assert set(ends.all_text_contents()) == {f"≥ {LEADING.map_range[1]:g}"}
+    page.locator("#live summary").click()
+    said = f"up to {LEADING.map_range[1]:g} and more"
+    assert said in page.locator("#live").text_content()
+    visitor.open()
+    assert said in page.locator("#overview").text_content()
+
+
+def test_a_scene_that_the_page_does_not_have_is_named(visitor):
+    page = visitor.page
+    page.goto(f"{visitor.report.url}#scene=fig-99")
+    assert "“fig-99”" in page.locator("#unknown:visible").text_content()
+    assert page.locator(".bars").is_visible()
+    visitor.open(SCENE)
+    visitor.open("#t=3")
+    assert not page.locator("#unknown").is_visible()
+
+
+def test_numbers_stand_in_line_with_the_name_of_their_scene(visitor):
+    page = visitor.open()
+    row = page.locator(f".bars [data-scene='{NOISY_ID}']")
+    middles = []
+    for part in ("> a", ".number >> nth=0"):
+        box = row.locator(part).bounding_box()
+        middles.append(box["y"] + box["height"] / 2)
+    assert abs(middles[0] - middles[1]) <= 1
+
+
+SHARPENED = """() => {
+  const code = value => VALUES.findIndex(one => one >= value);
+  const plane = (size, at) =>
+    Uint16Array.from({ length: size * size }, (_, p) => code(at(p % size)));
+  const images = (size, at) => {
+    const codes = Object.fromEntries(["heuristic", "reference"].flatMap(half =>
+      ["R", "G", "B"].map(c => [`${half}.${c}`, plane(size, at)])));
+    codes.dE2000 = codes.flags = plane(size, () => 0);
+    return { width: size, height: size, block: 1, names: [], codes };
+  };
+  const scene = { width: 24, height: 24, exposure: 1 };
+  // An edge between two pixels of the whole picture, inside of a pixel of the small one.
+  const whole = new Painter(scene, images(24, x => (x < 11 ? 0.1 : 0.8)));
+  const small = new Painter(scene, images(4, x => [0.05, 0.2083, 0.4, 0.4][x]), whole);
+  const fine = sharpened(small, whole);
+  return [9, 10, 11, 12].map(x => fine[3 * (24 * 12 + x)]);
+}"""
+
+
+def test_a_small_picture_is_as_sharp_as_the_whole_one(chromium):
+    folder = templating.TEMPLATES / "viewer"
+    code = "\n".join((folder / f"{part}.js").read_text() for part in ("page", "images"))
+    tab = chromium.new_page()
+    tab.set_content("<body></body>")
+    left, edge, beyond, right = tab.evaluate(f"() => {{ {code}\n return ({SHARPENED})(); }}")
+    tab.close()
+    assert beyond - edge > 4 * max(edge - left, right - beyond)
+    assert beyond - edge > 0.1
