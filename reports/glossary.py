@@ -34,7 +34,6 @@ RESULTS: Terms = {
     ),
     ("not counted",): "Pixels that see no surface are left out of all numbers.",
     ("unchanged",): "Both images as rendered, with one exposure.",
-    ("mean, with noise",): "The mean over the pixels, to which noise adds.",
     ("median",): "Half of the values are below it.",
     ("95 %",): "95 % of the pixels are below it.",
     ("95 % interval", "interval"): (
@@ -52,7 +51,7 @@ RESULTS: Terms = {
         "The time of what makes the scene look right, over that of the textbook picture with 4"
         " samples per pixel; 1 if that picture looks right."
     ),
-    ("differ visibly", "differ visibly, with noise", "pixels that differ visibly"): (
+    ("differ visibly", "pixels that differ visibly"): (
         "The share of the pixels whose ΔE2000 is above the threshold."
     ),
 }

@@ -357,8 +357,9 @@ def _mostly(effects: Sequence[str]) -> str:
 
 
 def noun(effect: str) -> str:
-    """Return what a picture without an effect lacks, in words."""
-    return next((each.noun for each in EFFECTS if each.label == effect), "") or effect
+    """Return what a picture without an effect lacks, in words; of several, in their order."""
+    nouns = {each.label: each.noun or each.label for each in EFFECTS}
+    return ", then ".join(nouns.get(part, part) for part in effect.split(", then "))
 
 
 # --- A run -----------------------------------------------------------------------------------

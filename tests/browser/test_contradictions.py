@@ -34,14 +34,14 @@ def test_a_label_has_one_value_and_the_value_is_the_records(visitor, report):
     (usual,) = (share["value"] for share in lead["visible"] if share["threshold"] == 2)
     pixel = page.locator("[data-value=position]").text_content().removeprefix("Worst pixel: ")
     assert found[f"{pixel}: δe2000"] == words.difference(lead["max"])
-    assert found["whole: mean, with noise"] == words.difference(lead["mean"])
-    assert found["whole: differ visibly, with noise"] == words.percent(usual)
+    assert found["whole: mean"] == words.difference(lead["mean"])
+    assert found["whole: differ visibly"] == words.percent(usual)
     assert words.percent(usual) in page.locator(".scene.open h1").text_content()
-    assert f"{pixel}: textbook at the centre" in found  # the terms are those of the worst pixel
+    assert f"{pixel}: sum of the terms" in found  # the terms are those of the worst pixel
     visitor.unfold()
     row = page.locator(".scene.open .folded tr").filter(has_text=LEADING.label).first
     mean, *_, largest = row.locator("td").all_text_contents()[:4]
-    assert mean.split()[0] == found["whole: mean, with noise"]
+    assert mean.split()[0] == found["whole: mean"]
     assert largest == found[f"{pixel}: δe2000"]
 
 

@@ -16,7 +16,7 @@ def shown_rows(page):
     for line in page.locator("#terms tbody tr").all():
         name, *cells = (text.strip() for text in line.locator("th, td").all_text_contents())
         light = name if "light" in (line.get_attribute("class") or "") else light
-        is_whole = name in ("ambient", "textbook at the centre", "physical", light)
+        is_whole = name in ("ambient", "sum of the terms", "physical", light)
         rows[name if is_whole else f"{light} {name}"] = cells
     return rows
 
@@ -49,7 +49,7 @@ def test_the_terms_are_those_of_the_pixel(visitor, how):
         place += f"{x}, {y}: {expected.material.name}"
         assert page.locator("#terms h3").text_content().endswith(place)
         rows = shown_rows(page)
-        assert values(rows["textbook at the centre"]) == pytest.approx(expected.total, rel=6e-3)
+        assert values(rows["sum of the terms"]) == pytest.approx(expected.total, rel=6e-3)
         assert values(rows["ambient"]) == pytest.approx(expected.ambient, rel=6e-3)
         for light in expected.lights:
             assert values(rows[f"{light.name} diffuse"]) == pytest.approx(light.diffuse, rel=6e-3)

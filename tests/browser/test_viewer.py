@@ -261,4 +261,4 @@ def test_a_link_to_a_region_selects_it(visitor, report):
     visitor.settle()
     region = report.records[NOISY]["regions"][0]
     assert visitor.state()["box"] == ",".join(map(str, box_of(region)))
-    assert page.locator("#distribution h3").text_content() == "ΔE2000 in the selection"
+    assert page.locator("#distribution h3").text_content() == "ΔE2000 in the selection, with noise"

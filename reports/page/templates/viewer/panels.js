@@ -38,7 +38,7 @@ class Panels {
     const all = summarise(painter, null, view.t);
     const some = box ? summarise(painter, box, view.t) : all;
     this.part("title").textContent =
-      `ΔE2000 ${added ? "left " : ""}in ${box ? "the selection" : "the whole image"}`;
+      `ΔE2000 ${added ? "left " : ""}in ${box ? "the selection" : "the whole image"}, with noise`;
     const tallest = Math.max(...all.bars, ...some.bars, 1e-9);
     this.part("some").setAttribute("d", outlineOf(some.bars, tallest));
     this.part("all").setAttribute("d", outlineOf(all.bars, tallest));

@@ -115,7 +115,7 @@ function termRows({ terms, planes }, material, place) {
     );
   if (others.some(Boolean))
     rows.push(termRow("other lights", "diffuse and specular", others.map(amount)));
-  return [...rows, termRow("textbook at the centre", "the sum of the terms", total.map(amount), "sum")];
+  return [...rows, termRow("sum of the terms", "the textbook at the pixel’s centre", total.map(amount), "sum")];
 }
 
 /**

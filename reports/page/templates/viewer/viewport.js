@@ -9,9 +9,11 @@ const STACKED_BELOW = 340;
 /** Films of this shape or wider stack their panes, too. */
 const WIDE = 2;
 
-/** Most screen pixels per image pixel, and the least height relative to the window's. */
+/** Most screen pixels per image pixel, and the heights of all panes and of one, relative to the
+ * window's, that are left to them at least. */
 const GREATEST_ZOOM = 64;
 const LEAST_PART = 0.5;
+const LEAST_PANE = 0.3;
 
 /** @typedef {{left: number, top: number, width: number, height: number}} Box */
 
@@ -41,9 +43,8 @@ class Viewport {
     const rows = Math.ceil(count / columns);
     const width = (available - gap * (columns - 1)) / columns;
     const most = Math.max(window.innerHeight - top - gap, LEAST_PART * window.innerHeight);
-    const height = Math.round(
-      Math.min((width * this.height) / this.width, available < STACKED_BELOW ? most : most / rows),
-    );
+    const each = Math.max((most - gap * (rows - 1)) / rows, LEAST_PANE * window.innerHeight);
+    const height = Math.round(Math.min((width * this.height) / this.width, each));
     this.panes = Array.from({ length: count }, (_, place) => ({
       left: (place % columns) * (width + gap),
       top: Math.floor(place / columns) * (height + gap),
