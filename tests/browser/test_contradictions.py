@@ -3,7 +3,6 @@
 import pytest
 
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.reports.page import templating
 from fotismos.reports.terminal import words
 from tests.browser.conftest import NOISY, NOISY_ID
 
@@ -75,33 +74,3 @@ def test_numbers_stand_in_line_with_the_name_of_their_scene(visitor):
         box = row.locator(part).bounding_box()
         middles.append(box["y"] + box["height"] / 2)
     assert abs(middles[0] - middles[1]) <= 1
-
-
-SHARPENED = """() => {
-  const code = value => VALUES.findIndex(one => one >= value);
-  const plane = (size, at) =>
-    Uint16Array.from({ length: size * size }, (_, p) => code(at(p % size)));
-  const images = (size, at) => {
-    const codes = Object.fromEntries(["heuristic", "reference"].flatMap(half =>
-      ["R", "G", "B"].map(c => [`${half}.${c}`, plane(size, at)])));
-    codes.dE2000 = codes.flags = plane(size, () => 0);
-    return { width: size, height: size, block: 1, names: [], codes };
-  };
-  const scene = { width: 24, height: 24, exposure: 1 };
-  // An edge between two pixels of the whole picture, inside of a pixel of the small one.
-  const whole = new Painter(scene, images(24, x => (x < 11 ? 0.1 : 0.8)));
-  const small = new Painter(scene, images(4, x => [0.05, 0.2083, 0.4, 0.4][x]), whole);
-  const fine = sharpened(small, whole);
-  return [9, 10, 11, 12].map(x => fine[3 * (24 * 12 + x)]);
-}"""
-
-
-def test_a_small_picture_is_as_sharp_as_the_whole_one(chromium):
-    folder = templating.TEMPLATES / "viewer"
-    code = "\n".join((folder / f"{part}.js").read_text() for part in ("page", "images"))
-    tab = chromium.new_page()
-    tab.set_content("<body></body>")
-    left, edge, beyond, right = tab.evaluate(f"() => {{ {code}\n return ({SHARPENED})(); }}")
-    tab.close()
-    assert beyond - edge > 4 * max(edge - left, right - beyond)
-    assert beyond - edge > 0.1
