@@ -22,7 +22,7 @@ RESULTS: Terms = {
     ),
     ("without noise", "without noise 95 %"): (
         "The mean without the part that is due to noise, with a 95 % interval. If it contains 0,"
-        " there may be no departure."
+        " there may be no error."
     ),
     ("significant", "certain to differ", "certain and visible"): (
         "Pixels whose linear difference is more than noise, however small. At most 5 % of these"

@@ -74,3 +74,18 @@ def test_numbers_stand_in_line_with_the_name_of_their_scene(visitor):
         box = row.locator(part).bounding_box()
         middles.append(box["y"] + box["height"] / 2)
     assert abs(middles[0] - middles[1]) <= 1
+
+
+def test_each_command_is_copied_by_its_button(visitor, report):
+    page = visitor.open(SCENE)
+    visitor.unfold()
+    page.evaluate("navigator.clipboard.writeText = async text => { window.copied = text; }")
+    buttons = page.locator(".scene.open [data-copy]")
+    copied = []
+    for button in buttons.all():
+        button.click()
+        page.wait_for_function("() => window.copied")
+        copied.append(page.evaluate("window.copied"))
+        page.evaluate("window.copied = ''")
+    assert report.records[NOISY]["command"] in copied
+    assert len(set(copied)) == len(copied) >= 1
