@@ -1,6 +1,7 @@
 """Equation 8.10 term by term, as the kernel has it: at a grid of pixels, and as images.
 
-Those of the grid are at the centres of pixels, one in the middle of each cell.
+Those of the grid are at the centres of pixels, one in the middle of each cell; a column and a row
+may be moved to a pixel of interest.
 """
 
 from collections.abc import Callable, Sequence
@@ -221,12 +222,17 @@ def _colour(values: object) -> Colour:
 # --- Reading the kernel ------------------------------------------------------------------------
 
 
-def trace(half: Renderer, options: Options) -> TermGrid | Missing:
-    """Return the terms of a heuristic half, or why there are none."""
+def trace(
+    half: Renderer, options: Options, pixel: tuple[int, int] | None = None
+) -> TermGrid | Missing:
+    """Return the terms of a heuristic half, or why there are none.
+
+    The grid's column and row nearest to a ``pixel`` are moved to it.
+    """
     with variant(half.variant):
         if reason := _without(half, options, Interpolation.PHONG):
             return Missing(reason)
-        return _traced(half.scene, half.integrator)
+        return _traced(half.scene, half.integrator, pixel)
 
 
 def live(half: Renderer, options: Options) -> LivePoints | Missing:
@@ -318,10 +324,13 @@ def _live(half: Renderer, options: Options) -> LivePoints | Missing:
     )
 
 
-def _traced(scene: Scene, integrator: Any) -> TermGrid | Missing:
+def _traced(scene: Scene, integrator: Any, pixel: tuple[int, int] | None) -> TermGrid | Missing:
     emitters = lamps(scene)
     resolution = image_size(scene)
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
+    if pixel:
+        columns[pixel[0] * len(columns) // resolution[0]] = pixel[0]
+        rows[pixel[1] * len(rows) // resolution[1]] = pixel[1]
     x, y = np.meshgrid(columns, rows)
     points = _Points(scene, integrator, pixel_rays(scene, resolution, x=x, y=y))
     materials, places = points.materials()

@@ -203,8 +203,7 @@ def _effects_needed(record: ComparisonRecord, threshold: float) -> str:
 
 def _joined(effects: Sequence[str], word: str) -> str:
     """Return effects as a list within a sentence."""
-    nouns = {effect.label: effect.noun for effect in EFFECTS}
-    *first, last = [nouns.get(effect) or effect for effect in effects]
+    *first, last = map(noun, effects)
     return f"{', '.join(first)} {word} {last}" if first else last
 
 
@@ -354,9 +353,13 @@ def about(record: ComparisonRecord) -> str:
 
 
 def _mostly(effects: Sequence[str]) -> str:
-    nouns = {effect.label: effect.noun for effect in EFFECTS}
-    named = [nouns.get(effect) or effect for effect in effects]
-    return f"Mostly missing: {', '.join(named)}." if named else ""
+    return f"Mostly missing: {', '.join(map(noun, effects))}." if effects else ""
+
+
+def noun(effect: str) -> str:
+    """Return what a picture without an effect lacks, in words; of several, in their order."""
+    nouns = {each.label: each.noun or each.label for each in EFFECTS}
+    return ", then ".join(nouns.get(part, part) for part in effect.split(", then "))
 
 
 # --- A run -----------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ from msgspec import structs
 from fotismos.comparisons import atomic
 from fotismos.comparisons.comparison import Comparison, ComparisonRecord, Images
 from fotismos.comparisons.departure.metrics import LEADING, drawn
+from fotismos.comparisons.departure.regions import worst_pixel
 from fotismos.reference.records import Missing, Record, plain, to_json
 from fotismos.reports.files import images, results
 from fotismos.reports.page import embedding
@@ -124,6 +125,7 @@ def view_of(comparison: Comparison) -> SceneView:
         record=record,
         thumbnails=images.thumbnails(shown, record.viewing.exposure),
         embedded=embedding.embed(images.channels(_layers(shown)), shown.counted),
+        worst=worst_pixel(shown.maps[LEADING.name], shown.counted),
     )
     terms = comparison.terms
     live = comparison.live
