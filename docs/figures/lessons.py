@@ -21,7 +21,6 @@ from fotismos.comparisons.steps import with_terms
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Missing
 from fotismos.reports.files import images as files
-from fotismos.reports.terminal.tables import markdown
 
 SIDE, SAMPLES = 64, 1024
 """Size of the pictures whose pixels a lesson names, and samples per pixel."""
@@ -131,18 +130,18 @@ def values(lesson: str) -> Floats:
 
 
 def lines(lesson: str) -> Iterator[str]:
-    """Yield the picture of a lesson, and its table: 8.10 with the numbers put in, both halves."""
+    """Yield the picture of a lesson, and its pixels: both halves, and 8.10 with numbers put in."""
     yield f"![Textbook, physical, and the error: {LESSONS[lesson][0].command}]({file(lesson)})"
     yield ""
-    rows = [
-        (
-            f"`{pixel.command}` at {pixel.column}, {pixel.row}",
-            _equation(pixel),
-            *map(_shown, halves),
+    for pixel, halves in zip(LESSONS[lesson], values(lesson), strict=True):
+        textbook, physical = map(_shown, halves)
+        equation = _equation(pixel)
+        if equation:
+            equation = f" ({equation})"
+        yield (
+            f"- `{pixel.command}` at {pixel.column}, {pixel.row}: textbook {textbook}{equation};"
+            f" physical {physical}"
         )
-        for pixel, halves in zip(LESSONS[lesson], values(lesson), strict=True)
-    ]
-    yield from markdown([("Pixel", "8.10 at its centre", "Textbook", "Physical"), *rows], right=2)
 
 
 def file(lesson: str) -> str:
