@@ -176,3 +176,9 @@ def table(found: dict[str, Audit]) -> Iterator[str]:
             if check.verdict == "does not hold"
         ]
         yield f"- {title}: {', '.join(failed) or 'all hold'}"
+
+
+def _cell(check: Checked) -> str:
+    if check.verdict == "does not hold":
+        return number(check.value)
+    return {"holds": "holds", "not asked": "–"}[check.verdict]

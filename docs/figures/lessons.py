@@ -225,7 +225,7 @@ def _reflected(light: LightTerms, terms: PixelTerms) -> Iterator[str]:
         if material.form != "phong":
             cosine = f"{light.lobe:.3f}"
         front = _product(light.specular_intensity[0], light.attenuation, material.k_s[0])
-        yield from (rf"{factors} \cdot {cosine}" for factors in front)
+        yield from (f"{factors}·{cosine}" for factors in front)
 
 
 def _product(*factors: float) -> Iterator[str]:
@@ -233,7 +233,7 @@ def _product(*factors: float) -> Iterator[str]:
     if 0 in factors:
         return
     kept = [factor for factor in factors if abs(factor - 1) > 5e-4] or [1.0]
-    yield r" \cdot ".join(f"{factor:.3g}" for factor in kept)
+    yield "·".join(f"{factor:.3g}" for factor in kept)
 
 
 def _shown(colour: Floats) -> str:

@@ -25,7 +25,7 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.study import dataset, design
 from fotismos.reports.charts import vega
 from fotismos.reports.charts.cost_charts import titled
-from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.words import number
 
 DOCS = ROOT / "docs"
 COST_SCENE = "cornell-box"
@@ -93,35 +93,20 @@ def attribution() -> Iterator[str]:
 
 
 def gains() -> Iterator[str]:
-    """Verify plans, and yield the table of their savings."""
-    rows = [(scene, f"{gain:.3g}") for scene, gain in fact("gains", *VERIFIED).items()]
-    yield from markdown([("Scene", "times sooner"), *rows], right=1)
+    """Verify plans, and yield their savings."""
+    found = (f"{scene} {number(gain)}" for scene, gain in fact("gains", *VERIFIED).items())
+    yield f"{', '.join(found)}."
 
 
 def speed() -> Iterator[str]:
-    """Yield the table of the kernel's speed, and a sentence on many lights."""
+    """Yield sentences on the kernel's speed, and on many lights."""
     data = fact("speed", ROUNDS)
     times, ratios = data["times"], data["ratios"]
-    copy = min(times[name] for name in times if name.startswith("memory copy"))
-    yield from markdown(
-        [
-            ("", "Time", "The kernel is"),
-            ("Dr.Jit kernel", f"{times['Dr.Jit']:.1f} ms", ""),
-            (
-                "memory copy of the bytes that it reads and writes",
-                f"{copy:.1f} ms",
-                f"{ratios['memory copy']:.1f} times that",
-            ),
-            *(
-                (label, f"{times[name]:.1f} ms", f"{ratios[name]:.{digits}f} times as fast")
-                for label, name, digits in (
-                    ("Numba, parallel, three lights unrolled", "Numba, three lights", 1),
-                    ("Numba, parallel, any number of lights", "Numba", 0),
-                    ("NumPy", "NumPy", 0),
-                )
-            ),
-        ],
-        right=1,
+    yield (
+        f"The kernel takes {times['Dr.Jit']:.1f} ms, {ratios['memory copy']:.1f} times a memory copy"
+        f" of what it reads and writes. It is {ratios['NumPy']:.0f} times as fast as NumPy,"
+        f" {ratios['Numba']:.0f} times as fast as Numba in parallel for any number of lights, and"
+        f" {ratios['Numba, three lights']:.1f} times as fast as Numba with three lights unrolled."
     )
     many = data["lights"]
     each = [row["ns"] for row in many if row["lights"] >= 1_000]

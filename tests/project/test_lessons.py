@@ -23,10 +23,10 @@ def falls_off(t, p):
 
 
 def computed(equation):
-    """The value of products and powers as a lesson has them, such as ``0.5 \\cdot 0.9^{3}``."""
+    """The value of products and powers as a lesson has them, such as ``0.5·0.9^{3}``."""
     total = 0.0
     for product in equation.strip("$").split(" + "):
-        factors = (re.fullmatch(r"([\d.]+)(?:\^\{(\d+)\})?", f) for f in product.split(r" \cdot "))
+        factors = (re.fullmatch(r"([\d.]+)(?:\^\{(\d+)\})?", f) for f in product.split("·"))
         total += np.prod([float(factor[1]) ** int(factor[2] or 1) for factor in factors])
     return total
 
