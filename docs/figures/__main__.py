@@ -209,11 +209,10 @@ def _sheet(name: str, titles: Sequence[str], rows: Sequence[Sequence[Any]]) -> N
 
 
 def _hero() -> None:
-    """Draw the picture of docs/reading.md, and write its caption, which README has, too."""
+    """Draw the picture of docs/reading.md, and write README's caption, which has its numbers."""
     found = hero.made()
     atomic.write(DOCS / "hero.webp", hero.encoded(hero.picture(found)))
-    for page in ("../README.md", "reading.md"):
-        replace(page, "hero", hero.caption(found))
+    replace("../README.md", "hero", hero.caption(found))
 
 
 def _site() -> None:

@@ -146,27 +146,30 @@ def findings(records: Sequence[Cost]) -> Iterator[str]:
         f"- A path-traced sample costs {min(ratios):.2g} to {max(ratios):.2g} times a textbook"
         f" sample, {median(ratios):.2g} times in the median."
     )
-    yield from (f"- {_within(records, limit)}" for limit in TOLERANCES)
+    yield f"- {_kernels(records)}"
     yield f"- {_worth_most(records)}"
     yield f"- {_stand_ins(records)}"
 
 
-def _within(records: Sequence[Any], limit: float) -> str:
-    """Return how many scenes need only a kernel at a tolerance, and how much faster it is."""
-    enough, saved = 0, []
-    for record in records:
-        chosen = sufficient(at_full_size(record), limit)
-        if chosen and record.method(chosen.method).is_kernel:
-            enough += 1
-            full = record.method(FULL_PLAN.name).per_sample_s.value
-            saved.append(full / record.method(chosen.method).per_sample_s.value)
-    said = (
-        f"At ΔE2000 {parameter(limit)}, a textbook kernel is the fastest passing method in {enough}"
-        f" of {len(records)} scenes"
+def _kernels(records: Sequence[Any]) -> str:
+    """Return in how many scenes a kernel is the fastest that passes, and how much time it saves."""
+    counts = []
+    gains = []
+    for limit in TOLERANCES:
+        saved = []
+        for record in records:
+            chosen = sufficient(at_full_size(record), limit)
+            if chosen and record.method(chosen.method).is_kernel:
+                full = record.method(FULL_PLAN.name).per_sample_s.value
+                saved.append(full / record.method(chosen.method).per_sample_s.value)
+        counts.append(f"{len(saved)}")
+        gains.append(f"{median(saved):.2g}" if saved else "–")
+    limits = _joined([parameter(limit) for limit in TOLERANCES])
+    scenes = f"{_joined(counts)} of {len(records)} scenes"
+    return (
+        f"At ΔE2000 {limits}, a textbook kernel is the fastest passing method in {scenes}, and"
+        f" only {_joined(gains)} times faster than path tracing there."
     )
-    if not saved:
-        return f"{said}."
-    return f"{said}, and only {median(saved):.2g} times faster than path tracing there."
 
 
 def _worth_most(records: Sequence[Any]) -> str:
@@ -213,3 +216,8 @@ def _ratio(record: Cost, point: Point | None) -> float:
     kernel = record.methods[0].name
     fewest = min(one.seconds.value for one in at_full_size(record) if one.method == kernel)
     return point.seconds.value / fewest if point else 0.0
+
+
+def _joined(words: Sequence[str]) -> str:
+    """Return words as a sentence lists them: with commas, and *and* before the last."""
+    return f"{', '.join(words[:-1])} and {words[-1]}"

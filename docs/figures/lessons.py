@@ -131,7 +131,7 @@ def values(lesson: str) -> Floats:
 
 def lines(lesson: str) -> Iterator[str]:
     """Yield the picture of a lesson, and its pixels: both halves, and 8.10 with numbers put in."""
-    yield f"![Textbook, physical, and the error: {LESSONS[lesson][0].command}]({file(lesson)})"
+    yield f"![{LESSONS[lesson][0].command}: textbook, physical, error]({file(lesson)})"
     yield ""
     for pixel, halves in zip(LESSONS[lesson], values(lesson), strict=True):
         textbook, physical = map(_shown, halves)

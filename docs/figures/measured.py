@@ -101,12 +101,14 @@ def gains() -> Iterator[str]:
 def speed() -> Iterator[str]:
     """Yield sentences on the kernel's speed, and on many lights."""
     data = fact("speed", ROUNDS)
-    times, ratios = data["times"], data["ratios"]
+    times = data["times"]
+    ratios = data["ratios"]
+    unrolled_ratio = ratios["Numba, three lights"]
     yield (
-        f"The kernel takes {times['Dr.Jit']:.1f} ms, {ratios['memory copy']:.1f} times a memory copy"
-        f" of what it reads and writes. It is {ratios['NumPy']:.0f} times as fast as NumPy,"
+        f"The kernel takes {times['Dr.Jit']:.1f} ms, {ratios['memory copy']:.1f} times a memory"
+        f" copy of what it reads and writes. It is {ratios['NumPy']:.0f} times as fast as NumPy,"
         f" {ratios['Numba']:.0f} times as fast as Numba in parallel for any number of lights, and"
-        f" {ratios['Numba, three lights']:.1f} times as fast as Numba with three lights unrolled."
+        f" {unrolled_ratio:.1f} times as fast as Numba with its lights unrolled."
     )
     many = data["lights"]
     each = [row["ns"] for row in many if row["lights"] >= 1_000]

@@ -78,10 +78,8 @@ def complexity(records: Sequence[ComparisonRecord]) -> Iterator[str]:
     yield (
         "Chapter 8 leaves physical models out because of their considerably greater complexity. In"
         f" {len(ratios)} of its own figures a physical sample takes {number(min(ratios))} to"
-        f" {number(max(ratios))} times as long as a textbook one: both trace the same"
-        " camera rays, and one ball hides and lights nothing else. In the"
-        " Cornell box it does take longer, and needs more samples"
-        " ([what accuracy costs](accuracy.md))."
+        f" {number(max(ratios))} times as long as a textbook one; in the Cornell box it takes"
+        " longer ([what accuracy costs](accuracy.md))."
     )
 
 
