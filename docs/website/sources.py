@@ -86,7 +86,7 @@ def with_links(text: str, page: str, linked: set[str]) -> str:
             return f"[{words}]({place(target)}{anchor})"
         if path.partition("/")[0] in api_pages.ROOMS and (name := api_pages.name(path, words)):
             return f"[{words}](#{name})"
-        if not (ROOT / path).is_file() or path.endswith((".csv", ".parquet")):
+        if not (ROOT / path).is_file() or path.endswith(".parquet"):
             return words  # the site has no page for a folder
         linked.add(path)
         if test := file_pages.label(path, words):
