@@ -193,7 +193,7 @@ def lead(rows: Sequence[Measured]) -> Iterator[str]:
         f" their pixels visibly off, by more than {LEADING.label} {TOLERANCE:g}. The nearest is"
         f" {best.approximation} on *{best.scene}*: {percent(best.visible)}. Under lamps, most of"
         " what is missing is light from other surfaces. These shares of ltc's pixels differ from"
-        f" the reference, and from one without that light: {ltc}.",
+        f" the physical picture, and from one without that light: {ltc}.",
         width=110,
     )
 

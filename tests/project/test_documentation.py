@@ -8,11 +8,12 @@ import click
 import nbformat
 import pytest
 from markdown_it import MarkdownIt
+from matplotlib.collections import PathCollection
 from nbclient import NotebookClient
 from PIL import Image
 from pyarrow import csv, parquet
 
-from docs.figures import accuracy, engines, hero
+from docs.figures import accuracy, charts, engines, hero
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.options import Options
 from fotismos.reports import cli
@@ -116,3 +117,17 @@ def test_the_page_of_engines_has_the_numbers_of_its_files():
         cell = cells[list(engines.SCENES).index(row["scene"]) + 1]
         bias = f"{row['stops_direct']:+.2f}; {row['stops']:+.2f}"
         assert cell == f"{number(row['de2000'])} ({bias})"
+
+
+@pytest.mark.parametrize("name", charts.CHARTS)
+def test_a_chart_shows_each_row_of_its_table(name):
+    assert (ROOT / f"docs/{name}.svg").is_file()
+    panels = charts.CHARTS[name]().axes
+    clouds = [one for axes in panels for one in axes.collections if isinstance(one, PathCollection)]
+    lines = [line for axes in panels for line in axes.lines if line.get_marker() == "o"]
+    drawn = sum(len(cloud.get_offsets()) for cloud in clouds)
+    drawn += sum(len(line.get_xdata()) for line in lines)
+    rows = [row for row in charts.read(name) if row.get("threshold") != "most samples"]
+    passing = [row for row in rows if row.get(charts.TIME) != ""]
+    marks = {"gates": 2 * len(charts.GATES), "fits": 2}.get(name, 1)
+    assert drawn == marks * len(passing)
