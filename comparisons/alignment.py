@@ -119,7 +119,7 @@ def _correlations(seen: np.ndarray, edges: np.ndarray, reach: int) -> np.ndarray
     seen_sums = _overlap_sums(first, down, right)
     edge_sums = _overlap_sums(second, -down, -right)
     covariance = products - seen_sums * edge_sums / counts
-    variances = 1.0
+    variances = np.ones(counts.shape)
     for map_of, sums, by in (
         (first, seen_sums, (down, right)),
         (second, edge_sums, (-down, -right)),

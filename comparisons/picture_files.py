@@ -33,6 +33,7 @@ from fotismos.comparisons import picture_formats
 from fotismos.comparisons.departure.colour import BT709, CHROMATICITIES, Array, from_srgb
 from fotismos.comparisons.names import PICTURES, picture_parts
 from fotismos.comparisons.options import Options
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
 from fotismos.reference.rendering.finite import LARGEST_VALUE
 
@@ -68,8 +69,8 @@ class Layer:
     ``notes`` what else was done to them.
     """
 
-    colours: Array
-    alpha: Array | None = None
+    colours: Floats
+    alpha: Floats | None = None
     transfer: Callable[[Array], Array] | None = None
     encoding: str = ""
     is_premultiplied: bool = False
@@ -84,7 +85,7 @@ class PictureFile:
     ``is_encoded`` ends at display white, as in a PNG.
     """
 
-    image: Array
+    image: Floats
     opaque: NDArray[np.bool_]
     digest: str
     is_encoded: bool = False
@@ -215,7 +216,7 @@ def colour_over(text: str) -> Array:
     return numbers
 
 
-def _opaque(path: Path, image: Array, layer: Layer, behind: Array | None) -> Array:
+def _opaque(path: Path, image: Floats, layer: Layer, behind: Array | None) -> Floats:
     """Return linear colours over the colour behind them; without alpha, unchanged."""
     alpha = layer.alpha
     if alpha is None or (alpha >= OPAQUE).all():
@@ -255,7 +256,9 @@ def _exr(path: Path, name: str) -> Layer:
     prefix = f"{name}." if name else ""
     if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
         raise _without_colours(path, name, channels)
-    colours = np.stack([channels[f"{prefix}{c}"].astype(np.float32) for c in "RGB"], axis=-1)
+    colours: Floats = np.stack(
+        [channels[f"{prefix}{c}"].astype(np.float32) for c in "RGB"], axis=-1
+    )
     alpha = channels.get(f"{prefix}A")
     notes = []
     data = np.array(header["dataWindow"]).tolist()
@@ -302,7 +305,7 @@ def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> Inp
     )
 
 
-def _in_window(path: Path, values: Array, data: Any, display: Any) -> Array:
+def _in_window(path: Path, values: Floats, data: Any, display: Any) -> Floats:
     """Return values of a data window (h, w, C) in the display window (H, W, C), 0 around them."""
     (left, top), (right, bottom) = display
     (data_left, data_top), _ = data
@@ -335,7 +338,7 @@ def _named(primaries: Any) -> str:
     return f"the primaries and white ({', '.join(f'{value:.4g}' for value in primaries)})"
 
 
-def _converted(path: Path, colours: Array, primaries: Any) -> Array:
+def _converted(path: Path, colours: Floats, primaries: Any) -> Floats:
     """Return linear colours with the primaries of BT.709; those outside it are clipped at 0.
 
     Whites are adapted by Bradford's matrix, as ICC profiles do.

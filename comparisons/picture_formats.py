@@ -5,7 +5,6 @@ A file that is not as its format says raises `ValueError` with the fault.
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,19 +103,20 @@ def deep_png(path: Path) -> NDArray[np.uint16]:
     with Image.open(path) as file:
         if not file.tile:
             raise ValueError(TOO_SHORT)
-        coding = file.tile[0].args
+        coding = str(file.tile[0].args)
         clear = file.info.get("transparency")
     if coding == "LA;16B":  # four bytes of a pixel
         return _decoded(path, "RGBA").view(">u2").astype(np.uint16)
     high = _decoded(path, coding).astype(np.uint16)
-    colours = high << 8 | _decoded(path, coding.replace("16B", "16L"))
+    low = _decoded(path, coding.replace("16B", "16L"))
+    colours: NDArray[np.uint16] = high << np.uint16(8) | low
     if clear is None:
         return colours
     alpha = np.where((colours == clear).all(axis=-1, keepdims=True), 0, 2**16 - 1)
     return np.concatenate([colours, alpha.astype(np.uint16)], axis=-1)
 
 
-def _decoded(path: Path, coding: Any) -> NDArray[np.uint8]:
+def _decoded(path: Path, coding: str) -> NDArray[np.uint8]:
     """Return the bytes (H, W, C) that Pillow makes of a file by one of its codings of pixels."""
     with Image.open(path) as file:
         file.tile = [file.tile[0]._replace(args=coding)]

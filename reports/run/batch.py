@@ -194,7 +194,7 @@ def run(
             libraries=subjects.libraries,
         )
         batch.stages["start-up"] = perf_counter() - START
-        calls = {
+        calls: dict[str, tuple[Any, ...]] = {
             target: (word, folder, target, replace(job, options=options_by_scene[word]))
             for target, word in places.items()
         }

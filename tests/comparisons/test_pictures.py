@@ -441,3 +441,22 @@ def test_a_changed_picture_is_compared_again(run, tmp_path, monkeypatch):
         path = tmp_path / "out/fig-8-9/comparison.json"
         records.append((path.stat().st_mtime_ns, path.read_text()))
     assert records[0] == records[1] != records[2]
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (9, 7), (33, 20)])
+def test_edges_are_correlated_where_shifted_maps_overlap(shape):
+    """One Fourier transform gives the coefficients of all shifts, as they are defined."""
+    random = np.random.default_rng(4)
+    seen, edges = random.uniform(size=(2, *shape))
+    reach = 3
+    seen[:-reach] = 0.3  # flat where the second is moved up as far as it goes
+    height, width = shape
+    table = alignment._correlations(seen, edges, reach)
+    for down in range(-reach, reach + 1):
+        for right in range(-reach, reach + 1):
+            part = seen[max(down, 0) : height + down, max(right, 0) : width + right]
+            other = edges[max(-down, 0) : height - down, max(-right, 0) : width - right]
+            expected = 0.0
+            if part.size and height > down > -height and np.ptp(part) and np.ptp(other):
+                expected = np.corrcoef(part.ravel(), other.ravel())[0, 1]
+            assert table[down + reach, right + reach] == pytest.approx(expected, abs=1e-9)
