@@ -88,11 +88,12 @@ function painted(width, height, paint) {
   return canvas;
 }
 
-/** The colours of differences: grey up to the threshold, then from dark to bright. @param {number} t */
+/** The colours of differences: grey up to a threshold, then dark to bright. @param {number} t */
 function differenceColours(t) {
   const table = pixelsOf(page.colours.error);
   return (/** @type {number} */ value) => {
-    if (value <= t) return rgba(new Array(3).fill(Math.round((page.dark * Math.max(value, 0)) / t)));
+    const grey = Math.round((page.dark * Math.max(value, 0)) / t);
+    if (value <= t) return rgba([grey, grey, grey]);
     return table[clamp(Math.floor(64 + (192 * (value - t)) / (TOP - t)), 64, 255)];
   };
 }

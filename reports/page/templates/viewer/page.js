@@ -2,7 +2,7 @@
 
 /**
  * @typedef {[number, string][]} Runs   texts by the place of the threshold from which each holds
- * @typedef {{name: string, title: string, kind: string, top: number}} MapOf   `top` ends its colours
+ * @typedef {{name: string, title: string, kind: string, top: number}} MapOf
  * @typedef {{x: number, y: number, width: number, height: number, effect: string | null}} Region
  * @typedef {{width: number, height: number, names: string[], colours: string[], map: string}}
  * Effects
@@ -11,8 +11,8 @@
  * @typedef {{name: string, k_i: number[], k_a: number[], k_d: number[], k_s: number[], n: number,
  * form: string, ambient: number[]}} Material
  * @typedef {{name: string, intensity: number[], specular_intensity: number[]}} Lamp
- * @typedef {{grid: Manifest | null, columns: number[], rows: number[], tops: Record<string, number>,
- * materials: Material[], lights: Lamp[], missing: string}} Terms
+ * @typedef {{grid: Manifest | null, columns: number[], rows: number[],
+ * tops: Record<string, number>, materials: Material[], lights: Lamp[], missing: string}} Terms
  */
 
 /**

@@ -60,11 +60,11 @@ class TermsPanel {
       Math.floor((y * height) / scene.height),
     ];
     const pixel = [data.terms.columns[column], data.terms.rows[row]];
-    const isNear = pixel[0] !== x || pixel[1] !== y;
     const place = row * width + column;
     const material = data.terms.materials[codes.material[place] - 1];
-    this.part("place").textContent =
-      `at ${pixel.join(", ")}${isNear ? `, the nearest to ${x}, ${y}` : ""}${material ? `: ${material.name}` : ", where no surface is seen"}`;
+    const near = pixel[0] === x && pixel[1] === y ? "" : `, the nearest to ${x}, ${y}`;
+    const seen = material ? `: ${material.name}` : ", where no surface is seen";
+    this.part("place").textContent = `at ${pixel.join(", ")}${near}${seen}`;
     const rows = material ? termRows(data, material, place) : [];
     const own = painter.placeOf(pixel);
     const error = VALUES[painter.images.codes.standard_error[own]];
@@ -115,7 +115,8 @@ function termRows({ terms, planes }, material, place) {
     );
   if (others.some(Boolean))
     rows.push(termRow("other lights", "diffuse and specular", others.map(amount)));
-  return [...rows, termRow("sum of the terms", "the textbook at the pixel’s centre", total.map(amount), "sum")];
+  const where = "the textbook at the pixel’s centre";
+  return [...rows, termRow("sum of the terms", where, total.map(amount), "sum")];
 }
 
 /**
@@ -151,7 +152,8 @@ function lightRows(light, material) {
   const isLit = light.cosIncidence > 0;
   const isBlinn = material.form === "blinn";
   const cosine = Math.max(isBlinn ? light.lobe ** (1 / material.n) : light.cosReflection, 0);
-  const behind = `N·L = ${factor(light.cosIncidence)}: the light is behind the surface`;
+  const cosIncidence = factor(light.cosIncidence);
+  const behind = `N·L = ${cosIncidence}: the light is behind the surface`;
   const [diffuse, specular] = [light.intensity, light.specular_intensity].map(colourText);
   const [symbol, second] =
     diffuse === specular ? ["I_{p0}", ""] : ["L_{d}", `; L_{s} = ${specular}`];
@@ -171,7 +173,7 @@ function lightRows(light, material) {
     termRow(
       "diffuse",
       isLit
-        ? `I k_{d} (N·L): k_{d} = ${colourText(material.k_d)}, N·L = ${factor(light.cosIncidence)}`
+        ? `I k_{d} (N·L): k_{d} = ${colourText(material.k_d)}, N·L = ${cosIncidence}`
         : behind,
       light.diffuse.map(amount),
     ),
