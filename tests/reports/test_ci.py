@@ -136,6 +136,7 @@ def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
     assert "differ visibly</h1>" not in html
     for part in ("1 of 3 moved", "row 2, column 3", "physical, before", "--update"):
         assert part in html, part
+    assert html.index("physical, before") < html.index("textbook, before")  # which did not move
     names = {path.name for path in (failure.out / "fig-8-6b").iterdir()}
     assert {"check.json", "comparison.json", "comparison.exr", "reference.png"} <= names
     record = json.loads((failure.out / "fig-8-6b/check.json").read_text())
