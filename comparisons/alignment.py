@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fotismos.comparisons.departure.blocks import ratio
 from fotismos.comparisons.departure.colour import luminance
 
 if TYPE_CHECKING:  # two pictures have no scene
@@ -33,6 +34,10 @@ DOUBTFUL = 2.0
 """A shift improves the agreement by more than this times what noise does."""
 AGREEMENT = 1.0
 """Pixels by which the shifts of halves of the repeats may differ from that of all."""
+
+
+ROUNDING = 1e-12
+"""Share of a map's squares below which its variance is rounding."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +90,7 @@ def _edges(layers: np.ndarray) -> np.ndarray:
 
 def _shift(edges: np.ndarray, seen: np.ndarray) -> Place:
     reach = max(1, min(REACH, min(edges.shape) // 4))
-    shifts = range(-reach, reach + 1)
-    table = np.array([[_correlation(seen, edges, down=y, right=x) for x in shifts] for y in shifts])
+    table = _correlations(seen, edges, reach)
     y, x = map(int, np.unravel_index(np.argmax(table), table.shape))
     highest = float(table[y, x])
     gain = highest - float(table[reach, reach])
@@ -97,17 +101,49 @@ def _shift(edges: np.ndarray, seen: np.ndarray) -> Place:
     return Place(shift=(float(right), float(down)), correlation=highest, gain=gain)
 
 
-def _correlation(seen: np.ndarray, edges: np.ndarray, down: int, right: int) -> float:
-    """Return the correlation of two maps where they overlap after a shift of the first."""
-    height, width = edges.shape
-    a = seen[max(down, 0) : height + down, max(right, 0) : width + right]
-    b = edges[max(-down, 0) : height - down, max(-right, 0) : width - right]
-    if not a.size:  # the picture is a pixel wide or high
-        return 0.0
-    a = a - a.mean()
-    b = b - b.mean()
-    size = np.sqrt((a * a).sum() * (b * b).sum())
-    return float((a * b).sum() / size) if size > 0 else 0.0
+def _correlations(seen: np.ndarray, edges: np.ndarray, reach: int) -> np.ndarray:
+    """Return the correlations of two maps (H, W) where they overlap after shifts of the second.
+
+    Rows are shifts down, and columns to the right, from ``-reach`` to ``reach``.
+    """
+    first = seen - seen.mean()
+    second = edges - edges.mean()
+    shifts = np.arange(-reach, reach + 1)
+    down = shifts[:, None]
+    right = shifts[None]
+    # Zeros beyond the edges, since Fourier transforms are of periodic maps.
+    sides = [side + reach for side in edges.shape]
+    spectrum = np.fft.rfft2(first, sides) * np.conj(np.fft.rfft2(second, sides))
+    products = np.fft.irfft2(spectrum, sides)[down, right]
+    counts = np.maximum(_overlap_sums(np.ones(edges.shape), down, right), 1.0)
+    seen_sums = _overlap_sums(first, down, right)
+    edge_sums = _overlap_sums(second, -down, -right)
+    covariance = products - seen_sums * edge_sums / counts
+    variances = np.ones(counts.shape)
+    for map_of, sums, by in (
+        (first, seen_sums, (down, right)),
+        (second, edge_sums, (-down, -right)),
+    ):
+        squares = _overlap_sums(map_of**2, *by)
+        variance = squares - sums**2 / counts
+        # What is left of a flat part is rounding.
+        variances = variances * np.where(variance > ROUNDING * squares.max(), variance, 0.0)
+    return ratio(covariance, np.sqrt(variances))
+
+
+def _overlap_sums(values: np.ndarray, down: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return sums of a map (H, W) over the part that shifted maps of its size overlap."""
+    height, width = values.shape
+    # Sums of all pixels above and to the left of each corner.
+    corner = np.pad(values.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    top = np.clip(down, 0, height)
+    bottom = np.clip(height + down, 0, height)
+    left = np.clip(right, 0, width)
+    end = np.clip(width + right, 0, width)
+    sums: np.ndarray = (
+        corner[bottom, end] - corner[top, end] - corner[bottom, left] + corner[top, left]
+    )
+    return sums
 
 
 def _vertex(values: np.ndarray, peak: int) -> float:

@@ -55,7 +55,7 @@ def compare(
     alone: AbstractContextManager[Any] | None = None,
     then: Sequence[Step] = (),
 ) -> Comparison:
-    """Compare the heuristic half of a scene with the physical one, in the current variant.
+    """Compare the textbook half of a scene with the physical one, in the current variant.
 
     ``command`` repeats the comparison, for the record. ``progress(stage, done, total)`` is called
     after each pass; with a noise target, ``total`` is the limit. The steps ``then`` add to the

@@ -78,11 +78,11 @@ def machine() -> Machine:
 
 
 class Significant(Record):
-    """Share of the counted pixels that are shown to differ; it grows with the samples."""
+    """Share of the counted pixels that are certain to differ; it grows with the samples."""
 
     fraction: Share
     undetermined: Annotated[
-        Share, Meta(description="Not shown to differ, though a visible difference may hide there.")
+        Share, Meta(description="Not certain to differ, but noise may hide a visible error there.")
     ]
     level: Annotated[
         float,
@@ -173,7 +173,7 @@ class ObjectContribution(Record):
     share
         Its part of the departure.
     departure
-        Mean ΔE2000 of the heuristic half on it, without noise.
+        Mean ΔE2000 of the textbook half on it, without noise.
     removes
         Mean ΔE2000 that each effect removes there, in the order of the attribution's effects.
     left
@@ -196,14 +196,14 @@ class Hybrid(Record):
 
 
 class Attribution(Record):
-    """What the effects remove from the departure of the heuristic half.
+    """What the effects remove from the departure of the textbook half.
 
     Attributes
     ----------
     effects
         One contribution each. They and the closure add up to the departure.
     departure
-        Mean ΔE2000 of the heuristic half, without noise.
+        Mean ΔE2000 of the textbook half, without noise.
     closure
         What remains with all effects simulated: only a fault can leave any.
     implementation
@@ -362,10 +362,10 @@ class ComparisonRecord(Record):
     ] = ""
     noise_target: NoiseTarget | None = None
     picture: Annotated[
-        PictureFiles | None, Meta(description="The pictures in place of the heuristic half.")
+        PictureFiles | None, Meta(description="The pictures in place of the textbook half.")
     ] = None
     reference_picture: Annotated[
-        PictureFiles | None, Meta(description="The pictures in place of the reference.")
+        PictureFiles | None, Meta(description="The pictures in place of the physical half.")
     ] = None
     agreement: Annotated[
         Agreement | None, Meta(description="How pictures agree with the other half.")
@@ -377,11 +377,11 @@ class ComparisonRecord(Record):
         ),
     ] = None
     mistakes: Annotated[
-        tuple[str, ...], Meta(description="Mistakes that the heuristic seems to make, in words.")
+        tuple[str, ...], Meta(description="Mistakes that the shader seems to make, in words.")
     ] = ()
     textbook: Annotated[
         Amount | None,
-        Meta(description="Mean dE2000 of Phong in place of a user's heuristic; null otherwise."),
+        Meta(description="Mean dE2000 of Phong in place of a user's shader; null otherwise."),
     ] = None
     colour_science: Deviations | None = None
     record_version: int = VERSION
@@ -395,7 +395,7 @@ class Images:
     ``materials`` hold the index in the record of what each pixel sees, -1 for uncounted pixels.
     Two pictures without a scene have neither these nor ``position`` and ``normal``. ``light`` is
     the reference before its tone map, if it has one.
-    ``terms`` are those of 8.10 in the heuristic half, by layer, if it has any.
+    ``terms`` are those of 8.10 in the textbook half, by layer, if it has any.
     """
 
     heuristic: np.ndarray

@@ -1,6 +1,6 @@
 """Both halves as sums of passes, and the numbers and maps that follow from them."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from fotismos.comparisons.departure.metrics import (
     Metric,
     leading_distance,
 )
+from fotismos.comparisons.departure.statistics import Summary
 from fotismos.comparisons.options import Options
 from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.sums import (
@@ -118,6 +119,28 @@ def metrics_for(options: Options) -> Mapping[str, Metric]:
     return definitions.metrics()
 
 
+def summarised(
+    estimates: Estimates, counted: np.ndarray, options: Options, names: Iterable[str]
+) -> tuple[dict[str, Summary], dict[str, np.ndarray]]:
+    """Return the summaries of metrics over the pixels that count, and the maps of the drawn."""
+    metrics = metrics_for(options)
+    summaries = {}
+    maps = {}
+    for name in names:
+        summaries[name], distances = statistics.summarise(
+            metrics[name],
+            estimates.heuristic,
+            reference=estimates.reference,
+            mask=counted,
+            viewing=options.viewing,
+            noise=estimates.difference.noise,
+            grouped=estimates.difference.grouped,
+        )
+        if metrics[name].drawn:
+            maps[name] = distances
+    return summaries, maps
+
+
 def measure(
     estimates: Estimates,
     counted: np.ndarray,
@@ -125,31 +148,20 @@ def measure(
     surface: "GBuffer | None" = None,
     exact: bool = False,
     is_random: bool = True,
+    names: Iterable[str] = METRICS,
 ) -> tuple[dict[str, Any], Images]:
     """Return fields of the record, and maps over the pixels that count, (H, W).
 
     ``surface`` is what they see; two pictures have none. ``exact`` says that the difference has no
     noise, and not ``is_random`` that passes do not show it
-    (:func:`fotismos.comparisons.departure.marks.find`).
+    (:func:`fotismos.comparisons.departure.marks.find`). ``names`` are those of the metrics, among
+    them the leading one.
     """
     test = estimates.heuristic
     reference = estimates.reference
     viewing = options.viewing
     metrics = metrics_for(options)
-    summaries = {}
-    maps = {}
-    for name, metric in metrics.items():
-        summaries[name], distances = statistics.summarise(
-            metric,
-            test,
-            reference=reference,
-            mask=counted,
-            viewing=viewing,
-            noise=estimates.difference.noise,
-            grouped=estimates.difference.grouped,
-        )
-        if metric.drawn:
-            maps[name] = distances
+    summaries, maps = summarised(estimates, counted, options, names)
     ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(test, reference, counted)
     distance = leading_distance(viewing, metrics)
     found = marks.find(

@@ -56,7 +56,7 @@ class Options(
     ] = None  # fmt: skip
     heuristic_variant: Annotated[
         Variant | None,
-        _help("Variant of the heuristic half, such as RGB shading against a spectral reference.",
+        _help("Variant of the textbook half, such as RGB shading of a spectral scene.",
               "the scene's own, else `variant`"),
     ] = None  # fmt: skip
     seed: Annotated[Seed, _help("Seed of the run, from which each pass derives its own.")] = 0
@@ -72,25 +72,25 @@ class Options(
     resolution: Annotated[tuple[Side, Side] | None, _help("Width and height.", "the film's")] = None
     heuristic: Annotated[
         str,
-        _help("The heuristic: phong, blinn, one that engines use (such as shadow-map), one that"
-              " a package declares, or a function shade(point) in a file."),
+        _help("The textbook shading: phong, blinn, one that engines use (such as shadow-map), one"
+              " that a package declares, or a function shade(point) in a file."),
     ] = "phong"  # fmt: skip
     interpolation: Annotated[
         Literal["flat", "gouraud", "phong"] | None,
-        _help("Shading of polygons in the heuristic half.", "the scene's own, else phong"),
+        _help("Shading of polygons in the textbook half.", "the scene's own, else phong"),
     ] = None
     tessellation: Annotated[
         Fineness | None,
-        _help("Mesh the shapes of the heuristic half: N edges per quarter turn or straight side.",
+        _help("Mesh the shapes of the textbook half: N edges per quarter turn or straight side.",
               "the scene's own, else 16 for flat and gouraud"),
     ] = None  # fmt: skip
     vertex_weights: Annotated[
         VertexWeights | None,
         _help("How much a face counts in its vertices' normals (6.32 to 6.34); the shapes of the"
-              " heuristic half become meshes with such normals.",
+              " textbook half become meshes with such normals.",
               "the scene's own, else a mesh's normals, or angle if it has none"),
     ] = None  # fmt: skip
-    everything: Annotated[bool, _help("Switch off all pruning: simulate every effect.")] = False
+    everything: Annotated[bool, _help("Simulate every effect, and leave out nothing.")] = False
     pairing: Annotated[
         Literal["literal", "matched"], _help("How roughplastic and phong are paired.")
     ] = "matched"
@@ -107,7 +107,7 @@ class Options(
     image: Annotated[
         tuple[str, ...],
         _help("A picture of the scene (.exr, FILE.exr:LAYER, .png, .jpg, .hdr, .pfm, .npy) that"
-              " replaces the heuristic half, or a pattern of several in quotes: repeats, which show"
+              " replaces the textbook half, or a pattern of several in quotes: repeats, which show"
               " its noise."),
     ] = ()  # fmt: skip
     reference: Annotated[
@@ -150,11 +150,6 @@ class Options(
         if self.image and self.heuristic != "phong":
             raise InputError(
                 f"heuristic {self.heuristic} and image {self.image[0]}: give one of them."
-            )
-        if self.tone_map and not self.image:
-            raise InputError(
-                f"tone_map = {self.tone_map} and no image: it is the curve of a picture. Give an"
-                " `image`, or omit it."
             )
 
     @classmethod
@@ -210,12 +205,12 @@ class Options(
 
     @property
     def first_half(self) -> str:
-        """What the first half is, as records name it."""
+        """What stands for the textbook half, as records name it."""
         return f"picture {', '.join(self.image)}" if self.image else self.heuristic
 
     @property
     def polygon_shading(self) -> Interpolation:
-        """How the heuristic half shades polygons."""
+        """How the textbook half shades polygons."""
         # Loaded late: help needs no Mitsuba.
         from fotismos.heuristic.heuristics import Interpolation
 

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from fotismos.comparisons.departure.colour import to_srgb
 from fotismos.comparisons.departure.mapped_sums import Light
+from fotismos.comparisons.departure.minimum import minimum
 from fotismos.comparisons.departure.tone_maps import TONE_MAPS, ToneMap
 
 CURVES: dict[str | None, ToneMap] = {None: lambda light: np.clip(light, 0, 1)}
@@ -66,16 +66,15 @@ class Curves:
             return float(np.abs(encoded - shown(stops, self.light)).mean())
 
         start = min(STOPS, key=distance)
-        bounds = (start - 1, start + 1)
-        finest = minimize_scalar(distance, bounds=bounds, method="bounded")
+        stops, left = minimum(distance, start - 1, start + 1)
         # Two images whose noise is normal and alike are 2 / √π of their standard error apart.
-        above = shown(finest.x, self.light + self.standard_error)
-        below = shown(finest.x, self.light - self.standard_error)
+        above = shown(stops, self.light + self.standard_error)
+        below = shown(stops, self.light - self.standard_error)
         noise = np.abs(above - below).mean() / np.sqrt(np.pi)
         return FittedCurve(
             name=name,
-            exposure=float(2.0**finest.x),
-            distance=float(np.sqrt(max(finest.fun**2 - noise**2, 0.0))),
+            exposure=float(2.0**stops),
+            distance=float(np.sqrt(max(left**2 - noise**2, 0.0))),
         )
 
     def shown(self, curve: FittedCurve) -> np.ndarray:

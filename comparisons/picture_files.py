@@ -29,10 +29,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from fotismos.comparisons import picture_formats
 from fotismos.comparisons.departure.colour import BT709, CHROMATICITIES, Array, from_srgb
 from fotismos.comparisons.names import PICTURES, picture_parts
 from fotismos.comparisons.options import Options
-from fotismos.heuristic.errors import InputError, InstallationError, NonFiniteError, suggestion
+from fotismos.heuristic.convention import Floats
+from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
 from fotismos.reference.rendering.finite import LARGEST_VALUE
 
 SAME_PRIMARIES = 2e-3
@@ -67,8 +69,8 @@ class Layer:
     ``notes`` what else was done to them.
     """
 
-    colours: Array
-    alpha: Array | None = None
+    colours: Floats
+    alpha: Floats | None = None
     transfer: Callable[[Array], Array] | None = None
     encoding: str = ""
     is_premultiplied: bool = False
@@ -83,7 +85,7 @@ class PictureFile:
     ``is_encoded`` ends at display white, as in a PNG.
     """
 
-    image: Array
+    image: Floats
     opaque: NDArray[np.bool_]
     digest: str
     is_encoded: bool = False
@@ -140,7 +142,7 @@ def read_file(
     """
     path, layer_name = picture_parts(word)
     if word in ARRAYS:
-        layer = _layer(path, np.asarray(ARRAYS[word], float))
+        layer = _of_values(path, np.asarray(ARRAYS[word]))
     elif not path.is_file():
         fault = "it is not a regular file" if path.exists() else "there is no such file"
         raise InputError(f"{path}: {fault}. Give a {' or '.join(PICTURES)} picture.")
@@ -153,13 +155,13 @@ def read_file(
     else:
         layer = _bitmap(path, path.suffix.lower())
     # A NaN would pass the later tests: it is neither above nor below.
-    wrong = np.asarray(~np.isfinite(layer.colours).all(axis=-1))
+    wrong = ~np.isfinite(layer.colours)
     if layer.alpha is not None:
-        wrong |= ~np.isfinite(layer.alpha)
+        wrong |= ~np.isfinite(layer.alpha)[..., None]
     if wrong.any():
         raise NonFiniteError(f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture.")
     decode = {"srgb": from_srgb, "linear": None}.get(transfer or "", layer.transfer)
-    image = layer.colours if decode is None else decode(layer.colours)
+    image = layer.colours if decode is None else decode(layer.colours.astype(float))
     behind = None if over is None else colour_over(over)
     opaque = np.ones(image.shape[:2], bool)
     notes = [layer.encoding if transfer is None else "", *layer.notes]
@@ -169,13 +171,13 @@ def read_file(
             notes.append(f"{np.count_nonzero(~opaque)} pixels with alpha below 1 do not count")
     else:
         image = _opaque(path, image, layer, behind)
-    wrong = np.any(image > LARGEST_VALUE, axis=-1)
+    wrong = image > LARGEST_VALUE
     if wrong.any():
         raise InputError(
             f"{word}: {_counted(wrong)} above {LARGEST_VALUE:g}, which is too bright. Divide the"
             " picture and all lights by the same number."
         )
-    wrong = np.any(image < MOST_NEGATIVE, axis=-1)
+    wrong = image < MOST_NEGATIVE
     if wrong.any():
         raise InputError(
             f"{word}: {_counted(wrong)} negative. Colours outside BT.709 are, if the file does not"
@@ -214,7 +216,7 @@ def colour_over(text: str) -> Array:
     return numbers
 
 
-def _opaque(path: Path, image: Array, layer: Layer, behind: Array | None) -> Array:
+def _opaque(path: Path, image: Floats, layer: Layer, behind: Array | None) -> Floats:
     """Return linear colours over the colour behind them; without alpha, unchanged."""
     alpha = layer.alpha
     if alpha is None or (alpha >= OPAQUE).all():
@@ -254,7 +256,9 @@ def _exr(path: Path, name: str) -> Layer:
     prefix = f"{name}." if name else ""
     if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
         raise _without_colours(path, name, channels)
-    colours = np.stack([channels[f"{prefix}{c}"].astype(float) for c in "RGB"], axis=-1)
+    colours: Floats = np.stack(
+        [channels[f"{prefix}{c}"].astype(np.float32) for c in "RGB"], axis=-1
+    )
     alpha = channels.get(f"{prefix}A")
     notes = []
     data = np.array(header["dataWindow"]).tolist()
@@ -301,7 +305,7 @@ def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> Inp
     )
 
 
-def _in_window(path: Path, values: Array, data: Any, display: Any) -> Array:
+def _in_window(path: Path, values: Floats, data: Any, display: Any) -> Floats:
     """Return values of a data window (h, w, C) in the display window (H, W, C), 0 around them."""
     (left, top), (right, bottom) = display
     (data_left, data_top), _ = data
@@ -334,7 +338,7 @@ def _named(primaries: Any) -> str:
     return f"the primaries and white ({', '.join(f'{value:.4g}' for value in primaries)})"
 
 
-def _converted(path: Path, colours: Array, primaries: Any) -> Array:
+def _converted(path: Path, colours: Floats, primaries: Any) -> Floats:
     """Return linear colours with the primaries of BT.709; those outside it are clipped at 0.
 
     Whites are adapted by Bradford's matrix, as ICC profiles do.
@@ -364,7 +368,10 @@ def _converted(path: Path, colours: Array, primaries: Any) -> Array:
 
 
 BEGINNINGS = {".hdr": (b"#?",), ".pfm": (b"PF", b"Pf")}
-"""What files that Mitsuba reads begin with; it also reads others by these names, wrongly."""
+"""What files begin with; a PNG or JPEG is told by its content."""
+
+READERS = {".hdr": picture_formats.hdr, ".pfm": picture_formats.pfm}
+"""How files are read that Pillow does not read."""
 
 PNG_HEADER = 26
 """Bytes that a PNG file begins with; the last two are its bit depth and its kind of colours."""
@@ -374,16 +381,16 @@ MODES = ("L", "LA", "RGB", "RGBA", "I;16")
 
 
 def _bitmap(path: Path, suffix: str) -> Layer:
-    """Read a file by Pillow, or by Mitsuba, which also reads HDR, PFM and 16 bits of colours."""
+    """Read a file by Pillow, or by :mod:`fotismos.comparisons.picture_formats`."""
     kind = (suffix or path.name).removeprefix(".").upper()
     with path.open("rb") as stream:
         header = stream.read(PNG_HEADER)
     if not header.startswith(BEGINNINGS.get(suffix, (b"",))):
         raise _unreadable(path, kind, ValueError("it does not begin as one"))
     is_deep = suffix == ".png" and header[24:25] == b"\x10" and header[25:26] != b"\0"
-    is_for_mitsuba = is_deep or suffix in (".hdr", ".pfm")
+    read = picture_formats.deep_png if is_deep else READERS.get(suffix, _by_pillow)
     try:
-        pixels = _by_mitsuba(path, kind) if is_for_mitsuba else _by_pillow(path)
+        pixels = read(path)
     except (OSError, RuntimeError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise _unreadable(path, kind, error) from error
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
@@ -421,25 +428,17 @@ def _by_pillow(path: Path) -> NDArray[Any]:
         return np.array(file)
 
 
-def _by_mitsuba(path: Path, kind: str) -> NDArray[Any]:
-    try:
-        import fotismos.reference.scene  # noqa: F401  loaded late: few pictures need Mitsuba
-    except ImportError as error:
-        raise InstallationError(
-            f"{path}: Mitsuba reads such {kind} files, and cannot be loaded: {error}. Convert it to"
-            " EXR, or install Mitsuba."
-        ) from error
-    import mitsuba as mi
-
-    return np.array(mi.Bitmap(str(path)))
-
-
 def _array(path: Path) -> Layer:
     try:
         with path.open("rb") as stream:
             values = np.lib.format.read_array(stream, allow_pickle=False)
     except (ValueError, OSError, EOFError, MemoryError) as error:
         raise _unreadable(path, "NPY", error) from error
+    return _of_values(path, values)
+
+
+def _of_values(path: Path, values: NDArray[Any]) -> Layer:
+    """Return an array as a layer; InputError if its shape or type is not a picture's."""
     values = values[..., None] if values.ndim == 2 else values
     if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or values.dtype.kind not in "fiu":
         raise InputError(
@@ -464,7 +463,9 @@ def _unreadable(path: Path, kind: str, error: Exception) -> InputError:
     return InputError(f"{path}: not a readable {kind} file: {fault}. Save the picture again.")
 
 
-def _counted(wrong: NDArray[np.bool_]) -> str:
+def _counted(channels: NDArray[np.bool_]) -> str:
+    """Return how many pixels are wrong in any channel (H, W, C), and which is the first."""
+    wrong = channels.any(axis=-1)
     y, x = np.unravel_index(np.argmax(wrong), wrong.shape)
     count = int(np.count_nonzero(wrong))
     return f"{count} of {wrong.size} pixels, the first at (x, y) = ({x}, {y}), are"

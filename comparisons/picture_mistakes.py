@@ -182,9 +182,10 @@ def find(
         return image
 
     def candidates() -> Iterator[Mistake | None]:
-        plain = _distance(picture.mean[counted], truth[counted])
+        pairs = [(picture.mean[counted], truth[counted])]
         if tone_map:
-            plain = min(plain, _distance(curves.picture, curves.shown(given)))
+            pairs.append((curves.picture, curves.shown(given)))
+        plain = min(_distance(*map(_below_highlights, pair)) for pair in pairs)
         reading = _other_reading(picture.mean, truth, counted, names, plain)
         curve = _other_curve(curves, given, names)
         if curve and (reading is None or curve.left < reading.left):
@@ -321,8 +322,9 @@ def _other_reading(
     readings |= {
         f"It looks {how}, or lit from the other side.": turn for how, turn in TURNED.items()
     }
+    truth = _below_highlights(other[counted])
     distances = {
-        symptom: _distance(undo(picture)[counted], other[counted])
+        symptom: _distance(_below_highlights(undo(picture)[counted]), truth)
         for symptom, undo in readings.items()
     }
     symptom = min(distances, key=distances.__getitem__)
@@ -335,11 +337,17 @@ def _other_reading(
     )
 
 
+def _below_highlights(image: Array) -> Array:
+    """Return an image clipped, or highlights would decide.
+
+    It is at the same share of the pixels in any image, which no curve changes.
+    """
+    clipped: Array = np.minimum(image, np.percentile(image, HIGHLIGHTS))
+    return clipped
+
+
 def _distance(image: Array, other: Array) -> float:
     """Return the relative RMS difference after the best factor on an image."""
-    # Clipped, or highlights would decide: at the same share of the pixels, which no curve changes.
-    image = np.minimum(image, np.percentile(image, HIGHLIGHTS))
-    other = np.minimum(other, np.percentile(other, HIGHLIGHTS))
     factor = np.sum(image * other) / max(np.sum(image * image), 1e-30)
     return float(np.sqrt(np.mean((factor * image - other) ** 2) / np.mean(other**2 + 1e-12)))
 

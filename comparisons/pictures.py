@@ -7,6 +7,7 @@ They are read by :mod:`fotismos.comparisons.picture_files`, placed by
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import repeat
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -25,6 +26,15 @@ from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.comparisons.picture_mistakes import Names, NoisyImage
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Times
+
+FEWEST = 2
+"""Passes of single pictures, which are equal."""
+
+USED = {
+    "image", "reference", "mask", "transfer", "over", "tone_map", "pixels_per_degree",
+    "colour_science", "allow_empty", "seed", "pairing",
+}  # fmt: skip
+"""Options that serve pictures, or are stated without being given; the others are of a scene."""
 
 TEMPLATE_SPP = 16
 """Samples per pixel of the textbook half whose edges and colours a picture may have."""
@@ -130,21 +140,27 @@ class PictureHalf:
 
 @dataclass(frozen=True)
 class GivenPictures:
-    """The pictures that options name for either half, and for the pixels that count."""
+    """The pictures that options name for either half, and for the pixels that count.
+
+    ``settings`` are those of an engine's settings, which stand side by side in place of ``image``.
+    """
 
     image: Pictures | None = None
     reference: Pictures | None = None
     mask: NDArray[np.bool_] | None = None
+    settings: tuple[Pictures, ...] = ()
 
     @property
     def halves(self) -> tuple[Pictures, ...]:
-        """Those of the halves."""
-        return tuple(half for half in (self.image, self.reference) if half is not None)
+        """Those of the halves, and of the settings."""
+        halves = (self.image, self.reference, *self.settings)
+        return tuple(half for half in halves if half is not None)
 
     @property
     def passes(self) -> int | None:
         """The passes of both halves; None if each is one picture, or rendered."""
-        counts = [half.passes for half in self.halves if half.passes is not None]
+        halves = (self.image, self.reference)
+        counts = [half.passes for half in halves if half is not None and half.passes is not None]
         return min(counts, default=None)
 
     def where(self) -> NDArray[np.bool_]:
@@ -160,20 +176,39 @@ class GivenPictures:
         return counted
 
 
-def read_all(options: Options) -> GivenPictures:
-    """Return the pictures that options name: all of one size, repeats of different names."""
+def require_no_scene(options: Options, others: Iterable[str] = ()) -> None:
+    """Raise `InputError` if options, or ``others`` that were given, need a scene."""
+    if needed := sorted({*options.stated(), *others} - USED):
+        shown = ", ".join(f"`{name}`" for name in needed)
+        raise InputError(
+            f"{shown}: this needs a scene, and pictures have none. Omit it, or give a scene."
+        )
+
+
+def read_all(options: Options, settings: Iterable[Sequence[str]] = ()) -> GivenPictures:
+    """Return the pictures that options name, and those of settings, by the names of their files.
+
+    All are of one size, and repeats of different names. With a scene that has settings, their
+    pictures must be opaque.
+    """
     image = _read(options.image, options, options.tone_map) if options.image else None
     reference = _read(options.reference, options) if options.reference else None
+    shots = tuple(
+        _read(names, options, options.tone_map, is_mask=reference is not None) for names in settings
+    )
     mask = None
     if options.mask is not None:
         mask = np.any(read_file(options.mask, "linear", "black").image > 0, axis=-1)
-    given = GivenPictures(image=image, reference=reference, mask=mask)
+    given = GivenPictures(image=image, reference=reference, mask=mask, settings=shots)
     if options.noise is not None and given.passes is not None:
         raise InputError(
             f"noise = {options.noise:g} and {given.passes} repeats: a noise target may need more"
             " passes than there are pictures. Give `spp` instead of `noise`."
         )
-    require_one_size(file.image for half in given.halves for file in half.files)
+    require_one_size(
+        (file.image for half in given.halves for file in half.files),
+        [name for half in given.halves for name in half.names],
+    )
     if mask is not None and given.halves:
         require_size_of_mask(options, mask, given.halves[0].size)
     return given
@@ -188,8 +223,10 @@ def require_size_of_mask(options: Options, mask: NDArray[np.bool_], size: tuple[
         )
 
 
-def _read(names: Sequence[str], options: Options, tone_map: str | None = None) -> Pictures:
-    files = [read_file(name, options.transfer, options.over, is_mask=True) for name in names]
+def _read(
+    names: Sequence[str], options: Options, tone_map: str | None = None, is_mask: bool = True
+) -> Pictures:
+    files = [read_file(name, options.transfer, options.over, is_mask=is_mask) for name in names]
     places = [str(Path(name).resolve()) for name in names]
     for name, place in zip(names, places, strict=True):
         if places.count(place) > 1:
@@ -202,12 +239,17 @@ def _read(names: Sequence[str], options: Options, tone_map: str | None = None) -
     )
 
 
-def require_one_size(images: Iterable[np.ndarray]) -> None:
-    """Ensure that pictures are of one size."""
-    sizes = sorted({(image.shape[1], image.shape[0]) for image in images})
+def require_one_size(images: Iterable[np.ndarray], names: Sequence[str] = ()) -> None:
+    """Ensure that pictures are of one size; ``names`` are those of their files, if known."""
+    known: dict[tuple[int, int], str] = {}
+    for image, name in zip(images, names or repeat(""), strict=False):
+        known.setdefault((image.shape[1], image.shape[0]), name)
+    sizes = sorted(known)
     if len(sizes) > 1:
         (width, height), (wider, higher) = sizes[0], sizes[-1]
-        shown = ", ".join(map(_by, sizes))
+        shown = ", ".join(
+            f"{_by(size)} ({known[size]})" if known[size] else _by(size) for size in sizes
+        )
         sides = {"wide": wider / width, "high": higher / height}
         differing = [f"{by:.3g} times as {side}" for side, by in sides.items() if by != 1]
         larger = f"the last is {' and '.join(differing)} as the first"
@@ -243,11 +285,6 @@ def at_size_of_pictures(film: tuple[int, int], given: GivenPictures, options: Op
     return options.changed(resolution=(width, height))
 
 
-def read(word: str, transfer: str | None = None, over: str | None = None) -> np.ndarray:
-    """Return a picture as linear RGB, (H, W, 3), float32; see :func:`picture_files.read_file`."""
-    return read_file(word, transfer, over).image
-
-
 # --- What is odd -------------------------------------------------------------------------------
 
 
@@ -277,7 +314,7 @@ def with_records(
             reference_stderr=np.zeros_like(images.reference_stderr),
         )
         found = agreement(given.reference, swapped, expected, REFERENCE)
-    found = structs.replace(found, odd=(*_same_files(given), *found.odd, *unknown_noise(given)))
+    found = structs.replace(found, odd=(*same_files(given), *found.odd, *unknown_noise(given)))
     record = structs.replace(
         record,
         picture=given.image and given.image.record(),
@@ -336,7 +373,7 @@ def agreement(
     )
 
 
-def _same_files(given: GivenPictures) -> Iterator[str]:
+def same_files(given: GivenPictures) -> Iterator[str]:
     """Yield which file of one half is also one of the other, byte for byte."""
     if given.image is None or given.reference is None:
         return
@@ -344,7 +381,9 @@ def _same_files(given: GivenPictures) -> Iterator[str]:
     theirs = list(zip(given.reference.files, given.reference.names, strict=True))
     for file, name in ours:
         for other, other_name in theirs:
-            if file.digest == other.digest:
+            if name == other_name:
+                yield f"{name} is also the reference."
+            elif file.digest == other.digest:
                 yield f"{name} and {other_name} are the same file, byte for byte."
 
 

@@ -1,6 +1,7 @@
 """Equation 8.10 term by term, as the kernel has it: at a grid of pixels, and as images.
 
-Those of the grid are at the centres of pixels, one in the middle of each cell.
+Those of the grid are at the centres of pixels, one in the middle of each cell; a column and a row
+may be moved to a pixel of interest.
 """
 
 from collections.abc import Callable, Sequence
@@ -221,16 +222,21 @@ def _colour(values: object) -> Colour:
 # --- Reading the kernel ------------------------------------------------------------------------
 
 
-def trace(half: Renderer, options: Options) -> TermGrid | Missing:
-    """Return the terms of a heuristic half, or why there are none."""
+def trace(
+    half: Renderer, options: Options, pixel: tuple[int, int] | None = None
+) -> TermGrid | Missing:
+    """Return the terms of a heuristic half, or why there are none.
+
+    The grid's column and row nearest to a ``pixel`` are moved to it.
+    """
     with variant(half.variant):
         if reason := _without(half, options, Interpolation.PHONG):
             return Missing(reason)
-        return _traced(half.scene, half.integrator)
+        return _traced(half.scene, half.integrator, pixel)
 
 
 def live(half: Renderer, options: Options) -> LivePoints | Missing:
-    """Return what a page needs to shade a heuristic half again, or why it cannot.
+    """Return what a page needs to shade a textbook half again, or why it cannot.
 
     Flat shading has the face's normal, at each point in place of the face's centre.
     """
@@ -250,7 +256,7 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
     if half.integrator.occlusion:
         return "Shadow rays hide lights, and equation 8.10 has no shadows."
     if mi.is_spectral:
-        return "The heuristic half is rendered by wavelength, so its terms are not RGB."
+        return "The textbook half is rendered by wavelength, so its terms are not RGB."
     if any(bsdf.is_clear for bsdf in half.integrator.known(half.scene).materials.bsdfs):
         return "Some surfaces are transparent, so a pixel shows several of them at once."
     return ""
@@ -259,7 +265,7 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
 def _without_sum(half: Renderer, options: Options) -> str:
     """Return why a half has no terms in any form; empty if it has."""
     if options.image:
-        return "The heuristic half is a picture, which has no terms."
+        return "The textbook half is a picture, which has no terms."
     if options.heuristic not in MODELS:
         return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
     if len(half.scene.emitters()) > MOST_LIGHTS:
@@ -318,10 +324,13 @@ def _live(half: Renderer, options: Options) -> LivePoints | Missing:
     )
 
 
-def _traced(scene: Scene, integrator: Any) -> TermGrid | Missing:
+def _traced(scene: Scene, integrator: Any, pixel: tuple[int, int] | None) -> TermGrid | Missing:
     emitters = lamps(scene)
     resolution = image_size(scene)
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
+    if pixel:
+        columns[pixel[0] * len(columns) // resolution[0]] = pixel[0]
+        rows[pixel[1] * len(rows) // resolution[1]] = pixel[1]
     x, y = np.meshgrid(columns, rows)
     points = _Points(scene, integrator, pixel_rays(scene, resolution, x=x, y=y))
     materials, places = points.materials()
@@ -479,7 +488,7 @@ TERMS = dict(zip(("emission", "ambient", "diffuse", "specular"), COEFFICIENTS, s
 
 
 def layers(half: Renderer, options: Options, whole: Floats) -> dict[str, Floats]:
-    """Return the terms of a heuristic half as layers that add up to its image ``whole``, (H, W, 3).
+    """Return the terms of a textbook half as layers that add up to its image ``whole``, (H, W, 3).
 
     Each has its share of the half's first pass, rendered once more: all passes would add a quarter
     to some runs, and AOVs lengthen the passes, whose times are compared. Backgrounds are emission.

@@ -1,6 +1,6 @@
 """A scene as plain data: camera, triangles, paired materials and lights, and what pixels see.
 
-Everything is in world space and in the heuristic half's display-linear units.
+Everything is in world space and in the textbook half's display-linear units.
 """
 
 from dataclasses import dataclass

@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons import alignment
-from fotismos.comparisons.departure.colour import BLACK
+from fotismos.comparisons.caution import caution
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
@@ -48,9 +48,6 @@ WAVEFRONT = 2**24
 
 LIMIT_SPP = 4096
 """Samples per pixel at which a run with a noise target stops, unless another limit is given."""
-
-UNIFORM = 1e-6
-"""Relative differences within a picture that are rounding."""
 
 
 def schedule(
@@ -110,7 +107,7 @@ class Prepared:
         return alignment.geometry_edges(gbuffer(self.scene, fine), width, height)
 
     def shaded_by(self, heuristic: str) -> Renderer:
-        """Return what renders the first half with another heuristic."""
+        """Return what renders the textbook half with another heuristic."""
         options = self.options.changed(heuristic=heuristic)
         pair = pair_for(self.source, options)
         renderer: Renderer = _heuristic_renderer(
@@ -177,29 +174,14 @@ class Prepared:
         )
 
     def require_light(self, test: np.ndarray, reference: np.ndarray) -> str:
-        """Return what makes linear images (H, W, 3) of both halves meaningless; often "".
-
-        If both are black, it raises `InputError`, unless the options allow it: they would agree,
-        whatever is wrong.
-        """
-        if not self.counted.any():
-            return ""
-        sides = [np.abs(image[self.counted]) for image in (test, reference)]
-        is_black = [float(values.max()) < BLACK for values in sides]
-        if all(is_black) and not self.options.allow_empty:
-            raise InputError(
-                f"{self.source.name}: both halves are black: no pixel that sees a surface is"
-                f" brighter than {BLACK} of display white. Check the lights, their intensity, and"
-                " whether the camera is inside a shape. To allow a black picture, give"
-                " `allow_empty`."
-            )
-        if all(is_black):
-            return "Both halves are black, so their difference means nothing."
-        if is_black[1]:
-            return "The reference is black: check whether its lights reach what the camera sees."
-        if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in sides):
-            return "Each half is one colour: the view shows nothing but a uniform surface."
-        return ""
+        """Return why the error of linear images (H, W, 3) may mean nothing; see :func:`caution`."""
+        return caution(
+            test[self.counted],
+            reference[self.counted],
+            name=self.source.name,
+            allow_empty=self.options.allow_empty,
+            is_picture=bool(self.options.image),
+        )
 
     def plan_record(self, passes: int) -> Plan:
         """Return the plan with the samples and passes that were rendered."""
@@ -255,6 +237,11 @@ def pair_for(source: Source, options: Options) -> Pair:
 def prepare(source: Source, options: Options | None = None) -> Prepared:
     """Pair and plan a scene in the current variant, and make both halves ready to render."""
     options = options or Options()
+    if options.tone_map and not options.image:
+        raise InputError(
+            f"tone_map = {options.tone_map} and no image: it is the curve of a picture. Give an"
+            " `image`, or omit it."
+        )
     given = None
     if options.has_pictures or options.mask:
         from fotismos.comparisons import pictures  # loaded late: few comparisons have any
@@ -286,7 +273,7 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
         spp = max(1, spp * passes // given.passes)
         passes = given.passes
     heuristic: Any = _heuristic_renderer(source, pair, chosen=chosen, spp=spp, options=options)
-    reference: Any = Renderer(physical, integrator, pass_spp=spp, label="reference image")
+    reference: Any = Renderer(physical, integrator, pass_spp=spp, label="physical picture")
     if given is not None and given.image is not None:
         heuristic = pictures.PictureHalf(given.image, passes, heuristic.variant, heuristic)
     if given is not None and given.reference is not None:
@@ -337,9 +324,9 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
 def _heuristic_renderer(
     source: Source, pair: Pair, chosen: Plan, spp: int, options: Options
 ) -> Renderer:
-    """Make the heuristic half ready to render, in its own variant if it has one."""
+    """Make the textbook half ready to render, in its own variant if it has one."""
     with variant(options.heuristic_variant or mi.variant()):
         if options.heuristic_variant:
             pair = pair_for(source, options)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        return Renderer(scene, None, pass_spp=spp, label="heuristic image")
+        return Renderer(scene, None, pass_spp=spp, label="textbook picture")

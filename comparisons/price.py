@@ -269,7 +269,7 @@ def effects_that_pass(visible: Visible) -> tuple[EffectsThatPass, ...]:
 def _fewest(visible: Visible, place: int, threshold: float) -> EffectsThatPass:
     """Return the smallest set that surely passes; of several, the one furthest below.
 
-    There is one: all effects leave no difference from themselves.
+    There is always one: with all effects an image is compared with itself.
     """
     passing = [effects for effects, shares in visible.items() if shares[place].high <= LIMIT]
     effects = min(passing, key=lambda labels: (len(labels), visible[labels][place].high))

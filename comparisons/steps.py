@@ -15,7 +15,8 @@ from msgspec import structs
 from fotismos.comparisons.compare import Step
 from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.blocks import bands
-from fotismos.comparisons.departure.metrics import leading_distance
+from fotismos.comparisons.departure.metrics import LEADING, leading_distance
+from fotismos.comparisons.departure.regions import worst_pixel
 from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
@@ -95,9 +96,10 @@ def with_terms(comparison: Comparison, ready: Prepared, progress: Progress | Non
     options = ready.options
     images = comparison.images
     layers = pixel_terms.layers(half, options, images.heuristic)
+    worst = worst_pixel(images.maps[LEADING.name], images.counted)
     comparison = replace(
         comparison,
-        terms=pixel_terms.trace(half, options),
+        terms=pixel_terms.trace(half, options, worst),
         live=pixel_terms.live(half, options),
         images=replace(images, terms=layers),
     )

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from fotismos.comparisons.case import Scene
     from fotismos.comparisons.comparison import Comparison, ComparisonRecord
     from fotismos.comparisons.cost.cost_record import Cost, Method
+    from fotismos.comparisons.cost.engine_record import EngineCost
     from fotismos.comparisons.departure.metrics import Metric, Pixelwise
     from fotismos.comparisons.fit.fit_record import FitRecord
     from fotismos.comparisons.options import Options
@@ -43,6 +44,7 @@ NAMES = {
     "comparisons.case": ("Scene",),
     "comparisons.comparison": ("Comparison", "ComparisonRecord"),
     "comparisons.cost.cost_record": ("Cost", "Method"),
+    "comparisons.cost.engine_record": ("EngineCost",),
     "comparisons.departure.metrics": ("Metric", "Pixelwise"),
     "comparisons.fit.fit_record": ("FitRecord",),
     "comparisons.options": ("Options",),
@@ -76,7 +78,7 @@ HOMES = heuristic.HOMES | {
 
 __all__ = [
     "Audit", "CheckRecord", "Comparison", "ComparisonRecord", "Cost", "DirectionalLight",
-    "FitRecord", "FotismosError", "Heuristic", "InputError", "InstallationError",
+    "EngineCost", "FitRecord", "FotismosError", "Heuristic", "InputError", "InstallationError",
     "LostProcessError", "Material", "Method", "Metric", "NonFiniteError", "Options", "OutputError",
     "Parameter", "PixelTerms", "Pixelwise", "PlanReport", "PointLight", "Range", "Scene", "Shown",
     "SpotLight", "audit", "check", "compare", "cost", "declare", "environment", "fit", "plan",

@@ -31,7 +31,8 @@ HOMES = {
     "register": "fotismos.heuristic.plugins",
     "shade": "fotismos.heuristic.kernel",
 }
-"""Where names come from when they are asked for: errors need no Dr.Jit, the kernel no Mitsuba."""
+"""The module of each name, imported at its first use: errors load without Dr.Jit, and the kernel
+without Mitsuba."""
 
 __all__ = [
     "DirectionalLight", "Heuristic", "Material", "Parameter", "PointLight", "Range", "SpotLight",

@@ -1,7 +1,8 @@
 """The light of a scene's background, as shaders read it (:meth:`Point.environment`).
 
-It is that of Mitsuba's environment emitter, such as ``constant``, ``envmap`` or ``sunsky``. A scene
-without one has ``I_a`` in every direction. ``I_a`` of a scene with one is its mean, without a sun.
+It is that of Mitsuba's environment emitter, such as ``constant``, ``envmap`` or ``sunsky``. In a
+scene without one it is ``I_a`` in every direction; in a scene with one, ``I_a`` is its mean,
+without a sun.
 
 A map has rows from straight up to straight down, and columns around that axis, as Mitsuba's
 ``envmap`` has them. With ``(x, y, z)`` in the emitter's own frame, a direction is at column ``W u -
@@ -23,18 +24,18 @@ from fotismos.heuristic.convention import Colour, Doubles, Floats, Interaction, 
 from fotismos.heuristic.errors import InputError
 
 ROWS = 512
-"""Rows of the map of an emitter that is no map itself; it has twice as many columns."""
+"""Rows of a map made of another emitter than ``envmap``; it has twice as many columns."""
 
 UNIT = 1e-6
-"""A square of a length that differs less from 1 is that of a unit vector, rounded."""
+"""How far rounding may take the squared length of a unit vector from 1."""
 
 
 def environment(scene: Scene, direction: Vector, sun: bool = True) -> Colour:
     """Return the radiance of a scene's background, for the ``prepare`` of a heuristic.
 
-    ``direction`` is a Dr.Jit vector of any length in world space, away from the scene. Without
-    ``sun`` that of ``sunsky`` is left out: it is among the lights, too. InputError in spectral
-    variants, whose colours depend on the wavelengths of a ray.
+    ``direction`` is a Dr.Jit vector of any length in world space, away from the scene. ``sun``
+    says whether it includes the sun of ``sunsky``, which is also one of the lights. InputError in
+    spectral variants, whose colours depend on the wavelengths of a ray.
     """
     if mi.is_spectral:
         raise InputError(
@@ -95,7 +96,7 @@ class EnvironmentMap:
 
 
 def environment_map(scene: Scene) -> EnvironmentMap:
-    """Return the background as a map: that of ``envmap`` itself, others at the texels."""
+    """Return the background as a map: an ``envmap``'s own, or another emitter read at texels."""
     emitter = scene.environment()
     if emitter is None:
         level = np.array(environment(scene, mi.Vector3f(0)), np.float32).reshape(1, 1, 3)

@@ -1,4 +1,4 @@
-"""Heuristics in GLSL, run by OpenGL 4.3, which a command names as ``FILE.glsl``.
+"""Shaders in GLSL, which a command names as ``FILE.glsl``; OpenGL 4.3 runs them.
 
 The file holds ``vec3 shade(Point point)``. Its text is put between declarations of the record and a
 ``main``, compiled in a context without a window and called for arrays of points. The background is
@@ -82,7 +82,7 @@ def opengl() -> Any:
         import moderngl  # loaded late: only shaders in GLSL need it
     except ImportError as error:
         raise InstallationError(
-            "moderngl is not installed, and heuristics in GLSL need it. Install it:"
+            "moderngl is not installed, and shaders in GLSL need it. Install it:"
             f" {program.installation('moderngl')}"
         ) from error
     try:
@@ -90,7 +90,7 @@ def opengl() -> Any:
         context = moderngl.create_context(standalone=True, require=VERSION, **options)
     except Exception as error:  # its type depends on which library is missing
         raise InstallationError(
-            f"EGL finds no OpenGL {VERSION / 100:.1f}, and heuristics in GLSL need it:"
+            f"EGL finds no OpenGL {VERSION / 100:.1f}, and shaders in GLSL need it:"
             f" {str(error).strip().rstrip('.')}. Install a driver; Mesa's works without a"
             " graphics card (Debian, Ubuntu: apt-get install libegl1 libgl1-mesa-dri)."
         ) from error
@@ -184,7 +184,7 @@ class Shader:
         if dr.flag(dr.JitFlag.SymbolicScope):
             raise InputError(
                 f"{self.file}: Dr.Jit cannot record a shader in GLSL, so it cannot run in a"
-                " symbolic loop. Evaluate that loop, or write the heuristic in Python."
+                " symbolic loop. Evaluate that loop, or write the shader in Python."
             )
         if not mi.is_rgb:
             raise InputError(

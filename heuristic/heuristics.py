@@ -1,4 +1,4 @@
-"""Heuristics: ways to shade the first half of a pair, each one declaration.
+"""Heuristics: ways to shade the textbook half of a pair, each one declaration.
 
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
 ``blinn`` are here, those of engines in :mod:`fotismos.heuristic.shadow_maps` and
@@ -42,12 +42,12 @@ LOADERS = {
     ".py": "fotismos.heuristic.user_shaders:from_file",
     ".glsl": "fotismos.heuristic.glsl:from_file",
 }
-"""Functions that read a user's file by its suffix, imported when a name has it."""
+"""The function that reads a user's file, by the file's suffix; imported at its first use."""
 
 OF_FUNCTION = "fotismos.heuristic.user_shaders:of_function"
 SHADED = "fotismos.heuristic.user_shaders:shaded"
 PREPARED = "fotismos.heuristic.user_shaders:prepared"
-"""Make a heuristic of a function, and call and check a user's; imported as late."""
+"""Functions that make a heuristic of a user's function, and call it; imported as late."""
 
 _FILE = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)
 
@@ -254,7 +254,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Heuristic:
-    """A way to shade the heuristic half.
+    """A way to shade the textbook half.
 
     ===========  ===================================================================================
     name         used in commands, records and messages: lower case, digits and hyphens; or
@@ -325,8 +325,8 @@ class Heuristic:
     def digest(self) -> str | None:
         """Return what identifies the code: a name of the package's, or a digest of GLSL.
 
-        None for others' Python, of which nobody knows what else it reads; GLSL may have a table of
-        it.
+        None for a user's Python, which may read files that nobody knows of, and for GLSL with a
+        table that such Python makes.
         """
         if self.is_builtin:
             return self.name
@@ -341,7 +341,7 @@ class Heuristic:
         wavelengths: Array = (),
         environment: Callable[[Array], Array] | None = None,
     ) -> Array:
-        """Return the colour at points; InputError if a user's heuristic fails or returns none."""
+        """Return the colour at points; InputError if a user's function fails or gives none."""
         tuned = SimpleNamespace(**parameters)
         point = Point(
             needs=self.needs,

@@ -1,7 +1,7 @@
 """Indirect light gathered at visible points, and ambient light that is set to it.
 
 ``I = ... + k_d A``, where ``A`` stands for the light that other surfaces reflect, or that comes
-from the unhidden environment. It is gathered in the heuristic half, by Mitsuba's ``path`` over the
+from the unhidden environment. It is gathered in the textbook half, by Mitsuba's ``path`` over the
 ``phong`` materials and the heuristic's lights, from a coarse grid of the points that the camera
 sees::
 

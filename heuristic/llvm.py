@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fotismos.heuristic.errors import InstallationError
+from fotismos.heuristic.mitsuba_version import require_mitsuba
 
 VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
 """The supported variants of Mitsuba."""
@@ -44,7 +45,7 @@ How to get it:
 
 _TOO_EARLY = (
     f"Dr.Jit was imported before fotismos, so the LLVM of the {WHEEL} wheel is not used: "
-    f"import heuristic first, or set {VARIABLE} before Python starts."
+    f"import fotismos first, or set {VARIABLE} before Python starts."
 )
 
 
@@ -104,7 +105,8 @@ def require_libraries() -> None:
 
 
 def check() -> LLVM:
-    """Return the LLVM that Dr.Jit uses; raise `InstallationError` unless it works."""
+    """Return the LLVM that Dr.Jit uses; raise `InstallationError` unless it and Mitsuba work."""
+    require_mitsuba()
     value = os.environ.get(VARIABLE)
     path = Path(value) if value else None
     # A child process inherits what `configure` set.

@@ -131,7 +131,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 def scaled_edges(p0: Position, p1: Position, p2: Position) -> tuple[tuple[Vector, ...], Number]:
-    """Return the edges ``p1 - p0, p2 - p1, p0 - p2`` over their largest component, and that."""
+    """Return the edges ``p1 - p0, p2 - p1, p0 - p2`` over their largest component; and it."""
     edges = (p1 - p0, p2 - p1, p0 - p2)
     largest = dr.maximum(_largest(edges[0]), dr.maximum(_largest(edges[1]), _largest(edges[2])))
     return tuple(_over(edge, largest) for edge in edges), largest

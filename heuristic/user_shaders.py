@@ -371,23 +371,31 @@ def trial_points(heuristic: Heuristic) -> _TrialPoint:
     )
 
 
+def dark_scene() -> Any:
+    """Return a scene without any light: a white square."""
+    return mi.load_dict(_square(), optimize=False)
+
+
 def trial_scene(radiance: float) -> Any:
     """Return the scene that is prepared on trial: a white square, one light, a background."""
+    lights = {
+        "light": {"type": "heuristic_directional", "direction": [0, 0, -1], "intensity": 1.0},
+        "background": {"type": "constant", "radiance": radiance},
+    }
+    return mi.load_dict(_square() | lights, optimize=False)
+
+
+def _square() -> dict[str, Any]:
     plugins.register()
-    return mi.load_dict(
-        {
-            "type": "scene",
-            "sensor": {
-                "type": "perspective",
-                "to_world": mi.ScalarTransform4f().look_at((0, -2, 2), (0, 0, 0), (0, 0, 1)),
-                "film": {"type": "hdrfilm", "width": 16, "height": 16},
-            },
-            "square": {"type": "rectangle", "bsdf": {"type": "phong", "k_a": 1.0, "k_d": 1.0}},
-            "light": {"type": "heuristic_directional", "direction": [0, 0, -1], "intensity": 1.0},
-            "background": {"type": "constant", "radiance": radiance},
+    return {
+        "type": "scene",
+        "sensor": {
+            "type": "perspective",
+            "to_world": mi.ScalarTransform4f().look_at((0, -2, 2), (0, 0, 0), (0, 0, 1)),
+            "film": {"type": "hdrfilm", "width": 16, "height": 16},
         },
-        optimize=False,
-    )
+        "square": {"type": "rectangle", "bsdf": {"type": "phong", "k_a": 1.0, "k_d": 1.0}},
+    }
 
 
 def _require(

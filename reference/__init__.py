@@ -26,7 +26,7 @@ HOMES = {
     "pair": "fotismos.reference.pairing.halves",
     "plan": "fotismos.reference.planning.plan",
 }
-"""Where names come from when they are asked for: records need no Mitsuba."""
+"""The module of each name, imported at its first use: records load without Mitsuba."""
 
 __all__ = [
     "Convention", "Estimate", "Pair", "PairOptions", "Plan", "Source", "Times", "pair", "plan",

@@ -28,7 +28,7 @@ CHANGES = (
 """Older versions, and what changed since; records in which nothing changed are still read."""
 
 CHANGED = ("rung", "method", "price", "attribution", "visible", "ratio")
-"""Parts of the names of these fields, which are in the message of a record that holds the old."""
+"""Parts of the names of fields that changed: an error about one of them means an older record."""
 
 Kind = TypeVar("Kind")
 

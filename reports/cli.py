@@ -118,7 +118,7 @@ def cli() -> None:
     Examples:
       fotismos compare fig-8-9              how far, where, and is it more than noise?
       fotismos compare my_scene.xml         the same for your own Mitsuba scene
-      fotismos plan cornell-box             which effects does it call for?
+      fotismos plan cornell-box             which effects does it need?
       fotismos cost cornell-box             what does accuracy cost in time?
       fotismos fit fig-8-9                  the model's fault, or its parameters'?
       fotismos report                       all built-in scenes in one page

@@ -11,7 +11,7 @@ RESULTS: Terms = {
         " no exposure would remove it."
     ),
     ("level", "level mean − shape"): (
-        "The part of the mean that the best exposure removes: a difference in brightness alone."
+        "The part of the mean that the best exposure removes: an error of brightness alone."
     ),
     ("best exposure", "factor"): (
         "The one factor on the textbook image that makes the metric’s mean smallest."
@@ -22,14 +22,14 @@ RESULTS: Terms = {
     ),
     ("without noise", "without noise 95 %"): (
         "The mean without the part that is due to noise, with a 95 % interval. If it contains 0,"
-        " there may be no departure."
+        " there may be no error."
     ),
-    ("significant", "significant pixels", "shown to differ"): (
+    ("significant", "certain to differ", "certain and visible"): (
         "Pixels whose linear difference is more than noise, however small. At most 5 % of these"
         " marks are expected to be wrong; more samples show more of them."
     ),
     ("undetermined",): (
-        "Not shown to differ, but noise might hide a visible difference there: rare bright paths"
+        "Not certain to differ, but noise might hide a visible difference there: rare bright paths"
         " may be missing, even where the standard error is small."
     ),
     ("not counted",): "Pixels that see no surface are left out of all numbers.",
@@ -43,9 +43,9 @@ RESULTS: Terms = {
         "How far the mean of the samples is likely to be from the true value, because of noise. At"
         " a pixel it is the mean over a square of 2 by 2."
     ),
-    ("of the departure", "of the error"): "Its part of the sum of ΔE2000 over all pixels.",
+    ("share of error", "of the error"): "Its part of the sum of ΔE2000 over all pixels.",
     ("mostly", "mostly missing", "effect", "worth most", "cause", "causes"): (
-        "The difference between the two halves that adds most to the departure there."
+        "The effect that adds most to the error there."
     ),
     ("time", "price"): (
         "The time of what makes the scene look right, over that of the textbook picture with 4"
@@ -104,7 +104,7 @@ COSTS: Terms = {
 }
 
 PLANS: Terms = {
-    ("called for",): "Whether the scene needs the effect, by a rule that is proved or measured.",
+    ("needed",): "Whether the scene needs the effect, by a rule that is proved or measured.",
     ("rule",): "Why the effect is simulated, or left out without any change of the image.",
     ("guard",): "A few rays with everything simulated, which check that the plan left out nothing.",
     ("pairing",): "How each textbook material and light gets its physical partner.",
@@ -120,8 +120,11 @@ EFFECTS: Terms = {
         "Highlights of rough, transparent coats, stronger at grazing angles. Phong’s are not."
     ),
     ("extended lights",): "Lights with an area, and so soft shadows. The textbook’s are points.",
-    ("environment",): "Light from all around. The textbook has one ambient colour.",
-    ("spectral",): "Light by wavelength in place of three colours.",
+    (
+        "environment",
+        "environment light",
+    ): "Light from all around. The textbook has one ambient colour.",
+    ("spectral", "spectral light"): "Light by wavelength in place of three colours.",
     ("polygon interpolation",): "Flat and Gouraud shading, which interpolate over polygons.",
     ("transmission",): "Light that passes through surfaces, which the textbook’s cannot.",
     ("distance attenuation",): "How light weakens with distance: physically, with its square.",

@@ -95,6 +95,9 @@ command = partial(click.command, cls=Helped)
 # --- Options ---------------------------------------------------------------------------------
 
 scene_argument = click.argument("scene", metavar="SCENE", shell_complete=complete_scene)
+scene_or_pictures_argument = click.argument(
+    "scene", metavar="[SCENE]", required=False, shell_complete=complete_scene
+)
 scenes_argument = click.argument(
     "scenes", nargs=-1, required=True, metavar="SCENE...", shell_complete=complete_scene
 )
@@ -171,8 +174,8 @@ METAVARS = {
     "image": "FILE", "reference": "FILE", "mask": "FILE",
 }  # fmt: skip
 
-SHORT = {"image": "-t", "reference": "-r"}
-"""Short names of options, as other programs that compare pictures have them."""
+SHORT = {"image": "-t", "reference": "-r", "variant": "-m"}
+"""Short names of options, as other programs have them: Mitsuba, and those that compare pictures."""
 
 
 def option(name: str, command_default: str = "") -> Decorator:
@@ -282,7 +285,7 @@ def percentage(text: str) -> float:
 within_option = click.option(
     "--within",
     type=float,
-    default=2.0,
+    default=2,
     show_default=True,
     metavar="DE",
     help="Pixels differ visibly if ΔE2000 is above this: 1 to 10 in steps of 0.25.",
@@ -394,7 +397,7 @@ class Job:
     """What a command does with each of its scenes.
 
     ``options`` say how to render; ``fresh`` renders finished scenes again; pixels differ
-    visibly above the ΔE2000 ``within``. Of the scenes ``ladders`` methods are measured, too.
+    visibly above the ΔE2000 ``within``. The methods of the scenes ``ladders`` are measured, too.
     """
 
     options: Options

@@ -10,8 +10,8 @@ Programs use the same functions, which return records. One runs at a time, other
 threads. Each leaves Mitsuba's variant as it was.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import wraps
 from html import escape
 from pathlib import Path
@@ -28,13 +28,17 @@ from fotismos.comparisons.check.moved import LEVEL
 from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.cost.cost import cost as study
 from fotismos.comparisons.cost.cost_record import Cost, Method
+from fotismos.comparisons.cost.engine import front_of_pictures
+from fotismos.comparisons.cost.engine_record import EngineCost
 from fotismos.comparisons.cost.methods import declare as declare_method
+from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
 from fotismos.comparisons.departure.metrics import Metric
 from fotismos.comparisons.departure.metrics import declare as declare_metric
 from fotismos.comparisons.fit.fit import fit as fit_parameters
 from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.options import Options, OptionValues
 from fotismos.comparisons.picture_files import as_files, with_files
+from fotismos.comparisons.pictures import require_no_scene
 from fotismos.comparisons.pixel_terms import PixelTerms
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.steps import steps
@@ -141,7 +145,7 @@ def compare(
     `InputError` for a scene or an option that is not allowed, `NonFiniteError` for a NaN or an
     infinity in a rendering, and `InstallationError` if a library is missing.
     """
-    values, arrays = _with_names(options)
+    values, arrays = _with_names(options, PICTURED)
     with as_files(arrays):
         chosen = with_files(Options.of(values))
         if scene is None and chosen.image and chosen.reference:
@@ -154,11 +158,13 @@ def compare(
     return Shown(comparison, page.render([view_of(comparison)]))
 
 
-def _with_names(options: OptionValues) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return options in which arrays have names, and the arrays by these."""
-    values: dict[str, Any] = dict(options)
+def _with_names(
+    given_values: Mapping[str, Any], pictured: Iterable[str]
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return values in which arrays of the ``pictured`` have names, and the arrays by these."""
+    values: dict[str, Any] = dict(given_values)
     arrays: dict[str, Any] = {}
-    for half in PICTURED:
+    for half in pictured:
         given = values.get(half)
         several = [given] if isinstance(given, np.ndarray) else given
         if not isinstance(several, (list, tuple)):
@@ -175,7 +181,7 @@ def _with_names(options: OptionValues) -> tuple[dict[str, Any], dict[str, Any]]:
 
 @_alone
 def plan(scene: Scene, name: str | None = None, **options: Unpack[OptionValues]) -> PlanReport:
-    """Return which effects a scene calls for, and what will be simulated.
+    """Return which effects a scene needs, and what will be simulated.
 
     Arguments and errors are those of :func:`compare`; only the plan's probe is rendered.
     """
@@ -185,21 +191,50 @@ def plan(scene: Scene, name: str | None = None, **options: Unpack[OptionValues])
 
 @_alone
 def cost(
-    scene: Scene,
+    scene: Any = None,
     name: str | None = None,
     at: tuple[int, int] | None = None,
     measure: bool = False,
+    pictures: Mapping[str, Any] | None = None,
+    machine: str = "",
+    kernel_time: str | None = None,
     **options: Unpack[OptionValues],
-) -> Cost:
+) -> Cost | EngineCost:
     """Return what each step of accuracy costs: seconds and ΔE2000 by method and samples.
 
     ``at`` is a width and height in pixels to predict for, where ``measure`` also measures. ``spp``
-    is the largest number of samples. It takes about a minute. Other arguments and errors are those
-    of :func:`compare`.
+    is the largest number of samples. It takes about a minute. ``pictures`` are settings of another
+    renderer, ``{"name @ 1.2ms": picture}``: a file, a pattern, an array (H, W, 3) of linear
+    colours, or several of them. ``machine`` and ``kernel_time`` are what their times are of, as in
+    the command. With a ``reference``, no scene is needed. Other arguments and errors are those of
+    :func:`compare`.
     """
-    case = open_case(scene, Options.of(options), name)
-    command = case.command("cost")
-    return study(case.source, case.options, None, None, command, at, measure).record
+    values, arrays = _with_names(options, PICTURED)
+    # Names of settings may be anything: arrays are called by their numbers.
+    words = pictures or {}
+    shots = {f"picture {number}": shot for number, shot in enumerate(words.values(), start=1)}
+    shots, more = _with_names(shots, tuple(shots))
+    settings = [_setting(word, shot) for word, shot in zip(words, shots.values(), strict=True)]
+    times = EngineTimes.given(settings, machine, kernel_time)
+    with as_files(arrays | more):
+        chosen = Options.of(values)
+        if scene is None and chosen.reference and times:
+            of_scenes = {"at": at, "measure": measure, "kernel_time": kernel_time}
+            require_no_scene(chosen, [word for word, value in of_scenes.items() if value])
+            return front_of_pictures(chosen, times, name or "pictures").record
+        case = open_case(scene, chosen, name)
+        command = case.command("cost", **(times.as_options() if times else {}))
+        return study(
+            case.source, case.options, None, None, command, at, measure, engine_times=times
+        ).record
+
+
+def _setting(word: str, picture: str | Path | list[str]) -> TimedPicture:
+    """Return a setting, ``NAME @ TIME``, of one picture or several."""
+    names = picture if isinstance(picture, list) else [str(picture)]
+    if not names:
+        raise InputError(f"{word!r} has no picture: give a file, a pattern, an array, or several.")
+    return replace(TimedPicture.of(f"{word}={names[0]}"), patterns=tuple(names))
 
 
 @_alone
@@ -211,7 +246,7 @@ def fit(
     ``loss`` is ``perceptual``, the mean ΔE2000, or ``linear``, the squared difference of linear
     colours. Other arguments and errors are those of :func:`compare`.
     """
-    values, arrays = _with_names(options)
+    values, arrays = _with_names(options, PICTURED)
     with as_files(arrays):
         case = open_case(scene, with_files(Options.of(values)), name)
         command = case.command("fit")

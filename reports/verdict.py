@@ -64,7 +64,7 @@ class HalfNames:
 
 
 def judged(record: ComparisonRecord) -> HalfNames:
-    """Return the names of a comparison's first half; a shader in a file is called as its file."""
+    """Return the names of what is compared; a shader in a file is called as its file."""
     if record.picture:
         return HalfNames(subject="The picture", title="Picture", name="picture")
     if record.heuristic in TEXTBOOK:
@@ -74,7 +74,7 @@ def judged(record: ComparisonRecord) -> HalfNames:
 
 
 def truth(record: ComparisonRecord) -> HalfNames:
-    """Return the names of a comparison's second half."""
+    """Return the names of what it is compared with."""
     if record.reference_picture:
         return HalfNames(subject="Reference picture", title="Reference", name="reference")
     return HalfNames(subject="Physical reference", title="Physical", name="physical")
@@ -203,8 +203,7 @@ def _effects_needed(record: ComparisonRecord, threshold: float) -> str:
 
 def _joined(effects: Sequence[str], word: str) -> str:
     """Return effects as a list within a sentence."""
-    nouns = {effect.label: effect.noun for effect in EFFECTS}
-    *first, last = [nouns.get(effect) or effect for effect in effects]
+    *first, last = map(noun, effects)
     return f"{', '.join(first)} {word} {last}" if first else last
 
 
@@ -354,9 +353,13 @@ def about(record: ComparisonRecord) -> str:
 
 
 def _mostly(effects: Sequence[str]) -> str:
-    nouns = {effect.label: effect.noun for effect in EFFECTS}
-    named = [nouns.get(effect) or effect for effect in effects]
-    return f"Mostly missing: {', '.join(named)}." if named else ""
+    return f"Mostly missing: {', '.join(map(noun, effects))}." if effects else ""
+
+
+def noun(effect: str) -> str:
+    """Return what a picture without an effect lacks, in words; of several, in their order."""
+    nouns = {each.label: each.noun or each.label for each in EFFECTS}
+    return ", then ".join(nouns.get(part, part) for part in effect.split(", then "))
 
 
 # --- A run -----------------------------------------------------------------------------------
@@ -370,7 +373,7 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
     if not records:
         return "No scene was compared."
     subjects = {judged(record).subject for record in records}
-    subject = subjects.pop() if len(subjects) == 1 else "The first half"
+    subject = subjects.pop() if len(subjects) == 1 else "Shading"
     decisions = Counter(decision(record, threshold) for record in records)
     if len(records) > 1:
         undecided = decisions["undecided"]

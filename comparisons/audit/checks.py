@@ -102,7 +102,7 @@ class Audit(Record):
         tuple[str, ...], Meta(description="Values that light cannot have, and where.")
     ] = ()
     mistakes: Annotated[
-        tuple[str, ...], Meta(description="Mistakes that the heuristic seems to have, in words.")
+        tuple[str, ...], Meta(description="Mistakes that the shader seems to have, in words.")
     ] = ()
     command: str
     versions: Versions
@@ -273,7 +273,7 @@ def sampling(subject: Subject) -> Checked:
     bound = 1 - (1 - LEVEL) ** (1 / len(furnace.both_sides(INCIDENT, subject.eta)))  # Šidák
     expected = f"p of χ² at least {bound:.2g}"
     if not isinstance(subject, ScatteringSubject):
-        return _checked("sampling", None, None, expected, "a heuristic is not sampled")
+        return _checked("sampling", None, None, expected, "textbook shading is not sampled")
     if (least := subject.sampling()) is None:
         return _checked("sampling", None, None, expected, "it scatters nothing")
     return _checked("sampling", least[0] >= bound, least[0], expected, least[1])
@@ -317,8 +317,8 @@ two rightly differ."""
 
 FAINT = 1e-3
 NOTHING = 1e-5
-"""Derivatives below the former share of the largest are judged by their absolute difference; if all
-are below the latter, they are rounding errors."""
+"""A derivative below FAINT times the largest is judged by its absolute difference. If all are below
+NOTHING, they are rounding errors."""
 
 OPPOSITE = 2.0
 """The largest possible relative difference; it also stands for derivatives that are not finite."""

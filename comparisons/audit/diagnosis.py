@@ -14,11 +14,11 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from fotismos.comparisons.audit import probes
 from fotismos.comparisons.audit.subjects import shaded
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
+from fotismos.comparisons.departure.minimum import minimum
 from fotismos.comparisons.picture_mistakes import factor_of_pi
 from fotismos.comparisons.textbook import clamped, dot, halfway, lobe, mirrored, unit
 from fotismos.heuristic import heuristics
@@ -84,17 +84,18 @@ TermFit = tuple[Array, float]
 def describe(name: str) -> tuple[str, ...]:
     """Return the mistakes of a heuristic, in words.
 
-    There are none of a built-in one, or one that prepares a scene.
+    There are none of a built-in one.
     """
     heuristic = heuristics.named(name)
-    if heuristic.is_builtin or heuristic.prepare is not None:
+    if heuristic.is_builtin:
         return ()
     with mi.scoped_set_variant(DEFAULT_VARIANT):
         heuristic = heuristics.named(name)
         try:
             found = probes.findings(heuristic)
             sure = [words for name, words in found.items() if not probes.PROBES[name].vague]
-            sure += _compared(heuristic)
+            if heuristic.prepare is None:  # what it keeps may replace the textbook's ambient light
+                sure += _compared(heuristic)
         except Exception:  # a user's code may raise anything where it was not tried
             return ()
     return tuple(sure or found.values())
@@ -137,8 +138,7 @@ def _best(mistake: Mistake, model: Model, seen: Array) -> tuple[str, TermFit]:
     # The remainder may have several minima: a grid finds the valley, a search its bottom.
     grid, step = np.linspace(-LARGEST_LOG, LARGEST_LOG, 32, retstep=True)
     start = grid[np.argmin([fit(log)[1] for log in grid])]
-    bounds = start - step, start + step
-    best = minimize_scalar(lambda log: fit(log)[1], bounds=bounds, options={"xatol": 1e-5}).x
+    best, _ = minimum(lambda log: fit(log)[1], start - step, start + step)
     return description.format(f"{np.exp(best):.3g}"), fit(best)
 
 

@@ -17,6 +17,7 @@ from fotismos.comparisons.audit.furnace import UP, direction
 from fotismos.comparisons.audit.subjects import COLOURS, shaded
 from fotismos.comparisons.departure.colour import from_srgb
 from fotismos.comparisons.picture_mistakes import CHANNELS, MISREADINGS, factor_of_pi
+from fotismos.heuristic import user_shaders
 from fotismos.heuristic.heuristics import Heuristic
 from fotismos.heuristic.lights import INVERSE_SQUARE, PointLight
 
@@ -83,8 +84,8 @@ Find = Callable[[Values], str | None]
 class Probe:
     """What is varied, and what is found.
 
-    It is asked if all is well with the probes ``after`` which it comes. A ``vague`` one is heard if
-    nothing else is found.
+    It runs if the probes in ``after`` found nothing. What a ``vague`` probe finds counts only if no
+    other finds anything.
     """
 
     find: Find
@@ -109,13 +110,19 @@ def probe(cases: Mapping[str, Cases], *after: str, vague: bool = False) -> Calla
 
 
 def findings(heuristic: Heuristic) -> dict[str, str]:
-    """Return what the probes find in a heuristic, as sentences by the probe's name."""
+    """Return what the probes find in a heuristic, as sentences by the probe's name.
+
+    One that prepares a scene gets a dark one: what it keeps of other lights is not the cases'.
+    """
     cases = {(name, part): each.cases[part] for name, each in PROBES.items() for part in each.cases}
     # One kernel for all cases with one light, and one for those with two.
+    defaults = {each.name: each.default for each in heuristic.parameters if each.prepared}
+    prepared = heuristic.prepared(user_shaders.dark_scene(), defaults)
     values: dict[tuple[str, str], Array] = {}
     for number in (1, 2):
         alike = {key: case for key, case in cases.items() if len(case.toward) == number}
-        values |= dict(zip(alike, evaluate(heuristic, tuple(alike.values())), strict=True))
+        shown = evaluate(heuristic, tuple(alike.values()), prepared)
+        values |= dict(zip(alike, shown, strict=True))
     said: dict[str, str | None] = {}
     for name, each in PROBES.items():
         seen = {part: values[name, part] for part in each.cases}
@@ -125,7 +132,7 @@ def findings(heuristic: Heuristic) -> dict[str, str]:
     return {name: words for name, words in said.items() if words}
 
 
-def evaluate(heuristic: Heuristic, cases: Sequence[Cases]) -> list[Array]:
+def evaluate(heuristic: Heuristic, cases: Sequence[Cases], prepared: Any = None) -> list[Array]:
     """Return what the lights add at cases' points, (3, N) each; all have the same number of lights.
 
     A second evaluation in the dark tells what they add.
@@ -142,7 +149,8 @@ def evaluate(heuristic: Heuristic, cases: Sequence[Cases]) -> list[Array]:
             PointLight(mi.Point3f(inputs[f"light {i}"]), mi.Spectrum(intensity), INVERSE_SQUARE)
             for i in range(len(cases[0].toward))
         ]
-        values = np.array(shaded(heuristic, point, material, lights), float).reshape(3, -1)
+        colours = shaded(heuristic, point, material, lights, prepared=prepared)
+        values = np.array(colours, float).reshape(3, -1)
         shown.append(np.broadcast_to(values, intensity.shape))
     ends = np.cumsum([part["position"].shape[1] for part in parts])
     return np.split(shown[0] - shown[1], ends[:-1], axis=1)

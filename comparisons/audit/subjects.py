@@ -38,9 +38,9 @@ Number = tuple[str, float, Callable[[Any], Any]]
 class Subject(ABC):
     """A heuristic or a BSDF, with white materials and the roughness of those that have several.
 
-    ``untuned`` is why no derivative can be checked, if so; ``faults`` are values that light cannot
-    have, in words, from any check. ``eta`` is the relative index of refraction below what transmits
-    light, None for others.
+    ``untuned`` says why no derivative can be checked, where that is so. ``faults`` describe values
+    that light cannot have, from any check. ``eta`` is the relative index of refraction below what
+    transmits light, None for others.
     """
 
     materials: dict[str, float | None]

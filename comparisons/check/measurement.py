@@ -37,8 +37,8 @@ from fotismos.reference.scene.source import Source
 
 PASSES = 16
 MOST_PASSES = 1024
-"""The former are enough for a t-test, corrected for a hundred quantities, to detect five standard
-errors; images of the latter are in memory at once."""
+"""PASSES are enough for a t-test, corrected for a hundred quantities, to detect five standard
+errors. There are at most MOST_PASSES, since the images of all passes are in memory at once."""
 
 GRID = 4
 """Blocks along each side of the image: few enough to read, small enough to locate a change."""
@@ -176,7 +176,7 @@ def measure_scene(
 
 
 def measurement(images: Array, counted: Array, viewing: Viewing) -> Measurement:
-    """Measure passes (n, 2, H, W, 3) of the heuristic half and the reference.
+    """Measure passes (n, 2, H, W, 3) of the textbook half and the reference.
 
     Metrics compare the mean images over the pixels of ``counted`` (H, W); their standard errors are
     the jackknife's. Metrics are not linear, and noise raises them: compare only measurements with
@@ -274,7 +274,8 @@ class Baseline(Record, omit_defaults=True):
     passes: Annotated[int, Meta(ge=2, le=MOST_PASSES)]
     versions: Annotated[Versions, Meta(description="Of the software that measured it.")]
     images: Annotated[
-        str | None, Meta(description="An EXR beside it with both halves, for people to look at.")
+        str | None,
+        Meta(description="An EXR with both pictures, beside the baseline, for people to look at."),
     ] = None
     metrics: dict[str, MetricAmount]
     heuristic: Half

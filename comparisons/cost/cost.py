@@ -1,17 +1,17 @@
 """Study what accuracy costs on one scene."""
 
-from collections.abc import Mapping
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
 from typing import Any
 
 import drjit as dr
 import numpy as np
 from msgspec import structs
 
+from fotismos.comparisons.alignment import picture_edges
 from fotismos.comparisons.comparison import Causes, machine, versions
 from fotismos.comparisons.cost import engine, times
 from fotismos.comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
+from fotismos.comparisons.cost.engine import Study
 from fotismos.comparisons.cost.front import Reach, at_size, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import (
     LARGEST_CERTAIN,
@@ -26,13 +26,15 @@ from fotismos.comparisons.cost.measure import (
     reduced,
     requested,
 )
-from fotismos.comparisons.cost.methods import FULL_PLAN
+from fotismos.comparisons.cost.methods import FULL_PLAN, all_methods
 from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.hybrids.attribution import find
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.pictures import TEMPLATE_SPP, GivenPictures, at_size_of_pictures
 from fotismos.comparisons.price_record import Price
 from fotismos.heuristic.errors import InputError
+from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import VERSION, Pixels, Positive, Record, Resolution
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
@@ -40,20 +42,6 @@ from fotismos.reference.scene.source import Source
 
 SPP = 64
 """Samples per pixel of the image to which effects add time."""
-
-
-@dataclass(frozen=True)
-class Study:
-    """Results of a study: its record, ``cost.json``, and its images.
-
-    ``methods`` are ``{method: (H, W, 3)}``, one rendering with the most samples of each;
-    ``settings`` are the given pictures, by the names of an engine's settings.
-    """
-
-    record: Cost
-    methods: Mapping[str, np.ndarray]
-    reference: np.ndarray
-    settings: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 def cost(
@@ -67,7 +55,7 @@ def cost(
     causes: Causes | None = None,
     alone: AbstractContextManager[Any] | None = None,
     engine_times: EngineTimes | None = None,
-) -> Study:
+) -> Study[Cost]:
     """Study what accuracy costs on one scene, in the current variant.
 
     For ``source``, ``options``, ``progress`` and ``command`` see
@@ -81,11 +69,18 @@ def cost(
     progress = progress or (lambda *_: None)
     options = options or Options()
     effort = effort or Effort()
+    for name in ("reference", "mask", "tone_map"):
+        if getattr(options, name):
+            raise InputError(
+                f"`{name}` is for pictures without a scene: here all methods have the scene's own"
+                " reference and surfaces. Omit it, or omit the scene."
+            )
     # Before anything is rendered: pictures may be refused.
-    settings: tuple[engine.Repeated, ...] = ()
+    given = GivenPictures()
     if engine_times:
-        settings = engine.read(engine_times, options)
-        options = engine.at_their_size(source, options, settings)
+        require_other_names(engine_times)
+        given = engine.read(engine_times, options)
+        options = at_size_of_pictures(film_size(source.parse(), options.sensor), given, options)
     if at:
         size = options.resolution or reduced(source, options.changed(resolution=at), WIDTH)
         require(source.name, at, size, is_measured)
@@ -97,7 +92,7 @@ def cost(
     predicted = at_size(found.points, found.methods, at) if at else ()
     measured = measure_at(found, at, progress) if at and is_measured else ()
     ladder.forget()  # its scenes would slow later work
-    judged = engine.judged(settings, engine_times, found) if engine_times else None
+    judged = engine.judged(given, engine_times, truth(found)) if engine_times else None
     known = causes or find(ready, source, options, progress, most=found.size[0])
     made = Cost(
         scene=source.name,
@@ -128,8 +123,32 @@ def cost(
         left_out=ladder.left_out,
         engine=judged,
     )
-    shown = {setting.given.name: setting.images[0] for setting in settings}
-    return Study(record=made, methods=found.images, reference=found.reference.mean, settings=shown)
+    return Study(
+        record=made,
+        reference=found.reference.mean,
+        settings=engine.shown(given, engine_times) if engine_times else {},
+        methods=found.images,
+    )
+
+
+def require_other_names(engine_times: EngineTimes) -> None:
+    """Raise `InputError` if a setting has the name of a method."""
+    known = {name for method in all_methods() for name in (method.name, *method.names)}
+    for picture in engine_times.pictures:
+        if picture.name in known:
+            raise InputError(f"{picture.name!r} is a method of the study: give another name.")
+
+
+def truth(found: Measurements) -> engine.Truth:
+    """Return what pictures of a scene are judged by: the reference of its methods."""
+    textbook = np.array(found.ready.heuristic.sampled(TEMPLATE_SPP).render(0), float)
+    return engine.Truth(
+        reference=found.reference,
+        counted=found.ready.counted,
+        viewing=found.options.viewing,
+        edges=[found.ready.geometry_edges(), picture_edges(textbook)],
+        textbook=textbook,
+    )
 
 
 def quick(
@@ -139,7 +158,7 @@ def quick(
     progress: Progress,
     command: str,
     alone: AbstractContextManager[Any],
-) -> Study:
+) -> Study[Cost]:
     """Study a compared scene with less effort, and predict for its own size; see :func:`cost`."""
     whole = requested(source, options)
     small = options.changed(resolution=reduced(source, options, QUICK_WIDTH), spp=None)

@@ -4,9 +4,9 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from fotismos.comparisons.comparison import Agreement, Contribution, MeanError, PictureFiles
+from fotismos.comparisons.comparison import Contribution, MeanError
+from fotismos.comparisons.cost.engine_record import Engine, FrontPoint
 from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import (
@@ -108,31 +108,6 @@ class TimedMethod(Method):
         )
 
 
-class FrontPoint(Record):
-    """A time and an error, of which a front is made.
-
-    Attributes
-    ----------
-    method
-        Name of the method, or of an engine's setting.
-    seconds
-        Wall time of one image.
-    error
-        Mean ΔE2000 of one image to the reference.
-    front
-        Whether no other point is clearly faster or clearly more accurate without being clearly
-        worse in the other.
-    ties
-        Others of the front whose time and error are both too close to call.
-    """
-
-    method: str
-    seconds: Interval
-    error: MeanError
-    front: bool = False
-    ties: tuple[str, ...] = ()
-
-
 class Point(FrontPoint):
     """A method at one sample count; its time follows from overhead and time per sample.
 
@@ -147,53 +122,6 @@ class Point(FrontPoint):
 
     spp: Size
     tolerance: MeanError
-
-
-class EngineSetting(FrontPoint):
-    """A setting of another renderer, whose picture and time are given.
-
-    Its front is that of the given settings alone: their times are of another machine. Its error is
-    that of one picture, without the reference's noise; the interval holds that noise, and the
-    spread of repeats.
-
-    Attributes
-    ----------
-    visible
-        The shares of a picture's pixels above thresholds.
-    passes_at
-        The smallest of these thresholds at which it passes; null if it passes at none.
-    p95
-        The ΔE2000 that 5 % of the pixels exceed, with the reference's noise.
-    ratio
-        Its time over that of the textbook kernel on the same machine, if that is given.
-    picture, agreement
-        Its files, and what is odd about them.
-    """
-
-    visible: tuple[VisibleShare, ...]
-    passes_at: Positive | None
-    p95: Amount
-    ratio: Positive | None = None
-    picture: PictureFiles
-    agreement: Agreement
-
-
-class Engine(Record):
-    """Settings of another renderer, and what their times are of.
-
-    Attributes
-    ----------
-    settings
-        The settings, in the order in which they were given.
-    machine
-        The machine of their times, in the user's words; empty if it is not known.
-    kernel_s
-        Seconds that the textbook kernel takes there, if given.
-    """
-
-    settings: tuple[EngineSetting, ...]
-    machine: str = ""
-    kernel_s: Positive | None = None
 
 
 class Converged(Record):

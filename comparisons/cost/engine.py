@@ -1,131 +1,193 @@
 """Settings of another renderer: the error of each picture, and a front with their given times.
 
-A picture is compared with the reference that all methods of a study are compared with. Its error is
-that of one picture, like a method's: the noise of a picture counts, and that of the reference does
-not (:mod:`fotismos.comparisons.departure.noise`). The interval holds what is left of the
-reference's noise, and Student's interval of the repeats; both are independent, so squares add up. A
-single picture does not show its own noise.
+A picture is compared with the reference that all methods of a study are compared with, or without a
+scene with reference pictures (:func:`front_of_pictures`). Its error is that of one picture, like a
+method's: the noise of a picture counts, and that of the reference does not
+(:mod:`fotismos.comparisons.departure.noise`). The interval holds what is left of the reference's
+noise, and Student's interval of the repeats; both are independent, so squares add up. A single
+picture does not show its own noise, nor does a single reference, whose noise counts as error.
 
 Given times are of another machine, program and load than measured ones. So the settings have a
 front of their own, and no measured time is compared with theirs. If the kernel's own time on that
 machine is given, each has the ratio to it, as methods have theirs.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import hypot
+from typing import Generic, TypeVar
 
 import numpy as np
 from msgspec import structs
+from numpy.typing import NDArray
 
-from fotismos.comparisons.alignment import picture_edges
-from fotismos.comparisons.comparison import Images, MeanError
-from fotismos.comparisons.cost.cost_record import Engine, EngineSetting
+from fotismos.comparisons.caution import caution
+from fotismos.comparisons.comparison import PICTURE_LIBRARIES, Images, MeanError, versions
+from fotismos.comparisons.cost.engine_record import Engine, EngineCost, EngineSetting
 from fotismos.comparisons.cost.front import fronted
-from fotismos.comparisons.cost.measure import Measurements
-from fotismos.comparisons.cost.methods import all_methods
 from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
+from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import decide
+from fotismos.comparisons.departure.mapped_sums import Light, MappedReference
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.departure.statistics import Summary, summarise
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import matching, read_file
+from fotismos.comparisons.picture_files import matching, with_files
 from fotismos.comparisons.picture_mistakes import Names
 from fotismos.comparisons.pictures import (
-    TEMPLATE_SPP,
+    FEWEST,
     GivenPictures,
+    PictureHalf,
     Pictures,
     agreement,
-    at_size_of_pictures,
+    read_all,
+    require_no_scene,
+    same_files,
     unknown_noise,
 )
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.pairing.settings import film_size
-from fotismos.reference.records import Interval
-from fotismos.reference.rendering.sums import student
-from fotismos.reference.scene.source import Source
+from fotismos.reference.records import Interval, Pixels
+from fotismos.reference.rendering.sums import DifferenceEstimate, DifferenceSums, student
+
+AnyCost = TypeVar("AnyCost")
 
 
 @dataclass(frozen=True)
-class Repeated:
-    """A setting whose picture is read: its files, one for each repeat."""
+class Study(Generic[AnyCost]):
+    """Results of a study: its record, ``cost.json``, and its images.
 
-    given: TimedPicture
-    pictures: Pictures
+    ``reference`` is (H, W, 3). ``settings`` are the given pictures, by the names of an engine's
+    settings; ``methods`` are ``{method: (H, W, 3)}``, one rendering with the most samples of each.
+    """
 
-    @property
-    def images(self) -> list[Floats]:
-        """The repeats, each (H, W, 3)."""
-        return [file.image for file in self.pictures.files]
+    record: AnyCost
+    reference: Floats
+    settings: Mapping[str, Floats] = field(default_factory=dict)
+    methods: Mapping[str, Floats] = field(default_factory=dict)
 
 
-def read(times: EngineTimes, options: Options) -> tuple[Repeated, ...]:
+@dataclass(frozen=True)
+class Truth:
+    """What settings are judged by: the passes of a reference, and the pixels (H, W) that count.
+
+    ``reference.grouped`` holds groups of its passes, of which no other image is taken off.
+    ``light`` is the reference before its tone map, if it has one. ``edges`` and ``textbook`` are as
+    for :func:`fotismos.comparisons.pictures.agreement`.
+    """
+
+    reference: DifferenceEstimate
+    counted: NDArray[np.bool_]
+    viewing: Viewing
+    light: Light | None = None
+    edges: Sequence[Floats] = ()
+    textbook: Floats | None = None
+
+
+def front_of_pictures(
+    options: Options, times: EngineTimes, name: str, command: str = ""
+) -> Study[EngineCost]:
+    """Judge the pictures of settings by reference pictures, without a scene.
+
+    Options name the reference. ``name`` is that of the study, and ``command`` repeats it. Raises
+    `InputError` if a picture cannot be read, if they differ in size, or if an option needs a scene.
+    """
+    require_no_scene(options)
+    given = read(times, with_files(options))
+    reference = given.reference
+    if reference is None:
+        raise InputError("pictures without a scene need a `reference`: give one, or a scene.")
+    truth = _truth(reference, given.where(), options)
+    engine = judged(given, times, truth, options.allow_empty)
+    floor = None
+    if reference.passes is not None:
+        mean = truth.reference.mean
+        distances = LEADING.against(mean, truth.counted, truth.viewing)
+        floor = LEADING.mean(distances(mean + truth.reference.noise))
+    record = EngineCost(
+        scene=name,
+        resolution=reference.size,
+        reference_picture=reference.record(),
+        noise_floor=floor,
+        engine=engine,
+        viewing=options.viewing,
+        pixels=Pixels(counted=int(truth.counted.sum()), total=truth.counted.size),
+        warnings=tuple(unknown_noise(GivenPictures(reference=reference))),
+        versions=versions(PICTURE_LIBRARIES),
+        command=command,
+    )
+    return Study(record=record, reference=truth.reference.mean, settings=shown(given, times))
+
+
+def _truth(reference: Pictures, counted: NDArray[np.bool_], options: Options) -> Truth:
+    """Return reference pictures as passes, shown by the tone map of the others."""
+    sums: DifferenceSums
+    if options.tone_map is None:
+        sums = DifferenceSums(counted)
+    else:
+        sums = MappedReference(counted, TONE_MAPS[options.tone_map])
+    passes = reference.passes or FEWEST
+    half = PictureHalf(reference, passes)
+    for number in range(passes):
+        sums.add(half.render(number))
+    return Truth(
+        reference=sums.estimate(),
+        counted=counted,
+        viewing=options.viewing,
+        light=sums.light() if isinstance(sums, MappedReference) else None,
+    )
+
+
+def read(times: EngineTimes, options: Options) -> GivenPictures:
     """Read the pictures of all settings; InputError if they cannot be put on one front."""
-    known = {name for method in all_methods() for name in (method.name, *method.names)}
-    settings = []
-    for given in times.pictures:
-        if given.name in known:
-            raise InputError(f"{given.name!r} is a method of the study: give another name.")
-        names = matching([given.pattern])
-        files = tuple(read_file(name, options.transfer, options.over) for name in names)
-        found = Pictures(names=names, files=files, transfer=options.transfer)
-        settings.append(Repeated(given=given, pictures=found))
-    _require_one_size(settings)
-    for setting in settings:
-        count = len({image.tobytes() for image in setting.images})
+    given = read_all(options, [matching(picture.patterns) for picture in times.pictures])
+    for picture, pictures in zip(times.pictures, given.settings, strict=True):
+        images = [file.image for file in pictures.files]
+        count = len({image.tobytes() for image in images})
         # As many as there are: noise. One: a renderer without noise. Else a seed came twice.
-        if 1 < count < len(setting.images):
+        if 1 < count < len(images):
             raise InputError(
-                f"{setting.given.pattern}: {len(setting.images)} repeats, of which only {count}"
+                f"{', '.join(picture.patterns)}: {len(images)} repeats, of which only {count}"
                 " differ. Give each its own seed."
             )
-    return tuple(settings)
+    return given
 
 
-def _require_one_size(settings: Sequence[Repeated]) -> None:
-    first = settings[0]
-    height, width = first.images[0].shape[:2]
-    for setting in settings:
-        for name, image in zip(setting.pictures.names, setting.images, strict=True):
-            rows, columns = image.shape[:2]
-            if (rows, columns) != (height, width):
-                raise InputError(
-                    f"{name} has {columns}x{rows} pixels, and {first.pictures.names[0]}"
-                    f" {width}x{height}: give pictures of one size."
-                )
+def shown(given: GivenPictures, times: EngineTimes) -> dict[str, Floats]:
+    """Return the first picture of each setting, by its name."""
+    settings = zip(times.pictures, given.settings, strict=True)
+    return {picture.name: pictures.files[0].image for picture, pictures in settings}
 
 
-def at_their_size(source: Source, options: Options, settings: Sequence[Repeated]) -> Options:
-    """Return options whose resolution is that of the pictures, as the scene's film allows it."""
-    given = GivenPictures(image=settings[0].pictures)
-    film = film_size(source.parse(), options.sensor)
-    return at_size_of_pictures(film, given, options)
-
-
-def judged(settings: Sequence[Repeated], times: EngineTimes, found: Measurements) -> Engine:
+def judged(
+    given: GivenPictures, times: EngineTimes, truth: Truth, allow_empty: bool = False
+) -> Engine:
     """Return the settings with their errors, on a front of their own."""
-    textbook = np.array(found.ready.heuristic.sampled(TEMPLATE_SPP).render(0), float)
-    edges = [found.ready.geometry_edges(), picture_edges(textbook)]
-    judged = [_setting(setting, times, found, edges, textbook) for setting in settings]
+    settings = [
+        _setting(picture, GivenPictures(image=pictures, reference=given.reference), truth,
+                 times.kernel_s, allow_empty)
+        for picture, pictures in zip(times.pictures, given.settings, strict=True)
+    ]  # fmt: skip
     return Engine(
-        settings=fronted(judged),
+        settings=fronted(settings),
         machine=times.machine,
         kernel_s=times.kernel_s,
     )
 
 
 def _setting(
-    setting: Repeated,
-    times: EngineTimes,
-    found: Measurements,
-    edges: Sequence[Floats],
-    textbook: Floats,
+    picture: TimedPicture,
+    given: GivenPictures,
+    truth: Truth,
+    kernel_s: float | None,
+    allow_empty: bool,
 ) -> EngineSetting:
-    """Return a setting with its error; ``edges`` and ``textbook`` are as for `agreement`."""
-    seconds = setting.given.seconds
-    summaries = [_summary(image, found) for image in setting.images]
+    """Return a setting with its error; ``given`` has its pictures, and the reference's if given."""
+    pictures = given.image
+    assert pictures is not None, "a setting has pictures"
+    summaries = [_summary(file.image, truth) for file in pictures.files]
     error = of_repeats(
         [Interval(value=one.debiased, low=one.low, high=one.high) for one in summaries]
     )
@@ -134,32 +196,40 @@ def _setting(
     visible = tuple(_share(of_threshold) for of_threshold in shares)
     passing = [share.threshold for share in visible if decide(visible, share.threshold) == "pass"]
     images = Images(
-        heuristic=setting.pictures.mean,
-        reference=found.reference.mean,
-        reference_stderr=found.reference.standard_error,
+        heuristic=pictures.mean,
+        reference=truth.reference.mean,
+        reference_stderr=truth.reference.standard_error,
         maps={},
-        significant=np.zeros_like(found.ready.counted),
-        counted=found.ready.counted,
+        significant=np.zeros_like(truth.counted),
+        counted=truth.counted,
+        light=truth.light,
     )
-    given = GivenPictures(image=setting.pictures)
-    agreed = agreement(setting.pictures, images, edges, Names(), textbook)
-    agreed = structs.replace(agreed, odd=(*agreed.odd, *unknown_noise(given)))
+    doubt = caution(
+        images.heuristic[truth.counted],
+        images.reference[truth.counted],
+        name=picture.name,
+        allow_empty=allow_empty,
+        is_picture=True,
+    )
+    agreed = agreement(pictures, images, truth.edges, Names(), truth.textbook)
+    odd = [*agreed.odd, *same_files(given), *unknown_noise(GivenPictures(image=pictures))]
+    agreed = structs.replace(agreed, odd=(*([doubt] if doubt else []), *odd))
     return EngineSetting(
-        method=setting.given.name,
-        seconds=Interval(value=seconds, low=seconds, high=seconds),
+        method=picture.name,
+        seconds=Interval(value=picture.seconds, low=picture.seconds, high=picture.seconds),
         error=MeanError(value=error.value, low=max(error.low, 0.0), high=error.high),
         visible=visible,
         passes_at=min(passing, default=None),
         p95=float(np.mean([one.p95 for one in summaries])),
-        ratio=None if times.kernel_s is None else seconds / times.kernel_s,
-        picture=setting.pictures.record(),
+        ratio=None if kernel_s is None else picture.seconds / kernel_s,
+        picture=pictures.record(),
         agreement=agreed,
     )
 
 
-def _summary(image: Floats, found: Measurements) -> Summary:
+def _summary(image: Floats, truth: Truth) -> Summary:
     """Return the ΔE2000 of one picture to the reference, whose noise is taken out."""
-    reference = found.reference
+    reference = truth.reference
     # The groups hold means of the reference's passes; wanted are differences from it.
     places = reference.grouped.places
     means = image.reshape(-1, 3)[places] - reference.grouped.means
@@ -167,8 +237,8 @@ def _summary(image: Floats, found: Measurements) -> Summary:
         LEADING,
         image,
         reference.mean,
-        found.ready.counted,
-        viewing=found.options.viewing,
+        truth.counted,
+        viewing=truth.viewing,
         noise=reference.noise,
         grouped=replace(reference.grouped, means=means),
     )

@@ -5,14 +5,19 @@ A method passes at a tolerance t if at most 5 % of the pixels of its image excee
 is too close to call.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from math import ceil, sqrt
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from msgspec import structs
 
-from fotismos.comparisons.cost.cost_record import FrontPoint, Point, TimedMethod
+from fotismos.comparisons.cost.engine_record import FrontPoint
 from fotismos.reference.records import Interval, Record
+
+if TYPE_CHECKING:  # pictures have no methods
+    from fotismos.comparisons.cost.cost_record import Point, TimedMethod
 
 OnFront = TypeVar("OnFront", bound=FrontPoint)
 

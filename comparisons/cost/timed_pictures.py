@@ -38,14 +38,14 @@ def seconds_of(text: str) -> float:
 
 @dataclass(frozen=True)
 class TimedPicture:
-    """A setting: its name, the time of its picture, and the pattern of the picture's files.
+    """A setting: its name, the time of its picture, and patterns of the picture's files.
 
     ``word`` is how it was given.
     """
 
     name: str
     seconds: float
-    pattern: str
+    patterns: tuple[str, ...]
     word: str
 
     @classmethod
@@ -69,7 +69,7 @@ class TimedPicture:
             if not name.strip() or not pattern.strip():
                 missing = "picture" if name.strip() else "name"
                 raise InputError(f"{word!r} has no {missing}: {FORM}.")
-            return cls(name=name.strip(), seconds=seconds, pattern=pattern, word=word)
+            return cls(name=name.strip(), seconds=seconds, patterns=(pattern,), word=word)
         if refusal:
             raise InputError(f"{word!r}: {refusal} A picture with its time: {FORM}.")
         raise InputError(f"{word!r} has no time, which a front needs: {FORM}.")
@@ -80,36 +80,45 @@ class EngineTimes:
     """Settings with their times, the machine that they were measured on, and the kernel's time.
 
     ``machine`` is in the user's words, and empty if not known. ``kernel_time`` is the time of the
-    textbook kernel on that machine, as it was typed.
+    textbook kernel on that machine, as it was typed. Raises `InputError` for a name that is given
+    twice, or what is not a time.
     """
 
     pictures: tuple[TimedPicture, ...]
     machine: str = ""
     kernel_time: str | None = None
 
-    @classmethod
-    def of(
-        cls, words: Sequence[str], machine: str | None, kernel_time: str | None
-    ) -> "EngineTimes | None":
-        """Return what a user typed; None without pictures, which the others need."""
-        if not words:
-            if machine or kernel_time:
-                raise InputError(
-                    f"machine {machine or kernel_time!r}: it says what given times are of."
-                    f" Give a picture: {FORM}."
-                )
-            return None
-        if kernel_time is not None:
-            seconds_of(kernel_time)
-        pictures = tuple(map(TimedPicture.of, words))
-        names = [picture.name for picture in pictures]
+    def __post_init__(self) -> None:
+        if self.kernel_time is not None:
+            seconds_of(self.kernel_time)
+        names = [picture.name for picture in self.pictures]
         for name in names:
             if names.count(name) > 1:
                 raise InputError(
                     f"{names.count(name)} pictures are called {name!r}: give each setting a name of"
                     " its own; repeats of one setting share a pattern."
                 )
-        return cls(pictures=pictures, machine=machine or "", kernel_time=kernel_time)
+
+    @classmethod
+    def of(
+        cls, words: Sequence[str], machine: str | None, kernel_time: str | None
+    ) -> "EngineTimes | None":
+        """Return what a user typed; None without pictures, which the others need."""
+        return cls.given([TimedPicture.of(word) for word in words], machine, kernel_time)
+
+    @classmethod
+    def given(
+        cls, pictures: Sequence[TimedPicture], machine: str | None, kernel_time: str | None
+    ) -> "EngineTimes | None":
+        """Return the settings with what their times are of; None without pictures."""
+        if pictures:
+            return cls(pictures=tuple(pictures), machine=machine or "", kernel_time=kernel_time)
+        if machine or kernel_time:
+            raise InputError(
+                f"machine {machine or kernel_time!r}: it says what given times are of."
+                f" Give a picture: {FORM}."
+            )
+        return None
 
     def as_options(self) -> dict[str, Any]:
         """Return the options of the command that gives the same."""

@@ -1,4 +1,4 @@
-"""Mark the pixels that are shown to differ, and those left undetermined.
+"""Mark the pixels that are certain to differ, and those left undetermined.
 
 **The guarantee.** The expected share of wrong marks among all marks is at most `LEVEL`. If the two
 images do not differ at all, the chance of any mark is at most `LEVEL`.
@@ -96,8 +96,8 @@ def find(
     ``difference`` is the test image (H, W, 3) less the reference, pass by pass. Pixels that are not
     ``counted`` (H, W) are 0. ``distance(test, reference) -> (N,)`` takes linear colours (N, 3), and
     is in the unit of `VISIBLE`. ``exact`` says that only the positions of camera rays are random,
-    and both images share them; not ``is_random``, that both are single pictures, whose passes show
-    no noise: it is then taken to be independent in cells of a few pixels. ``level`` replaces
+    and both images share them. ``is_random`` is false for two single pictures, whose passes show no
+    noise; it is then taken to be independent in cells of a few pixels. ``level`` replaces
     `LEVEL`; blocks take the same share of it.
     """
     test = np.asarray(test)
@@ -143,8 +143,9 @@ def find(
 CELL = 4
 CELLS = 4
 TYPICAL = 0.86
-"""Side of the cells whose noise is taken to be independent, in pixels; cells along a tile; and the
-median of five times the share of squares between quarters, of Beta(3/2, 6), if it is."""
+"""Side in pixels of the cells whose noise is taken to be independent, and cells along a tile. If it
+is independent, TYPICAL is the median of five times the share of squares between quarters, which
+follows Beta(3/2, 6)."""
 
 
 def _is_even(difference: Array, counted: Array) -> bool:

@@ -209,6 +209,11 @@ def drawn() -> dict[str, Metric]:
     return {name: metric for name, metric in METRICS.items() if metric.drawn}
 
 
+def declared() -> dict[str, Metric]:
+    """Return the drawn metrics that are not the package's own: a page has their maps, too."""
+    return {name: metric for name, metric in drawn().items() if not METRICS.is_builtin(metric)}
+
+
 def _float(image: ArrayLike) -> Array:
     values = np.asarray(image)
     return values if values.dtype == np.float32 else values.astype(np.float64, copy=False)
@@ -228,7 +233,7 @@ def checked_pair(test: ArrayLike, reference: ArrayLike) -> tuple[Array, Array]:
             " give both as (height, width, 3)."
         )
     require_finite(test, "test image")
-    require_finite(reference, "reference image")
+    require_finite(reference, "reference picture")
     return test, reference
 
 

@@ -72,6 +72,12 @@ class ObjectShare(Region):
     material: str = ""
 
 
+def worst_pixel(error: ArrayLike, counted: ArrayLike) -> tuple[int, int]:
+    """Return column and row of the counted pixel with the largest of a map of ΔE2000 (H, W)."""
+    row, column = np.unravel_index(np.argmax(np.where(counted, error, -1.0)), np.shape(error))
+    return int(column), int(row)
+
+
 def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
     """Return the regions of a map of ΔE2000 (H, W) ≥ 0, of greatest worth first.
 

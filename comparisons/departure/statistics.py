@@ -19,6 +19,7 @@ from fotismos.comparisons.departure.metrics import (
     checked_pair,
     log2_luminance_ratio,
 )
+from fotismos.comparisons.departure.minimum import minimum
 from fotismos.comparisons.departure.noise import VisibleShare, debiased, exactly, roughly
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Amount, Positive, Record
@@ -222,8 +223,6 @@ def best_exposure(
     multiple of the reference gives that multiple exactly. 1 if no pixel counts or if either image
     has no positive value.
     """
-    from scipy.optimize import minimize_scalar
-
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
     if not isinstance(metric, Pixelwise):
@@ -251,10 +250,11 @@ def best_exposure(
     some = np.broadcast_to(truth[:_BRACKET_PIXELS], bracketing.shape)
     at_stops = metric.against(some, ..., viewing)(bracketing)
     start = whole_stops[np.argmin([metric.mean(at_stop) for at_stop in at_stops])]
-    bounds = max(start - 1.0, -EXPOSURE_STOPS), min(start + 1.0, EXPOSURE_STOPS)
-    finest = minimize_scalar(mean_at, bounds=bounds, method="bounded", options={"xatol": 1e-3})
+    low = max(start - 1.0, -EXPOSURE_STOPS)
+    high = min(start + 1.0, EXPOSURE_STOPS)
+    finest, _ = minimum(mean_at, low, high, tolerance=1e-3)
     least_squares = np.log2(least_squares_factor(shown, truth))
-    candidates = [0.0, float(np.clip(least_squares, -EXPOSURE_STOPS, EXPOSURE_STOPS)), finest.x]
+    candidates = [0.0, float(np.clip(least_squares, -EXPOSURE_STOPS, EXPOSURE_STOPS)), finest]
     return float(2.0 ** min(candidates, key=mean_at))
 
 

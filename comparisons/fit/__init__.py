@@ -1,4 +1,4 @@
-"""Fitting the heuristic model's parameters to the reference.
+"""Fitting the textbook model's parameters to the reference.
 
 Is the model wrong, or only its parameters?
 """

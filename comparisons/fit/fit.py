@@ -1,4 +1,4 @@
-"""Fitting the heuristic half of a scene to its reference.
+"""Fitting the textbook half of a scene to its reference.
 
 The loss at the best parameters is the *model error*: no other values would remove it. The part that
 they removed is the *parameter error* of the pairing table. Both refer to the loss that was
@@ -122,7 +122,7 @@ def fit(
     progress: Progress | None = None,
     command: str = "",
 ) -> Fit:
-    """Fit the heuristic half of a scene to its reference, in the current variant.
+    """Fit the textbook half of a scene to its reference, in the current variant.
 
     ``loss`` is a name in :data:`fotismos.comparisons.fit.search.LOSSES`; ``forms`` are forms of the
     lobe. The resolution and samples are :data:`RESOLUTION` and :data:`SPP` if omitted. Films get a

@@ -87,7 +87,7 @@ def bounds(parameters: Sequence[FitParameter]) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Surface:
-    """All of an image of the heuristic half but its parameters.
+    """All of an image of the textbook half but its parameters.
 
     The paired materials are in plain numbers; a coefficient with a texture is 1, a factor on it.
     ``samples`` of each material are those that see it from the side that is shaded, as arrays
@@ -115,7 +115,7 @@ class Surface:
 
 
 def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
-    """Return the surface that passes of a heuristic half with these seeds see.
+    """Return the surface that passes of a textbook half with these seeds see.
 
     The half has Phong shading and a box filter.
     """
@@ -130,7 +130,7 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
             scene,
             eye,
             pass_spp=renderer.pass_spp,
-            label="heuristic samples",
+            label="textbook samples",
             is_traced=True,  # else it would see nothing
         )
         # The passes: each gives the fixed light as its image, and its samples.
@@ -342,7 +342,7 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
 
 
 class PhongModel:
-    """The heuristic half of a scene as a function of its parameters, for one form of the lobe.
+    """The textbook half of a scene as a function of its parameters, for one form of the lobe.
 
     An image is that of the pixels of a mask (N), of which each material has ``reached`` some.
     ``vector`` is the type of the kernel's arrays, such as one of double precision.
@@ -466,9 +466,9 @@ class PhongModel:
 
 
 class OwnModel:
-    """The heuristic half of a scene as a function of the parameters that a heuristic declares.
+    """The textbook half of a scene as a function of the parameters that a heuristic declares.
 
-    An image is a rendering: the passes of the heuristic half, with the reference's seeds, over the
+    An image is a rendering: the passes of the textbook half, with the reference's seeds, over the
     pixels of a mask (H, W). Dr.Jit differentiates it in forward mode, through the user's code. A
     step function has no derivative; that is one more reason for several starts.
     """

@@ -49,12 +49,12 @@ SMOOTH = 1.0
 
 LARGEST_COUNT = 60
 LARGEST_DAMPING = 1e12
-"""Evaluations of one search, and the damping at which it ends."""
+"""A search ends after so many evaluations, or at this damping."""
 
 TOLERANCE = 1e-7
 SMALLEST_GAIN = 1e-14
-"""A search has converged when a step is expected to lower the loss by less than this part of it, or
-by less than the latter, in its own unit, for images that the model can make exactly."""
+"""A search has converged when the next step is expected to lower the loss by less than the share
+TOLERANCE of it, or by less than SMALLEST_GAIN: a model that makes the image exactly has no loss."""
 
 AT_BOUND = 1e-5
 """Share of the distance between two bounds; anything nearer to a bound is at it."""

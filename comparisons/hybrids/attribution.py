@@ -71,34 +71,34 @@ from fotismos.reference.scene.source import Source
 WIDTH = 48
 NARROW = 32
 MANY = 64
-"""Width of the images that causes are found in, at most, and that for more than MANY lights or
-shapes: each sample takes longer there."""
+"""Largest width of the images in which causes are found. With more than MANY lights or shapes it is
+NARROW, since each sample takes longer."""
 
 REPLICATES = 4
 SPP = 64
 FEW_SPP = 32
 EXACT_SPP = 16
-"""Replicates of each image, samples per pixel of each, those for MANY lights or shapes, and those
-where plans are exact: only the pixel filter needs them. With 16 instead of 64, skewed noise left
-2 % of the Cornell box's departure in the closure."""
+"""Replicates of each image, and samples per pixel of each: FEW_SPP with MANY lights or shapes, and
+EXACT_SPP where only the pixel filter needs samples. With 16 in place of 64, skewed noise left 2 %
+of the Cornell box's error in the closure."""
 
 EXACT_EFFECTS = 4
 ORDERS = 8
-"""Largest number of effects for which every subset is rendered, and orders drawn for more."""
+"""Up to EXACT_EFFECTS effects every subset is rendered; for more, ORDERS orders are drawn."""
 
 BIAS = 0.005
-"""Half an interval of what an effect removes, at least, as a share of the departure: some noise is
-not taken away (:meth:`ErrorMeter.without_noise`)."""
+"""Least half width of the interval of what an effect removes, as a share of the departure: some
+noise is not taken away (:meth:`ErrorMeter.without_noise`)."""
 
 SLOWEST = float(np.sqrt(4 / 3))
-"""Growth of the noise with half of the samples, at least, by which it is extrapolated."""
+"""Least growth of the noise with half of the samples that noise is extrapolated by."""
 
 MORE = 4
 PATIENCE = 2
 AFFORDABLE = 2**24
-"""Factor of more samples for causes that do not add up; all of their images have at most PATIENCE
-times the comparison's own samples, or AFFORDABLE ones. Not seconds: a result must not depend on how
-busy the machine was."""
+"""If causes do not add up, they take MORE times the samples, up to PATIENCE times the comparison's
+own samples, or AFFORDABLE ones, over all images. The limit is not in seconds: a result must not
+depend on how busy the machine was."""
 
 CLOSED = 0.025
 """Largest closure, as a share of the departure, that needs no more samples; its interval may have
@@ -171,7 +171,7 @@ def find(
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
     reference = Renderer(
-        ready.scene, ready.reference.integrator, pass_spp=spp, label="reference image", size=size
+        ready.scene, ready.reference.integrator, pass_spp=spp, label="physical picture", size=size
     )
     try:
         while True:

@@ -1,8 +1,8 @@
-"""Hybrids: images in which some effects are simulated, the others as in the heuristic half.
+"""Hybrids: images in which some effects are simulated, the others as in the textbook half.
 
 The halves of a pair differ in a few effects. Any subset of them makes a scene: the physical half
 with the BSDFs, lights and environment of the heuristic one where an effect is left out. Emission
-and ambient light of the heuristic half are not transported light. They are a pass of their own, of
+and ambient light of the textbook half are not transported light. They are a pass of their own, of
 what a camera ray meets, which is added.
 
 Every image is rendered in a few replicates, each with its own seed, which all images share. So
@@ -100,7 +100,7 @@ class Pairs:
         )
 
     def effects(self, differences: Iterable[Effect]) -> tuple[Effect, ...]:
-        """Return the effects in which the heuristic half as requested differs from the reference.
+        """Return the effects in which the textbook half as requested differs from the reference.
 
         ``differences`` are those of the pair with the scene's own geometry, in this variant.
         """
@@ -201,7 +201,7 @@ class HybridScenes:
 
 
 class HybridImages:
-    """The images between the heuristic half as requested and the reference, each rendered once.
+    """The images between the textbook half as requested and the reference, each rendered once.
 
     Of each image there are ``replicates``, at least 3, with ``replicate_spp`` samples per pixel,
     and of a ``size`` of (width, height). ``scenes`` are in the reference's variant. Images are
@@ -382,7 +382,7 @@ class HybridImages:
         """Return the means (f H, f W, 3) of images' replicates, with less noise if possible.
 
         ``clean`` are the reference (H', W', 3) on a film of at least the preview's size, and its
-        standard error. All images share camera rays and paths, so what the full plan's replicates
+        standard error. All images share camera rays and paths, so what the whole plan's replicates
         F deviate from the clean C tells part of the noise of an image X (a control variate)::
 
             X - beta (F - C),  beta = cor(X, F) sqrt(var X / (var F + var C))

@@ -4,14 +4,14 @@ Each field's metadata has ``unit`` and ``description``; the schema's has ``title
 TOML text) and ``versions`` (JSON). No time or place is recorded, so equal studies give equal files.
 """
 
+from __future__ import annotations
+
 import json
 from math import isclose
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from msgspec.structs import replace
 
 from fotismos.comparisons.atomic import require_regular
@@ -21,8 +21,12 @@ from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO
 from fotismos.comparisons.study.design import OWN, StudyFile
 from fotismos.comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
-from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.errors import InputError, InstallationError, unknown
+from fotismos.heuristic.program import installation
 from fotismos.reference.planning.effects import PRUNED
+
+if TYPE_CHECKING:
+    import pyarrow as pa  # loaded late: see arrow()
 
 Row: TypeAlias = dict[str, Any]
 """Values by column."""
@@ -32,7 +36,7 @@ Column: TypeAlias = tuple[str, str, type]
 """A column's unit (``1`` for pure numbers), its meaning, and its Python type."""
 
 STEPS = ("form", *(effect.label for effect in PRUNED))
-"""The steps between the halves, in the order in which they are added to the heuristic image: the
+"""The steps between the halves, in the order in which they are added to the textbook picture: the
 form of BSDFs and lights, then one effect after another."""
 
 DIMMED = {"quarter": 1 / 4, "sixteenth": 1 / 16}
@@ -62,14 +66,14 @@ def results() -> dict[str, Column]:
     name = LEADING.name
     label = LEADING.label
     numbers = {
-        "heuristic": f"mean of the heuristic image, {LUMINANCE}",
-        "reference": f"mean of the reference, {LUMINANCE}",
+        "heuristic": f"mean of the textbook picture, {LUMINANCE}",
+        "reference": f"mean of the physical picture, {LUMINANCE}",
         name: LEADING.heading,
         f"{name}_p95": f"{label}, 95th percentile",
         f"{name}_noise": f"{label} that the noise of the comparison alone would cause",
         f"{name}_shape": f"{label}, mean, after the best exposure",
         **{f"{name}_{part}": f"{label}, mean, under a {part} of the light" for part in DIMMED},
-        "exposure": f"factor on the heuristic image that minimises {label}",
+        "exposure": f"factor on the textbook picture that minimises {label}",
         **{name: metric.heading for name, metric in METRICS.items()},
     }
     changes = {
@@ -78,7 +82,7 @@ def results() -> dict[str, Column]:
     }
     return {
         **{key: ("1", meaning, float) for key, meaning in numbers.items()},
-        RATIO.name: (RATIO.unit, "mean ratio of luminances, heuristic to reference", float),
+        RATIO.name: (RATIO.unit, "mean ratio of luminances, textbook to physical", float),
         **{key: ("1", meaning, float) for key, meaning in changes.items()},
         "dominant": ("", f"the largest of {', '.join(STEPS[:-1])} and {STEPS[-1]}", str),
         **{
@@ -136,8 +140,22 @@ def measure(
 # --- The file -------------------------------------------------------------------------------------
 
 
+def arrow() -> Any:
+    """Return the module pyarrow, an extra; `InstallationError` if it is not installed."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError as error:
+        raise InstallationError(
+            "pyarrow is not installed, and a study writes its dataset with it. Install it:"
+            f" {installation('pyarrow')}"
+        ) from error
+    return pyarrow
+
+
 def table(study: StudyFile, rows: list[Row]) -> pa.Table:
     """Return the rows of a study; columns without any value are omitted."""
+    pa = arrow()
     present = {name for row in rows for name, value in row.items() if value is not None}
     present |= {"part", "point", "error"}
     meanings = {True: "parameter that the heuristic declares",
@@ -160,17 +178,19 @@ def table(study: StudyFile, rows: list[Row]) -> pa.Table:
 
 def file_of(data: pa.Table) -> bytes:
     """Return the Parquet file of a table."""
+    pa = arrow()
     stream = pa.BufferOutputStream()
-    pq.write_table(data, stream, compression="zstd", write_page_checksum=True)
+    pa.parquet.write_table(data, stream, compression="zstd", write_page_checksum=True)
     content: bytes = stream.getvalue().to_pybytes()
     return content
 
 
 def read(path: str | Path) -> pa.Table:
     """Read a dataset; ``InputError`` if it is missing, damaged, or not one of a study."""
+    pa = arrow()
     try:
         require_regular(path)
-        data = pq.read_table(path, page_checksum_verification=True)
+        data = pa.parquet.read_table(path, page_checksum_verification=True)
         data.validate(full=True)
         missing = {"part", "point", "error"} - set(data.column_names)
         if missing:

@@ -4,6 +4,8 @@ Each finished point is saved at once in its own file, named by everything that i
 run that ends early loses nothing, and the next one repeats nothing.
 """
 
+from __future__ import annotations
+
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,10 +14,10 @@ from hashlib import sha256
 from itertools import pairwise
 from numbers import Real
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import mitsuba as mi
 import numpy as np
-import pyarrow as pa
 
 from fotismos.comparisons.atomic import Entry
 from fotismos.comparisons.case import RGB, open_case
@@ -40,6 +42,9 @@ from fotismos.reference.rendering.sums import Accumulator
 from fotismos.reference.scene.graph import Graph, set_variant
 from fotismos.reference.scene.source import Source, digest
 from fotismos.reference.scene.values import COLOURS
+
+if TYPE_CHECKING:
+    import pyarrow as pa  # loaded late: it is an extra
 
 POINTS = "points"
 """Folder of finished points."""
@@ -241,12 +246,12 @@ def _rendered(point: StudyPoint) -> tuple[Row, sheet.Pictures]:
     for name, value in tuned.items():
         parameters[name] = value
     parameters.update()
-    # The heuristic half, then one image per step; the last is the reference.
+    # The textbook half, then one image per step; the last is the reference.
     renderers = [heuristic]
     plans = _plans(ready.plan)
     for stage in plans.values():
         integrator = physical_integrator(stage, scene, ready.pair.hide_emitters)
-        renderers.append(Renderer(scene, integrator, pass_spp=spp, label="reference image"))
+        renderers.append(Renderer(scene, integrator, pass_spp=spp, label="physical picture"))
     sums = [Accumulator() for _ in renderers]
     difference = Accumulator()
     for rendered in passes(renderers, part.options.seed, PASSES):

@@ -19,6 +19,7 @@ from nbclient import NotebookClient
 from docs.figures import (
     accuracy,
     audits,
+    charts,
     density,
     engines,
     examples,
@@ -29,10 +30,12 @@ from docs.figures import (
     measured,
     model_figures,
     other_tools,
+    photograph,
     prices,
     renderers,
     rooms,
     schemes,
+    study_sheet,
     two_pictures,
 )
 from docs.figures.from_tests import ROOT, fact
@@ -40,7 +43,6 @@ from docs.website import build
 from fotismos.comparisons import atomic
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.comparison import Images
-from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.gallery.builtin import builtin
 from fotismos.comparisons.options import Options
 from fotismos.heuristic import plugins
@@ -51,8 +53,6 @@ from fotismos.reports.charts import figures, vega
 from fotismos.reports.charts.cost_charts import titled
 from fotismos.reports.files import images
 from fotismos.reports.run import audit_files
-from fotismos.reports.terminal import tables
-from fotismos.reports.terminal.words import number, percent
 
 DOCS = ROOT / "docs"
 SIDE, SAMPLES = 192, 64
@@ -99,10 +99,12 @@ def main(words: Sequence[str]) -> None:
     _guarantees()
     replace("plans.md", "rules", rules())
     _hero()
+    _page()
+    _study()
     _models()
     _architecture()
-    _example()
     _witnesses()
+    _charts()
     _shaders()
     _renderers()
     _audits()
@@ -141,15 +143,33 @@ def marks(part: str) -> tuple[str, str]:
     return f"<!-- {part}: made by ./run docs -->", f"<!-- end of {part} -->"
 
 
+LEFT_OUT = {
+    "light by light": (
+        "the noise of picking one light at random. The sum over all lights is the mean of one light"
+        " divided by its probability."
+    ),
+    "no shadow rays": (
+        "shadow rays, because no shape can stand between a light and a reflecting surface."
+    ),
+    "direct light alone": (
+        "interreflection, because no point of a reflecting surface sees another one."
+    ),
+    "environment from a table": (
+        "the noise of the environment: what is reflected is its radiance times an albedo."
+    ),
+}
+"""What each rule of pruning leaves out, and why it may."""
+
+
 def rules() -> Iterator[str]:
-    """Yield the rules of pruning: what each omits, its proof, and its premises, numbered once."""
+    """Yield the rules of pruning: what each leaves out, and its premises, numbered once."""
     numbers: dict[str, int] = {}
     for rule in RULES:
         known = ", ".join(str(numbers[p.sentence]) for p in rule.premises if p.sentence in numbers)
         if rule is not RULES[0]:
             yield ""
         yield f"### {rule.name[0].upper()}{rule.name[1:]}"
-        yield from ("", f"*Absent:* {rule.absent}.", "", f"*Proof.* {rule.proof}", "")
+        yield from ("", f"*Left out:* {LEFT_OUT[rule.name]}", "")
         yield f"*Premises*{' ' * bool(known)}{known}:"
         yield ""
         for premise in rule.premises:
@@ -189,7 +209,7 @@ def _sheet(name: str, titles: Sequence[str], rows: Sequence[Sequence[Any]]) -> N
 
 
 def _hero() -> None:
-    """Draw the README's first picture, and write its caption."""
+    """Draw the picture of docs/reading.md, and write README's caption, which has its numbers."""
     found = hero.made()
     atomic.write(DOCS / "hero.webp", hero.encoded(hero.picture(found)))
     replace("../README.md", "hero", hero.caption(found))
@@ -219,8 +239,8 @@ def _measurements() -> None:
     replace("models.md", "light counts", light_counts.sentences(shading))
     for measure in (measured.baselines, measured.findings):
         measure()
-    replace("witnesses.md", "noise", fact("intervals_in_noise"))
-    replace("fit.md", "fits", measured.fits())
+    charts.write("noise", fact("intervals_in_noise"))
+    charts.write("fits", measured.fits())
     replace("../README.md", "cost", measured.attribution())
     replace("plans.md", "gains", measured.gains())
     replace("speed.md", "speed", measured.speed())
@@ -229,10 +249,12 @@ def _measurements() -> None:
 def _accuracy() -> None:
     """Study what accuracy costs over many scenes, for 40 minutes on an idle machine."""
     records = accuracy.measured()
-    for part in ("setting", "findings", "methods", "attribution", "pictures"):
+    for part in ("setting", "findings", "attribution", "pictures"):
         replace("accuracy.md", part, getattr(accuracy, part)(records))
-    replace("accuracy.md", "fronts", accuracy.fronts(records))
+    charts.write("methods", accuracy.methods(records))
+    charts.write("fronts", accuracy.fronts(records))
     replace("accuracy.md", "predictions", accuracy.predictions())
+    _charts()
     for record, path in accuracy.charts(records):
         atomic.write(DOCS / path, vega.paper(titled(record)))
 
@@ -252,13 +274,14 @@ def _prices() -> None:
     atomic.write(DOCS / "prices.svg", figures.drawn(prices.chart(records), "svg"))
     for page in ("accuracy.md", "../README.md"):
         replace(page, "prices", prices.sentences(records))
-    replace("accuracy.md", "table of prices", prices.table(records))
+    charts.write("prices", prices.table(records))
     replace("models.md", "complexity", prices.complexity(records))
 
 
 def _guarantees() -> None:
     """List what the tests guarantee."""
-    replace("guarantees.md", "guarantees", guarantees.lines())
+    charts.write("guarantees", guarantees.rows())
+    replace("guarantees.md", "guarantees", guarantees.summary())
 
 
 def _architecture() -> None:
@@ -267,35 +290,28 @@ def _architecture() -> None:
     atomic.write(DOCS / "architecture.svg", figures.drawn(rooms.picture(found), "svg"))
 
 
-def _example() -> None:
-    """Write the example of docs/reading.md: one scene with few and with many samples."""
-    results = []
-    for samples in (16, 256):
-        options = Options(spp=samples, resolution=(256, 256))
-        results.append(compare(builtin("cornell-box").source(), options))
-    atomic.write(DOCS / "reading.png", figures.drawn(figures.strip(results[-1]), "png", 150))
-    replace("reading.md", "example", _departures([result.record for result in results]))
+def _charts() -> None:
+    """Draw the charts of measured tables, and the sentence on intervals in noise."""
+    for name, chart in charts.CHARTS.items():
+        atomic.write(DOCS / f"{name}.svg", figures.drawn(chart(), "svg"))
+    replace("witnesses.md", "noise", charts.intervals())
 
 
-def _departures(records: Sequence[Any]) -> Iterator[str]:
-    """Yield a table of the means of each metric, and what its brackets hold."""
-    rows = [("", *(f"{record.plan.spp} samples per pixel" for record in records))]
-    for name, metric in METRICS.items():
-        means = (
-            f"{number(one.mean)} ({number(one.after_exposure.mean)}; {number(one.noise_floor)})"
-            for one in (record.metrics[name] for record in records)
-        )
-        rows.append((metric.label, *means))
-    rows.append(("significant", *(percent(one.significant.fraction) for one in records)))
-    yield from tables.markdown(rows)
-    yield ""
-    yield "Means over the pixels that see a surface; in brackets the mean after the one exposure"
-    yield "that makes it smallest, and the mean that the reference's noise alone would give."
+def _page() -> None:
+    """Photograph the page of the README's scene."""
+    atomic.write(DOCS / "page.webp", photograph.of_page())
+
+
+def _study() -> None:
+    """Draw both halves of an example study at each of its points."""
+    atomic.write(DOCS / "study.webp", hero.encoded(study_sheet.picture()))
 
 
 def _witnesses() -> None:
     """Run the cases of docs/witnesses.md, and write their results."""
-    for part, lines in fact("witnesses").items():
+    found = fact("witnesses")
+    charts.write("closed-forms", found.pop("closed forms"))
+    for part, lines in found.items():
         replace("witnesses.md", part, lines)
 
 

@@ -168,20 +168,14 @@ def _albedo(roughness: float, cosine: float) -> float:
 
 
 def table(found: dict[str, Audit]) -> Iterator[str]:
-    """Yield the table of checks that do not hold for all: *holds*, or the worst value found."""
-    first = next(iter(found.values()))
-    names = [check.name for check in first.checks]
-    shown = [
-        name
-        for name in names
-        if any(record.named(name).verdict == "does not hold" for record in found.values())
-    ]
-    rows = [
-        (title, *(_cell(record.named(name)) for name in shown)) for title, record in found.items()
-    ]
-    yield from markdown([("", *shown), *rows], right=1)
-    yield ""
-    yield f"Hold for all: {', '.join(name for name in names if name not in shown)}."
+    """Yield a line for each subject: the worst value of each check that does not hold."""
+    for title, record in found.items():
+        failed = [
+            f"{check.name} {number(check.value)}"
+            for check in record.checks
+            if check.verdict == "does not hold"
+        ]
+        yield f"- {title}: {', '.join(failed) or 'all hold'}"
 
 
 def _cell(check: Checked) -> str:

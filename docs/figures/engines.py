@@ -100,8 +100,9 @@ class Measured(Rendered):
     """What an approximation loses on a scene, and costs.
 
     ``visible`` is the share of the pixels above :data:`TOLERANCE`, ``visible_direct`` that against
-    a reference without interreflection, ``de2000`` the mean, and ``stops`` the ratio of the mean
-    luminances on a display.
+    a reference without interreflection, ``de2000`` the mean. ``stops`` is the ratio of the mean
+    luminances on a display, and ``stops_direct`` that to the reference without interreflection: the
+    bias of the whole, and that of direct light.
     """
 
     scene: str
@@ -110,6 +111,7 @@ class Measured(Rendered):
     visible_direct: float
     de2000: float
     stops: float
+    stops_direct: float
 
 
 def measured() -> list[Measured]:
@@ -138,9 +140,15 @@ def on_scene(name: str) -> Iterator[Measured]:
             visible=float(np.mean(errors > TOLERANCE)),
             visible_direct=float(np.mean(to_direct(one.picture) > TOLERANCE)),
             de2000=LEADING.mean(errors),
-            stops=log2(_shown(one.picture[counted]) / _shown(reference[counted])),
+            stops=_stops(one.picture[counted], reference[counted]),
+            stops_direct=_stops(one.picture[counted], direct[counted]),
             **vars(one),
         )
+
+
+def _stops(pixels: Floats, reference: Floats) -> float:
+    """Return how much brighter pixels are than a reference's: 1 is twice as bright."""
+    return log2(_shown(pixels) / _shown(reference))
 
 
 def _shown(pixels: Floats) -> float:
@@ -185,7 +193,7 @@ def lead(rows: Sequence[Measured]) -> Iterator[str]:
         f" their pixels visibly off, by more than {LEADING.label} {TOLERANCE:g}. The nearest is"
         f" {best.approximation} on *{best.scene}*: {percent(best.visible)}. Under lamps, most of"
         " what is missing is light from other surfaces. These shares of ltc's pixels differ from"
-        f" the reference, and from one without that light: {ltc}.",
+        f" the physical picture, and from one without that light: {ltc}.",
         width=110,
     )
 
@@ -220,10 +228,7 @@ def table(rows: Sequence[Measured]) -> Iterator[str]:
     lines = []
     for method in APPROXIMATIONS:
         own = {one.scene: one for one in rows if one.approximation == method.name}
-        cells = (
-            f"{number(own[scene].de2000)} ({own[scene].stops:+.2f})" if scene in own else "–"
-            for scene in SCENES
-        )
+        cells = (_cell(own[scene]) if scene in own else "–" for scene in SCENES)
         time = median(one.time for one in own.values())
         prepare = median(one.prepare_s for one in own.values())
         lines.append((method.name, *cells, f"{time:.2f}", seconds(prepare) if prepare else "–"))
@@ -233,6 +238,11 @@ def table(rows: Sequence[Measured]) -> Iterator[str]:
         f"Pictures are {WIDTH} pixels wide. Times are from {ROUNDS} rounds on"
         f" {machine().processor}, {machine().cores} cores."
     )
+
+
+def _cell(one: Measured) -> str:
+    """Return the mean error, and the bias of direct light and of the whole, in stops."""
+    return f"{number(one.de2000)} ({one.stops_direct:+.2f}; {one.stops:+.2f})"
 
 
 def write(rows: Sequence[Measured], folder: Path) -> None:

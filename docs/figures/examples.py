@@ -77,12 +77,11 @@ def lamp() -> Iterator[str]:
     )
     yield from wrap(
         "[representative_point.py](shaders/representative_point.py) uses `extent` for a lamp's"
-        " highlight, after Karis (2013). On rough plastic under a spherical lamp, a scene that the"
-        f" file holds, the RMSE falls from {matt[0][1]:.3f} to {matt[1][1]:.3f}, and the mean"
-        f" ΔE2000 from {matt[0][0]:.2f} to {matt[1][0]:.2f}. On white metal the RMSE falls,"
-        f" too, from {metallic[0][1]:.2f} to {metallic[1][1]:.2f}, but around the highlight the"
-        f" lobe gets too dark: the mean ΔE2000 rises from {metallic[0][0]:.2f} to"
-        f" {metallic[1][0]:.2f}.",
+        " highlight, after Karis (2013). Under a spherical lamp, the RMSE falls from"
+        f" {matt[0][1]:.3f} to {matt[1][1]:.3f} on rough plastic, and the mean ΔE2000 from"
+        f" {matt[0][0]:.2f} to {matt[1][0]:.2f}. On white metal the RMSE falls from"
+        f" {metallic[0][1]:.2f} to {metallic[1][1]:.2f}, but the lobe gets too dark around the"
+        f" highlight: the mean ΔE2000 rises from {metallic[0][0]:.2f} to {metallic[1][0]:.2f}.",
         width=110,
     )
 

@@ -1,4 +1,4 @@
-"""The list of guarantees in docs/guarantees.md, from the tests that show them.
+"""The list of guarantees, from the tests that show them.
 
 A test, or a class or parametrised function of tests, states its guarantee::
 
@@ -8,6 +8,7 @@ Tests are parsed, not imported.
 """
 
 import ast
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,13 +55,28 @@ def guarantees() -> list[Guarantee]:
     return sorted(found, key=lambda each: places.index(each.area))
 
 
+def rows() -> Iterator[tuple[str, str, str, str, str]]:
+    """Yield the rows of docs/data/guarantees.csv."""
+    yield "area", "guarantee", "test", "file", "slow"
+    for each in guarantees():
+        slow = "slow" if each.is_slow else ""
+        yield AREAS[each.area], each.text, each.test, each.path, slow
+
+
+def summary() -> Iterator[str]:
+    """Yield how many guarantees there are of each area."""
+    counts = Counter(AREAS[each.area] for each in guarantees())
+    areas = ", ".join(f"{area[0].lower()}{area[1:]} ({count})" for area, count in counts.items())
+    yield f"{counts.total()} guarantees: {areas}."
+
+
 def lines() -> Iterator[str]:
-    """Yield the lines of the list."""
-    area, found = None, guarantees()
-    for each in found:
+    """Yield the list for the site, with links to the tests."""
+    area = ""
+    for each in guarantees():
         if each.area != area:
             area = each.area
-            yield from (*([""] if each is not found[0] else []), f"## {AREAS[area]}", "")
+            yield from ("", f"## {AREAS[area]}", "")
         slow = ", `-m slow`" if each.is_slow else ""
         yield f"- {each.text} ([{each.test}](../{each.path}){slow})"
 

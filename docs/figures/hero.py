@@ -1,4 +1,4 @@
-"""The README's first picture: both halves of a scene, the map of the error, and its causes.
+"""The picture of docs/reading.md, and README's caption: halves of a scene, the error, its causes.
 
 It is drawn from the files and the record of `./run compare SCENE`, so its numbers are the page's.
 """
@@ -74,8 +74,8 @@ def caption(hero: Hero) -> Iterator[str]:
     parts = ", ".join(f"{effect} {number(part)}" for effect, part in hero.parts.items())
     yield (
         f"*`{hero.command}`: {percent(hero.visible)} of the pixels differ visibly, by more than"
-        f" {LEADING.label} {TOLERANCE:g}; the mean is {number(hero.mean)}. The bar splits it by the"
-        f" effects that are missing: {parts}.*"
+        f" {LEADING.label} {TOLERANCE:g}; the mean is {number(hero.mean)}. Missing effects"
+        f" make up the mean: {parts}.*"
     )
 
 

@@ -21,7 +21,6 @@ from fotismos.comparisons.steps import with_terms
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Missing
 from fotismos.reports.files import images as files
-from fotismos.reports.terminal.tables import markdown
 
 SIDE, SAMPLES = 64, 1024
 """Size of the pictures whose pixels a lesson names, and samples per pixel."""
@@ -131,18 +130,18 @@ def values(lesson: str) -> Floats:
 
 
 def lines(lesson: str) -> Iterator[str]:
-    """Yield the picture of a lesson, and its table: 8.10 with the numbers put in, both halves."""
-    yield f"![Textbook, physical, and the error: {LESSONS[lesson][0].command}]({file(lesson)})"
+    """Yield the picture of a lesson, and its pixels: both halves, and 8.10 with numbers put in."""
+    yield f"![{LESSONS[lesson][0].command}: textbook, physical, error]({file(lesson)})"
     yield ""
-    rows = [
-        (
-            f"`{pixel.command}` at {pixel.column}, {pixel.row}",
-            _equation(pixel),
-            *map(_shown, halves),
+    for pixel, halves in zip(LESSONS[lesson], values(lesson), strict=True):
+        textbook, physical = map(_shown, halves)
+        equation = _equation(pixel)
+        if equation:
+            equation = f" ({equation})"
+        yield (
+            f"- `{pixel.command}` at {pixel.column}, {pixel.row}: textbook {textbook}{equation};"
+            f" physical {physical}"
         )
-        for pixel, halves in zip(LESSONS[lesson], values(lesson), strict=True)
-    ]
-    yield from markdown([("Pixel", "8.10 at its centre", "Textbook", "Physical"), *rows], right=2)
 
 
 def file(lesson: str) -> str:
@@ -226,7 +225,7 @@ def _reflected(light: LightTerms, terms: PixelTerms) -> Iterator[str]:
         if material.form != "phong":
             cosine = f"{light.lobe:.3f}"
         front = _product(light.specular_intensity[0], light.attenuation, material.k_s[0])
-        yield from (rf"{factors} \cdot {cosine}" for factors in front)
+        yield from (f"{factors}·{cosine}" for factors in front)
 
 
 def _product(*factors: float) -> Iterator[str]:
@@ -234,7 +233,7 @@ def _product(*factors: float) -> Iterator[str]:
     if 0 in factors:
         return
     kept = [factor for factor in factors if abs(factor - 1) > 5e-4] or [1.0]
-    yield r" \cdot ".join(f"{factor:.3g}" for factor in kept)
+    yield "·".join(f"{factor:.3g}" for factor in kept)
 
 
 def _shown(colour: Floats) -> str:

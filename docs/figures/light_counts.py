@@ -140,7 +140,7 @@ def chart(found: Sequence[ShadingCost]) -> Figure:
 
 def sentences(found: Sequence[ShadingCost]) -> Iterator[str]:
     """Yield what was measured on the typical mesh."""
-    flat, gouraud, phong = (
+    _, gouraud, phong = (
         [cost for cost in found if (cost.shading, cost.fineness) == (shading, TYPICAL)]
         for shading in MARKS
     )
@@ -152,8 +152,7 @@ def sentences(found: Sequence[ShadingCost]) -> Iterator[str]:
     times = ", ".join(map(number, ratios(gouraud)))
     yield (
         f"With {counts} lights on {phong[0].faces:,} faces, a picture in Gouraud shading takes"
-        f" {times} times the processor time of one in Phong shading; in flat shading"
-        f" {', '.join(map(number, ratios(flat)))} times."
+        f" {times} times the processor time of one in Phong shading."
     )
     faster = [
         cost.lights for cost, ratio in zip(gouraud, ratios(gouraud), strict=True) if ratio < 1

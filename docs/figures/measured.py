@@ -25,7 +25,7 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.study import dataset, design
 from fotismos.reports.charts import vega
 from fotismos.reports.charts.cost_charts import titled
-from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.words import number
 
 DOCS = ROOT / "docs"
 COST_SCENE = "cornell-box"
@@ -46,19 +46,17 @@ def baselines() -> None:
     _run("pytest", "-q", "-m", "", "tests/test_baselines.py", "--fotismos-update")
 
 
-def fits() -> Iterator[str]:
-    """Fit the figures of chapter 8, and yield the table of departures before and after."""
+def fits() -> Iterator[tuple[str, ...]]:
+    """Fit the figures of chapter 8, and yield their errors before and after."""
     words = ("-P", "-m", "fotismos.reports", "fit", *CHAPTER_8, "--json")
     done = subprocess.run([sys.executable, *words], cwd=ROOT, check=True, capture_output=True)
-    rows = []
+    label = f"mean {LEADING.label}"
+    yield "scene", "form", f"paired {label}", f"fitted {label}", "parameter error", "model error"
     for record in msgspec.json.decode(done.stdout, type=list[FitRecord]):
         best = record.nearest
         departure = best.departure[LEADING.name]
         errors = departure.before, departure.after, best.parameter_error, best.loss
-        before, after, *parts = (f"{each:z.2f}" for each in errors)
-        rows.append((record.scene, best.form, f"{before}→{after}", *parts))
-    head = "scene", "form", LEADING.label, "parameter error", "model error"
-    yield from markdown([head, *rows], right=2)
+        yield record.scene, best.form, *(f"{each:z.2f}" for each in errors)
 
 
 def findings() -> None:
@@ -85,45 +83,32 @@ def attribution() -> Iterator[str]:
     few, *_, many = (one for one in points if one.method == "full plan")
     ratio = {one.name: f"{one.ratio.value:.2g}" for one in record.methods}
     yield (
-        f"A sample of the full plan takes {ratio['full plan']} times as long as the textbook"
-        f" kernel's, one of direct light alone {ratio['direct']} times. The kernel is"
-        f" {kernel.error.value:.1f} away from the reference (mean ΔE2000), and more samples do not"
-        f" bring it nearer; the full plan is {few.error.value:.1f} away with {few.spp} samples per"
-        f" pixel and {many.error.value:.1f} with {many.spp}. Adding shadows alone gives"
-        f" {shadows.error.value:.1f}, because the interreflection that would fill them is missing."
+        f"A path-traced sample costs {ratio['full plan']} times a textbook sample; direct light"
+        f" alone costs {ratio['direct']} times. The kernel stays at mean ΔE2000"
+        f" {kernel.error.value:.1f} however many samples it takes; path tracing reaches"
+        f" {few.error.value:.1f} with {few.spp} samples per pixel and {many.error.value:.1f} with"
+        f" {many.spp}. Adding shadows alone gives {shadows.error.value:.1f}, because the"
+        " interreflection that would fill them is missing."
     )
 
 
 def gains() -> Iterator[str]:
-    """Verify plans, and yield the table of their savings."""
-    rows = [(scene, f"{gain:.3g}") for scene, gain in fact("gains", *VERIFIED).items()]
-    yield from markdown([("Scene", "times sooner"), *rows], right=1)
+    """Verify plans, and yield their savings."""
+    found = (f"{scene} {number(gain)}" for scene, gain in fact("gains", *VERIFIED).items())
+    yield f"{', '.join(found)}."
 
 
 def speed() -> Iterator[str]:
-    """Yield the table of the kernel's speed, and a sentence on many lights."""
+    """Yield sentences on the kernel's speed, and on many lights."""
     data = fact("speed", ROUNDS)
-    times, ratios = data["times"], data["ratios"]
-    copy = min(times[name] for name in times if name.startswith("memory copy"))
-    yield from markdown(
-        [
-            ("", "Time", "The kernel is"),
-            ("Dr.Jit kernel", f"{times['Dr.Jit']:.1f} ms", ""),
-            (
-                "memory copy of the bytes that it reads and writes",
-                f"{copy:.1f} ms",
-                f"{ratios['memory copy']:.1f} times that",
-            ),
-            *(
-                (label, f"{times[name]:.1f} ms", f"{ratios[name]:.{digits}f} times as fast")
-                for label, name, digits in (
-                    ("Numba, parallel, three lights unrolled", "Numba, three lights", 1),
-                    ("Numba, parallel, any number of lights", "Numba", 0),
-                    ("NumPy", "NumPy", 0),
-                )
-            ),
-        ],
-        right=1,
+    times = data["times"]
+    ratios = data["ratios"]
+    unrolled_ratio = ratios["Numba, three lights"]
+    yield (
+        f"The kernel takes {times['Dr.Jit']:.1f} ms, {ratios['memory copy']:.1f} times a memory"
+        f" copy of what it reads and writes. It is {ratios['NumPy']:.0f} times as fast as NumPy,"
+        f" {ratios['Numba']:.0f} times as fast as Numba in parallel for any number of lights, and"
+        f" {unrolled_ratio:.1f} times as fast as Numba with its lights unrolled."
     )
     many = data["lights"]
     each = [row["ns"] for row in many if row["lights"] >= 1_000]

@@ -22,11 +22,21 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.price_record import Price
 from fotismos.comparisons.steps import steps
 from fotismos.reports import verdict
-from fotismos.reports.terminal.tables import markdown
 from fotismos.reports.terminal.words import number, percent, seconds
 
 SIZE = 256, 192
 THRESHOLD = 2.0
+
+HEAD = (
+    "scene",
+    "needs",
+    "share that differs",
+    "time of a sample over the textbook's",
+    "samples",
+    "time over the textbook's",
+    "time",
+)
+"""Columns of the table: the last three are those of the physical picture that passes."""
 
 NEAR = 7.0
 NEAR_DECADES = 0.13
@@ -67,29 +77,16 @@ def complexity(records: Sequence[ComparisonRecord]) -> Iterator[str]:
     ]
     yield (
         "Chapter 8 leaves physical models out because of their considerably greater complexity. In"
-        f" {len(ratios)} of its own figures a sample of the physical half takes"
-        f" {number(min(ratios))} to {number(max(ratios))} times as long as one of the textbook"
-        " half: both trace the same camera rays, and one ball hides and lights nothing else. In the"
-        " Cornell box it does take longer, and needs more samples"
-        " ([what accuracy costs](accuracy.md))."
+        f" {len(ratios)} of its own figures a physical sample takes {number(min(ratios))} to"
+        f" {number(max(ratios))} times as long as a textbook one; in the Cornell box it takes"
+        " longer ([what accuracy costs](accuracy.md))."
     )
 
 
-def table(records: Sequence[ComparisonRecord]) -> Iterator[str]:
+def table(records: Sequence[ComparisonRecord]) -> Iterator[tuple[str, ...]]:
     """Yield a row for each scene: what differs, what is needed, and what that takes."""
-    rows: list[tuple[str, ...]] = [
-        ("Scene", "needs", "differ", "sample", "samples", "price", "time")
-    ]
-    rows += [_row(record) for record in records]
-    yield from markdown(rows, right=2)
-    yield ""
-    yield (
-        "*Needs*: the fewest effects with which an image passes."
-        " *Differ*: the share of the pixels above ΔE2000 2. *Sample*: the time of one of the"
-        " physical half over one of the textbook half. *Samples*: per pixel, with which the"
-        " physical half passes. *Price*: the time of what passes over that of the textbook picture"
-        " with 4 samples."
-    )
+    yield HEAD
+    yield from map(_row, records)
 
 
 def _row(record: ComparisonRecord) -> tuple[str, ...]:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from posixpath import dirname, normpath, relpath
 
-from docs.figures import lessons
+from docs.figures import guarantees, lessons
 from docs.figures.from_tests import ROOT
 from docs.website import api_pages, file_pages, notebook_page
 
@@ -20,6 +20,9 @@ ORDER = "docs/README.md"
 LESSONS = "docs/lessons.md"
 """The page whose scenes the site shows live."""
 
+GUARANTEES = "docs/guarantees.md"
+"""The page to which the site adds each guarantee, with a link to its test."""
+
 PROJECT = ("CONTRIBUTING.md", "CHANGELOG.md")
 
 
@@ -28,7 +31,10 @@ def gather(folder: Path) -> None:
     linked: set[str] = set()
     for path in (*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))):
         page = path.relative_to(ROOT).as_posix()
-        text = with_links(path.read_text(encoding="utf-8"), page, linked)
+        text = path.read_text(encoding="utf-8")
+        if page == GUARANTEES:
+            text += "\n".join(guarantees.lines())
+        text = with_links(text, page, linked)
         if page == "README.md":
             text += "\n".join(contents())
         if page == LESSONS:

@@ -100,7 +100,7 @@ class SceneMaterials:
             if not hasattr(bsdf, "material"):
                 raise InputError(
                     f"BSDF {bsdf.id()!r}: {bsdf.class_name()} is not a phong. The integrator"
-                    " heuristic renders the heuristic half of a pair,"
+                    " heuristic renders the textbook half of a pair,"
                     " which fotismos.reference.pair makes."
                 )
             # A pointer is a number in Dr.Jit's registry; the table maps it to a place in `bsdfs`.

@@ -18,13 +18,13 @@ Parameter                 Type (default)      Meaning
 ``half_u``, ``half_v``    vector (0, 0, 0)    point and spot: half the edges of a rectangular lamp
 ========================  ==================  =====================================================
 
-All but the last two rows and ``clamped`` are exposed to ``mitsuba.traverse``, intensities only if
-given. Differentiable are intensities, ``scale``, ``k0`` to ``k2``, ``exponent``, and a spot's
-``direction``, of which the edge of the cone is left out. ``position``, ``cutoff``, ``shell`` and
-the ``direction`` of parallel light are marked as not differentiable, as in Mitsuba's own lights:
-``prb`` leaves out that ``L`` changes, ``N.L`` with it, and nothing has a derivative by ``cutoff``
-and ``shell``. By ``position`` and ``direction`` the integrators ``direct``, ``path`` and
-``heuristic`` do differentiate, after a warning of Mitsuba's. Python::
+``mitsuba.traverse`` shows all of these but the last two rows and ``clamped``, and intensities only
+if they are given. Differentiable are intensities, ``scale``, ``k0`` to ``k2``, ``exponent`` and a
+spot's ``direction``; the derivative ignores that the edge of the cone moves. As in Mitsuba's own
+lights, ``position`` and the ``direction`` of parallel light are not differentiable, because the
+integrator ``prb`` ignores that ``L`` and ``N.L`` change. The integrators ``direct``, ``path`` and
+``heuristic`` take derivatives by them nevertheless, after a warning of Mitsuba's. ``cutoff`` and
+``shell`` have no derivative. Python::
 
     {'type': 'heuristic_point', 'position': [-4.24, 0, 0], 'intensity': 1.0}
 

@@ -202,8 +202,8 @@ def define() -> dict[str, Any]:
                     lights.append(emitter.light(si, active))
                 elif not (emitter.is_environment() or hasattr(emitter, "k_a")):
                     raise InputError(
-                        f"emitter {emitter.id()!r} ({emitter.class_name()}) has no heuristic form."
-                        " The integrator heuristic renders the heuristic half of a pair, which"
+                        f"emitter {emitter.id()!r} ({emitter.class_name()}) has no textbook form."
+                        " The integrator heuristic renders the textbook half of a pair, which"
                         " fotismos.reference.pair makes."
                     )
             return lights

@@ -74,7 +74,7 @@ OPERATIONS: dict[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
         lambda si, rho, scale, returned: scale * rho / (1 - returned * rho),
     ),
 }
-"""The operands of each plugin, and its value of theirs."""
+"""The operands of each plugin, and the function that computes its value from them."""
 
 
 def define() -> dict[str, Any]:

@@ -57,15 +57,16 @@ FINE = 128
 """Nodes along each axis of a rule: few into the denser side, many out of it."""
 
 LEAST_SPREAD = 0.01
-"""Of the nodes for the diffuse part: those of smoother lobes would be too few beside the lobe."""
+"""Least roughness for the nodes of the diffuse part. Those of a smoother lobe crowd in the lobe,
+and too few are left beside it."""
 
 LITERAL_IOR = 1.5
 SMALLEST_IOR = exp(1e-4)
 """Reflects 2.5e-9 at normal incidence; Mitsuba rejects an IOR of 1."""
 LARGEST_IOR = 10.0
 LARGEST_SMOOTH_IOR = 3.8
-"""A larger specular albedo is recorded as missed. Above the second, by Mitsuba's fit, a smooth coat
-returns more from within than arrives."""
+"""Largest indices of rough and of smooth plastics; a specular albedo that needs more is recorded as
+missed. Above the second, Mitsuba's fit lets a smooth coat return more from within than arrives."""
 
 MATCHING_TOLERANCE = 1e-5
 """Relative tolerance; a larger mismatch is recorded as a miss."""

@@ -1,6 +1,6 @@
 """Replacing the BSDFs of a scene by their counterparts, by the conventions of pairing.
 
-Towards the heuristic half there is one rule per plugin, which returns the nearest ``phong``:
+Towards the textbook half there is one rule per plugin, which returns the nearest ``phong``:
 :mod:`fotismos.reference.pairing.nearest`. Those of the plainest materials are here. Values are
 those of :mod:`fotismos.reference.scene.values`.
 """
@@ -30,8 +30,8 @@ REFLECTANCES: dict[str, dict[str, float]] = {
     "roughconductor": {"specular_reflectance": 1.0},
     "principled": {},
 }
-"""Plugins known only to reflect, on the side of the normal, and parameters with their defaults: it
-reflects nothing if all are 0, and without any it may always reflect."""
+"""Plugins that only reflect, on the side of the normal. If all of a plugin's parameters here are 0,
+it reflects nothing; values are defaults. A plugin without parameters may always reflect."""
 
 TRANSMITTANCES = {"principled": {"spec_trans": 0.0}}
 """Parameters with which one of these transmits, unless they are 0."""
@@ -67,7 +67,7 @@ def give_default(graph: Graph) -> None:
 class NearestPhong:
     """The phong material that replaces a BSDF; with values as in ``reference.scene.values``.
 
-    ``lost`` are pairs of something that the heuristic model has no form for, and the rule for the
+    ``lost`` are pairs of something that the textbook model has no form for, and the rule for the
     rest; ``physical`` are parameters of the BSDF, as engines have them, for users' heuristics.
     """
 
@@ -158,8 +158,8 @@ Rule = Callable[[Context, int], NearestPhong]
 def to_heuristic(context: Context, replaced: Replacements) -> None:
     """Replace the BSDFs of all shapes by the nearest ``phong``.
 
-    Those that were not ``phong`` are recorded, and what is lost; nested ones, too, but not those
-    around them.
+    Each BSDF that was not ``phong`` is recorded, with what is lost. Of nested BSDFs the inner ones
+    are recorded, and not those around them.
     """
     graph = context.graph
     for shape in graph.nodes(mi.ObjectType.Shape):

@@ -13,7 +13,7 @@ depends on the distance, which only the scene determines.
 
 Parallel light is an exact pair; so is a point with the fall-off of Mitsuba's.
 
-Physical light has one intensity. A heuristic light of two (6.6, 6.8) is paired by its diffuse one,
+Physical light has one intensity. A textbook light of two (6.6, 6.8) is paired by its diffuse one,
 which determines the irradiance; its ``L_s`` is recorded as lost.
 """
 
@@ -70,7 +70,7 @@ def to_heuristic(
 
 
 def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements) -> None:
-    """Replace heuristic lights by physical ones; ``surface()`` returns the visible `GBuffer`."""
+    """Replace textbook lights by physical ones; ``surface()`` returns the visible `GBuffer`."""
     for index in [i for i in graph.nodes(EMITTER) if is_heuristic(graph.plugin(i))]:
         light = LightNode(graph, index, surface=surface, replaced=replaced)
         if len(set(light.intensities())) > 1:

@@ -91,7 +91,7 @@ class Replacements:
     lost: list[Unrepresentable] = field(default_factory=list)
 
     def lose(self, name: str, plugin: str, lost: str, nearest: str) -> None:
-        """Record what has no form in the heuristic model, see :class:`Unrepresentable`."""
+        """Record what has no form in the textbook model, see :class:`Unrepresentable`."""
         record = Unrepresentable(name=name, plugin=plugin, lost=lost, nearest=nearest)
         self.lost.append(record)
 

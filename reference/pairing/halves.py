@@ -1,6 +1,6 @@
 """The two halves of a pair, derived from one scene.
 
-A scene may be physical (a user's), heuristic (a textbook figure), or a mixture: the heuristic half
+A scene may be physical (a user's), heuristic (a textbook figure), or a mixture: the textbook half
 replaces physical parts, the physical half replaces heuristic parts, and parts of the right kind
 stay. Both keep the scene's geometry, cameras and films.
 """
@@ -40,7 +40,7 @@ class Pair:
     ``heuristic`` and ``physical`` are graphs, to be copied before an edit. ``max_depth``,
     ``integrator`` and ``rr_depth`` are the scene's own: -1 for no limit, None if omitted. ``media``
     are labels and plugins of participating media, ``shading`` names the declaration that shades the
-    heuristic half (:mod:`fotismos.heuristic.heuristics`).
+    textbook half (:mod:`fotismos.heuristic.heuristics`).
     """
 
     name: str
@@ -62,11 +62,11 @@ class Pair:
 class PairOptions:
     """How both halves are derived from a scene.
 
-    FLAT and GOURAUD make meshes of the heuristic half's shapes, by ``tessellation``
+    FLAT and GOURAUD make meshes of the textbook half's shapes, by ``tessellation``
     (:mod:`fotismos.heuristic.tessellation`), with vertex normals by ``vertex_weights`` (6.32 to
     6.34); if one of the two is given, PHONG gets meshes too. ``prune``
     lets the kernel leave out the terms that no material has. ``heuristic`` names the declaration
-    that shades the heuristic half; ``with_partners`` lets its materials know their physical
+    that shades the textbook half; ``with_partners`` lets its materials know their physical
     parameters (:mod:`fotismos.reference.pairing.nearest`), as they do for every user's heuristic.
     """
 
@@ -82,7 +82,7 @@ class PairOptions:
 
     @property
     def has_meshes(self) -> bool:
-        """Whether the heuristic half's shapes become meshes."""
+        """Whether the textbook half's shapes become meshes."""
         is_phong = self.interpolation is Interpolation.PHONG
         return not is_phong or bool(self.tessellation or self.vertex_weights)
 
@@ -111,7 +111,7 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
                 bare.detach(shape, key)
     geometry = cache(bare.instantiate)
 
-    # The heuristic half.
+    # The textbook half.
     model = named(options.heuristic)
     half = graph.copy()
     replaced = Replacements()

@@ -34,7 +34,7 @@ def constant_to_ambient(light: LightNode) -> Any:
 
 
 def environment_to_ambient(light: LightNode) -> Any:
-    """Return the mean radiance of an environment; leave out a light that is none."""
+    """Return the mean radiance of an environment; a light of another kind is left out."""
     if not light.emitter.is_environment():
         light.leave_out()
         return None

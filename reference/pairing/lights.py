@@ -87,13 +87,13 @@ class LightNode:
         return self.vector("direction", (0, 0, 1), 2)
 
     def intensities(self) -> tuple[Any, ...]:
-        """Return ``L_d`` and ``L_s`` of a heuristic light, without its scale."""
+        """Return ``L_d`` and ``L_s`` of a textbook light, without its scale."""
         colour = partial(values.colour, self.graph, self.index)
         common = colour("intensity", 1.0)
         return colour("diffuse_intensity", common), colour("specular_intensity", common)
 
     def scaled_intensity(self, factor: float) -> tuple[float, ...]:
-        """Return ``L_d`` of a heuristic light times a factor."""
+        """Return ``L_d`` of a textbook light times a factor."""
         colour, _ = self.intensities()
         return tuple((np.multiply(colour, factor * self.number("scale", 1.0))).tolist())
 
@@ -130,7 +130,7 @@ class LightKind:
 
     ``to_heuristic`` and ``to_physical`` are rules: functions of a :class:`LightNode`, each named by
     its module in this folder and its name. The first replaces a light by its nearest form in the
-    heuristic half, and returns the radiance that becomes ``I_a``, if any; a kind without it is left
+    textbook half, and returns the radiance that becomes ``I_a``, if any; a kind without it is left
     out. The second replaces its heuristic form, if there is one, by the nearest physical light.
 
     ``plugins`` are Mitsuba's emitters of this kind, ``model`` its class in
@@ -243,7 +243,7 @@ def is_heuristic(plugin: str) -> bool:
 
 
 def give_one_intensity(graph: Graph) -> None:
-    """Let the heuristic lights of a graph have their diffuse intensity for both terms."""
+    """Let the textbook lights of a graph have their diffuse intensity for both terms."""
     for index in graph.nodes(mi.ObjectType.Emitter):
         props = graph.props(index)
         if is_heuristic(graph.plugin(index)):
@@ -252,7 +252,7 @@ def give_one_intensity(graph: Graph) -> None:
 
 
 def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: Any) -> mi.Properties:
-    """Return the properties of a heuristic light with the fall-off of Mitsuba's."""
+    """Return the properties of a textbook light with the fall-off of Mitsuba's."""
     falloff = FALLOFF_OF_MITSUBA if of(plugin).has("attenuation") else {}
     return properties(plugin, scale=scale, **values, **falloff)
 

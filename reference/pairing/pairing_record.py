@@ -37,7 +37,7 @@ class EmitterPair(Record):
 
 
 class Unrepresentable(Record):
-    """Something that the heuristic model cannot represent; compared nevertheless."""
+    """Something that the textbook model cannot represent; compared nevertheless."""
 
     name: Annotated[str, Meta(description="Id, or place in the file.")]
     plugin: str
@@ -46,7 +46,7 @@ class Unrepresentable(Record):
 
 
 class Pairing(Record):
-    """How heuristic and physical materials and lights correspond."""
+    """How textbook and physical materials and lights correspond."""
 
     convention: str
     bsdfs: tuple[BsdfPair, ...]

@@ -1,4 +1,4 @@
-"""The heuristic half's shapes as meshes, for flat and Gouraud shading."""
+"""The textbook half's shapes as meshes, for flat and Gouraud shading."""
 
 import shutil
 import weakref

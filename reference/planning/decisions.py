@@ -4,7 +4,7 @@ from fotismos.reference.records import Record
 
 
 class Decision(Record):
-    """Whether a scene calls for an effect, and why.
+    """Whether a scene needs an effect, and why.
 
     Attributes
     ----------

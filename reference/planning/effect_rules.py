@@ -2,7 +2,7 @@
 
 A rule returns whether a scene needs an effect, and the evidence. Sites are the nodes or keys of the
 physical half's graph that have it; ``put`` functions replace them in a copy of that graph by what
-the heuristic half has.
+the textbook half has.
 """
 
 from collections.abc import Sequence
@@ -86,7 +86,7 @@ def inexact_lights(facts: Facts, with_cone: bool) -> list[str]:
 
 
 def put_lights(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
-    """Put the heuristic half's lights into a graph."""
+    """Put the textbook half's lights into a graph."""
     emitters = dict(facts.pair.heuristic.children(0, EMITTER))
     for key in keys:
         graph.attach(0, key, graft(graph, facts.pair.heuristic, emitters[key]))
@@ -100,7 +100,7 @@ def is_attenuated(facts: Facts) -> tuple[bool, str]:
         is_even = (props.get("k1", 0.0), props.get("k2", 0.0)) == (0.0, 0.0)
         if lights.of(graph.plugin(index)).has("attenuation") and not is_even:
             return True, f"{graph.label(index)} falls off with distance"
-    return False, "no light of the heuristic half falls off with distance"
+    return False, "no light of the textbook half falls off with distance"
 
 
 def has_cone(facts: Facts) -> tuple[bool, str]:
@@ -117,20 +117,20 @@ def shining_shapes(facts: Facts) -> list[int]:
 
 
 def put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
-    """Put the heuristic half's lights into a graph, in place of shapes that shine."""
+    """Put the textbook half's lights into a graph, in place of shapes that shine."""
     for shape in shapes:
         for key, _ in graph.children(shape, EMITTER):
             graph.detach(shape, key)
             if facts.pair.hide_emitters:
                 graph.remove(shape)
-    # The lights that only the heuristic half has are those in place of shapes.
+    # The lights that only the textbook half has are those in place of shapes.
     before = dict(facts.pair.physical.children(0, EMITTER))
     emitters = facts.pair.heuristic.children(0, EMITTER)
     put_lights(graph, facts, [key for key, _ in emitters if key not in before])
 
 
 def own_light(phong: mi.Properties, facts: Facts) -> dict[str, Any]:
-    """Return the light of a heuristic material itself."""
+    """Return the light of a textbook material itself."""
     return {"k_i": phong["k_i"]} if "k_i" in phong else {}
 
 
@@ -154,7 +154,7 @@ def detach(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
 
 
 def ambient_light(phong: mi.Properties, facts: Facts) -> dict[str, Any]:
-    """Return the ambient light that a heuristic material reflects."""
+    """Return the ambient light that a textbook material reflects."""
     if "k_a" not in phong or "ambient" not in facts.kernel:
         return {}
     return {"k_a": phong["k_a"], "ambient": facts.kernel["ambient"]}
@@ -178,7 +178,7 @@ def inexact_surfaces(facts: Facts, opaque: bool) -> list[int]:
 
 
 def put_materials(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
-    """Give shapes the materials of the heuristic half; shared materials stay shared."""
+    """Give shapes the materials of the textbook half; shared materials stay shared."""
     replaced: dict[int, int] = {}
     for shape in shapes:
         ((key, _),) = graph.children(shape, BSDF)

@@ -61,7 +61,7 @@ class Effect:
         return Decision(name=self.label, called_for=called_for, rule=f"{kind}: {evidence}")
 
     def differs(self, facts: Facts, called_for: bool) -> bool:
-        """Return whether the two halves differ in it, given whether the scene calls for it."""
+        """Return whether the two halves differ in it, given whether the scene needs it."""
         return bool(self.sites(facts))
 
     def __repr__(self) -> str:
@@ -94,13 +94,13 @@ class PrunedEffect(Effect):
         return self.decision(not result.applies, kind, result.evidence)
 
     def differs(self, facts: Facts, called_for: bool) -> bool:
-        """Return whether the scene calls for it, and the halves treat it differently."""
+        """Return whether the scene needs it, and the halves treat it differently."""
         return called_for and not self.is_alike(facts)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class ReplacedEffect(Effect):
-    """An effect that is left out by giving the physical half the heuristic half's form.
+    """An effect that is left out by giving the physical half the textbook half's form.
 
     ``put(graph, facts, sites)`` replaces the ``sites`` in a copy of the physical half's graph.
     """
@@ -111,7 +111,7 @@ class ReplacedEffect(Effect):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class GlowingEffect(ReplacedEffect):
-    """A replaced effect without which a heuristic material shines of itself.
+    """A replaced effect without which a textbook material shines of itself.
 
     ``emission(phong, facts)`` returns the light that a camera ray then sees, as parameters of
     ``heuristic_glow``.

@@ -390,18 +390,18 @@ class Facts:
 
     @cached_property
     def kernel(self) -> mi.Properties:
-        """The parameters of the heuristic half's integrator."""
+        """The parameters of the textbook half's integrator."""
         graph = self.pair.heuristic
         return graph.props(graph.nodes(mi.ObjectType.Integrator)[0])
 
     @property
     def has_shadows(self) -> bool:
-        """Whether the heuristic half itself has shadows."""
+        """Whether the textbook half itself has shadows."""
         return bool(self.kernel.get("occlusion", False))
 
     @cached_property
     def materials(self) -> list[mi.Properties]:
-        """The parameters of the heuristic half's materials."""
+        """The parameters of the textbook half's materials."""
         graph = self.pair.heuristic
         return [graph.props(index) for index in graph.nodes(BSDF, "phong")]
 

@@ -43,8 +43,8 @@ from fotismos.reference.scene.values import plain
 
 EXACT_SPP = 64
 EXACT_PASSES = 4
-"""Of plans whose only random numbers are the places of camera rays: only edges have noise, and four
-times as many samples move mean departures by 1e-5."""
+"""Samples and passes of plans in which only camera rays are random. Only edges then have noise, and
+four times as many samples change mean errors by 1e-5."""
 
 
 def plan(

@@ -1,4 +1,4 @@
-"""The record of a plan: how both halves are rendered, and the effects that a scene calls for."""
+"""The record of a plan: how both halves are rendered, and the effects that a scene needs."""
 
 from collections.abc import Collection
 from typing import Annotated, Literal
@@ -63,7 +63,7 @@ class Guard(Record):
 
 
 class Plan(Record):
-    """How both halves are rendered, and the effects that the scene calls for.
+    """How both halves are rendered, and the effects that the scene needs.
 
     Attributes
     ----------

@@ -161,7 +161,7 @@ SAMPLED_AS_HIT = Premise(
 LIGHT_BY_LIGHT = PruningRule(
     name="light by light",
     omits="the choice of one light",
-    absent="noise of picking one light: the sum over all equals the mean of one over its chance",
+    absent="noise of picking one light at random: all lights are summed",
     proof="The mean is the sum over all lights, which `direct_all` takes at each sample, if each"
     " estimate of a light has the right mean, however samples of the BSDF are weighted against it.",
     premises=(

@@ -6,7 +6,7 @@ smaller error, than it is. The third moment of the passes measures such contribu
 groups of passes show how any number computed from the image scatters.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import hypot
 from typing import Any
@@ -25,6 +25,9 @@ BLOCK = 8
 
 BLOCKS = 256
 """Blocks sampled, at most: 16,384 pixels, all of a 128 x 128 image. It bounds memory and time."""
+
+PART = 2**15
+"""Doubles that NumPy sums at a time."""
 
 MEAN = ("mean",)
 DEVIATION = ("mean", "squares")
@@ -92,6 +95,14 @@ class NumPyDoubles:
         """Return zeros (size,)."""
         return np.zeros(size)
 
+    def parts(
+        self, value: Array, sums: dict[str, Array]
+    ) -> Iterator[tuple[Array, dict[str, Array]]]:
+        """Yield parts of values and of their sums, small enough for the processor's cache."""
+        for start in range(0, len(value), PART):
+            part = slice(start, start + PART)
+            yield value[part], {name: total[part] for name, total in sums.items()}
+
     def number(self, value: int) -> Any:
         """Return a number as a factor of doubles."""
         return float(value)
@@ -125,6 +136,11 @@ class DrJitDoubles(NumPyDoubles):
 
     def zeros(self, size: int) -> Array:
         return self._dr.zeros(self._mi.Float64, size)
+
+    def parts(
+        self, value: Array, sums: dict[str, Array]
+    ) -> Iterator[tuple[Array, dict[str, Array]]]:
+        yield value, sums
 
     def number(self, value: int) -> Any:
         # An input of the kernel, so that all passes share one.
@@ -165,10 +181,14 @@ class Accumulator:
             self._shape = tuple(image.shape)
             self._sums = {name: self._by.zeros(len(value)) for name in self._moments}
         self.count += 1
-        self._add(value, self._sums)
+        self._add(value)
         self._by.evaluate(self._sums)
 
-    def _add(self, value: Array, sums: dict[str, Array]) -> None:
+    def _add(self, value: Array) -> None:
+        for part, sums in self._by.parts(value, self._sums):
+            self._add_part(part, sums)
+
+    def _add_part(self, value: Array, sums: dict[str, Array]) -> None:
         count = self.count
         step = value - sums["mean"]
         share = step / self._by.number(count)
@@ -226,12 +246,12 @@ class DifferenceSums(Accumulator):
         self._index: Any = None
         self._groups = np.zeros((GROUPS, self._places.size))
 
-    def _add(self, value: Array, sums: dict[str, Array]) -> None:
+    def _add(self, value: Array) -> None:
         if self._places.size:
             if self._index is None:
                 self._index = self._by.index(self._places)
             self._groups[(self.count - 1) % GROUPS] += self._by.gather(value, self._index)
-        super()._add(value, sums)
+        super()._add(value)
 
     def estimate(self, dtype: type = float) -> DifferenceEstimate:
         """Return the estimate so far, like the base; the third cumulant in doubles."""

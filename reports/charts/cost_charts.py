@@ -1,19 +1,24 @@
 """The chart of a study of cost: error against time."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from math import log10
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import altair as alt
 import numpy as np
 from scipy.optimize import isotonic_regression
 
-from fotismos.comparisons.cost.cost_record import Cost
+from fotismos.comparisons.cost.engine_record import Engine, EngineCost
 from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.reports.charts.theme import FAINT, Spec
 from fotismos.reports.charts.vega import specification
-from fotismos.reports.terminal.cost_tables import stated
+from fotismos.reports.terminal.cost_tables import OWN_FRONT, stated
 from fotismos.reports.terminal.words import number
+
+if TYPE_CHECKING:  # pictures without a scene need no Mitsuba
+    from fotismos.comparisons.cost.cost_record import Cost
 
 WIDTH = 560
 HEIGHT = 380
@@ -40,28 +45,36 @@ Ends: TypeAlias = tuple[float, float]
 """Of an axis."""
 
 
-def titled(record: Cost) -> Spec:
+def titled(record: Cost | EngineCost) -> Spec:
     """Return the chart of error against time with a title, on white."""
-    busy = ", busy" if record.is_busy else ""
-    machine = f"{record.threads} threads, {record.machine.processor}{busy}"
-    measured = f"{record.resolution[0]} × {record.resolution[1]} pixels, {record.rounds} rounds"
+    size = f"{record.resolution[0]} × {record.resolution[1]} pixels"
+    if isinstance(record, EngineCost):
+        measured = size
+    else:
+        busy = ", busy" if record.is_busy else ""
+        machine = f"{record.threads} threads, {record.machine.processor}{busy}"
+        measured = f"measured at {size}, {record.rounds} rounds, {machine}"
     title = {
         "text": f"{record.scene}: error against time",
-        "subtitle": [f"measured at {measured}, {machine}", *reading(record)],
+        "subtitle": [measured, *reading(record)],
     }
     chart = error_over_time(record, "white")
     return chart | {"title": title, "description": f"{title['text']}, of all methods"}
 
 
-def error_over_time(record: Cost, ground: str = "transparent") -> Spec:
+def error_over_time(record: Cost | EngineCost, ground: str = "transparent") -> Spec:
     """Return the chart of mean ΔE2000 over seconds, both logarithmic, on a ground of any colour.
 
     Points of the front are filled. Lines join the sample counts of one method. The dashed line is
     the slope −1/2 of plain Monte Carlo. The dotted line is the reference's own noise, below which
     errors are not resolved.
     """
-    floor = record.reference.noise_floor
-    rows = _rows(record)
+    if isinstance(record, EngineCost):
+        floor = record.noise_floor or 0.0
+        rows = _given(record.engine)
+    else:
+        floor = record.reference.noise_floor
+        rows = [*_measured(record), *(_given(record.engine) if record.engine else ())]
     times = _domain([row[end] for row in rows for end in ("fastest", "slowest")])
     errors = _domain([row["error"] for row in rows] + ([floor] if floor > 0 else []))
     colour = _by_family(alt.Color, 0)
@@ -83,8 +96,14 @@ def error_over_time(record: Cost, ground: str = "transparent") -> Spec:
     return specification(whole.properties(width=WIDTH, height=HEIGHT, padding=padding))
 
 
-def reading(record: Cost) -> list[str]:
+def reading(record: Cost | EngineCost) -> list[str]:
     """Return how to read the chart of error against time, in lines."""
+    if isinstance(record, EngineCost):
+        dotted = "; dotted: noise of the reference itself" if record.noise_floor else ""
+        return [
+            f"filled: front (nothing else is clearly faster or better){dotted}",
+            stated(record.engine),
+        ]
     sampled = any(method.monte_carlo for method in record.methods)
     slope = "dashed: slope −1/2, plain Monte Carlo; " if sampled else ""
     lines = [
@@ -93,14 +112,13 @@ def reading(record: Cost) -> list[str]:
         f"passes at: what 5 % of the pixels exceed with most samples; circled: at {TOLERANCE:g}",
     ]
     if record.engine:
-        lines.append(f"diamonds: given pictures, {stated(record.engine)}")
+        lines.append(f"diamonds: given pictures, {stated(record.engine)}{OWN_FRONT}")
     return lines
 
 
-def _rows(record: Cost) -> list[dict[str, Any]]:
+def _measured(record: Cost) -> list[dict[str, Any]]:
     methods = {method.name: method for method in record.methods}
-    settings = record.engine.settings if record.engine else ()
-    measured = [
+    return [
         {
             "method": point.method,
             "family": methods[point.method].family,
@@ -116,8 +134,11 @@ def _rows(record: Cost) -> list[dict[str, Any]]:
         }
         for point in record.points
     ]
+
+
+def _given(engine: Engine) -> list[dict[str, Any]]:
     # Given times have no interval.
-    given = [
+    return [
         {
             "method": setting.method,
             "family": "given",
@@ -130,9 +151,8 @@ def _rows(record: Cost) -> list[dict[str, Any]]:
             "right": setting.passes_at is not None and setting.passes_at <= TOLERANCE,
             "front": setting.front,
         }
-        for setting in settings
+        for setting in engine.settings
     ]
-    return [*measured, *given]
 
 
 def _passing(threshold: float | None) -> str:

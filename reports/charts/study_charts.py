@@ -4,18 +4,22 @@ Points that differ in other parameters are averaged, and the subtitle says over 
 viridis and magma, whose lightness rises steadily: they also work in grey.
 """
 
+from __future__ import annotations
+
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import altair as alt
-import pyarrow as pa
 
 from fotismos.comparisons.study import dataset
 from fotismos.comparisons.study.dataset import Row
 from fotismos.comparisons.study.design import StudyFigure, StudyFile, StudyPart
 from fotismos.reports.charts.theme import FAINT, Spec
 from fotismos.reports.charts.vega import specification
+
+if TYPE_CHECKING:
+    import pyarrow as pa  # loaded late: it is an extra
 
 Cell: TypeAlias = dict[str, Any]
 """A mark of a chart: ``x``, perhaps ``y``, and ``value``."""

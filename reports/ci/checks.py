@@ -20,7 +20,7 @@ from fotismos.comparisons.check.pictures import (
     picture_gate,
 )
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import versions
+from fotismos.comparisons.comparison import PictureFiles, versions
 from fotismos.comparisons.departure.blocks import averaged
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
@@ -94,6 +94,9 @@ class CheckRecord(Record, omit_defaults=True):
     ] = ()
     pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
     smallest_changes: SmallestChanges | None = None
+    picture: Annotated[PictureFiles | None, Meta(description="The pictures that were checked.")] = (
+        None
+    )
     gate: Annotated[
         PictureGate | None, Meta(description="The tolerance that decided, in place of drift.")
     ] = None
@@ -134,6 +137,17 @@ class CheckRecord(Record, omit_defaults=True):
         """The command that writes what moved to the baseline."""
         picture = ("--picture", f"{self.name}={self.scene}") if self.smallest_changes else ()
         return program.command("check", self.baseline, "--update", *picture)
+
+    @property
+    def other_mitsuba(self) -> str:
+        """What to know if the baseline is of another Mitsuba than the installed; else empty."""
+        change = (self.versions or {}).get("mitsuba")
+        if change is None:
+            return ""
+        return (
+            f"Mitsuba {change.after} renders here, and {change.before} made the baselines: what"
+            " moved may be its noise."
+        )
 
     @property
     def versions_line(self) -> str:
@@ -311,7 +325,7 @@ def examine_pictures(
     """Check pictures that match a pattern against their baseline, for drift or by a tolerance."""
     begin = perf_counter()
     baseline, before = pictures.read(path)
-    after = pictures.read_repeats(pattern, baseline.transfer, baseline.over)
+    after, files = pictures.read_repeats(pattern, baseline.transfer, baseline.over)
     found = check_pictures(before, after, level)
     gate = None
     has_failed = bool(found.moved)
@@ -319,7 +333,7 @@ def examine_pictures(
         gate = picture_gate(before, after, tolerance.within, tolerance.bound)
         has_failed = gate.state != "pass"
     status = "failed" if has_failed else "passed"
-    made = of_pictures(path, pattern, status=status, found=found, begin=begin)
+    made = of_pictures(path, pattern, status=status, found=found, begin=begin, files=files)
     if gate is not None:
         made = structs.replace(made, gate=gate, message=gate.sentence)
     if not has_failed:
@@ -352,16 +366,22 @@ def update_pictures(
         known = pictures.record_of(path)
         transfer = transfer or known.transfer
         over = over or known.over
-    repeats = pictures.read_repeats(pattern, transfer, over)
+    repeats, files = pictures.read_repeats(pattern, transfer, over)
     pictures.write(path, repeats, transfer, over)
     found = check_pictures(repeats, repeats, level)
-    return of_pictures(path, pattern, status=status, found=found, begin=begin), None
+    made = of_pictures(path, pattern, status=status, found=found, begin=begin, files=files)
+    return made, None
 
 
 def of_pictures(
-    path: Path, pattern: str, status: Any, found: PictureCheck, begin: float
+    path: Path,
+    pattern: str,
+    status: Any,
+    found: PictureCheck,
+    begin: float,
+    files: PictureFiles | None = None,
 ) -> CheckRecord:
-    """Return the record of a check of pictures that match a pattern."""
+    """Return the record of a check of pictures that match a pattern, in ``files`` if in any."""
     changes = found.smallest_changes()
     return CheckRecord(
         baseline=path.as_posix(),
@@ -373,6 +393,7 @@ def of_pictures(
         significance=found.level,
         moved=found.moved,
         smallest_changes=changes,
+        picture=files,
     )
 
 

@@ -1,11 +1,11 @@
 """Baselines of pictures as files, and repeats that match a pattern."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from fotismos.comparisons import pictures
 from fotismos.comparisons.check.measurement import LINEAR_ROUNDING, laid_out
 from fotismos.comparisons.check.pictures import (
     SIDE,
@@ -15,7 +15,8 @@ from fotismos.comparisons.check.pictures import (
     colour,
     means,
 )
-from fotismos.comparisons.picture_files import matching
+from fotismos.comparisons.comparison import PictureFiles
+from fotismos.comparisons.picture_files import matching, read_file
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError
 from fotismos.reference import records
@@ -27,9 +28,34 @@ LONGEST = 2**15
 """Pixels of the longer side of a baseline that is read, at most."""
 
 
-def read_repeats(pattern: str, transfer: str | None, over: str | None = None) -> Repeats:
-    """Read the repeats that match a pattern, ``render_*.exr`` or ``render_*.exr:LAYER``."""
-    return Repeats.of(pictures.read(word, transfer, over) for word in matching([pattern]))
+def read_repeats(
+    pattern: str, transfer: str | None, over: str | None = None
+) -> tuple[Repeats, PictureFiles]:
+    """Read the repeats that match a pattern, ``render_*.exr`` or ``render_*.exr:LAYER``.
+
+    Also return the record of their files.
+    """
+    names = matching([pattern])
+    digests = []
+    notes: dict[str, None] = {}
+
+    def images() -> Iterator[np.ndarray]:
+        # One at a time: only their sums are kept.
+        for name in names:
+            file = read_file(name, transfer, over)
+            digests.append(file.digest)
+            notes.update(dict.fromkeys(file.notes))
+            yield file.image
+
+    repeats = Repeats.of(images())
+    files = PictureFiles(
+        files=names,
+        digests=tuple(digests),
+        transfer=transfer,
+        notes=tuple(notes),
+        repeats=len(names),
+    )
+    return repeats, files
 
 
 def write(

@@ -291,6 +291,7 @@ def lines(checks: Sequence[CheckRecord], level: float) -> Iterator[str]:
     if len(checks) > 1:
         yield from printed(_table(checks), right=2)
         yield ""
+    yield from dict.fromkeys(filter(None, (made.other_mitsuba for made in checks)))
     yield outcome(checks, level)
 
 

@@ -250,7 +250,8 @@ class Fotismos:
         """Return pictures as repeats."""
         if isinstance(image, (str, Path)):
             beside = self.beside / image
-            return pictures.read_repeats(str(beside), None)
+            repeats, _ = pictures.read_repeats(str(beside), None)
+            return repeats
         arrays = [image] if isinstance(image, np.ndarray) else list(image)
         for array in arrays:
             if np.ndim(array) != 3 or np.shape(array)[2] != 3:

@@ -24,7 +24,7 @@ def _parameter(text: str) -> tuple[str, float | bool | str]:
 @click.option("--bsdf", metavar="TYPE|FILE.py:NAME",
               help="A BSDF plugin of Mitsuba, or one that a file registers.")  # fmt: skip
 @click.option("-p", "parameters", type=_parameter, multiple=True, metavar="NAME=VALUE",
-              help="A parameter of the heuristic or the BSDF; may be repeated.")  # fmt: skip
+              help="A parameter of the model or the BSDF; may be repeated.")  # fmt: skip
 @jobs.output_option("out", "audit/NAME")
 @jobs.timeout_option
 @jobs.verbosity_options
@@ -37,7 +37,7 @@ def audit(
     timeout: float,
     as_json: bool,
 ) -> None:
-    """Check a heuristic or BSDF: energy, reciprocity, continuity, gradients.
+    """Check a shading model or a BSDF: energy, reciprocity, continuity, gradients.
 
     Evaluates it on white materials for all directions, and prints a table of checks with the worst
     case of each. Writes a page (index.html), audit.json with all numbers, and audit.svg, the lobes,

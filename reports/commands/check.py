@@ -10,12 +10,13 @@ from click.core import ParameterSource
 from fotismos.comparisons.atomic import file_name
 from fotismos.heuristic.errors import InputError
 from fotismos.reports import jobs
+from fotismos.reports.ci import settings
 
 READING = ("--transfer", "--over")
 """Options that say how pictures are read; they are kept in their baseline."""
 
 
-@jobs.command()
+@jobs.command(cls=settings.Configured)
 @click.argument("baseline", type=click.Path(path_type=Path), metavar="BASELINE")
 @click.option("--update", is_flag=True, help="Write what moved to BASELINE, and print it.")
 @click.option(
@@ -96,11 +97,14 @@ def check(
     exit code is 1, and OUTPUT/check/index.html shows what moved and where. If a baseline could not
     be checked, it is 2; the others are checked nevertheless.
 
+    The table [tool.fotismos] of the nearest pyproject.toml may set baselines, in place of BASELINE,
+    report, in place of --output, significance, within and max_visible.
+
     With --picture nothing is rendered: repeats of pictures are compared with earlier ones. Repeats
     of a renderer without noise are equal, and any change is a drift; --within and --max-visible
     allow what nobody sees, such as another GPU's rounding.
 
-    A scene or heuristic in Python is code, and so is a baseline that names one: it is executed.
+    A scene or shader in Python is code, and so is a baseline that names one: it is executed.
 
     \b
     Examples:
@@ -130,7 +134,14 @@ def check(
     if pictures and update and (others := [word for word in wanting if word not in READING]):
         raise InputError(f"{', '.join(others)}: pictures are not rendered. Omit it, or --picture.")
     patterns = _places(baseline, pictures)
-    if (within, max_visible) != (None, None) and (update or not pictures):
+    is_stated = any(
+        context.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        for name in ("within", "max_visible")
+    )
+    if update or not pictures:
+        # A project's own tolerance is for its pictures alone.
+        within = max_visible = None
+    if is_stated and (update or not pictures):
         raise InputError(
             "--within, --max-visible: a tolerance judges new pictures. Give --picture, without"
             " --update."

@@ -29,7 +29,7 @@ from fotismos.reports import jobs
     "--why/--no-why",
     "with_causes",
     default=True,
-    help="Find causes and remedies, at a small size; of a picture, none. [default: why]",
+    help="Find which effects are missing, at a small size; not of a picture. [default: why]",
 )
 @jobs.open_option
 @jobs.within_option
@@ -62,11 +62,12 @@ def compare(
     """Measure how far textbook shading is from physics, where, and whether it is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), or a Python file (.py) in
-    which `scene` is a dictionary or returns one. Pictures of other renderers may replace either
-    half; with both, no scene is needed. Writes OUTPUT/index.html and tables of all
-    scenes, and for each scene comparison.json, comparison.exr and pictures. If one scene fails,
-    the others are still compared. An interrupted run keeps its finished scenes: the same command
-    resumes it.
+    which `scene` is a dictionary, or a function that returns one. Pictures of other renderers may
+    replace either half; with both, no scene is needed.
+
+    Writes OUTPUT/index.html and tables of all scenes, and for each scene comparison.json,
+    comparison.exr and pictures. If one scene fails, the others are still compared. An interrupted
+    run keeps its finished scenes: the same command resumes it.
 
     \b
     Examples:

@@ -6,12 +6,14 @@ from typing import Any
 import click
 
 from fotismos.comparisons.cost.timed_pictures import EngineTimes
+from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.errors import InputError
 from fotismos.reports import jobs
 
 
 @jobs.command()
-@jobs.scene_argument
+@jobs.scene_or_pictures_argument
 @jobs.output_option("out", "cost/SCENE")
 @jobs.timeout_option
 @jobs.options_of_scenes(resolution="the film's, reduced to a width of 128", spp="up to 64")
@@ -31,11 +33,15 @@ from fotismos.reports import jobs
 @click.option(
     "--kernel-time", metavar="TIME", help="What the textbook kernel takes there, for ratios."
 )
+@jobs.option("reference")
+@jobs.option("mask")
 @jobs.option("transfer")
 @jobs.option("over")
+@jobs.option("tone_map")
+@jobs.within_option
 @jobs.json_option
 def cost(
-    scene: str,
+    scene: str | None,
     output: Path,
     rounds: int | None,
     at: tuple[int, int] | None,
@@ -43,19 +49,21 @@ def cost(
     pictures: tuple[str, ...],
     machine: str | None,
     kernel_time: str | None,
+    within: float,
     as_json: bool,
     timeout: float,
     **rendering: Any,
 ) -> None:
     """Measure what each step of accuracy costs in time, and which effect is worth paying for.
 
-    Renders a ladder of methods, from flat shading to the full plan, at several sample counts, and
+    Renders with methods from flat shading to all effects, at several sample counts each, and
     attributes error and time to each effect in which textbook shading differs. Writes a page,
     cost.json, cost.svg and pictures to OUTPUT/cost/SCENE. Without --resolution the film is reduced
     to a width of 128 pixels; --spp gives the largest count of samples per pixel, 64 if omitted.
 
     With --picture, settings of another renderer have a front of their own: their times are given.
-    The size of the pictures becomes that of the study.
+    The size of the pictures becomes that of the study. Without SCENE, nothing is rendered: pictures
+    of --reference judge the settings.
 
     \b
     Examples:
@@ -63,6 +71,7 @@ def cost(
       fotismos cost my_scene.xml --resolution 256x256 --rounds 11
       fotismos cost cornell-box --at 1920x1080
       fotismos cost hall.xml --picture 'PCSS low @ 6.3ms=low_*.exr' --machine 'RTX 3060'
+      fotismos cost --reference 'truth_*.exr' --picture 'SSAO @ 1.2ms=ssao_*.exr'
     """  # noqa: D301 click reads the \b as: keep these lines
     if is_measured and at is None:
         raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
@@ -70,9 +79,15 @@ def cost(
     for name in ("transfer", "over"):
         if engine is None and rendering[name] is not None:
             raise InputError(f"--{name}: it says how pictures are read. Give --picture.")
+    if scene is None and not (rendering["reference"] and engine):
+        raise click.UsageError(
+            "Missing argument 'SCENE': give a scene, or pictures, --reference and --picture."
+        )
+    if scene is not None and within != TOLERANCE:
+        raise InputError("--within: it judges pictures without a scene. Omit it, or the scene.")
     jobs.work(
         "cost",
-        jobs.pool(timeout),
+        Pool(0) if scene is None else jobs.pool(timeout),  # pictures run no user's code
         scene=scene,
         output=output,
         options=jobs.chosen_options(rendering),
@@ -80,5 +95,6 @@ def cost(
         at=at,
         is_measured=is_measured,
         engine=engine,
+        within=within,
         as_json=as_json,
     )

@@ -17,7 +17,7 @@ from fotismos.reports import jobs
     show_default=True,
     type=click.Choice(["perceptual", "linear"]),
     help="Loss to minimise: the mean colour difference in CAM16-UCS, or the mean square of the"
-    " difference in linear RGB.",
+    " error in linear RGB.",
 )
 @click.option(
     "--form",
@@ -43,7 +43,7 @@ def fit(
     timeout: float,
     **rendering: Any,
 ) -> None:
-    """Find the heuristic parameters nearest to the reference, and the error that remains.
+    """Find the textbook parameters nearest to the physical picture, and the error that is left.
 
     The loss that the best parameters remove is the parameter error. The rest is the model error,
     which no parameters remove. Writes a page (before, reference, after, error left) and fit.json to

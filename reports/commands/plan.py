@@ -1,4 +1,4 @@
-"""``fotismos plan``: which effects a scene calls for."""
+"""``fotismos plan``: which effects a scene needs."""
 
 from typing import Any
 
@@ -22,7 +22,7 @@ from fotismos.reports.terminal.words import verbose_option
 @jobs.scene_options
 @verbose_option
 def plan(scene: str, as_json: bool, within: float | None, timeout: float, **rendering: Any) -> None:
-    """List the effects that a scene calls for, by which rule, and what will be simulated.
+    """List the effects that a scene needs, the rule for each, and what will be simulated.
 
     With --within, the exit code is 1 if no measured method passes.
 

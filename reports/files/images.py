@@ -20,6 +20,7 @@ from fotismos.comparisons.comparison import Images
 from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.departure.colour import CHROMATICITIES, to_srgb
+from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING, RATIO, drawn
 
 Bytes = NDArray[np.uint8]
@@ -30,6 +31,9 @@ QUALITY = 80
 #: Colour maps by purpose.
 ERROR_COLOURS = "magma"
 SIGNED_COLOURS = "RdBu_r"
+
+#: The greatest grey of a difference that is not visible.
+DARK = 70
 
 #: Pixels of a thumbnail's longer side; cards show it at two thirds of that size.
 THUMBNAIL = 160
@@ -50,6 +54,18 @@ def tonemap(rgb: ArrayLike, exposure: float = 1.0) -> Image.Image:
 def error_map(values: ArrayLike, vmax: float) -> Image.Image:
     """A map (H, W) of values ≥ 0: 0 to `vmax` over the colour map, beyond it the last colour."""
     return _coloured(np.asarray(values, np.float64) / vmax, ERROR_COLOURS)
+
+
+def difference_map(values: ArrayLike, threshold: float, top: float) -> Image.Image:
+    """A map (H, W) of differences: grey up to a threshold, then the colours from a quarter to all.
+
+    The page's script draws its maps by the same rule, with a threshold that moves.
+    """
+    values = np.asarray(values, np.float64)
+    table = _table(ERROR_COLOURS)
+    above = np.clip(64 + 192 * (values - threshold) / (top - threshold), 64, 255).astype(np.uint8)
+    grey = np.round(DARK * np.clip(values / threshold, 0, 1)).astype(np.uint8)
+    return Image.fromarray(np.where((values > threshold)[..., None], table[above], grey[..., None]))
 
 
 def signed_map(values: ArrayLike, limit: float) -> Image.Image:
@@ -101,7 +117,7 @@ def thumbnails(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
     panels = {
         "heuristic": tonemap(shown.heuristic, exposure),
         "reference": tonemap(shown.reference, exposure),
-        LEADING.name: error_map(shown.maps[LEADING.name], LEADING.map_range[1]),
+        LEADING.name: difference_map(shown.maps[LEADING.name], TOLERANCE, LEADING.map_range[1]),
     }
     panels |= {name: tonemap(term, exposure) for name, term in shown.terms.items() if term.any()}
     size = shrunk(panels["reference"].size, THUMBNAIL)
@@ -142,6 +158,13 @@ def webp(picture: Image.Image, lossless: bool = False) -> bytes:
     # Without loss, `quality` means the effort to pack.
     picture.convert("RGB").save(buffer, "WEBP", quality=QUALITY, method=4, lossless=lossless)
     return buffer.getvalue()
+
+
+def reduced(file: bytes, side: int) -> NDArray[np.float64]:
+    """Return a picture's file in grey at ``side`` by ``side`` pixels, as one row."""
+    with Image.open(BytesIO(file)) as picture:
+        small = picture.convert("L").resize((side, side), Image.Resampling.BOX)
+    return np.asarray(small, np.float64).ravel()
 
 
 def webp_uri(file: bytes) -> str:

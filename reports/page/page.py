@@ -14,10 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from datetime import date
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from msgspec import structs
 
+from fotismos.comparisons.comparison import machine
 from fotismos.comparisons.departure.colour import BT709, rgb_to_xyz
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
 from fotismos.comparisons.departure.metrics import (
@@ -26,8 +29,9 @@ from fotismos.comparisons.departure.metrics import (
     METRICS,
     RATIO,
     THRESHOLDS,
-    drawn,
+    declared,
 )
+from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.reference.records import plain
 from fotismos.reports import glossary, verdict
 from fotismos.reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT
@@ -49,6 +53,14 @@ SCRIPTS = (
     "pointer", "keyboard", "terms", "shading", "numbers", "live", "main",
 )  # fmt: skip
 
+WORST = 3
+"""Scenes whose pictures begin the overview."""
+
+LOOK = 16
+APART = 12
+"""Two scenes look nearly alike if their pictures, in grey at so many pixels, are less apart: the
+mean difference of their levels, of 255."""
+
 FIRST_MOVED = 3
 """Moved scenes that the headline of a check names."""
 
@@ -62,11 +74,14 @@ Runs = list[tuple[int, str]]
 class PageScene(SceneView):
     """A scene in the page: its name in the address, and ``(effect, colour, part)`` of its error.
 
+    ``title`` says what a built-in scene shows.
+
     ``prices`` are by threshold (:func:`fotismos.reports.verdict.price_at`); ``command`` finds the
     cheapest method; empty if the record has none to derive it from.
     """
 
     id: str
+    title: str
     parts: tuple[tuple[str, str, float], ...]
     shares: tuple[float, ...]
     verdicts: str
@@ -83,11 +98,13 @@ def render(
     state: str = "",
     threshold: float = TOLERANCE,
     moved: Sequence[Before] = (),
+    reloads: bool = False,
 ) -> str:
     """One HTML page of all scenes, worst first, that begins at a threshold.
 
     `failures` are the scenes that could not be compared; `state` is a sentence on an unfinished
-    run; `moved` are pictures without a scene that moved.
+    run; `moved` are pictures without a scene that moved. The page ``reloads`` itself until one
+    that does not takes its place.
     """
     page_title = title or title_of([view.record for view in views])
     taken: set[str] = set()
@@ -122,6 +139,9 @@ def render(
         note=title,
         data=data,
         scenes=scenes,
+        worst=_worst(scenes),
+        legend=dict(sorted({part[:2] for scene in scenes for part in scene.parts})),
+        settings=_settings(records) if records else "",
         failures=failed,
         usual=usual,
         savings="" if since else verdict.savings(records),
@@ -133,6 +153,7 @@ def render(
         details=DETAILS,
         state=state,
         moved=moved,
+        reloads=reloads,
     )
 
 
@@ -165,6 +186,38 @@ def details(
     )
 
 
+def _worst(scenes: Sequence[PageScene]) -> list[PageScene]:
+    """Return the scenes of largest mean error; of those that look nearly alike, only the first."""
+    chosen: list[PageScene] = []
+    looks: list[np.ndarray] = []
+    pictured = [scene for scene in scenes if scene.thumbnails]
+    for scene in sorted(pictured, key=lambda each: -each.record.metrics[LEADING.name].mean):
+        halves = [scene.thumbnails["heuristic"], scene.thumbnails["reference"]]
+        look = np.array([images.reduced(half, LOOK) for half in halves])
+        if all(np.abs(look - other).mean() >= APART for other in looks):
+            chosen.append(scene)
+            looks.append(look)
+    return chosen[:WORST]
+
+
+def _settings(records: Sequence[ComparisonRecord]) -> str:
+    """Return the size, samples, variants, versions, machine and date of a page, as words."""
+    sizes = dict.fromkeys("{} × {}".format(*record.resolution) for record in records)
+    samples = dict.fromkeys(sorted(record.plan.spp for record in records if record.plan))
+    variants = dict.fromkeys(record.variant for record in records if record.variant)
+    versions = records[0].versions.items()
+    computer = machine()
+    parts = (
+        f"{', '.join(sizes)} pixels",
+        f"{', '.join(map(str, samples))} samples per pixel" if samples else "",
+        ", ".join(variants),
+        ", ".join(f"{name} {version}" for name, version in versions),
+        f"{computer.processor}, {computer.cores} cores",
+        f"{date.today():%Y-%m-%d}",
+    )
+    return f"{'; '.join(filter(None, parts))}."
+
+
 def _runs(text: Callable[[float], str]) -> Runs:
     """Return the texts at all thresholds, each where it begins."""
     texts = [text(threshold) for threshold in THRESHOLDS]
@@ -177,8 +230,9 @@ def _scene(view: SceneView, taken: set[str], usual: float) -> PageScene:
     return PageScene(
         **structs.asdict(view),
         id=identifier(record.scene, taken),
+        title=SCENES[record.scene].title if record.scene in SCENES else "",
         parts=tuple(
-            (effect, EFFECT_COLOURS[effect], part)
+            (verdict.noun(effect), EFFECT_COLOURS[effect], part)
             for effect, part in verdict.missing(record).items()
         ),
         shares=tuple(round(share.value, 5) for share in visible),
@@ -221,16 +275,20 @@ def _scene_data(scene: PageScene) -> dict[str, Any]:
         "arePictures": record.pairing is None,
         "isNoiseKnown": verdict.is_noise_known(record),
         "mean": difference(record.metrics[LEADING.name].mean),
+        "worst": {"pixel": scene.worst, "error": difference(record.metrics[LEADING.name].max)},
         "shares": scene.shares,
         "verdicts": scene.verdicts,
         "advice": scene.advice,
         "prices": scene.prices,
         "regions": [
-            {key: getattr(region, key) for key in ("x", "y", "width", "height", "effect")}
+            {key: getattr(region, key) for key in ("x", "y", "width", "height")}
+            | {"effect": region.effect and verdict.noun(region.effect)}
             for region in record.regions
         ],
         "images": scene.embedded.manifest() if scene.embedded else None,
-        "effects": plain(why.effects) if why else None,
+        "effects": plain(why.effects) | {"names": list(map(verdict.noun, why.effects.names))}
+        if why
+        else None,
         "board": _board(why, record.why),
         "terms": scene.terms.manifest() if scene.terms else None,
         "live": scene.live.manifest() if scene.live else None,
@@ -255,17 +313,20 @@ def _board(why: WhyView | None, found: Attribution | None) -> dict[str, Any] | N
 
 def _drawing() -> dict[str, Any]:
     """Return the maps, their colours, and XYZ of linear RGB, under the script's names."""
-    declared = [metric for metric in drawn().values() if not METRICS.is_builtin(metric)]
     maps = (
-        (LEADING.name, LEADING.label, "difference", 0),
+        (LEADING.name, LEADING.label, "difference", LEADING.map_range[1]),
         ("effects", EFFECTS_TITLE, "effects", 0),
         (RATIO.name, RATIO.label, "ratio", RATIO.limit),
-        ("significant", "Shown to differ", "mask", 0),
-        *((metric.name, metric.label, "metric", metric.map_range[1]) for metric in declared),
+        ("significant", "Certain to differ", "mask", 0),
+        *(
+            (metric.name, metric.label, "metric", metric.map_range[1])
+            for metric in declared().values()
+        ),
     )
     return {
         "maps": [dict(zip(("name", "title", "kind", "top"), shown, strict=True)) for shown in maps],
         "noEffect": NO_EFFECT,
+        "dark": images.DARK,
         "colours": {
             "error": images.colour_table(images.ERROR_COLOURS),
             "signed": images.colour_table(images.SIGNED_COLOURS),

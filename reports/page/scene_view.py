@@ -36,11 +36,13 @@ class WhyView(Record):
 class TermsView(Record):
     """The page's data of the terms of a scene.
 
-    ``grid`` has planes over the grid of pixels, and ``tops`` those of its values ≥ 0; lights have a
-    name, ``L_d`` and ``L_s``. ``missing`` says why there are no terms.
+    ``grid`` has planes over the grid of pixels in ``columns`` and ``rows``, and ``tops`` those of
+    its values ≥ 0; lights have a name, ``L_d`` and ``L_s``. ``missing`` says why there are none.
     """
 
     grid: Embedded | None = None
+    columns: list[int] = field(default_factory=list)
+    rows: list[int] = field(default_factory=list)
     tops: dict[str, float] = field(default_factory=dict)
     materials: tuple[dict[str, Any], ...] = ()
     lights: tuple[dict[str, Any], ...] = ()
@@ -69,12 +71,13 @@ class EngineView(Record):
     """A page's sentences on an engine's settings, and their shares above the usual threshold.
 
     ``judgements`` are one for each, ``stated`` says what their times are of, and ``odd`` what is
-    odd about the pictures.
+    odd about the pictures. ``shares`` are those of the pixels above the ΔE2000 ``within``.
     """
 
     judgements: tuple[str, ...]
     stated: str
     odd: tuple[str, ...]
+    within: float
     shares: tuple[Any, ...]
 
 
@@ -85,18 +88,20 @@ class CostView(Record):
     to load. ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are
     sentences on its sums and on the machine, ``answer`` one on the cheapest method that looks
     right; ``colours`` are those of the effects; ``left_out`` are sentences on methods. ``engine``
-    is None without given pictures; ``reference`` is a small WebP file.
+    is None without given pictures; ``reference`` is a small WebP file. Without a scene, ``judged``
+    says by which reference, and ``record`` is an ``EngineCost``.
     """
 
     record: Any
     images: dict[str, bytes]
-    said: str
-    busy: str
     answer: str
-    colours: tuple[str, ...]
+    said: str = ""
+    busy: str = ""
+    colours: tuple[str, ...] = ()
     engine: EngineView | None = None
     left_out: tuple[str, ...] = ()
     reference: bytes | None = None
+    judged: str = ""
 
 
 class Before(Record):
@@ -119,13 +124,15 @@ class SceneView(Record):
     """A comparison as the page shows it.
 
     ``thumbnails`` are small named WebP files of both halves, the leading metric's map and terms;
-    without ``embedded`` images, the scene has only these. ``files`` are labels, and paths relative
-    to the page. ``before`` is what moved since a baseline, on the page of a check.
+    without ``embedded`` images, the scene has only these. ``worst`` is column and row of the pixel
+    with the largest error. ``files`` are labels, and paths relative to the page. ``before`` is what
+    moved since a baseline, on the page of a check.
     """
 
     record: ComparisonRecord
     thumbnails: dict[str, bytes] = field(default_factory=dict)
     embedded: Embedded | None = None
+    worst: tuple[int, int] = (0, 0)
     files: dict[str, str] = field(default_factory=dict)
     chart: Figure | None = None
     cost: CostView | None = None

@@ -88,6 +88,7 @@ def environment() -> Environment:
         region_view=region_view,
         at=text_at,
         ink=ink,
+        noun=verdict.noun,
         plain=plain,
         webp_uri=images.webp_uri,
     )

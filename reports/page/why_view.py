@@ -93,6 +93,8 @@ def terms_view(grid: TermGrid | Missing) -> TermsView:
         planes[name] = code.astype(np.uint16)
     return TermsView(
         grid=packed(planes),
+        columns=grid.columns.tolist(),
+        rows=grid.rows.tolist(),
         tops=tops,
         materials=tuple(vars(material) for material in grid.materials),
         lights=tuple(

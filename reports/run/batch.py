@@ -52,14 +52,16 @@ class Batch:
     libraries: Sequence[str] = LIBRARIES
     stages: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     views: dict[str, SceneView] = field(default_factory=dict)
+    first_views: dict[str, SceneView] = field(default_factory=dict)
     errors: dict[str, FotismosError] = field(default_factory=dict)
     hard_cases: "HardCases | None" = None
     next_page: float = 0.0
 
     @property
     def ordered(self) -> list[SceneView]:
-        """The views in the order of the scenes."""
-        return [self.views[target] for target in self.places if target in self.views]
+        """The views in the order of the scenes; the first ones of scenes that are not done."""
+        views = self.first_views | self.views
+        return [views[target] for target in self.places if target in views]
 
     @property
     def done(self) -> int:
@@ -95,6 +97,8 @@ class Batch:
         done = f"{self.done} of {len(self.places)} scenes are done"
         if is_interrupted:
             state = f"Interrupted: {done}; the same command resumes the run."
+        elif self.done < len(self.places) and self.first_views:
+            state = "In progress: other metrics and mistakes follow; the page reloads by itself."
         elif self.done < len(self.places):
             state = f"In progress: {done}; reload to see more."
         # Details first: the page links them.
@@ -102,7 +106,11 @@ class Batch:
         details = page.details(self.hard_cases, run, records)
         results.write(self.folder / results.DETAILS, details)
         html = page.render(
-            self.ordered, failures=self.failures(), state=state, threshold=self.within
+            self.ordered,
+            failures=self.failures(),
+            state=state,
+            threshold=self.within,
+            reloads=self.done < len(self.places) and bool(self.first_views),
         )
         results.write(path, html)
         end = perf_counter()
@@ -111,6 +119,17 @@ class Batch:
         if self.on_page:
             self.on_page(path)
             self.on_page = None
+
+    def show(self, target: str, view: SceneView) -> None:
+        """Write the page with the first view of a scene, which is measured in part."""
+        self.first_views[target] = view
+        self.grow_page()
+
+    def withdraw(self) -> None:
+        """Delete a page that has first views alone: none of their scenes was finished."""
+        if self.first_views and not self.views:
+            self.first_views.clear()
+            results.clear(self.folder, (results.PAGE, results.DETAILS))
 
     def grow_page(self) -> None:
         """Write the page of an unfinished run, unless that took long just now."""
@@ -130,13 +149,15 @@ class Subjects:
     """What a command compares: words that name it, the name and file of each, and how.
 
     ``compare(word, folder, place, job, progress)`` returns the view and the seconds by stage.
-    ``libraries`` are those that the results depend on.
+    ``libraries`` are those that the results depend on. If subjects ``are_shown_early``, ``compare``
+    runs in this process, and takes :meth:`Batch.show` before the progress.
     """
 
     words: tuple[str, ...]
     files: tuple[tuple[str, Path | None], ...]
     compare: Comparing
     libraries: Sequence[str] = LIBRARIES
+    are_shown_early: bool = False
 
 
 def run(
@@ -173,10 +194,12 @@ def run(
             libraries=subjects.libraries,
         )
         batch.stages["start-up"] = perf_counter() - START
-        calls = {
+        calls: dict[str, tuple[Any, ...]] = {
             target: (word, folder, target, replace(job, options=options_by_scene[word]))
             for target, word in places.items()
         }
+        if subjects.are_shown_early:
+            calls = {target: (*call, batch.show) for target, call in calls.items()}
         try:
             with progress.shown() as bar:
                 stages = ("rendering", "causes") if job.with_causes else ("rendering",)
@@ -187,6 +210,8 @@ def run(
             if batch.done:
                 _write(batch, is_interrupted=True)
             raise
+        finally:
+            batch.withdraw()
         # A single scene that failed leaves no page.
         if batch.views or len(places) > 1:
             _write(batch)

@@ -1,5 +1,6 @@
 """Two pictures of a command: compared and written."""
 
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 from fotismos.comparisons.comparison import PICTURE_LIBRARIES
 from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.two_pictures import compare_pictures
+from fotismos.comparisons.two_pictures import finish, look
 from fotismos.reports.files import results
 from fotismos.reports.jobs import Job
 from fotismos.reports.page.scene_view import SceneView
@@ -23,22 +24,34 @@ def subjects(options: Options) -> Subjects:
         files=((path.stem, path),),
         compare=compare,
         libraries=PICTURE_LIBRARIES,
+        are_shown_early=True,
     )
 
 
 def compare(
-    word: str, folder: Path, target: str, job: Job, progress: Any
+    word: str,
+    folder: Path,
+    target: str,
+    job: Job,
+    show: Callable[[str, SceneView], None],
+    progress: Any,
 ) -> tuple[SceneView, dict[str, float]]:
-    """Compare the pictures of a job, and write their files to ``folder/target``."""
+    """Compare the pictures of a job, and write their files to ``folder/target``.
+
+    ``show`` puts them on the page before the slow part.
+    """
     begin = perf_counter()
-    comparison = compare_pictures(
-        job.options, name=word, command=job.options.command("compare", "")
-    )
+    first = look(job.options, name=word, command=job.options.command("compare", ""))
+    view = scene_files.view_of(first.comparison)
     seconds = {"pictures": perf_counter() - begin}
+    show(target, view)
+    begin = perf_counter()
+    comparison = finish(first)
+    seconds["pictures"] += perf_counter() - begin
     begin = perf_counter()
     if job.figures:
         from fotismos.reports.charts import figures  # loaded late: few pages have any
 
         figures.write_scene(folder / results.FIGURES, target, comparison)
-    view = scene_files.write(folder, target, comparison)
+    view = scene_files.write(folder, target, comparison, view=view)
     return view, seconds | {"files": perf_counter() - begin}

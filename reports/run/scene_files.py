@@ -11,13 +11,15 @@ from msgspec import structs
 from fotismos.comparisons import atomic
 from fotismos.comparisons.comparison import Comparison, ComparisonRecord, Images
 from fotismos.comparisons.departure.metrics import LEADING, drawn
+from fotismos.comparisons.departure.regions import worst_pixel
 from fotismos.reference.records import Missing, Record, plain, to_json
 from fotismos.reports.files import images, results
 from fotismos.reports.page import embedding
 from fotismos.reports.page.scene_view import LiveView, SceneView, TermsView
 
 if TYPE_CHECKING:  # few scenes have one
-    from fotismos.comparisons.cost.cost import Study
+    from fotismos.comparisons.cost.cost_record import Cost
+    from fotismos.comparisons.cost.engine import Study
 
 RECORD = "comparison.json"
 PICTURE = "comparison.exr"
@@ -65,13 +67,15 @@ def write(
     folder: Path,
     name: str,
     comparison: Comparison,
-    costs: "Study | None" = None,
+    costs: "Study[Cost] | None" = None,
     key: str | None = None,
+    view: SceneView | None = None,
 ) -> SceneView:
     """Write the files of one comparison to ``folder/name``, and return its part of the page.
 
     The record is removed first and written last. Files of an earlier result that this one does not
-    have are deleted. With a key, :func:`load` finds the result.
+    have are deleted. With a key, :func:`load` finds the result. ``view`` is that of the same images
+    with an earlier record.
     """
     target = folder / name
     record = comparison.record
@@ -79,7 +83,7 @@ def write(
     # The view names the earlier files, and is about to go.
     earlier = _files(target)
     results.clear(target, (RECORD, VIEW))
-    view = view_of(comparison)
+    view = structs.replace(view, record=record) if view else view_of(comparison)
     made = {
         f"{picture}.png": png
         for picture, png in images.pictures(comparison.images, record.viewing.exposure).items()
@@ -121,6 +125,7 @@ def view_of(comparison: Comparison) -> SceneView:
         record=record,
         thumbnails=images.thumbnails(shown, record.viewing.exposure),
         embedded=embedding.embed(images.channels(_layers(shown)), shown.counted),
+        worst=worst_pixel(shown.maps[LEADING.name], shown.counted),
     )
     terms = comparison.terms
     live = comparison.live
@@ -169,7 +174,7 @@ def _layers(shown: Images) -> dict[str, Any]:
         "reference": shown.reference,
         "reference_stderr": shown.reference_stderr,
         **({"P": shown.position, "N": shown.normal} if shown.position is not None else {}),
-        **{name: shown.maps[name] for name in drawn()},
+        **{name: shown.maps[name] for name in drawn() if name in shown.maps},
         "significant": shown.significant,
         **shown.terms,
     }

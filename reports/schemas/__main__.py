@@ -13,6 +13,7 @@ from fotismos.comparisons.check.measurement import Baseline, laid_out
 from fotismos.comparisons.check.pictures import PictureBaseline
 from fotismos.comparisons.comparison import ComparisonRecord
 from fotismos.comparisons.cost.cost_record import Cost
+from fotismos.comparisons.cost.engine_record import EngineCost
 from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.reports.ci.checks import Checks
 from fotismos.reports.files.results import RunRecord
@@ -25,6 +26,7 @@ PUBLISHED: dict[str, Any] = {
     "check": Checks,
     "comparison": ComparisonRecord,
     "cost": Cost,
+    "engine": EngineCost,
     "fit": FitRecord,
     "pictures": PictureBaseline,
     "run": RunRecord,

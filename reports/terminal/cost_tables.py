@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 from fotismos.comparisons.cost.front import Reach, beats, is_below, reach, sufficient
-from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
+from fotismos.comparisons.departure.criterion import TOLERANCE, decide, share_above
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.reports.glossary import meanings
 from fotismos.reports.terminal.tables import printed
@@ -14,7 +14,8 @@ from fotismos.reports.terminal.words import given_time, number, parameter, perce
 
 if TYPE_CHECKING:
     from fotismos.comparisons.cost.cost import Choice
-    from fotismos.comparisons.cost.cost_record import Cost, Engine, EngineSetting, Point
+    from fotismos.comparisons.cost.cost_record import Cost, Point
+    from fotismos.comparisons.cost.engine_record import Engine, EngineCost, EngineSetting
     from fotismos.reference.records import Interval
 
 Rows: TypeAlias = Iterator[Sequence[str]]
@@ -55,8 +56,7 @@ def lines(record: Cost) -> Iterator[str]:
     yield from _explained(method.name for method in record.methods if method.family == "physical")
     yield from left_out(record)
     if record.engine:
-        yield from _section(f"Given pictures: {stated(record.engine)}", _settings(record.engine))
-        yield from oddities(record.engine)
+        yield from _pictures(record.engine, OWN_FRONT)
     # Errors, and what each effect contributes.
     yield from _section(f"Error and time of one image at {size}", _points(record.points))
     if record.attribution.effects:
@@ -72,6 +72,38 @@ def lines(record: Cost) -> Iterator[str]:
         yield from _section(title, _predicted(record))
     if record.measured:
         yield from _section("Predicted and measured there, fewest samples", _off(record))
+
+
+def lines_of_pictures(record: EngineCost, within: float) -> Iterator[str]:
+    """Yield the lines of settings without a scene; pixels differ visibly above a ΔE2000."""
+    yield answer_of_pictures(record, within)
+    yield from judgements(record.engine)
+    yield ""
+    yield f"{record.scene}, {sized(record.resolution)}: {reference_of(record)}"
+    yield from _pictures(record.engine, within=within)
+
+
+def answer_of_pictures(record: EngineCost, within: float) -> str:
+    """Return the fastest setting that looks right, and what is odd about the reference."""
+    settings = record.engine.settings
+    passing = [one for one in settings if decide(one.visible, within) == "pass"]
+    if passing:
+        best = min(passing, key=lambda one: (one.seconds.value, one.error.value))
+        found = f"Fastest that looks right: {best.method}, {given_time(best.seconds.value)}"
+    else:
+        found = "No setting is sure to look right"
+    limit = f"at most 5 % of the pixels exceed {LEADING.label} {parameter(within)}"
+    return " ".join([f"{found} ({limit}).", *record.warnings])
+
+
+def reference_of(record: EngineCost) -> str:
+    """Return what a reference is made of, and its noise."""
+    if record.noise_floor is None:
+        return "judged by one reference picture, whose noise is unknown"
+    return (
+        f"judged by {record.reference_picture.repeats} reference pictures; the noise of their mean"
+        f" gives {LEADING.label} {number(record.noise_floor)}"
+    )
 
 
 def left_out(record: Cost) -> Iterator[str]:
@@ -101,7 +133,7 @@ def together(record: Cost) -> str:
     kernel = whole.kernel_s.value
     added = sum(effect.adds_s.value for effect in whole.effects)
     return (
-        f"A sample of the full plan takes {number(whole.plan_s.value / kernel)} times as long as"
+        f"A sample with all effects takes {number(whole.plan_s.value / kernel)} times as long as"
         f" the kernel's: 1, {number(added / kernel)} for the effects, and"
         f" {number(whole.renderer_s.value / kernel)} for Mitsuba's integrator in place of the"
         " kernel."
@@ -164,10 +196,13 @@ def _rivals(setting: EngineSetting, engine: Engine) -> str:
     return f"nothing given under {given_time(min(better))} does better"
 
 
+OWN_FRONT = "; the front is their own"
+"""What to add where measured methods have a front, too."""
+
+
 def stated(engine: Engine) -> str:
     """Return what the times of settings are of."""
-    machine = f", on {engine.machine}" if engine.machine else ""
-    return f"times as given{machine}; the front is their own"
+    return f"times as given, on {engine.machine}" if engine.machine else "times as given"
 
 
 def oddities(engine: Engine) -> list[str]:
@@ -187,9 +222,9 @@ def closure(record: Cost) -> str:
     closes = left.low <= 0
     verdict = "no more than noise" if closes else "more than noise: some effect is missing"
     return (
-        f"With all effects simulated ΔE2000 = {left.value:.2g} is left ({left.low:.2g} to"
-        f" {left.high:.2g}; {verdict}). What the effects remove and what is left add up to the"
-        f" departure, ΔE2000 = {departure:.4g}."
+        f"With all effects simulated, an error of ΔE2000 = {left.value:.2g} is left"
+        f" ({left.low:.2g} to {left.high:.2g}; {verdict}). What the effects remove and"
+        f" what is left add up to the error of the textbook picture, ΔE2000 = {departure:.4g}."
     )
 
 
@@ -278,13 +313,20 @@ def _points(points: Sequence[Point]) -> Rows:
         )
 
 
-def _settings(engine: Engine) -> Rows:
+def _pictures(engine: Engine, more: str = "", within: float = TOLERANCE) -> Iterator[str]:
+    """Yield the table of settings, and what is odd about their pictures."""
+    title = f"Given pictures: {stated(engine)}{more}"
+    yield from _section(title, _settings(engine, within))
+    yield from oddities(engine)
+
+
+def _settings(engine: Engine, within: float) -> Rows:
     ratio = ("x kernel there",) if engine.kernel_s else ()
-    above = f"above {TOLERANCE:g}"
+    above = f"above {within:g}"
     ends = "95 % interval"
     yield "setting", "files", "time", *ratio, "mean ΔE2000", ends, above, ends, "passes at", "front"
     for one in engine.settings:
-        share = share_above(one.visible)
+        share = share_above(one.visible, within)
         notes = ["front"] if one.front else []
         if one.ties:
             notes.append(f"too close to call: {', '.join(one.ties)}")
@@ -294,9 +336,9 @@ def _settings(engine: Engine) -> Rows:
             given_time(one.seconds.value),
             *((number(one.ratio),) if one.ratio else ()),
             number(one.error.value),
-            f"{number(one.error.low)} to {number(one.error.high)}",
+            f"{number(one.error.low)} to {number(one.error.high)}" if one.has_noise else "unknown",
             percent(share.value),
-            f"{number(100 * share.low)} to {percent(share.high)}",
+            f"{number(100 * share.low)} to {percent(share.high)}" if one.has_noise else "unknown",
             "none" if one.passes_at is None else parameter(one.passes_at),
             ", ".join(notes),
         )

@@ -15,7 +15,7 @@ from fotismos.reports.terminal.tables import printed
 
 
 class PlannedEffect(Record):
-    """Whether a scene calls for an effect, why, and what simulates it on either side."""
+    """Whether a scene needs an effect, why, and what simulates it on either side."""
 
     name: str
     called_for: bool
@@ -70,7 +70,7 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
     yield from printed(_effects(plan))
     yield ""
     if plan.rules:
-        headings = "pruning rule", "applies", "premise not shown", "evidence"
+        headings = "pruning rule", "applies", "premise that may fail", "evidence"
         rules = [
             (rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence)
             for rule in plan.rules
@@ -79,7 +79,7 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
         yield ""
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
     reads = ", ".join(plan.heuristic_reads) or "nothing"
-    yield f"heuristic     {plan.shading}, which reads {reads}"
+    yield f"textbook      {plan.shading}, which reads {reads}"
     yield f"kernel terms  {', '.join(plan.kernel_terms) or 'none'}"
     yield f"variant       {plan.variant}"
     yield f"integrator    {plan.simulation}"
@@ -90,7 +90,7 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
 
 
 def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
-    yield "effect", "called for", "rule", "evidence", "cost"
+    yield "effect", "needed", "rule", "evidence", "cost"
     for effect in plan.effects:
         called = "yes" if effect.called_for else "no"
         yield effect.name, called, effect.rule, effect.evidence, effect.cost

@@ -155,7 +155,7 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
     # What is special about single scenes.
     for record in records:
         if record.heuristic != Options().heuristic and not record.picture:
-            line = f"{record.scene}: heuristic {record.heuristic}"
+            line = f"{record.scene}: shading {record.heuristic}"
             if record.textbook is not None:
                 own = number(record.metrics[LEADING.name].mean)
                 line += f" {own}, Phong {number(record.textbook)} (mean {LEADING.label})"

@@ -62,7 +62,18 @@ def visible(text: str) -> str:
     return re.sub(r"##(?=\w*\[)", "# #", re.sub(r"^(\s*)::", r"\1\\::", shown))
 
 
-OPTION_NAMES = frozenset({*Options.__struct_fields__, "at", "form", "measure", "output", "update"})
+OPTION_NAMES = frozenset(
+    {
+        *Options.__struct_fields__,
+        "at",
+        "form",
+        "kernel_time",
+        "measure",
+        "output",
+        "rounds",
+        "update",
+    }
+)
 
 OPTION = re.compile(r"`(\w+)(?:=([^`]*))?`")
 

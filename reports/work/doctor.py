@@ -1,8 +1,6 @@
 """The work of ``fotismos doctor``."""
 
 import platform
-import re
-import tomllib
 from collections.abc import Iterable, Iterator
 from importlib import metadata
 from importlib.util import find_spec
@@ -16,44 +14,42 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic import glsl, llvm
 from fotismos.heuristic.errors import InstallationError
-from fotismos.heuristic.program import ROOT, __version__, installation
+from fotismos.heuristic.mitsuba_version import other_version
+from fotismos.heuristic.program import __version__, installation
 from fotismos.reference.scene.graph import set_variant
 
+WIDTH = max(map(len, llvm.VARIANTS))
 LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
-
-PROJECT = ROOT / "pyproject.toml"
-
-CHANGES = {
-    "mitsuba": "The documentation's figures, baselines and kept images were made with the pinned"
-    " one: images may differ, and `check` may report that they moved.",
-    "drjit": "Mitsuba works only with the Dr.Jit that it was built with, and may not even load.",
-}
-"""What another version than the pinned one changes."""
 
 
 def run(pool: Pool) -> None:
     """Print the lines on the installation."""
-    for line in examine(pool, llvm.VARIANTS):
-        click.echo(line)
+    for found in examine(pool, llvm.VARIANTS):
+        click.echo(found)
 
 
 def examine(pool: Pool, variants: Iterable[str]) -> Iterator[str]:
     """Yield lines on versions, LLVM, test renderings, OpenGL and metrics."""
-    yield f"{'fotismos':<17} {__version__}"
-    yield f"{'python':<17} {platform.python_version()} on {platform.platform()}"
+    yield line("fotismos", __version__)
+    yield line("python", f"{platform.python_version()} on {platform.platform()}")
     yield from version_lines()
     info = llvm.check()
     version = ".".join(map(str, info.version or ()))
-    yield f"{'LLVM':<17} {version}, from {info.source}: {info.path or 'path unknown'}"
+    yield line("LLVM", f"{version}, from {info.source}: {info.path or 'path unknown'}")
     for variant in variants:
-        yield f"{variant:<17} {pool.do(Task(variant, rendered, (variant,)))}"
+        yield line(variant, pool.do(Task(variant, rendered, (variant,))))
     state = pool.do(Task("GLSL", shaded, ()))
-    yield f"{'GLSL':<17} {state}"
+    yield line("GLSL", state)
     apart = pool.do(Task("colour differences", compared, ()))
-    yield f"{'metrics':<17} at most {apart:.0e} from those of colour-science"
+    yield line("metrics", f"at most {apart:.0e} from those of colour-science")
     yield ""
     works = not state.startswith("cannot be run")
     yield "fotismos works here" + ("." if works else ", except for GLSL: see above for what to do.")
+
+
+def line(name: str, text: str) -> str:
+    """Return a line of two columns, the first as wide as the longest variant's name."""
+    return f"{name:<{WIDTH}}  {text}"
 
 
 def rendered(variant: str) -> str:
@@ -70,7 +66,7 @@ def shaded() -> str:
     """
     if find_spec("moderngl") is None:
         command = installation("moderngl")
-        return f"is an extra, which only --heuristic FILE.glsl needs. To install it: {command}"
+        return f"is an extra that only --heuristic FILE.glsl needs. To install it: {command}"
 
     try:
         renderer, is_software = glsl.device()
@@ -91,23 +87,9 @@ def compared() -> float:
     return apart
 
 
-def pinned() -> dict[str, str]:
-    """Return the versions that the installed package, or else the checkout, requires exactly."""
-    try:
-        required = metadata.requires("fotismos") or []
-    except metadata.PackageNotFoundError:
-        project = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
-        required = project["dependencies"]
-    matches = (re.fullmatch(r"([\w-]+) *== *([\w.]+)", text) for text in required)
-    return {match[1]: match[2] for match in matches if match}
-
-
 def version_lines() -> Iterator[str]:
-    """Yield a line per library, and one on what changes if it has another version than pinned."""
-    pins = pinned()
+    """Yield a line per library, and one where the documentation's numbers are of another."""
     for library in LIBRARIES:
-        version = metadata.version(library)
-        pin = pins.get(library, version)
-        yield f"{library:<17} {version}" + (f"; {pin} is pinned" if version != pin else "")
-        if version != pin:
-            yield f"{'':<17} {CHANGES[library]}"
+        yield line(library, metadata.version(library))
+        if library == "mitsuba" and (change := other_version()):
+            yield line("", change)

@@ -17,12 +17,16 @@ def results_of(
     scenes: Sequence[str],
     work: Callable[..., Any],
     arguments: Sequence[Any] = (),
+    files: Sequence[Path] = (),
 ) -> dict[Path, Any]:
     """Return what ``work(scene, *arguments, folder, progress)`` returns for each scene, by folder.
 
-    The scenes' folders are below ``folder``.
+    The scenes' folders are below ``folder``. With ``files``, which are pictures, ``scenes`` are
+    only names.
     """
-    subjects = [(name_of(scene), file_of(scene)) for scene in scenes]
+    subjects: list[tuple[str, Path | None]] = list(zip(scenes, files, strict=False))
+    if not files:
+        subjects = [(name_of(scene), file_of(scene)) for scene in scenes]
     with (
         results.hold_results(folder, subjects, command_line()) as places,
         progress.shown() as bar,
@@ -33,7 +37,7 @@ def results_of(
                 function=work,
                 arguments=(scene, *arguments, target),
                 progress=bar.of(target.name),
-                ends_process=is_script(scene),
+                ends_process=not files and is_script(scene),
             )
             for target, scene in zip(places, scenes, strict=True)
         ]

@@ -1,12 +1,13 @@
 """The work of ``fotismos study``."""
 
+from __future__ import annotations
+
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-import pyarrow as pa
 
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.comparisons.study import dataset, design, running
@@ -24,6 +25,9 @@ from fotismos.reports.page.templating import rendered
 from fotismos.reports.terminal import progress, tables
 from fotismos.reports.terminal.words import tell
 
+if TYPE_CHECKING:
+    import pyarrow as pa  # loaded late: it is an extra
+
 FIGURES = "figures"
 
 
@@ -32,6 +36,7 @@ def run(pool: Pool, file: Path, output: Path, many: Callable[[int], Pool]) -> No
 
     ``pool`` lists the points, since scenes are read for that; ``many(tasks)`` renders them.
     """
+    dataset.arrow()  # before anything is rendered
     chosen = design.read(file)
     with hold_results(output / "study", [(chosen.name, file)], command_line()) as (folder,):
         points = pool.do(Task(chosen.name, running.all_points, (chosen,)))

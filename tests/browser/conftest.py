@@ -12,9 +12,9 @@ from msgspec import structs
 from playwright.sync_api import sync_playwright
 
 from fotismos.comparisons.comparison import Comparison
-from fotismos.comparisons.cost.cost import Study
+from fotismos.comparisons.cost.engine import Study
 from fotismos.comparisons.departure import regions
-from fotismos.comparisons.departure.metrics import THRESHOLDS, drawn, log2_luminance_ratio
+from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS, drawn, log2_luminance_ratio
 from fotismos.comparisons.departure.regions import Region
 from fotismos.reference.records import Machine, Missing, Pixels, plain
 from fotismos.reference.rendering.gbuffer import ObjectIds
@@ -28,6 +28,9 @@ WIDTH, HEIGHT = 48, 32
 
 #: Columns that one shape has, the other has those to the right.
 LEFT = 20
+
+#: The pixel in the middle of the spot.
+WORST = 30, 12
 
 #: Names that the page has to bear; the address knows them by plain characters.
 NOISY, EXACT, FAILED = "noisy & <b>", "exact", "lost"
@@ -86,10 +89,16 @@ def noisy():
     found = comparison(NOISY, heuristic, reference, maps, marks)
     beyond = records.visible({t: 0.6 / t**1.7 for t in THRESHOLDS})
     metrics = found.record.metrics
-    metrics = metrics | {"dE2000": structs.replace(metrics["dE2000"], visible=beyond)}
+    error = maps["dE2000"][1:]
+    lead = structs.replace(
+        metrics["dE2000"], visible=beyond, mean=float(error.mean()), max=float(error.max())
+    )
+    metrics = metrics | {"dE2000": lead}
     record = structs.replace(found.record, metrics=metrics)
     size = WIDTH, HEIGHT
-    return Comparison(record, found.images, term_grids.grid(size), live=term_grids.points(size))
+    return Comparison(
+        record, found.images, term_grids.grid(size, WORST), live=term_grids.points(size)
+    )
 
 
 def exact():
@@ -210,11 +219,11 @@ class Visitor:
         columns = 2 if panes == 4 and box["width"] < 680 else panes
         row, column = divmod(pane or 0, columns)
         rows = -(-panes // columns)
-        width, height = (box["width"] + 4) / columns - 4, (box["height"] + 4) / rows - 4
+        width, height = (box["width"] + 8) / columns - 8, (box["height"] + 8) / rows - 8
         zoom = zoom or min(width / WIDTH, height / HEIGHT)
         return (
-            column * (width + 4) + width / 2 + (x + 0.5 - centre[0]) * zoom,
-            row * (height + 4) + height / 2 + (y + 0.5 - centre[1]) * zoom,
+            column * (width + 8) + width / 2 + (x + 0.5 - centre[0]) * zoom,
+            row * (height + 8) + height / 2 + (y + 0.5 - centre[1]) * zoom,
         )
 
     def colour_at(self, left, top):
@@ -279,7 +288,5 @@ def violations(page):
     return [(rule["id"], [node["html"][:120] for node in rule["nodes"]]) for rule in found]
 
 
-def top_of(report):
-    """The end of the map's colours: the least that 95 % of the counted pixels keep within."""
-    held = np.quantile(report.channels[NOISY]["dE2000.Y"][1:], 0.95, method="lower")
-    return next(top for top in (5, 10, 20, 40, 100) if top >= held)
+TOP = LEADING.map_range[1]
+"""The end of the colours of all maps of ΔE2000."""

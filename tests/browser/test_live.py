@@ -457,3 +457,12 @@ def test_the_open_section_is_for_everybody(visitor):
         handle.evaluate("slider => slider.scrollIntoView()")
         assert handle.evaluate(IN_SIGHT), name
         assert first.evaluate(IN_SIGHT), name
+
+
+def test_an_exponent_is_printed_plainly_in_one_line(visitor):
+    visitor.open(f"{SCENE}&live=n:1:1020")
+    section = ready(visitor)
+    choice(section, "material").select_option(label="shiny")
+    output = slider(section, "n").locator("xpath=../output")
+    assert output.text_content() == "1020"
+    assert output.bounding_box()["height"] < 30

@@ -2,12 +2,12 @@
 
 import pytest
 
-from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
+from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH, WORST
 from tests.shared import term_grids
 
 SCENE = f"#scene={NOISY_ID}&mode=error"
 PHONE = {"viewport": {"width": 390, "height": 844}, "has_touch": True}
-GRID = term_grids.grid((WIDTH, HEIGHT))
+GRID = term_grids.grid((WIDTH, HEIGHT), WORST)
 
 
 def shown_rows(page):
@@ -16,7 +16,7 @@ def shown_rows(page):
     for line in page.locator("#terms tbody tr").all():
         name, *cells = (text.strip() for text in line.locator("th, td").all_text_contents())
         light = name if "light" in (line.get_attribute("class") or "") else light
-        is_whole = name in ("ambient", "textbook", "physical", light)
+        is_whole = name in ("ambient", "sum of the terms", "physical", light)
         rows[name if is_whole else f"{light} {name}"] = cells
     return rows
 
@@ -45,10 +45,11 @@ def test_the_terms_are_those_of_the_pixel(visitor, how):
     for x, y in ((9, 14), (37, 22)):
         pick(visitor, x, y, how)
         expected = GRID.at(x, y)
-        place = "at {}, {}: ".format(*expected.pixel) + expected.material.name
+        place = "at {}, {}, the nearest to ".format(*expected.pixel)
+        place += f"{x}, {y}: {expected.material.name}"
         assert page.locator("#terms h3").text_content().endswith(place)
         rows = shown_rows(page)
-        assert values(rows["textbook"]) == pytest.approx(expected.total, rel=6e-3)
+        assert values(rows["sum of the terms"]) == pytest.approx(expected.total, rel=6e-3)
         assert values(rows["ambient"]) == pytest.approx(expected.ambient, rel=6e-3)
         for light in expected.lights:
             assert values(rows[f"{light.name} diffuse"]) == pytest.approx(light.diffuse, rel=6e-3)

@@ -55,7 +55,7 @@ def test_the_slider_drives_headline_bars_map_and_address_together(visitor, repor
     assert visitor.state() == {"scene": NOISY_ID, "t": "5"}
     assert page.locator("#viewer [data-threshold]").input_value() == "5"
     assert "grey up to 5" in page.locator(".legend").text_content()
-    assert "ΔE2000 above 5" in page.locator("[data-part=numbers]").text_content()
+    assert f"{100 * shares[5]:.1f} %" in page.locator(".scene.open h1").text_content()
 
 
 def visible(report):

@@ -11,8 +11,10 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+import fotismos
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost import engine, times
+from fotismos.comparisons.cost.cost import require_other_names, truth
 from fotismos.comparisons.cost.cost_record import Cost
 from fotismos.comparisons.cost.front import fronted
 from fotismos.comparisons.cost.measure import Effort, converged, measure_ladder
@@ -57,7 +59,7 @@ def test_random_settings_are_read_and_come_back_from_the_command_of_a_record():
         blank, other = rng.choice(["", " ", "  "], 2)
         word = f"{name}{blank}@{other}{number}{blank}{unit}{other}={pattern}"
         found = TimedPicture.of(word)
-        assert (found.name, found.pattern, found.word) == (name, pattern, word)
+        assert (found.name, found.patterns, found.word) == (name, (pattern,), word)
         exact = Decimal(number.rstrip(".")) * Decimal(10) ** POWERS[unit]
         assert found.seconds == pytest.approx(float(exact), rel=1e-12)
         machine = text_of(rng, 9)
@@ -72,7 +74,8 @@ def test_random_settings_are_read_and_come_back_from_the_command_of_a_record():
 
 def test_a_name_ends_at_the_first_time():
     found = TimedPicture.of("a=b @ c = d @ 2ms=dir@3ms=x/*.exr")
-    assert (found.name, found.seconds, found.pattern) == ("a=b @ c = d", 2e-3, "dir@3ms=x/*.exr")
+    assert (found.name, found.seconds) == ("a=b @ c = d", 2e-3)
+    assert found.patterns == ("dir@3ms=x/*.exr",)
     assert seconds_of(" .5 s ") == 0.5
 
 
@@ -113,7 +116,7 @@ def test_names_that_are_taken_and_times_of_nothing_are_refused(rgb):
     for name in ("full plan", "Phong kernel"):
         times_of = EngineTimes.of([f"{name} @ 1ms=x.exr"], None, None)
         with pytest.raises(InputError, match="is a method of the study"):
-            engine.read(times_of, Options())
+            require_other_names(times_of)
 
 
 # -- Errors ----------------------------------------------------------------------------------------
@@ -138,7 +141,7 @@ def judged(found, folder, repeats, seconds=None, kernel_time=None):
         words.append(f"{name} @ {time}s={folder / str(number)}_*.npy")
     times_of = EngineTimes.of(words, "its own", kernel_time)
     read = engine.read(times_of, found.options)
-    made = engine.judged(read, times_of, found)
+    made = engine.judged(read, times_of, truth(found))
     return {setting.method: setting for setting in made.settings}
 
 
@@ -289,7 +292,10 @@ def test_the_command_puts_pictures_on_a_front_at_their_size(rgb, run, tmp_path, 
     assert "Given pictures: times as given, on RTX 3060; the front is their own" in said
     assert (tmp_path / "out/cost/lambert-sphere/cost-picture-2.png").exists()
     for more, reason in (
-        (("--picture", "small @ 1ms=small_*.npy"), "small_0.npy has 16x16 pixels, and low_0.npy"),
+        (
+            ("--picture", "small @ 1ms=small_*.npy"),
+            "pictures of 16x16 (small_0.npy), 20x20 (low_0.npy): the last is 1.25 times as",
+        ),
         (("--resolution", "24x24"), "it has 20x20 pixels, and --resolution 24x24 is requested"),
         (("--picture", "none @ 1ms=none_*.npy"), "none_*.npy: no file matches"),
         (("--picture", "none=low_*.npy"), "has no time"),
@@ -299,6 +305,22 @@ def test_the_command_puts_pictures_on_a_front_at_their_size(rgb, run, tmp_path, 
         assert reason in error
     code, _, error = run("cost", "lambert-sphere", "--over", "black")
     assert (code, "--over: it says how pictures are read" in error) == (2, True)
+
+
+def test_python_puts_arrays_on_a_front_beside_a_scene():
+    """A reference, which the scene has, is refused."""
+    grey = np.full((8, 8, 3), 0.5)
+    pictures = {"low @ 6.3ms": [0.9 * grey, grey], "high @ 9ms": 1.1 * grey}
+    record = fotismos.cost("lambert-sphere", spp=4, pictures=pictures, kernel_time="2.1ms")
+    assert record.resolution == (8, 8)
+    low, high = record.engine.settings
+    assert (low.method, low.picture.repeats, low.ratio) == ("low", 2, pytest.approx(3.0))
+    assert high.picture.files == ("picture 2 1.npy",)
+    with pytest.raises(InputError, match="`reference` is for pictures without a scene"):
+        fotismos.cost("lambert-sphere", pictures=pictures, reference=grey)
+    clear = np.concatenate([grey, 0 * grey[..., :1]], axis=-1)
+    with pytest.raises(InputError, match="Give the colour behind"):
+        fotismos.cost("lambert-sphere", pictures={"clear @ 1ms": clear})
 
 
 def test_repeats_of_one_seed_are_refused_and_equal_ones_have_no_noise(found, tmp_path):

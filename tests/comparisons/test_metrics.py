@@ -294,7 +294,7 @@ def test_a_pixel_that_is_not_finite_is_named_with_layer_count_and_place():
         bad[2, 3, 1] = bad[3, 0, 0] = wrong
         with pytest.raises(NonFiniteError, match=r"test image: 2 of 20 .* \(x, y\) = \(3, 2\)"):
             LEADING(bad, np.zeros_like(bad))
-        with pytest.raises(NonFiniteError, match=r"reference image: 2 of 20"):
+        with pytest.raises(NonFiniteError, match=r"reference picture: 2 of 20"):
             LEADING(np.zeros_like(bad), bad)
         with pytest.raises(NonFiniteError, match=r"depth: 1 of 4 .*\(1, 0\)"):
             require_finite(np.array([[0, wrong], [1, 2]]), "depth")

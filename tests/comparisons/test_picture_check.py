@@ -1,5 +1,6 @@
 """Checks of pictures from any renderer tell noise from drift, by command and over many runs."""
 
+import hashlib
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -43,7 +44,12 @@ def test_repeats_pass_and_a_factor_fails_by_name(check):
     assert [check(count, 1)[0] for count in (1, 2, 4)] == [0, 0, 0]
     code, printed, _ = check(2, 1.01322, "--json", "--junit", "j.xml")
     jsonschema.validate(json.loads(printed), schema("check"))
-    cause = json.loads(printed)["checks"][0]["causes"][0]
+    (checked,) = json.loads(printed)["checks"]
+    names = checked["picture"]["files"]
+    assert len(names) == 2
+    digests = [hashlib.sha256(Path(name).read_bytes()).hexdigest() for name in names]
+    assert checked["picture"]["digests"] == digests
+    cause = checked["causes"][0]
     value, half = map(float, cause.split("factor of ")[1].split(",")[0].split(" ± "))
     assert (code, abs(value - 1.01322) < 2 * half < 0.004) == (1, True)
     for path in ("out/check/index.html", "j.xml"):

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from fotismos.comparisons import alignment, picture_files, picture_mistakes, pictures
+from fotismos.comparisons import alignment, picture_files, picture_mistakes
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
@@ -28,6 +28,11 @@ from fotismos.reference.rendering.gbuffer import gbuffer
 from tests.shared.outputs import write
 
 SIDE = 64
+
+
+def read(word, *how, **more):
+    """The linear picture of a file."""
+    return picture_files.read_file(word, *how, **more).image
 
 
 def picture_of(scene, words, spp=64, **more):
@@ -84,7 +89,7 @@ def test_a_png_is_read_to_its_bits_by_its_transfer_function(rgb, tmp_path):
     for bits, kind in ((8, np.uint8), (16, np.uint16)):
         codes = np.arange(48).reshape(4, 4, 3) * (2**bits // 50)
         mi.Bitmap(codes.astype(kind)).write(str(path))
-        linear, decoded = (pictures.read(str(path), word) for word in ("linear", "srgb"))
+        linear, decoded = (read(str(path), word) for word in ("linear", "srgb"))
         np.testing.assert_allclose(linear, codes / (2**bits - 1), atol=1e-7)
         np.testing.assert_allclose(decoded, from_srgb(codes / (2**bits - 1)), atol=1e-6)
 
@@ -117,7 +122,7 @@ def test_every_kind_of_png_is_read_as_mitsubas_library_does(rgb, tmp_path):
         count = 3 if values.shape[2] > 2 else 1
         alpha = values[..., count:] if values.shape[2] > count else np.ones((6, 9, 1))
         expected = np.broadcast_to(values[..., :count] * alpha + 1 - alpha, (6, 9, 3))
-        found = pictures.read(str(path), "linear", over="white")
+        found = read(str(path), "linear", over="white")
         np.testing.assert_allclose(found, expected, atol=1e-6, err_msg=path.name)
     assert len(files) == 14
 
@@ -153,10 +158,10 @@ def test_linear_files_are_read_as_they_are(rgb, tmp_path):
     mi.Bitmap(values).write(str(tmp_path / "x.pfm"))
     mi.Bitmap(values).write(str(tmp_path / "x.hdr"))
     for suffix, tolerance in ((".npy", 0), (".pfm", 0), (".hdr", 1 / 128)):
-        found = pictures.read(str(tmp_path / f"x{suffix}"))
+        found = read(str(tmp_path / f"x{suffix}"))
         assert np.abs(found - values).max() <= tolerance * values.max()
     np.save(tmp_path / "grey.npy", values[..., 0])
-    grey = pictures.read(str(tmp_path / "grey.npy"))
+    grey = read(str(tmp_path / "grey.npy"))
     np.testing.assert_array_equal(grey, values[..., :1].repeat(3, axis=2))
 
 
@@ -198,12 +203,12 @@ def test_alpha_shows_the_colour_behind(rgb, tmp_path):
     """EXR's colours are premultiplied, a PNG's are not."""
     alpha = np.full((8, 8), 0.25)
     path = write(tmp_path / "x.exr", np.full((8, 8, 3), 0.2), alpha=alpha)
-    assert pictures.read(path, over="black") == pytest.approx(0.2, abs=1e-3)
-    assert pictures.read(path, over="white") == pytest.approx(0.2 + 0.75, abs=1e-3)
-    assert pictures.read(path, over="0.1,0.1,0.1")[0, 0] == pytest.approx(0.275, abs=1e-3)
+    assert read(path, over="black") == pytest.approx(0.2, abs=1e-3)
+    assert read(path, over="white") == pytest.approx(0.2 + 0.75, abs=1e-3)
+    assert read(path, over="0.1,0.1,0.1")[0, 0] == pytest.approx(0.275, abs=1e-3)
     Image.fromarray(np.full((8, 8, 4), 51, np.uint8)).save(tmp_path / "x.png")  # alpha 1/5
     front = float(from_srgb(np.array(0.2)))
-    found = pictures.read(str(tmp_path / "x.png"), over="white")
+    found = read(str(tmp_path / "x.png"), over="white")
     assert found == pytest.approx(0.2 * front + 0.8, abs=1e-6)
 
 
@@ -382,27 +387,27 @@ BAD = (
 def test_what_is_no_picture_is_refused(rgb, tmp_path):
     for make, message in BAD:
         with pytest.raises((InputError, NonFiniteError), match=f"(?s){message}"):
-            pictures.read(make(tmp_path / "x.exr"))
+            read(make(tmp_path / "x.exr"))
     for name, make in (("folder.png", Path.mkdir), ("pipe.exr", os.mkfifo)):
         make(tmp_path / name)
         with pytest.raises(InputError, match=f"{name}: it is not a regular file. Give a .exr or"):
-            pictures.read(str(tmp_path / name), "srgb")
+            read(str(tmp_path / name), "srgb")
     path = tmp_path / "x.png"
     Image.fromarray(np.arange(768, dtype=np.uint8).reshape(16, 16, 3)).save(path)
     for content in (b"no picture", b"", path.read_bytes()[:-40], path.read_bytes()[:30]):
         path.write_bytes(content)
         with pytest.raises(InputError, match=r"x.png: not a readable PNG file"):
-            pictures.read(str(path), "srgb")
+            read(str(path), "srgb")
     Image.new("CMYK", (4, 4)).save(tmp_path / "x.jpg")
     with pytest.raises(InputError, match=r"x.jpg: its colours are CMYK. Save it as RGB"):
-        pictures.read(str(tmp_path / "x.jpg"))
+        read(str(tmp_path / "x.jpg"))
     Image.fromarray(np.full((8, 8, 4), 128, np.uint8)).save(path)
     with pytest.raises(InputError, match=r"64 of 64 pixels have an alpha below 1.*`over=black`"):
-        pictures.read(str(path), "srgb")
+        read(str(path), "srgb")
     for over in ("red", "1,2", "1,2,-3", "1,2,nan"):
         for word in (str(path), write(tmp_path / "opaque.exr", GREY)):
             with pytest.raises(InputError, match=f"over = {over} is not allowed"):
-                pictures.read(word, over=over)
+                read(word, over=over)
 
 
 def test_sizes_and_repeats_must_fit(rgb, tmp_path):
@@ -416,7 +421,8 @@ def test_sizes_and_repeats_must_fit(rgb, tmp_path):
         (
             (eight, nine),
             {},
-            "pictures of 8x8, 9x9: the last is 1.12 times as wide and 1.12 times as high",
+            r"pictures of 8x8 \(.*8.exr\), 9x9 \(.*9.exr\): the last is 1.12 times as wide and"
+            " 1.12 times as high",
         ),
         ((eight, other, eight), {}, r"8.exr is given 2 times. Give each repeat once"),
         ((eight, other), {"noise": 1.0, "spp": None}, r"noise = 1 and 2 repeats: .* Give `spp`"),
@@ -435,3 +441,22 @@ def test_a_changed_picture_is_compared_again(run, tmp_path, monkeypatch):
         path = tmp_path / "out/fig-8-9/comparison.json"
         records.append((path.stat().st_mtime_ns, path.read_text()))
     assert records[0] == records[1] != records[2]
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (9, 7), (33, 20)])
+def test_edges_are_correlated_where_shifted_maps_overlap(shape):
+    """One Fourier transform gives the coefficients of all shifts, as they are defined."""
+    random = np.random.default_rng(4)
+    seen, edges = random.uniform(size=(2, *shape))
+    reach = 3
+    seen[:-reach] = 0.3  # flat where the second is moved up as far as it goes
+    height, width = shape
+    table = alignment._correlations(seen, edges, reach)
+    for down in range(-reach, reach + 1):
+        for right in range(-reach, reach + 1):
+            part = seen[max(down, 0) : height + down, max(right, 0) : width + right]
+            other = edges[max(-down, 0) : height - down, max(-right, 0) : width - right]
+            expected = 0.0
+            if part.size and height > down > -height and np.ptp(part) and np.ptp(other):
+                expected = np.corrcoef(part.ravel(), other.ravel())[0, 1]
+            assert table[down + reach, right + reach] == pytest.approx(expected, abs=1e-9)

@@ -43,6 +43,16 @@ def kernel(ready, grid):
     return np.where(grid.material[..., None] < 0, 0, image)
 
 
+def test_the_grid_has_the_pixel_of_interest_and_the_kernels_value_there():
+    ready, given = prepared("fig-8-9", resolution=(200, 100))
+    plain = pixel_terms.trace(ready.heuristic, given)
+    pixel = plain.columns[40] + 1, plain.rows[12] + 1
+    grid = pixel_terms.trace(ready.heuristic, given, pixel)
+    assert grid.at(*pixel).pixel == pixel
+    assert (grid.columns != plain.columns).sum() == (grid.rows != plain.rows).sum() == 1
+    require_sum(grid, ready)
+
+
 @pytest.mark.guarantee("kernel", "The terms of 8.10 on a page add up to the kernel's value.")
 def test_the_terms_add_up_to_what_the_kernel_has():
     for name in [n for n, s in SCENES.items() if s.interpolation == "phong"]:

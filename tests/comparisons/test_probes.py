@@ -137,6 +137,43 @@ def test_further_mistakes_are_named(rgb, tmp_path, body, message):
     assert re.search(message, said), said
 
 
+PREPARE = """
+
+def prepare(scene):
+    return {}
+
+
+"""
+"""A shader keeps what it makes of a scene, and adds it to the light of the lamps."""
+
+KEPT = {
+    "the mean of the background": "fotismos.environment(scene, mi.Vector3f(0, 0, 1))",
+    "the lamps": "1 / len(scene.emitters())",
+}
+SHINING = "value += point.prepared * m.base_color + I * m.base_color * {}"
+
+
+@pytest.mark.parametrize(
+    ("cosine", "message"),
+    {
+        "c": None,
+        "1": "missing cosine",
+        "c * c": "squared cosine",
+        "dr.maximum(-signed, 0)": "below",
+    }.items(),
+)
+@pytest.mark.parametrize("kept", KEPT)
+def test_a_shader_that_prepares_a_scene_is_probed_in_the_dark(rgb, tmp_path, kept, cosine, message):
+    path = Path(written(tmp_path, SHINING.format(cosine)))
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text + PREPARE.format(KEPT[kept]), encoding="utf-8")
+    said = diagnosis.describe(str(path))
+    if message and kept != "the lamps":
+        assert re.search(message, said[0])
+    else:  # it fails without lamps, and what it makes of one says nothing of others
+        assert said == ()
+
+
 def test_the_chapters_models_pass_every_probe(rgb):
     for name in ("phong", "blinn"):
         assert probes.findings(heuristics.named(name)) == {}

@@ -285,8 +285,9 @@ def test_a_picture_is_compared_under_its_curve(run, tmp_path, monkeypatch):
     assert "shown by the tone map agx" in (tmp_path / "agx/index.html").read_text()
 
 
-def test_a_tone_map_needs_a_picture():
+def test_a_tone_map_needs_a_picture(rgb):
+    case = open_case("fig-8-9", Options(tone_map="agx"))
     with pytest.raises(InputError, match=r"tone_map = agx and no image: .* Give an `image`"):
-        Options(tone_map="agx")
+        prepare(case.source, case.options)
     with pytest.raises(InputError, match="tone_map 'filmic' is not known"):
         Options(image=("x.exr",), tone_map="filmic")

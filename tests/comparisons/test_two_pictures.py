@@ -1,6 +1,8 @@
 """Two pictures without a scene, and a picture in place of a scene's reference."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,11 +10,11 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 import fotismos
-from fotismos.comparisons import pictures
+from fotismos.comparisons import pictures, two_pictures
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.criterion import share_above
-from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.metrics import LEADING, METRICS
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import as_files, read_file
 from fotismos.comparisons.prepared import prepare
@@ -73,6 +75,52 @@ def test_two_files_are_compared_without_a_scene(run, tmp_path, monkeypatch):
     assert run("compare", *words, "-o", "again")[0] == 0
     again = json.loads((tmp_path / "again/mine/comparison.json").read_text())
     assert again["metrics"] == record["metrics"]
+
+
+DATA = r'<script type="application/json" id="page-data">(.*?)</script>'
+
+
+@pytest.fixture
+def two(tmp_path, monkeypatch):
+    """The words that compare two pictures of the current folder, one of which is turned."""
+    monkeypatch.chdir(tmp_path)
+    image = landscape()
+    np.save("theirs.npy", image)
+    np.save("mine.npy", image[::-1])
+    return ("compare", "-r", "theirs.npy", "-t", "mine.npy")
+
+
+def test_the_first_page_has_the_verdict_and_reloads_into_the_whole(run, two, monkeypatch):
+    pages = []
+
+    def finish(first):
+        pages.append(Path("out/index.html").read_text())
+        return two_pictures.finish(first)
+
+    monkeypatch.setattr("fotismos.reports.run.pictures.finish", finish)
+    assert run(*two)[0] == 0
+    pages.append(Path("out/index.html").read_text())
+    first, whole = pages
+    before, after = (json.loads(re.search(DATA, page)[1])["scenes"][0] for page in pages)
+    for key in ("name", "shares", "verdicts", "mean", "images", "regions"):
+        assert before[key] == after[key]
+    again = '<meta http-equiv="refresh"'
+    assert (again in first, again in whole) == (True, False)
+    assert ("In progress" in first, "In progress" in whole) == (True, False)
+    for later in ("It looks upside down", f'<th scope="row">{METRICS["ldr_flip"].label}</th>'):
+        assert later not in first
+        assert later in whole
+
+
+@pytest.mark.parametrize(("fault", "code"), [(InputError("late"), 2), (KeyboardInterrupt(), 130)])
+def test_a_first_page_does_not_outlive_its_command(run, two, monkeypatch, fault, code):
+    def finish(first):
+        assert Path("out/index.html").is_file()
+        raise fault
+
+    monkeypatch.setattr("fotismos.reports.run.pictures.finish", finish)
+    assert run(*two)[0] == code
+    assert not Path("out").exists()
 
 
 def test_two_pictures_are_a_gate(run, tmp_path, monkeypatch):
@@ -207,12 +255,12 @@ BAD = (
     (
         {"image": [GREY], "reference": [np.full((8, 16, 3), 0.5)]},
         {},
-        "8x8, 16x8: the last is 2 times as wide as",
+        r"8x8 \(image 0.npy\), 16x8 \(reference 0.npy\): the last is 2 times as wide as",
     ),
     ({"image": [0 * GREY], "reference": [0 * GREY]}, {}, "both pictures are black"),
     ({"image": [GREY], "reference": []}, {}, "two pictures are needed"),
     ({"image": [GREY], "reference": [GREY]}, {"mask": "none.png"}, "none.png: there is no such"),
-    ({"image": [GREY], "reference": [GREY]}, {"spp": 4}, "spp: this needs a scene"),
+    ({"image": [GREY], "reference": [GREY]}, {"spp": 4}, "`spp`: this needs a scene"),
 )
 
 
@@ -264,7 +312,7 @@ def test_a_picture_that_equals_the_textbook_half_is_said_to(run, tmp_path, monke
     file = "own/fig-8-9/comparison.exr:heuristic"
     said = run(*words, "--image", file)[1]
     assert "The picture equals the textbook half to ΔE2000 0.01, away from edges." in said
-    brighter = 1.05 * pictures.read(file)
+    brighter = 1.05 * read_file(file).image
     np.save("brighter.npy", brighter)
     assert "equals the textbook" not in run(*words, "--image", "brighter.npy")[1]
 

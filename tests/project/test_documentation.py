@@ -8,11 +8,14 @@ import click
 import nbformat
 import pytest
 from markdown_it import MarkdownIt
+from matplotlib.collections import PathCollection
 from nbclient import NotebookClient
 from PIL import Image
 from pyarrow import csv, parquet
 
-from docs.figures import engines, hero
+from docs.figures import accuracy, charts, engines, hero
+from fotismos.comparisons.case import open_case
+from fotismos.comparisons.options import Options
 from fotismos.reports import cli
 from fotismos.reports.terminal.words import number
 from tests.shared.programs import ROOT, python
@@ -88,6 +91,14 @@ def test_the_readme_shows_a_picture_with_the_command_that_makes_its_numbers():
     assert (ROOT / "docs/hero.webp").stat().st_size < 150_000
 
 
+def test_the_scenes_of_studies_open_without_values():
+    page = (ROOT / "docs/accuracy.md").read_text()
+    for path in accuracy.LARGER:
+        assert f"scenes/{path.name}" in page
+        case = open_case(str(path), Options())
+        assert case.source.name == path.stem
+
+
 def test_the_page_of_engines_has_the_numbers_of_its_files():
     rows = csv.read_csv(ROOT / "docs/engines.csv").to_pylist()
     assert rows == parquet.read_table(ROOT / "docs/engines.parquet").to_pylist()
@@ -104,4 +115,19 @@ def test_the_page_of_engines_has_the_numbers_of_its_files():
     for row in rows:
         cells = lines[row["approximation"]]
         cell = cells[list(engines.SCENES).index(row["scene"]) + 1]
-        assert cell == f"{number(row['de2000'])} ({row['stops']:+.2f})"
+        bias = f"{row['stops_direct']:+.2f}; {row['stops']:+.2f}"
+        assert cell == f"{number(row['de2000'])} ({bias})"
+
+
+@pytest.mark.parametrize("name", charts.CHARTS)
+def test_a_chart_shows_each_row_of_its_table(name):
+    assert (ROOT / f"docs/{name}.svg").is_file()
+    panels = charts.CHARTS[name]().axes
+    clouds = [one for axes in panels for one in axes.collections if isinstance(one, PathCollection)]
+    lines = [line for axes in panels for line in axes.lines if line.get_marker() == "o"]
+    drawn = sum(len(cloud.get_offsets()) for cloud in clouds)
+    drawn += sum(len(line.get_xdata()) for line in lines)
+    rows = [row for row in charts.read(name) if row.get("threshold") != "most samples"]
+    passing = [row for row in rows if row.get(charts.TIME) != ""]
+    marks = {"gates": 2 * len(charts.GATES), "fits": 2}.get(name, 1)
+    assert drawn == marks * len(passing)

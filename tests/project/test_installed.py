@@ -13,6 +13,16 @@ from tests.shared.small_scene import SCENE
 pytestmark = pytest.mark.thorough
 
 
+STUDY = """
+title = "Roughness"
+[[part]]
+name = "lobe"
+scene = "lobe"
+[part.parameters]
+alpha = [0.1, 0.2]
+"""
+
+
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
     """The folder of programs of an environment in which a wheel of this project is installed."""
@@ -60,6 +70,11 @@ def test_the_installed_commands_work(installed, tmp_path):
     do(fotismos, "check", "base", "--update", "--scene", "ball.xml", *words, folder=tmp_path)
     assert "1 of 1 unmoved" in do(fotismos, "check", "base", folder=tmp_path)
     assert "did you mean fig-8-9?" in do(fotismos, "compare", "fig-8-99", code=2)
+    # The wheel alone is without the extra.
+    (tmp_path / "study.toml").write_text(STUDY)
+    assert "pyarrow is not installed" in do(
+        fotismos, "study", "study.toml", folder=tmp_path, code=2
+    )
     program = "import fotismos; print(fotismos.plan('fig-8-9').integrator, fotismos.shade)"
     assert do(installed / "python", "-c", program).startswith("direct_all <function shade")
     assert "fotismos_variant" in do(installed / "python", "-m", "pytest", "--markers")

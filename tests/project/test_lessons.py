@@ -23,10 +23,10 @@ def falls_off(t, p):
 
 
 def computed(equation):
-    """The value of products and powers as the table has them, such as ``0.5 \\cdot 0.9^{3}``."""
+    """The value of products and powers as a lesson has them, such as ``0.5·0.9^{3}``."""
     total = 0.0
     for product in equation.strip("$").split(" + "):
-        factors = (re.fullmatch(r"([\d.]+)(?:\^\{(\d+)\})?", f) for f in product.split(r" \cdot "))
+        factors = (re.fullmatch(r"([\d.]+)(?:\^\{(\d+)\})?", f) for f in product.split("·"))
         total += np.prod([float(factor[1]) ** int(factor[2] or 1) for factor in factors])
     return total
 
@@ -64,11 +64,11 @@ def test_a_lesson_says_what_a_rendering_shows(section):
     # The picture has a circle around each pixel of its scene, in all three parts.
     assert (ROOT / "docs" / lessons.file(name)).read_bytes()[8:12] == b"WEBP"
     found = lessons.values(name)
-    pattern = r"^\| `(.*)` at (\d+), (\d+) \| (.*) \| (.*) \| (.*) \|$"
+    pattern = r"^- `(.*)` at (\d+), (\d+): textbook ([^(;]+?)(?: \((\$.*\$)\))?; physical (.*)$"
     rows = re.findall(pattern, table, re.MULTILINE)
     pixels = [lessons.Pixel(scene, int(x), int(y)) for scene, x, y, *_ in rows]
     assert pixels == [*lessons.LESSONS[name]]
-    for (*_, equation, textbook, physical), halves in zip(rows, found, strict=True):
+    for (*_, textbook, equation, physical), halves in zip(rows, found, strict=True):
         if equation:
             # The pixel is a mean over its square, the equation is that of its centre.
             assert halves[0][0] == pytest.approx(computed(equation), abs=0.02, rel=0.02), equation

@@ -1,5 +1,6 @@
 """The documentation as a site: in reading order, each guarantee with its test, links that hold."""
 
+import csv
 import re
 from pydoc import locate
 
@@ -57,9 +58,6 @@ def numbers(text):
     return [f"{c}.{n}" for c, low, high in found for n in range(int(low), int(high or low) + 1)]
 
 
-NAMED = "## The index of what the chapters name"
-
-
 def index(heading):
     """The rows of an index of the models: numbers, and what is said of them."""
     page = (ROOT / "docs/models.md").read_text().partition(f"\n## The index of {heading}\n")[2]
@@ -74,21 +72,28 @@ def test_an_index_has_each_number_of_both_chapters_once(heading, eighth, sixth):
     assert sorted(listed) == sorted(numbers(f"8.1-8.{eighth} 6.1-6.{sixth}"))
 
 
+def anchors(text):
+    """The anchors of a page's headings."""
+    found = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in found}
+
+
 def test_what_the_chapters_name_is_a_scene_an_equation_or_a_section():
-    """Scenes exist; links are held by the build of the site."""
     from fotismos.comparisons.gallery.builtin import SCENES
 
-    page = (ROOT / "docs/models.md").read_text()
-    rows = re.findall(r"^\| ([^|]+) \| ([^|]+) \| (.+) \|$", page.partition(NAMED)[2], re.MULTILINE)
-    rows = [row for row in rows if row[0] != "Named"]
+    with (ROOT / "docs/data/chapters.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))[1:]
     assert len(rows) > 30
     shown = set()
     for named, where, here in rows:
-        scenes = set(re.findall(r"`(.*?)`", here))
-        assert scenes <= set(SCENES), named
-        assert scenes or "](" in here, named
         assert set(numbers(where)) <= set(numbers("8.1-8.12 6.1-6.38")), named
-        shown |= scenes
+        for place in here.split(", "):
+            page, _, anchor = place.partition("#")
+            if anchor:
+                assert anchor in anchors((ROOT / "docs" / page).read_text()), named
+            elif place not in SCENES:
+                assert (ROOT / "docs" / place).is_file(), named
+            shown.add(place)
     assert {"emission", "mirror", "fall-offs", "far-lamp", "vertex-normals"} <= shown
 
 

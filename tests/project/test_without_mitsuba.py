@@ -12,6 +12,11 @@ from tests.shared.two_pictures import measured
 MODULES = (
     "fotismos",
     "fotismos.comparisons.comparison",
+    "fotismos.comparisons.caution",
+    "fotismos.comparisons.cost.engine",
+    "fotismos.comparisons.cost.engine_record",
+    "fotismos.comparisons.cost.front",
+    "fotismos.comparisons.cost.timed_pictures",
     "fotismos.comparisons.departure.arrays",
     "fotismos.comparisons.departure.blocks",
     "fotismos.comparisons.departure.colour",
@@ -26,6 +31,8 @@ MODULES = (
     "fotismos.comparisons.names",
     "fotismos.comparisons.options",
     "fotismos.comparisons.picture_files",
+    "fotismos.comparisons.picture_formats",
+    "fotismos.comparisons.two_pictures",
     "fotismos.comparisons.price_record",
     "fotismos.reference",
     "fotismos.reference.pairing.pairing_record",
@@ -36,6 +43,7 @@ MODULES = (
     "fotismos.reference.rendering.finite",
     "fotismos.reference.rendering.integrators",
     "fotismos.reference.rendering.sums",
+    "fotismos.reports.charts.cost_charts",
     "fotismos.reports.charts.theme",
     "fotismos.reports.cli",
     "fotismos.reports.files.images",
@@ -46,8 +54,12 @@ MODULES = (
     "fotismos.reports.page.page",
     "fotismos.reports.page.scene_view",
     "fotismos.reports.run.batch",
+    "fotismos.reports.run.cost_files",
+    "fotismos.reports.terminal.cost_tables",
+    "fotismos.reports.run.pictures",
     "fotismos.reports.terminal.tables",
     "fotismos.reports.verdict",
+    "fotismos.reports.work.cost",
 )
 
 WITHOUT = """
@@ -63,6 +75,20 @@ from importlib import import_module
 for name in sys.argv[1:]:
     import_module(name)
 print(open("/proc/self/maps").read().count("libLLVM"))
+"""
+)
+
+JUDGED = (
+    WITHOUT
+    + """
+import numpy as np
+y, x = np.mgrid[0:24, 0:32] / 32
+image = np.stack((0.1 + x, 0.5 * y + 0.2, np.abs(x - y)), axis=-1)
+np.save("truth.npy", image)
+np.save("mine.npy", 1.1 * image)
+from fotismos.reports.cli import main
+sys.argv[1:] = ["cost", "-r", "truth.npy", "--picture", "mine @ 2ms=mine.npy"]
+main()
 """
 )
 
@@ -108,6 +134,14 @@ print(json.dumps(plain(found)))
 def test_modules_for_two_pictures_are_imported_without_mitsuba():
     done = python("-c", IMPORTED, *MODULES)
     assert done.stdout == "0\n", done.stderr
+
+
+def test_settings_are_judged_without_mitsuba(tmp_path):
+    done = python("-c", JUDGED, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "mine passes at" in done.stdout
+    assert (tmp_path / "out/cost/truth/index.html").exists()
+    assert (tmp_path / "out/cost/truth/cost.svg").exists()
 
 
 def test_two_pictures_are_measured_recorded_and_shown_without_mitsuba(rgb, tmp_path):

@@ -103,10 +103,10 @@ DARK = SCENE.replace('value="60"', 'value="1e-38"').replace(
 def test_black_pictures_never_pass_in_silence(rgb, tmp_path):
     case = case_of(tmp_path, DARK)
     for work in (compare, measure_scene):
-        with pytest.raises(InputError, match=r"both halves are black.*`allow_empty`"):
+        with pytest.raises(InputError, match=r"both pictures are black.*`allow_empty`"):
             work(case.source, case.options)
     case = case.changed(allow_empty=True)
-    said = "Both halves are black, so their difference means nothing."
+    said = "Both pictures are black, so their error means nothing."
     record = compare(case.source, case.options).record
     assert record.caution == said
     assert measure_scene(case.source, case.options).caution == said
@@ -127,9 +127,9 @@ def test_doubts_about_pictures_are_told_from_their_values():
 
     assert doubt(noise, noise) == doubt(grey, noise) == doubt(black, noise) == ""
     assert doubt(noise, black).startswith("The reference is black")
-    assert doubt(grey, 2 * grey).startswith("Each half is one colour")
+    assert doubt(grey, 2 * grey).startswith("Each picture is one colour")
     assert not Prepared.require_light(view(np.zeros((4, 5), bool)), black, black)
-    with pytest.raises(InputError, match="a: both halves are black"):
+    with pytest.raises(InputError, match="a: both pictures are black"):
         doubt(black, 1e-6 * noise)
 
 

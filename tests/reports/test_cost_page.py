@@ -152,7 +152,7 @@ def test_given_pictures_stand_beside_the_methods_with_times_as_given(study):
     assert "Given pictures" not in bare
     assert "diamonds" not in bare
     nowhere = cost_tables.stated(cost_records.with_engine(study, machine="").record.engine)
-    assert nowhere == "times as given; the front is their own"
+    assert nowhere == "times as given"
 
 
 def test_a_setting_that_is_beaten_names_the_better_one(study):

@@ -8,12 +8,15 @@ from collections import Counter
 import jsonschema
 import numpy as np
 import pytest
+from PIL import Image
 
+from fotismos.comparisons.comparison import machine
 from fotismos.comparisons.cost.methods import BUILT_IN
 from fotismos.comparisons.departure.metrics import METRICS, THRESHOLDS, drawn
 from fotismos.reference.planning.effects import EFFECTS
 from fotismos.reference.records import Machine
 from fotismos.reports import glossary, verdict
+from fotismos.reports.files import images as files
 from fotismos.reports.files.results import Failure, RunRecord
 from fotismos.reports.page import embedding, page, templating
 from fotismos.reports.terminal import words
@@ -195,3 +198,41 @@ def test_effects_and_methods_have_their_sentence_in_the_glossary_once():
     assert effects | {method.name for method in BUILT_IN} <= set(known)
     names = [name for terms in glossary.GROUPS.values() for names in terms for name in names]
     assert len(names) == len({name.lower() for name in names})
+
+
+def pictured(record, name, mean, level):
+    """Return a view of a record with a name and mean, whose pictures have one grey level."""
+    metrics = record["metrics"] | {"dE2000": record["metrics"]["dE2000"] | {"mean": mean}}
+    flat = files.webp(Image.new("RGB", (8, 8), (level, level, level)))
+    halves = dict.fromkeys(("heuristic", "reference", "dE2000"), flat)
+    return records.view(record | {"scene": name, "metrics": metrics}, thumbnails=halves)
+
+
+def test_the_worst_have_the_largest_mean_errors_and_do_not_look_alike(record):
+    views = [
+        pictured(record, name, mean, level)
+        for name, mean, level in (
+            ("second", 8.0, 120), ("twin", 8.5, 20), ("first", 9.0, 22), ("last", 1.0, 200),
+            ("third", 3.0, 250),
+        )
+    ]  # fmt: skip
+    html = page.render(views)
+    cards = html[html.index('<ol class="worst">') : html.index("</ol>")]
+    assert re.findall(r'data-scene="(\w+)"', cards) == ["first", "second", "third"]
+
+
+def test_the_overview_has_the_runs_size_samples_versions_and_machine(record):
+    shown = " ".join(Page(page.render([records.view(record)])).text.split())
+    width, height = record["resolution"]
+    assert f"{width} × {height} pixels; {record['plan']['spp']} samples per pixel" in shown
+    assert f"{machine().processor}, {machine().cores} cores" in shown
+
+
+def test_a_small_map_of_the_error_has_the_colours_of_the_pages():
+    """Grey up to the usual threshold, then colours; the browser's tests have the same rule."""
+    row = np.array([[0.0, 1.0, 2.0, 2.01, 11.0, 20.0, 500.0]])
+    shown = np.array(files.difference_map(row, 2.0, 20.0))[0]
+    table = bytes.fromhex(files.colour_table(files.ERROR_COLOURS))
+    colours = np.frombuffer(table, np.uint8).reshape(256, 3)
+    expected = [[0] * 3, [35] * 3, [70] * 3, colours[64], colours[160], colours[255], colours[255]]
+    np.testing.assert_array_equal(shown, expected)

@@ -10,9 +10,15 @@ CELL = 4
 """Pixels along the sides of a cell."""
 
 
-def grid(resolution):
-    """Return a grid of half a cell's offset for an image of a width and a height."""
+def grid(resolution, pixel=None):
+    """Return a grid of half a cell's offset for an image of a width and a height.
+
+    The column and row of a pixel take the place of the nearest.
+    """
     columns, rows = (np.arange(CELL // 2, side, CELL) for side in resolution)
+    if pixel:
+        columns[pixel[0] // CELL] = pixel[0]
+        rows[pixel[1] // CELL] = pixel[1]
     across, down = np.meshgrid(np.linspace(0, 1, len(columns)), np.linspace(0, 1, len(rows)))
     material = np.where(down > 0.5, 1, 0)
     material[0] = -1

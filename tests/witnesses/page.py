@@ -9,13 +9,16 @@ import numpy as np
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.reports.terminal import tables
 from tests.witnesses import test_closed_forms, test_povray, test_radiance
-from tests.witnesses.witness import Witness, deviation
+from tests.witnesses.witness import deviation
 
 
-def closed_forms() -> Iterator[str]:
+def closed_forms() -> Iterator[tuple[str, str, str]]:
     """Yield how far the reference is from each closed form."""
-    cases = (f"{each.name} ({_measured(each)})" for each in test_closed_forms.WITNESSES)
-    yield f"Reference less form in percent, with 95 % intervals: {'; '.join(cases)}."
+    yield "case", "reference less form (%)", "95 % interval (±)"
+    for each in test_closed_forms.WITNESSES:
+        found = deviation(each)
+        spread = 1.96 * found.standard_error[0] + each.form_error
+        yield each.name, f"{100 * found.value[0]:+.3f}", f"{100 * spread:.3f}"
 
 
 def figures() -> Iterator[str]:
@@ -37,12 +40,6 @@ def whole_scenes() -> Iterator[str]:
         cells = (f"{found.flat[spot]:+.3f}±{1.96 * error.flat[spot]:.3f}" for spot in spots)
         rows.append((name, *cells))
     yield from tables.markdown(rows)
-
-
-def _measured(witness: Witness) -> str:
-    found = deviation(witness)
-    spread = 1.96 * found.standard_error[0] + witness.form_error
-    return f"{100 * found.value[0]:+.3f}±{100 * spread:.3f}"
 
 
 def _figure(name: str) -> tuple[int, int, float]:

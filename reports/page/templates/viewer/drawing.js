@@ -9,7 +9,11 @@ const OVERLAY = {
   label: "#000b",
 };
 
-/** @typedef {{picture: HTMLCanvasElement, title: string, smooth?: boolean}} Content of a pane */
+/** Pixels of a line of a label, and about its letters on both sides. */
+const LINE = 17;
+const MARGIN = 5;
+
+/** @typedef {{picture: HTMLCanvasElement, title: string}} Content of a pane */
 
 /** Draws a view of a scene, without handling events. */
 class Drawing {
@@ -31,7 +35,8 @@ class Drawing {
   draw(view, viewport, contents, outlines) {
     const isDivided = view.mode === "split";
     const width = this.canvas.clientWidth;
-    const height = viewport.arrange(isDivided ? 1 : contents.length, width);
+    const top = this.canvas.getBoundingClientRect().top + window.scrollY;
+    const height = viewport.arrange(isDivided ? 1 : contents.length, width, top);
     const density = window.devicePixelRatio || 1;
     Object.assign(this.canvas, {
       width: Math.round(width * density),
@@ -41,6 +46,8 @@ class Drawing {
     this.context.setTransform(density, 0, 0, density, 0, 0);
     viewport.panes.forEach((pane, place) => {
       const content = isDivided ? contents[1] : contents[place];
+      this.context.fillStyle = "#000";
+      this.context.fillRect(pane.left, pane.top, pane.width, pane.height);
       this.clipped(pane, () => this.image(view, viewport, pane, content, density));
       if (isDivided)
         this.clipped({ ...pane, width: pane.width * view.split }, () =>
@@ -49,11 +56,7 @@ class Drawing {
       this.clipped(pane, () =>
         outlines.forEach(([box, colour]) => this.outline(viewport.frame(view, pane, box), colour)),
       );
-      this.label(
-        isDivided ? contents[0].title : content.title,
-        pane.left + 6,
-        pane.top + pane.height - 23,
-      );
+      this.label(isDivided ? contents[0].title : content.title, pane, isDivided);
       if (isDivided) this.divide(pane, pane.width * view.split, content.title);
     });
   }
@@ -75,14 +78,14 @@ class Drawing {
    * @param {Content} content
    * @param {number} density
    */
-  image(view, viewport, pane, { picture, smooth }, density) {
+  image(view, viewport, pane, { picture }, density) {
     const [left, top, width, height] = viewport.frame(view, pane, [
       0,
       0,
       viewport.width,
       viewport.height,
     ]);
-    this.context.imageSmoothingEnabled = smooth || width * density < picture.width;
+    this.context.imageSmoothingEnabled = width * density < picture.width;
     this.context.imageSmoothingQuality = "high";
     this.context.drawImage(picture, left, top, width, height);
   }
@@ -112,22 +115,34 @@ class Drawing {
     context.beginPath();
     context.arc(pane.left + at, pane.top + pane.height / 2, 7, 0, 2 * Math.PI);
     context.fill();
-    this.label(title, pane.left + pane.width - 6, pane.top + pane.height - 23, 1);
+    this.label(title, pane, true, 1);
   }
 
   /**
-   * Text at a place, which is left of it or (1) right.
+   * Words in a lower corner of a pane, in as many lines as they need: left, or (1) right.
    * @param {string} text
-   * @param {number} left
-   * @param {number} top
+   * @param {Box} pane
+   * @param {boolean} isHalf whether the other corner has words, too
    */
-  label(text, left, top, align = 0) {
+  label(text, pane, isHalf, align = 0) {
     const { context } = this;
     context.font = "12px system-ui, sans-serif";
-    const width = context.measureText(text).width + 10;
+    const widthOf = (/** @type {string} */ words) => context.measureText(words).width + 2 * MARGIN;
+    const room = (pane.width - 3 * MARGIN) / (isHalf ? 2 : 1);
+    const lines = [""];
+    for (const word of text.split(" ")) {
+      const longer = `${lines.at(-1)} ${word}`.trim();
+      if (widthOf(longer) > room && lines.at(-1)) lines.push(word);
+      else lines.splice(-1, 1, longer);
+    }
+    const width = Math.max(...lines.map(widthOf));
+    const left = pane.left + MARGIN + align * (pane.width - 2 * MARGIN - width);
+    const top = pane.top + pane.height - MARGIN - LINE * lines.length;
     context.fillStyle = OVERLAY.label;
-    context.fillRect(left - align * width, top, width, 17);
+    context.fillRect(left, top, width, LINE * lines.length);
     Object.assign(context, { fillStyle: OVERLAY.line, textBaseline: "middle" });
-    context.fillText(text, left - align * width + 5, top + 9);
+    lines.forEach((line, place) =>
+      context.fillText(line, left + MARGIN, top + (place + 0.5) * LINE),
+    );
   }
 }

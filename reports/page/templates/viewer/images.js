@@ -17,8 +17,8 @@ const SIGNIFICANT = 1;
 const COUNTED = 2;
 const UNDETERMINED = 4;
 
-/** The greatest grey of a difference that is not visible. */
-const DARK = 70;
+/** The end of the colours of differences, for all scenes. */
+const TOP = page.maps?.[0].top;
 
 /** Decoded planes by the ids of their elements. @type {Map<string, Promise<Images>>} */
 const decoded = new Map();
@@ -88,16 +88,12 @@ function painted(width, height, paint) {
   return canvas;
 }
 
-/**
- * The colours of differences: grey up to the threshold, then from dark to bright up to the top.
- * @param {number} t
- * @param {number} top
- */
-function differenceColours(t, top) {
+/** The colours of differences: grey up to the threshold, then from dark to bright. @param {number} t */
+function differenceColours(t) {
   const table = pixelsOf(page.colours.error);
   return (/** @type {number} */ value) => {
-    if (value <= t) return rgba(new Array(3).fill(Math.round((DARK * Math.max(value, 0)) / t)));
-    return table[clamp(Math.floor(64 + (192 * (value - t)) / (top - t)), 64, 255)];
+    if (value <= t) return rgba(new Array(3).fill(Math.round((page.dark * Math.max(value, 0)) / t)));
+    return table[clamp(Math.floor(64 + (192 * (value - t)) / (TOP - t)), 64, 255)];
   };
 }
 
@@ -112,18 +108,15 @@ class Painter {
     this.scene = scene;
     this.images = images;
     this.differences = Float64Array.from(images.codes.dE2000, code => VALUES[code]);
-    const sizes = this.differences.filter((_, place) => this.counts(place)).sort();
-    /** The end of the map's colours, by what most pixels have. */
-    this.top =
-      whole?.top ??
-      [5, 10, 20, 40].find(end => end >= (sizes[Math.floor(0.95 * sizes.length)] ?? 0)) ??
-      100;
+    this.whole = whole;
     /** Pixels of the scene in a place, to the right and down. */
     this.step = whole
       ? [scene.width / images.width, scene.height / images.height]
       : [images.block, images.block];
     /** @type {Map<string, {key: string, canvas: HTMLCanvasElement}>} */
     this.kept = new Map();
+    /** Linear RGB of the first half, sharpened. @type {Float32Array | undefined} */
+    this.fine;
   }
 
   /** Whether statistics include a place. @param {number} place */
@@ -172,14 +165,29 @@ class Painter {
    * @param {string} key
    * @param {(place: number) => number} pixelAt
    */
-  picture(slot, key, pixelAt) {
+  picture(slot, key, pixelAt, { width, height } = this.images) {
     const kept = this.kept.get(slot);
     if (kept?.key === key) return kept.canvas;
-    const canvas = painted(this.images.width, this.images.height, pixels => {
+    const canvas = painted(width, height, pixels => {
       for (let place = 0; place < pixels.length; place++) pixels[place] = pixelAt(place);
     });
     this.kept.set(slot, { key, canvas });
     return canvas;
+  }
+
+  /** The first half, as sharp as the whole scene's pictures if it is smaller. @param {number} ev */
+  sharp(ev) {
+    const { whole, images } = this;
+    if (!whole || images.width >= whole.images.width) return this.rendering("heuristic", ev);
+    this.fine ??= sharpened(this, whole);
+    const { fine, scene } = this;
+    const level = (/** @type {number} */ value) => srgb(value * scene.exposure * 2 ** ev);
+    return this.picture(
+      "heuristic",
+      String(ev),
+      place => rgba([0, 1, 2].map(c => level(fine[3 * place + c]))),
+      whole.images,
+    );
   }
 
   /** "heuristic" or "reference". @param {string} half @param {number} ev */
@@ -226,9 +234,62 @@ class Painter {
           : own[letter === NO_EFFECT ? own.length - 1 : parseInt(letter, 36)];
       };
     }
-    const colour = differenceColours(t, this.top);
+    const colour = differenceColours(t);
     return place => colour(this.differences[place]);
   }
+}
+
+/** How far levels of the guide may be apart (of 1) in pixels that share their light. */
+const NEARNESS = 0.08;
+
+/**
+ * The first half of small images at the size of the whole scene's, linear RGB place by place: means
+ * of the nearest small pixels, weighed by how alike both whole pictures are there (joint bilateral
+ * upsampling).
+ * @param {Painter} small
+ * @param {Painter} whole
+ */
+function sharpened(small, whole) {
+  const { width, height } = whole.images;
+  const across = small.images.width;
+  const down = small.images.height;
+  const levels = Float32Array.from(VALUES, value => srgb(value * whole.scene.exposure) / 255);
+  const planes = ["heuristic", "reference"].flatMap(half =>
+    ["R", "G", "B"].map(channel => whole.images.codes[`${half}.${channel}`]),
+  );
+  const size = planes.length;
+  const place = (/** @type {number} */ x, /** @type {number} */ y) =>
+    [((x + 0.5) * across) / width - 0.5, ((y + 0.5) * down) / height - 0.5];
+  /** The mean of the guide in each small pixel. */
+  const guide = new Float32Array(size * across * down);
+  const counts = new Uint32Array(across * down);
+  for (let p = 0; p < width * height; p++) {
+    const [x, y] = place(p % width, Math.floor(p / width)).map(Math.round);
+    const cell = y * across + x;
+    counts[cell] += 1;
+    for (let i = 0; i < size; i++)
+      guide[size * cell + i] += (levels[planes[i][p]] - guide[size * cell + i]) / counts[cell];
+  }
+  const colours = ["R", "G", "B"].map(channel => small.images.codes[`heuristic.${channel}`]);
+  const fine = new Float32Array(3 * width * height);
+  for (let p = 0; p < width * height; p++) {
+    const [x, y] = place(p % width, Math.floor(p / width));
+    let total = 0;
+    for (let row = Math.round(y) - 1; row <= Math.round(y) + 1; row++)
+      for (let column = Math.round(x) - 1; column <= Math.round(x) + 1; column++) {
+        if (row < 0 || column < 0 || row >= down || column >= across) continue;
+        const cell = row * across + column;
+        let apart = 0;
+        for (let i = 0; i < size; i++)
+          apart += (levels[planes[i][p]] - guide[size * cell + i]) ** 2;
+        const far = (column - x) ** 2 + (row - y) ** 2;
+        const weight = Math.exp(-far - apart / (2 * NEARNESS ** 2)) + 1e-9;
+        total += weight;
+        for (let c = 0; c < 3; c++) fine[3 * p + c] += weight * VALUES[colours[c][cell]];
+      }
+    for (let c = 0; c < 3; c++) fine[3 * p + c] /= total;
+  }
+  return fine;
 }
 
 /** Letters of pixels without an effect: none dominates, and not counted. */

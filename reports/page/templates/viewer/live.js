@@ -123,7 +123,7 @@ class LiveShading {
     this.whole.hidden = !live?.grid;
     this.part("missing").hidden = Boolean(live?.grid);
     this.part("missing").textContent =
-      `The textbook half cannot be shaded again here. ${live?.missing}`;
+      `No other coefficients can be tried here. ${live?.missing}`;
   }
 
   /** @param {Painter} painter @param {View} view */
@@ -205,8 +205,9 @@ class LiveShading {
       const output = label.querySelector("output");
       if (!output) continue;
       const { before = "", unit = "" } = output.dataset;
-      output.textContent = `${before}${significant(value)}${unit}`;
-      control.ariaValueText = `${significant(value)}${unit}`;
+      const text = name === "n" ? String(Number(value.toPrecision(4))) : significant(value);
+      output.textContent = `${before}${text}${unit}`;
+      control.ariaValueText = `${text}${unit}`;
     }
   }
 
@@ -235,7 +236,7 @@ class LiveShading {
       grid: { width, height },
       live: { fit },
     } = session;
-    const colour = differenceColours(this.threshold, painter.top);
+    const colour = differenceColours(this.threshold);
     const seen = (/** @type {Float64Array} */ rgb) => (/** @type {number} */ cell) =>
       rgba([0, 1, 2].map(c => srgb(rgb[3 * cell + c] * exposure)));
     const pictures = {
@@ -259,6 +260,7 @@ class LiveShading {
     const texts = { mean: session.mean, first: session.first, best: session.best };
     for (const [name, value] of Object.entries(texts))
       this.part(name).textContent = differenceText(value);
+    this.part("grey").textContent = String(this.threshold);
     this.part("fit").textContent = fit
       ? `, the fit ${differenceText(fit[0])} at ${fit[1]} × ${fit[2]}`
       : "";

@@ -23,7 +23,11 @@ function change(changes, passing = false) {
 function follow() {
   const before = view;
   view = parseFragment(address.read());
-  if (!page.scenes.some(scene => scene.id === view.scene && !scene.failed)) view.scene = "";
+  const isKnown = page.scenes.some(scene => scene.id === view.scene && !scene.failed);
+  const unknown = byId("unknown");
+  unknown.hidden = isKnown || !view.scene;
+  unknown.textContent = `This page has no pictures of “${view.scene}”: choose a scene below.`;
+  if (!isKnown) view.scene = "";
   if (!before.scene && view.scene) left = window.scrollY;
   if (!/[#&]t=/.test(address.read()) && before.t !== view.t) {
     view.t = before.t;
@@ -76,7 +80,7 @@ function openScene(scene, section) {
 
 function showTerms() {
   if (!viewer.painter) return;
-  terms.show(viewer.painter, view.pixel ?? viewer.panels.worst());
+  terms.show(viewer.painter, view.pixel ?? viewer.scene.worst.pixel);
   live.show(viewer.painter, view);
 }
 

@@ -5,20 +5,18 @@ function showOverview(t) {
   const place = placeOf(t);
   byId("headline").textContent = textAt(page.headlines, place);
   byId("missing").textContent = textAt(page.missing, place);
-  for (const list of document.querySelectorAll("[data-list]")) {
-    const items = /** @type {HTMLElement[]} */ ([...list.children]);
-    const known = new Map(page.scenes.map(scene => [scene.id, scene]));
-    const sizeOf = (/** @type {HTMLElement} */ item) => {
-      const scene = known.get(item.dataset.scene ?? "");
-      return scene && !scene.failed ? scene.shares[place] : -1;
-    };
-    items
-      .sort((a, b) => sizeOf(b) - sizeOf(a))
-      .forEach(item => {
-        const scene = known.get(item.dataset.scene ?? "");
-        if (scene && !scene.failed) showScene(item, scene, place);
-      });
-    list.append(...items);
+  const known = new Map(page.scenes.map(scene => [scene.id, scene]));
+  const sizeOf = (/** @type {HTMLElement} */ item) => {
+    const scene = known.get(item.dataset.scene ?? "");
+    return scene && !scene.failed ? scene.shares[place] : -1;
+  };
+  const list = document.querySelector(".bars");
+  const items = /** @type {HTMLElement[]} */ ([...(list?.children ?? [])]);
+  list?.append(...items.sort((a, b) => sizeOf(b) - sizeOf(a)));
+  for (const item of document.querySelectorAll("#overview [data-scene]")) {
+    const row = /** @type {HTMLElement} */ (item);
+    const scene = known.get(row.dataset.scene ?? "");
+    if (scene && !scene.failed) showScene(row, scene, place);
   }
   showPrices(place);
 }
@@ -82,7 +80,7 @@ function showScene(item, scene, place) {
 document.addEventListener("click", event => {
   const button = /** @type {HTMLElement} */ (event.target).closest("[data-copy]");
   if (!button) return;
-  const command = button.parentElement?.querySelector("[data-command]")?.textContent ?? "";
+  const command = button.parentElement?.querySelector("code")?.textContent ?? "";
   void navigator.clipboard.writeText(command).then(() => (button.textContent = "Copied"));
 });
 

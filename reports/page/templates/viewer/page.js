@@ -2,7 +2,7 @@
 
 /**
  * @typedef {[number, string][]} Runs   texts by the place of the threshold from which each holds
- * @typedef {{name: string, title: string, kind: string, top: number}} MapOf
+ * @typedef {{name: string, title: string, kind: string, top: number}} MapOf   `top` ends its colours
  * @typedef {{x: number, y: number, width: number, height: number, effect: string | null}} Region
  * @typedef {{width: number, height: number, names: string[], colours: string[], map: string}}
  * Effects
@@ -11,8 +11,8 @@
  * @typedef {{name: string, k_i: number[], k_a: number[], k_d: number[], k_s: number[], n: number,
  * form: string, ambient: number[]}} Material
  * @typedef {{name: string, intensity: number[], specular_intensity: number[]}} Lamp
- * @typedef {{grid: Manifest | null, tops: Record<string, number>, materials: Material[], lights:
- * Lamp[], missing: string}} Terms
+ * @typedef {{grid: Manifest | null, columns: number[], rows: number[], tops: Record<string, number>,
+ * materials: Material[], lights: Lamp[], missing: string}} Terms
  */
 
 /**
@@ -27,6 +27,7 @@
  * @property {boolean} arePictures    whether there is no scene
  * @property {boolean} isNoiseKnown   whether passes or repeats show it
  * @property {string} mean       of ΔE2000
+ * @property {{pixel: number[], error: string}} worst   where the error is largest, and its ΔE2000
  * @property {number[]} shares   of the pixels that differ visibly, by threshold
  * @property {string} verdicts   a letter by threshold: p(ass), f(ail) or u(ndecided)
  * @property {Runs} advice
@@ -56,6 +57,7 @@
  * @property {{low: number, high: number, marks: number[]}} axis   of prices: powers of ten
  * @property {MapOf[]} maps
  * @property {string} noEffect
+ * @property {number} dark               the greatest grey of a difference that is not visible
  * @property {Record<string, string>} colours   256 of each map, as "rrggbb"
  * @property {number[][]} mask  colours of pixels: marked, unmarked, not counted, undetermined
  * @property {number[][]} xyz            the matrix from linear RGB; white has Y = 1

@@ -15,11 +15,6 @@ class Panels {
     this.distribution = byId("distribution");
     this.elements = [this.inspector, this.distribution];
     this.key = "";
-    /**
-     * The worst pixel, found once for each scene.
-     * @type {{painter: Painter | null, pixel: number[]}}
-     */
-    this.found = { painter: null, pixel: [0, 0] };
     this.part("clear").addEventListener("click", () => viewer.change({ box: null }));
     this.listenToDrags(/** @type {SVGElement} */ (this.distribution.querySelector("svg")));
   }
@@ -27,20 +22,6 @@ class Panels {
   /** @param {string} name @returns {HTMLElement} */
   part(name) {
     return /** @type {HTMLElement} */ (this.distribution.querySelector(`[data-part=${name}]`));
-  }
-
-  /** The pixel of the largest difference, in the region that holds most of the error. */
-  worst() {
-    const { painter, scene } = this.viewer;
-    if (!painter || this.found.painter === painter) return this.found.pixel;
-    const { block, width } = painter.images;
-    let [best, most] = [0, -1];
-    const [region] = scene.regions;
-    eachPlace(painter, region ? [region.x, region.y, region.width, region.height] : null, place => {
-      if (painter.differences[place] > most) [best, most] = [place, painter.differences[place]];
-    });
-    this.found = { painter, pixel: [(best % width) * block, Math.floor(best / width) * block] };
-    return this.found.pixel;
   }
 
   show() {
@@ -57,23 +38,24 @@ class Panels {
     const all = summarise(painter, null, view.t);
     const some = box ? summarise(painter, box, view.t) : all;
     this.part("title").textContent =
-      `ΔE2000 ${added ? "left " : ""}in ${box ? "the selection" : "the whole image"}`;
+      `ΔE2000 ${added ? "left " : ""}in ${box ? "the selection" : "the whole image"}, with noise`;
     const tallest = Math.max(...all.bars, ...some.bars, 1e-9);
     this.part("some").setAttribute("d", outlineOf(some.bars, tallest));
     this.part("all").setAttribute("d", outlineOf(all.bars, tallest));
-    this.part("line").setAttribute("x", String((100 * view.t) / painter.top));
-    this.part("end").textContent = `≥ ${painter.top}`;
+    this.part("line").setAttribute("x", String((100 * view.t) / TOP));
+    this.part("end").textContent = `≥ ${TOP}`;
     const texts = {
-      mean: added && !box ? added.mean : differenceText(some.mean),
+      mean: box || added ? differenceText(some.mean) : scene.mean,
       visible: percentText(box || added ? some.visible : scene.shares[placeOf(view.t)]),
-      shown: added
-        ? UNKNOWN
-        : `${percentText(some.marked)}, ${percentText(some.both)} above ${view.t}`,
-      pixels: box ? percentText(some.count / all.count) : "all",
+      certain: added ? UNKNOWN : percentText(some.marked),
+      both: added ? UNKNOWN : percentText(some.both),
+      pixels: percentText(some.count / all.count),
       error: percentText(all.sum ? some.sum / all.sum : 0),
       cause: added ? UNKNOWN : causesIn(painter, box),
     };
     for (const [name, text] of Object.entries(texts)) this.part(name).textContent = text;
+    for (const name of ["pixels", "error"])
+      /** @type {HTMLElement} */ (this.part(name).parentElement).hidden = !box;
     this.part("clear").hidden = !box;
   }
 
@@ -81,7 +63,7 @@ class Panels {
   listenToDrags(chart) {
     const drag = (/** @type {PointerEvent} */ event, passing = true) => {
       const { left, width } = chart.getBoundingClientRect();
-      const value = ((event.clientX - left) / width) * (this.viewer.painter?.top ?? 1);
+      const value = ((event.clientX - left) / width) * TOP;
       const t = page.thresholds.reduce((best, one) =>
         Math.abs(one - value) < Math.abs(best - value) ? one : best,
       );
@@ -117,7 +99,7 @@ class Panels {
     const marked = flags & SIGNIFICANT ? "yes" : flags & UNDETERMINED ? "undetermined" : "no";
     const short = (/** @type {number} */ value) =>
       significant(value, Math.abs(value) < 1e-3 ? 2 : 3);
-    const isWorst = !this.viewer.hovered && !view.pixel && !added;
+    const isWorst = String(pixel) === String(scene.worst.pixel) && block === 1 && !added;
     const size = added
       ? ` + ${added.name}, at ${width} × ${height}`
       : block > 1
@@ -125,13 +107,13 @@ class Panels {
         : "";
     /** @type {Record<string, string | string[]>} */
     const texts = {
-      position: `${isWorst ? "Worst pixel outlined" : "Pixel"} ${pixel.join(", ")}${size}`,
+      position: `${isWorst ? "Worst pixel:" : "Pixel"} ${pixel.join(", ")}${size}`,
       cause: added ? UNKNOWN : causeAt(painter, pixel) || "unknown",
       heuristic: textbook.map(short),
       reference: physical.map(short),
       heuristic_hex: seen(textbook),
       reference_hex: seen(physical),
-      dE2000: differenceText(painter.differences[place]),
+      dE2000: isWorst ? scene.worst.error : differenceText(painter.differences[place]),
       log2_luminance: `${significant(painter.ratio(place), 2)} stops`,
       standard_error: added
         ? UNKNOWN
@@ -189,7 +171,7 @@ function summarise(painter, box, t) {
     visible += Number(value > t);
     marked += Number(isMarked > 0);
     both += Number(isMarked && value > t);
-    bars[clamp(Math.floor((BARS * value) / painter.top), 0, BARS - 1)] += 1;
+    bars[clamp(Math.floor((BARS * value) / TOP), 0, BARS - 1)] += 1;
   });
   const share = (/** @type {number} */ part) => (count ? part / count : 0);
   return {

@@ -59,16 +59,12 @@ class TermsPanel {
       Math.floor((x * width) / scene.width),
       Math.floor((y * height) / scene.height),
     ];
-    const middle = (
-      /** @type {number} */ cell,
-      /** @type {number} */ count,
-      /** @type {number} */ side,
-    ) => Math.floor(((2 * cell + 1) * side) / (2 * count));
-    const pixel = [middle(column, width, scene.width), middle(row, height, scene.height)];
+    const pixel = [data.terms.columns[column], data.terms.rows[row]];
+    const isNear = pixel[0] !== x || pixel[1] !== y;
     const place = row * width + column;
     const material = data.terms.materials[codes.material[place] - 1];
     this.part("place").textContent =
-      `at ${pixel.join(", ")}${material ? `: ${material.name}` : ", where no surface is seen"}`;
+      `at ${pixel.join(", ")}${isNear ? `, the nearest to ${x}, ${y}` : ""}${material ? `: ${material.name}` : ", where no surface is seen"}`;
     const rows = material ? termRows(data, material, place) : [];
     const own = painter.placeOf(pixel);
     const error = VALUES[painter.images.codes.standard_error[own]];
@@ -119,7 +115,7 @@ function termRows({ terms, planes }, material, place) {
     );
   if (others.some(Boolean))
     rows.push(termRow("other lights", "diffuse and specular", others.map(amount)));
-  return [...rows, termRow("textbook", "the sum of the terms", total.map(amount), "sum")];
+  return [...rows, termRow("sum of the terms", "the textbook at the pixel’s centre", total.map(amount), "sum")];
 }
 
 /**
@@ -159,21 +155,23 @@ function lightRows(light, material) {
   const [diffuse, specular] = [light.intensity, light.specular_intensity].map(colourText);
   const [symbol, second] =
     diffuse === specular ? ["I_{p0}", ""] : ["L_{d}", `; L_{s} = ${specular}`];
-  const power = `^{${factor(material.n)}}`;
-  const lobe = `(${isBlinn ? "N·H" : "R·V"})^{n}`;
-  const k_s = colourText(material.k_s);
-  const specularText = `× k_{s} ${lobe} = × ${k_s} × ${factor(cosine, 4)}${power}`;
+  const angle = isBlinn ? "N·H" : "R·V";
+  const power = `(${angle})^{n} = ${factor(cosine, 4)}^{${factor(material.n)}}`;
+  const shine = cosine > 0 ? power : `${angle} = 0, far from the highlight`;
+  const specularText = material.k_s.some(Boolean)
+    ? `I k_{s} (${angle})^{n}: k_{s} = ${colourText(material.k_s)}, ${shine}`
+    : "k_{s} = 0: no highlight";
   return [
     termRow(
       light.name,
-      `${symbol} f_{att} = ${diffuse} × ${factor(light.attenuation)}${second}`,
+      `I = ${symbol} f_{att} = ${diffuse} × ${factor(light.attenuation)}${second}`,
       ["", "", ""],
       "light",
     ),
     termRow(
       "diffuse",
       isLit
-        ? `× k_{d} (N·L) = × ${colourText(material.k_d)} × ${factor(light.cosIncidence)}`
+        ? `I k_{d} (N·L): k_{d} = ${colourText(material.k_d)}, N·L = ${factor(light.cosIncidence)}`
         : behind,
       light.diffuse.map(amount),
     ),

@@ -112,7 +112,7 @@ class Viewer {
   /** The pixel at the pointer, or the marked one, or the worst. @returns {number[]} */
   pixel() {
     const { width, height } = this.scene;
-    const [x, y] = this.hovered ?? this.view.pixel ?? this.panels.worst();
+    const [x, y] = this.hovered ?? this.view.pixel ?? this.scene.worst.pixel;
     return [Math.min(x, width - 1), Math.min(y, height - 1)];
   }
 
@@ -135,9 +135,8 @@ class Viewer {
     const more = added
       ? [
           {
-            picture: added.painter.rendering("heuristic", view.ev),
+            picture: added.painter.sharp(view.ev),
             title: `+ ${added.name}`,
-            smooth: true,
           },
         ]
       : [];
@@ -156,7 +155,7 @@ class Viewer {
       .slice(0, 1)
       .map(({ x, y, width, height }) => [[x, y, width, height], OVERLAY.worst]);
     if (box) outlines.push([box, OVERLAY.selection]);
-    outlines.push([[...(view.pixel ?? this.panels.worst()), 1, 1], OVERLAY.line]);
+    outlines.push([[...(view.pixel ?? this.scene.worst.pixel), 1, 1], OVERLAY.line]);
     this.drawing.draw(view, this.viewport, contents, outlines);
     this.canvas.style.touchAction = view.zoom === null && !this.selecting ? "pan-y" : "none";
     this.canvas.setAttribute(
@@ -183,21 +182,18 @@ class Viewer {
     return this.added?.painter ?? this.painter;
   }
 
-  /** The numbers of the whole image, and at which size. @param {Added | null} added */
+  /** What the effects that are on change, in the small pictures. @param {Added | null} added */
   numbers(added) {
-    const { scene, view } = this;
-    const visibly = `of the pixels differ visibly (ΔE2000 above ${view.t}), mean`;
-    const share = percentText(scene.shares[placeOf(view.t)]);
-    const size = `at ${scene.width} × ${scene.height}`;
+    const { view } = this;
     const none = added && this.switches?.find([]);
-    if (!none) return `${share} ${visibly} ${scene.mean}; ${size}`;
+    if (!none) return "";
     const [before, after] = [none, added].map(({ painter }) =>
       percentText(summarise(painter, null, view.t).visible),
     );
     const { width, height } = none.painter.images;
-    const changes = `${before} → ${after} ${visibly} ${none.mean} → ${added.mean}`;
-    const whole = `whole comparison, ${size}: ${share}, mean ${scene.mean}`;
-    return `${changes}; at ${width} × ${height} (${whole})`;
+    const share = `${before} → ${after} of the pixels differ visibly, with noise`;
+    const mean = `mean without noise ${none.mean} → ${added.mean}`;
+    return `${share}; ${mean}; at ${width} × ${height}`;
   }
 
   /** @param {number[] | null} place */
@@ -231,7 +227,7 @@ class Viewer {
    */
   step(right, down) {
     const { width, height } = this.scene;
-    const [x, y] = this.view.pixel ?? this.panels.worst();
+    const [x, y] = this.view.pixel ?? this.scene.worst.pixel;
     if (!this.selecting)
       return this.change({
         pixel: [clamp(x + right, 0, width - 1), clamp(y + down, 0, height - 1)],
@@ -256,8 +252,8 @@ class Viewer {
 
   /** Do the action of a button or a key. @param {string} action */
   act(action) {
-    if (action === "zoom-in") this.zoomBy(2);
-    if (action === "zoom-out") this.zoomBy(0.5);
+    if (action === "zoom-in") this.zoomBy(Math.SQRT2);
+    if (action === "zoom-out") this.zoomBy(Math.SQRT1_2);
     if (action === "fit") this.change({ zoom: null, x: null, y: null });
     if (action === "help") openHelp();
     if (action === "select") {
@@ -280,18 +276,18 @@ function showLegend(legend, { painter, view, scene }) {
   bar.hidden = labels.hidden = !hasBar;
   if (hasBar) {
     const table = pixelsOf(is === "ratio" ? page.colours.signed : page.colours.error);
-    const differences = differenceColours(view.t, painter.top);
+    const differences = differenceColours(view.t);
     const strip = painted(256, 1, pixels =>
       pixels.forEach((_, place) => {
         pixels[place] =
-          is === "difference" ? differences((place / 256) * painter.top) : table[place];
+          is === "difference" ? differences((place / 256) * TOP) : table[place];
       }),
     );
     /** @type {HTMLCanvasElement} */ (bar).getContext("2d")?.drawImage(strip, 0, 0);
     const texts =
       is === "ratio"
         ? [`≤ −${top}`, "0", `≥ +${top} stops`]
-        : ["0", "", `≥ ${is === "metric" ? top : painter.top}`];
+        : ["0", "", `≥ ${top}`];
     texts.forEach((text, place) => {
       labels.children[place].textContent = text;
     });
@@ -301,8 +297,8 @@ function showLegend(legend, { painter, view, scene }) {
   }
   const names =
     is === "mask"
-      ? ["shown to differ, however little", "not shown", "not counted", "undetermined"]
-      : [...(scene.effects?.names ?? []), "none visible"];
+      ? ["certain to differ, however little", "not certain", "not counted", "undetermined"]
+      : [...(scene.effects?.names ?? []), "no visible error"];
   const colours =
     is === "mask"
       ? page.mask.map(rgb => `rgb(${rgb})`)

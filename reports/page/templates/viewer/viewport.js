@@ -6,9 +6,14 @@
  */
 const STACKED_BELOW = 340;
 
-/** Most screen pixels per image pixel, and the greatest height relative to the window's. */
+/** Films of this shape or wider stack their panes, too. */
+const WIDE = 2;
+
+/** Most screen pixels per image pixel, and the heights of all panes and of one, relative to the
+ * window's, that are left to them at least. */
 const GREATEST_ZOOM = 64;
-const GREATEST_PART = 0.74;
+const LEAST_PART = 0.5;
+const LEAST_PANE = 0.3;
 
 /** @typedef {{left: number, top: number, width: number, height: number}} Box */
 
@@ -25,18 +30,21 @@ class Viewport {
   }
 
   /**
-   * Lay out panes over a canvas of a width, and return their height.
+   * Lay out panes over a canvas of a width, and return their height: together they fit into the
+   * window where the page is not scrolled, if that leaves enough.
    * @param {number} count
    * @param {number} available
+   * @param {number} top of the canvas on the page
    */
-  arrange(count, available) {
-    const gap = 4;
-    const columns =
-      available < STACKED_BELOW ? 1 : count > 3 && available < 2 * STACKED_BELOW ? 2 : count;
+  arrange(count, available, top) {
+    const gap = 8;
+    const isStacked = available < STACKED_BELOW || this.width >= WIDE * this.height;
+    const columns = isStacked ? 1 : count > 3 && available < 2 * STACKED_BELOW ? 2 : count;
+    const rows = Math.ceil(count / columns);
     const width = (available - gap * (columns - 1)) / columns;
-    const height = Math.round(
-      Math.min((width * this.height) / this.width, GREATEST_PART * window.innerHeight),
-    );
+    const most = Math.max(window.innerHeight - top - gap, LEAST_PART * window.innerHeight);
+    const each = Math.max((most - gap * (rows - 1)) / rows, LEAST_PANE * window.innerHeight);
+    const height = Math.round(Math.min((width * this.height) / this.width, each));
     this.panes = Array.from({ length: count }, (_, place) => ({
       left: (place % columns) * (width + gap),
       top: Math.floor(place / columns) * (height + gap),
@@ -44,7 +52,7 @@ class Viewport {
       height,
     }));
     this.fit = Math.min(width / this.width, height / this.height);
-    return Math.ceil(count / columns) * (height + gap) - gap;
+    return rows * (height + gap) - gap;
   }
 
   /** @param {View} view */

@@ -1,0 +1,123 @@
+"""Formats of pictures that no library here reads whole: HDR, PFM, and PNG with 16 bits of colours.
+
+A file that is not as its format says raises `ValueError` with the fault.
+"""
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+PFM_HEADER = re.compile(rb"(PF|Pf)\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]+)\s")
+"""Kind, width, height and scale."""
+
+HDR_FORMAT = b"FORMAT=32-bit_rle_rgbe"
+HDR_SIZE = re.compile(rb"-Y\s+(\d{1,9})\s+\+X\s+(\d{1,9})\s*")
+HDR_PACKED = range(8, 2**15)
+"""Widths of rows that may be packed."""
+
+TOO_SHORT = "it ends too soon"
+EMPTY = "it has no pixels"
+
+
+def hdr(path: Path) -> NDArray[np.float32]:
+    """Read a Radiance picture of RGBE, (H, W, 3).
+
+    An exposure in its header is ignored: values are as they are shown.
+    """
+    header, _, rest = path.read_bytes().partition(b"\n\n")
+    line, _, data = rest.partition(b"\n")
+    size = HDR_SIZE.fullmatch(line)
+    if size is None or HDR_FORMAT not in header.splitlines():
+        raise ValueError("its header lacks 32-bit_rle_rgbe, or rows from top left (-Y, +X)")
+    height, width = map(int, size.groups())
+    if not width or not height:
+        raise ValueError(EMPTY)
+    rows = []
+    place = 0
+    for _ in range(height):
+        row, place = _hdr_row(data, place, width)
+        rows.append(row)
+    pixels = np.array(rows, np.uint8).reshape(height, width, 4)
+    if (pixels[..., :3] == 1).all(axis=-1).any():  # no colour has such mantissas
+        raise ValueError("its rows have runs of the old kind, of mantissas 1, 1 and 1")
+    exponents = pixels[..., 3:].astype(int)
+    values = np.ldexp(pixels[..., :3].astype(np.float32), exponents - 136)
+    return np.where(exponents > 0, values, np.float32(0))
+
+
+def _hdr_row(data: bytes, place: int, width: int) -> tuple[NDArray[np.uint8], int]:
+    """Return the pixels (W, 4) of the row at a place, and where the next one begins."""
+    mark = bytes([2, 2, width >> 8 & 255, width & 255])
+    if width not in HDR_PACKED or data[place : place + 4] != mark:
+        end = place + 4 * width
+        if end > len(data):
+            raise ValueError(TOO_SHORT)
+        return np.frombuffer(data[place:end], np.uint8).reshape(width, 4), end
+    place += 4
+    planes = bytearray()
+    for channel in range(1, 5):
+        while len(planes) < channel * width:
+            code = data[place] if place < len(data) else 0
+            # Above 128 the next byte is repeated; else so many bytes follow.
+            count = code - 128 if code > 128 else code
+            following = 1 if code > 128 else count
+            found = data[place + 1 : place + 1 + following]
+            if not code or len(found) < following:
+                raise ValueError(TOO_SHORT)
+            planes += found * count if code > 128 else found
+            place += 1 + following
+        if len(planes) != channel * width:
+            raise ValueError("a run is longer than its row")
+    return np.frombuffer(planes, np.uint8).reshape(4, width).T, place
+
+
+def pfm(path: Path) -> NDArray[np.float32]:
+    """Read a portable float map, (H, W, 3) or (H, W, 1)."""
+    content = path.read_bytes()
+    header = PFM_HEADER.match(content)
+    if header is None:
+        raise ValueError("it has no kind, width, height and scale")
+    kind, width, height, scale = header.groups()
+    factor = float(scale)
+    shape = (int(height), int(width), 3 if kind == b"PF" else 1)
+    size = 4 * shape[0] * shape[1] * shape[2]
+    if not size:
+        raise ValueError(EMPTY)
+    data = content[header.end() : header.end() + size]
+    if len(data) < size:
+        raise ValueError(TOO_SHORT)
+    rows = np.frombuffer(data, "<f4" if factor < 0 else ">f4").reshape(shape)
+    # The lowest row is the first.
+    with np.errstate(all="ignore"):  # what becomes NaN or infinite is refused later
+        return (rows[::-1] * abs(factor)).astype(np.float32)
+
+
+def deep_png(path: Path) -> NDArray[np.uint16]:
+    """Read a PNG with 16 bits of several channels, (H, W, C), of which Pillow keeps the high 8.
+
+    Taken for little-endian, it gives the low ones.
+    """
+    with Image.open(path) as file:
+        if not file.tile:
+            raise ValueError(TOO_SHORT)
+        coding = str(file.tile[0].args)
+        clear = file.info.get("transparency")
+    if coding == "LA;16B":  # four bytes of a pixel
+        return _decoded(path, "RGBA").view(">u2").astype(np.uint16)
+    high = _decoded(path, coding).astype(np.uint16)
+    low = _decoded(path, coding.replace("16B", "16L"))
+    colours: NDArray[np.uint16] = high << np.uint16(8) | low
+    if clear is None:
+        return colours
+    alpha = np.where((colours == clear).all(axis=-1, keepdims=True), 0, 2**16 - 1)
+    return np.concatenate([colours, alpha.astype(np.uint16)], axis=-1)
+
+
+def _decoded(path: Path, coding: str) -> NDArray[np.uint8]:
+    """Return the bytes (H, W, C) that Pillow makes of a file by one of its codings of pixels."""
+    with Image.open(path) as file:
+        file.tile = [file.tile[0]._replace(args=coding)]
+        return np.array(file)

@@ -1,0 +1,136 @@
+"""What the package states of itself, and what works with another Mitsuba or without an extra."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from importlib import metadata
+
+import pytest
+
+from fotismos.heuristic import mitsuba_version
+from fotismos.heuristic.errors import InstallationError
+from fotismos.heuristic.program import __version__
+from fotismos.reports.ci import summary
+from fotismos.reports.ci.checks import CheckRecord, VersionChange
+from fotismos.reports.work import doctor
+from tests.shared.programs import ROOT, command_line
+
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+WITHOUT = """
+import sys
+
+class Hook:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] == "pyarrow":
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Hook())
+"""
+
+IMPORT = """
+import pkgutil
+from importlib import import_module
+
+names = [name for room in ("heuristic", "reference", "comparisons", "reports") for _, name, _ in
+         pkgutil.walk_packages(import_module(f"fotismos.{room}").__path__, f"fotismos.{room}.")]
+for name in names:
+    if not name.endswith("__main__"):
+        import_module(name)
+"""
+
+RUN = """
+from fotismos.reports.__main__ import main
+sys.argv[0] = "fotismos"
+main()
+"""
+
+
+def without_pyarrow(text, *words):
+    command = [sys.executable, "-P", "-c", WITHOUT + text, *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=300)
+
+
+@pytest.fixture
+def installed(monkeypatch):
+    """A function that makes Mitsuba be of another version, as far as its metadata say."""
+    real = metadata.version
+
+    def of(version):
+        known = {"mitsuba": version}
+        monkeypatch.setattr(metadata, "version", lambda name: known.get(name) or real(name))
+
+    return of
+
+
+# --- Versions --------------------------------------------------------------------------------
+
+
+def test_the_citation_has_the_version_and_its_date():
+    text = (ROOT / "CITATION.cff").read_text()
+    stated = dict(re.findall(r"(?m)^(version|date-released): (.*)$", text))
+    dates = re.findall(r"(?m)^## (\S+) - (\S+)$", (ROOT / "CHANGELOG.md").read_text())
+    assert stated["version"] == __version__
+    assert stated["date-released"] == dict(dates)[__version__]
+
+
+def test_the_package_requires_the_range_that_is_checked():
+    assert mitsuba_version.REQUIREMENT in PROJECT["dependencies"]
+    pin = f"mitsuba=={mitsuba_version.NAME} "
+    for name in ("requirements.txt", "requirements-test.txt"):
+        assert pin in (ROOT / name).read_text()
+
+
+@pytest.mark.parametrize("version", ["3.9.1", "3.9.2", "3.9.10", "3.9.1.post1"])
+def test_a_later_patch_of_mitsuba_is_allowed(version, installed):
+    installed(version)
+    mitsuba_version.require_mitsuba()
+    assert bool(mitsuba_version.other_version()) == (version != "3.9.1")
+    (line,) = (line for line in doctor.version_lines() if line.startswith("mitsuba"))
+    assert line.split() == ["mitsuba", version]
+    said = " ".join(doctor.version_lines())
+    assert ("may find that old baselines moved" in said) == (version != "3.9.1")
+
+
+@pytest.mark.parametrize("version", ["3.9.0", "3.8.7", "3.10.0", "4.0.0", "unknown"])
+def test_another_mitsuba_is_refused_with_what_to_install(version, installed):
+    installed(version)
+    message = rf"Mitsuba {version} is installed.*needs 3\.9\.1 or a later 3\.9.*mitsuba~=3\.9\.1"
+    with pytest.raises(InstallationError, match=message):
+        mitsuba_version.require_mitsuba()
+    code, _, said = command_line("doctor")
+    assert (code, "Traceback" in said) == (2, False)
+    assert re.search(message, said)
+
+
+def test_a_check_says_once_that_mitsuba_is_another():
+    change = VersionChange(before="3.9.1", after="3.9.2")
+    made = [
+        CheckRecord(baseline=name, scene=name, status="passed", seconds=1, versions=versions)
+        for name, versions in (("a", {"mitsuba": change}), ("b", {"mitsuba": change}), ("c", None))
+    ]
+    said = "\n".join(summary.lines(made, 0.01))
+    assert said.count("Mitsuba 3.9.2 renders here, and 3.9.1 made the baselines") == 1
+    assert "renders here" not in "\n".join(summary.lines(made[2:], 0.01))
+
+
+# --- Without pyarrow -------------------------------------------------------------------------
+
+
+def test_every_module_can_be_imported_without_pyarrow():
+    done = without_pyarrow(IMPORT)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_study_without_pyarrow_names_what_to_install_and_a_comparison_works(tmp_path):
+    study = without_pyarrow(RUN, "study", "studies/phong-roughplastic.toml", "-o", tmp_path)
+    assert study.returncode == 2
+    assert "pyarrow is not installed" in study.stderr
+    assert "pip install pyarrow" in study.stderr
+    assert "Traceback" not in study.stderr
+    assert not list(tmp_path.iterdir())
+    words = ("fig-8-9", "--resolution", "16x16", "--spp", 4, "--workers", 0, "--figures")
+    compared = without_pyarrow(RUN, "compare", *words, "-o", tmp_path)
+    assert compared.returncode == 0, compared.stderr
+    assert (tmp_path / "index.html").exists()

@@ -1,0 +1,83 @@
+"""The table ``[tool.fotismos]`` of pyproject.toml, which sets what ``check`` does by default."""
+
+import pytest
+
+from fotismos.heuristic.errors import InputError
+from fotismos.reports.commands import check as commands
+from fotismos.reports.work import check
+from tests.shared.programs import command_line
+
+TABLE = """\
+[tool.fotismos]
+baselines = "kept"
+report = "made"
+significance = 0.001
+within = 3
+max_visible = "7%"
+"""
+PICTURES = ("--picture", "hall=*.exr")
+
+
+@pytest.fixture
+def asked(tmp_path, monkeypatch):
+    """A function that runs ``check`` below a folder with a table; it returns what was asked."""
+    below = tmp_path / "tests/scenes"
+    below.mkdir(parents=True)
+    monkeypatch.chdir(below)
+    made = []
+    monkeypatch.setattr(check, "run", lambda pool, **arguments: made.append(arguments) or 0)
+
+    def ask(table, *words):
+        (tmp_path / "pyproject.toml").write_text(table)
+        code, _, message = command_line("check", *words)
+        assert code == 0, message
+        return made.pop()
+
+    return ask
+
+
+def test_the_table_sets_what_the_command_line_leaves_open(asked):
+    made = asked(TABLE, *PICTURES)
+    assert made["baseline"].as_posix() == "../../kept"
+    assert made["output"].as_posix() == "../../made"
+    assert (made["significance"], made["within"], made["max_visible"]) == (0.001, 3, 0.07)
+    words = ("other", "-o", "out", "--significance", 0.1, "--within", 4, "--max-visible", "1%")
+    made = asked(TABLE, *words, *PICTURES)
+    assert (made["baseline"].name, made["output"].name) == ("other", "out")
+    assert (made["significance"], made["within"], made["max_visible"]) == (0.1, 4, 0.01)
+
+
+def test_a_tolerance_of_the_table_is_for_pictures_alone(asked):
+    made = asked(TABLE)
+    assert (made["within"], made["max_visible"]) == (None, None)
+
+
+def test_nearer_files_without_the_table_are_passed_over(asked, tmp_path):
+    (tmp_path / "tests/pyproject.toml").write_text("[tool.other]\nbaselines = 'no'\n")
+    assert asked(TABLE)["baseline"].name == "kept"
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("baseline = 'x'", r"key 'baseline' is not known \(did you mean baselines\?\)"),
+        ("significance = 2", r"\[tool.fotismos\] significance: 2(.0)? is not in the range"),
+        ("max_visible = 'x'", r"max_visible: 'x' is not a percentage"),
+        ("baselines = 3", r"baselines = 3 is not a folder"),
+        ("within = [2]", r"within = \[2\] is not a number or a text"),
+        ("within", r"pyproject.toml cannot be read"),
+    ],
+)
+def test_what_is_wrong_in_the_table_is_named_with_its_file(table, message, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pyproject.toml").write_text(f"[tool.fotismos]\n{table}\n")
+    with pytest.raises(InputError, match=message) as caught:
+        commands.check.make_context("check", ["kept"])
+    assert str(tmp_path / "pyproject.toml") in str(caught.value)
+    assert command_line("check", "--help")[0] == 0
+
+
+def test_without_a_table_the_baselines_must_be_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code, _, message = command_line("check")
+    assert (code, "Missing argument 'BASELINE'" in message) == (2, True)
