@@ -28,7 +28,7 @@ def contact_sheet(part: StudyPart, sheet: Sheet, pictures: dict[int, Pictures]) 
             # Large values are on top, as in the maps.
             top = (rows - 1 - row) * step_down
             left = column * step_across
-            whole[top : top + height, left : left + 2 * width] = np.hstack(pictures[number])
+            whole[top : top + height, left : left + 2 * width] = np.hstack([*pictures[int(number)]])
     values = part.points()
     size = (columns * CELL + 0.8, rows * CELL * step_down / step_across + 0.9)
     with rc_context({"font.size": FONT_SIZE, "axes.titlesize": FONT_SIZE}):

@@ -174,7 +174,7 @@ def _mean(data: Sequence[Row], keys: Sequence[str], column: str) -> list[Cell]:
 def _axis(channel: Any, table: pa.Table, name: str) -> Any:
     field = {alt.X: "x", alt.Y: "y"}[channel]
     title = _with_unit(label(name), table, name)
-    return channel(f"{field}:Q", title=title).axis(format=".3~g")
+    return channel(f"{field}:Q", title=title).axis(format=".3~g", tickCount=8, labelFlush=False)
 
 
 def _with_unit(name: str, table: pa.Table, column: str) -> str:

@@ -171,7 +171,8 @@ def _interval(parameter: FittedParameter) -> str:
     """Return the interval of a parameter, or that it is narrower than the value's last digit."""
     if not parameter.interval:
         return ""
-    low, high = (f"{end:.4g}" for end in parameter.interval)
+    low = f"{parameter.interval[0]:.4g}"
+    high = f"{parameter.interval[1]:.4g}"
     return "below the last digit" if low == high else f"{low} to {high}"
 
 

@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from pathlib import Path
 from types import SimpleNamespace
 from xml.etree import ElementTree
 
@@ -400,3 +401,16 @@ def test_files_for_ci_never_replace_a_picture_whatever_its_name_and_layer(tmp_pa
     job = Job(options=Options(image=(f"{picture}{layer}",)))
     with pytest.raises(InputError, match="is an input of the same command"):
         work.run(None, [], tmp_path, job, 5.0, picture, None, is_opened=False)
+
+
+def test_the_half_that_moved_most_comes_first_on_the_page():
+    grey = np.full((4, 4, 3), 0.2)
+    kept = {"heuristic": grey, "reference": grey}
+    failed = checks.failed(Path("a.json"), InputError("x"))
+    move = Move(quantity="reference R", half="reference", block=None, before=1.0, after=2.0,
+                error=0.1, standard_errors=10.0, p=0.0, p_corrected=0.0)  # fmt: skip
+    made = structs.replace(failed, moved=(move,), tested=1, causes=())
+    for name, first in (("reference", "physical"), ("heuristic", "textbook")):
+        shown = checks._before(made, kept, kept | {name: 2 * grey})
+        assert next(iter(shown.pictures)) == f"{first}, before"
+        assert "physical R moved" in shown.headline
