@@ -288,7 +288,7 @@ def at_size_of_pictures(film: tuple[int, int], given: GivenPictures, options: Op
 # --- What is odd -------------------------------------------------------------------------------
 
 
-REFERENCE = Names(picture="The reference picture", other="the first half")
+REFERENCE = Names(picture="The reference picture", other="the other picture")
 
 
 def with_records(

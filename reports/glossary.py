@@ -17,8 +17,8 @@ RESULTS: Terms = {
         "The one factor on the textbook image that makes the metric’s mean smallest."
     ),
     ("noise", "noise floor", "ΔE2000, noise floor"): (
-        "The mean that the reference’s own noise gives: its distance from itself with noise of"
-        " its standard error added."
+        "The mean that the physical picture’s own noise gives: its distance from itself with noise"
+        " of its standard error added."
     ),
     ("without noise", "without noise 95 %"): (
         "The mean without the part that is due to noise, with a 95 % interval. If it contains 0,"
@@ -148,7 +148,7 @@ METHODS: Terms = {
     ("path 3", "path 4", "path 5"): (
         "Path tracing that ends after that many steps; 2 is direct light alone."
     ),
-    ("full plan",): "Everything that the scene calls for.",
+    ("full plan",): "Everything that the scene needs.",
 }
 
 GROUPS: dict[str, Terms] = {

@@ -23,7 +23,7 @@ from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.price_record import MOST_SPP, Price
 from fotismos.heuristic import program
 from fotismos.reference.planning.effects import EFFECTS, MICROFACETS
-from fotismos.reports.terminal.words import number, percent, seconds
+from fotismos.reports.terminal.words import number, parameter, percent, seconds
 
 if TYPE_CHECKING:
     from fotismos.comparisons.cost.cost_record import Cost
@@ -77,7 +77,7 @@ def truth(record: ComparisonRecord) -> HalfNames:
     """Return the names of what it is compared with."""
     if record.reference_picture:
         return HalfNames(subject="Reference picture", title="Reference", name="reference")
-    return HalfNames(subject="Physical reference", title="Physical", name="physical")
+    return HalfNames(subject="Physical picture", title="Physical", name="physical")
 
 
 def is_noise_known(record: ComparisonRecord) -> bool:
@@ -154,10 +154,10 @@ def sentence(
         return "Correct the shader first."
     match looks:
         case "pass":
-            return "Exact, as far as can be seen." if lead.high <= EXACT else "Nothing to do."
+            return "No visible difference." if lead.high <= EXACT else "Nothing to do."
         case "undecided":
             has_pictures = record.picture or record.reference_picture
-            more = "repeats of the pictures" if has_pictures else "samples (--spp, --noise)"
+            more = "repeats of the pictures" if has_pictures else "samples (--spp)"
             if found.low > LIMIT:
                 doubt = (
                     f"Noise may explain it: {percent(found.value)} of the pixels differ, but no"
@@ -165,8 +165,9 @@ def sentence(
                 )
             else:
                 doubt = (
-                    f"Too close to call: {percent(found.low)} to {percent(found.high)} of the"
-                    f" pixels differ, and {percent(LIMIT)} may. More {more} decide."
+                    f"Too close to call: between {percent(found.low)} and {percent(found.high)} of"
+                    f" the pixels differ, and at most {parameter(100 * LIMIT)} % may. More {more}"
+                    " decide."
                 )
             return f"{doubt} {_samples_needed(record, threshold)}".strip()
     if record.agreement and record.agreement.mistakes:
@@ -178,7 +179,15 @@ def sentence(
     if cost is not None:
         return _remedy(record, cost, threshold)
     parts = [_effects_needed(record, threshold), _samples_needed(record, threshold)]
-    return " ".join(filter(None, parts)) or "The map shows where it is wrong."
+    return " ".join(filter(None, parts)) or _where(record)
+
+
+def _where(record: ComparisonRecord) -> str:
+    """Return the shape with the largest part of the error, if shapes are known."""
+    if not record.objects:
+        return "The map shows where the pictures differ."
+    worst = record.objects[0]
+    return f"{percent(worst.share)} of the error is on {worst.name}."
 
 
 def _brightness_suffices(record: ComparisonRecord, threshold: float) -> bool:
@@ -390,7 +399,7 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
     if decisions["undecided"]:
         return f"{subject} may look right in {record.scene}."
     wrong = percent(share(record, threshold).value)
-    return f"{subject} is visibly wrong in {wrong} of the pixels of {record.scene}."
+    return f"{subject} differs visibly in {wrong} of the pixels of {record.scene}."
 
 
 def _difference(record: ComparisonRecord, subject: str, threshold: float) -> str:

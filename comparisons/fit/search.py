@@ -288,7 +288,7 @@ def identify(
             others = zip(np.flatnonzero(free).tolist(), shares, strict=True)
             partners = tuple(i for i, share in others if i != number and share > PARTNER)
         elif lost[number]:
-            reason = "lost in the reference's noise"
+            reason = "lost in the noise of the physical picture"
         certainties.append(Certainty(reason, partners, bool(at_bound[number])))
     return certainties, covariance
 

@@ -31,7 +31,7 @@ SCENE = "cornell-box"
 GROUND, INK, QUIET = "#fcfcfb", "#1c1e21", "#585f67"
 """Colours of the page in light."""
 
-PANELS = {"heuristic": "Textbook shading", "reference": "Path traced", LEADING.name: ""}
+PANELS = {"heuristic": "Textbook shading", "reference": "Physical", LEADING.name: ""}
 """Files of a comparison, and their titles; the map's title holds its mean."""
 
 WIDTH, HEIGHT = 9.1, 4.3

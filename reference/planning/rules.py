@@ -160,7 +160,7 @@ SAMPLED_AS_HIT = Premise(
 
 LIGHT_BY_LIGHT = PruningRule(
     name="light by light",
-    omits="the choice of one light",
+    omits="picking one light at random",
     absent="noise of picking one light at random: all lights are summed",
     proof="The mean is the sum over all lights, which `direct_all` takes at each sample, if each"
     " estimate of a light has the right mean, however samples of the BSDF are weighted against it.",

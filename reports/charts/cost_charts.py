@@ -99,7 +99,7 @@ def error_over_time(record: Cost | EngineCost, ground: str = "transparent") -> S
 def reading(record: Cost | EngineCost) -> list[str]:
     """Return how to read the chart of error against time, in lines."""
     if isinstance(record, EngineCost):
-        dotted = "; dotted: noise of the reference itself" if record.noise_floor else ""
+        dotted = "; dotted: noise of the reference picture itself" if record.noise_floor else ""
         return [
             f"filled: front (nothing else is clearly faster or better){dotted}",
             stated(record.engine),
@@ -108,7 +108,7 @@ def reading(record: Cost | EngineCost) -> list[str]:
     slope = "dashed: slope −1/2, plain Monte Carlo; " if sampled else ""
     lines = [
         "filled: front (nothing else is clearly faster or better); bars: 95 % intervals of times",
-        f"{slope}dotted: noise of the reference itself",
+        f"{slope}dotted: noise of the physical picture itself",
         f"passes at: what 5 % of the pixels exceed with most samples; circled: at {TOLERANCE:g}",
     ]
     if record.engine:
@@ -174,7 +174,9 @@ def _domain(values: Sequence[float]) -> Ends:
 
 
 def _error(field: str, errors: Ends) -> Any:
-    return _logarithmic(alt.Y(f"{field}:Q"), errors, "mean ΔE2000 to the reference (logarithmic)")
+    return _logarithmic(
+        alt.Y(f"{field}:Q"), errors, "mean ΔE2000 to the physical picture (logarithmic)"
+    )
 
 
 def _logarithmic(channel: Any, domain: Ends, title: str) -> Any:

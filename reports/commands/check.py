@@ -65,7 +65,7 @@ READING = ("--transfer", "--over")
 @jobs.ci_options
 @jobs.output_option("out", "check")
 @jobs.process_options
-@jobs.scene_options
+@jobs.options_of_scenes(resolution="the film's, reduced to 64 pixels at most")
 @jobs.option("transfer")
 @jobs.option("over")
 @jobs.verbosity_options

@@ -45,10 +45,10 @@ def fit(
 ) -> None:
     """Find the textbook parameters nearest to the physical picture, and the error that is left.
 
-    The loss that the best parameters remove is the parameter error. The rest is the model error,
-    which no parameters remove. Writes a page (before, reference, after, error left) and fit.json to
-    OUTPUT/fit/SCENE. By default it renders 96x96 pixels with 64 samples each. With pictures of
-    another renderer as the reference, it has their size.
+    The part of the error that the best parameters remove is the parameter error. The rest is the
+    model error, which no parameters remove. Writes a page (physical, before, after, and the errors)
+    and fit.json to OUTPUT/fit/SCENE. By default it renders 96x96 pixels with 64 samples each. With
+    pictures of another renderer as the reference, it has their size.
 
     \b
     Examples:

@@ -177,6 +177,7 @@ def details(
         "details.html.j2",
         HELP,
         title="Details",
+        settings=_settings(records) if records else "",
         data={"terms": glossary.meanings()},
         metrics=METRICS,
         glossary=glossary.GROUPS,

@@ -66,7 +66,7 @@ def headline(record: FitRecord) -> str:
     """Return how much of the error that was minimised better parameters remove."""
     best = record.nearest
     if best.departure[LEADING.name].before <= EXACT:
-        return f"{record.scene}: the paired parameters are exact, as far as can be seen"
+        return f"{record.scene}: the paired parameters show no visible difference"
     removed = percent(best.parameter_error / (best.loss + best.parameter_error))
     return f"{record.scene}: the best parameters remove {removed} of the error"
 

@@ -39,7 +39,7 @@ def lines(record: Cost) -> Iterator[str]:
     if record.is_busy:
         yield busy(record)
     yield (
-        f"reference: {reference.integrator}, {reference.spp} samples per pixel; its noise alone"
+        f"compared with: {reference.integrator}, {reference.spp} samples per pixel; its noise alone"
         f" gives ΔE2000 = {reference.noise_floor:.3g}"
     )
     if record.guard and record.guard.state == "disagreed":
@@ -264,11 +264,14 @@ def beyond(need: Reach | None) -> str:
         return "More samples (--spp) decide."
     if need.spp is None:
         return (
-            f"No number of samples is sure to: with {need.method}, the nearest, 5 % of the pixels"
-            f" exceed {LEADING.label} {number(need.left)} without its noise. What remains is bias,"
-            " or the noise of the study's own reference; a larger --spp tells them apart."
+            f"More samples cannot help: even without noise, 5 % of the pixels of {need.method}, the"
+            f" nearest, exceed {LEADING.label} {number(need.left)}. That may be the noise of the"
+            " picture it is compared with; a larger --spp shows it."
         )
-    return f"About {need.spp:,} samples per pixel of {need.method} would; --spp measures more."
+    return (
+        f"About {need.spp:,} samples per pixel with {need.method} would pass; a larger --spp"
+        " measures that."
+    )
 
 
 def _offer(point: Point, measured: str) -> str:

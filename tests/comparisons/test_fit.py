@@ -235,7 +235,7 @@ def test_a_parameter_under_the_noise_is_not_identifiable(rgb):
         certainties_of(spheres(grey=GREY | {"k_s": 0.2}), noise=noise) for noise in (1e-4, 3.0)
     )
     assert clear["n of grey"].reason == ""
-    assert lost["n of grey"].reason == "lost in the reference's noise"
+    assert lost["n of grey"].reason == "lost in the noise of the physical picture"
 
 
 def test_the_standard_error_is_the_spread_of_fits_to_noisy_images(rgb):

@@ -52,7 +52,7 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
     assert printed["text"] == "(16, 16)\n"
     picture = Image.open(BytesIO(b64decode(shown["data"]["image/png"])))
     assert picture.width > 2 * picture.height
-    assert shown["data"]["text/plain"].startswith("Textbook shading is visibly wrong in")
+    assert shown["data"]["text/plain"].startswith("Textbook shading differs visibly in")
     ((tag, attributes),) = tags_of(shown["data"]["text/html"])
     assert (tag, attributes["sandbox"]) == ("iframe", "allow-scripts")
     page = attributes["srcdoc"]

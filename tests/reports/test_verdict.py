@@ -95,8 +95,8 @@ RULES = {
     "passes": (scene(0.05), None, 2.0, "Nothing to do."),
     "undecided": (
         scene(0.03, 0.08), None, 2.0,
-        "Too close to call: 3.00 % to 8.00 % of the pixels differ, and 5.00 % may. More samples"
-        " (--spp, --noise) decide.",
+        "Too close to call: between 3.00 % and 8.00 % of the pixels differ, and at most 5 % may."
+        " More samples (--spp) decide.",
     ),
     "level": (
         scene(exposed=1.5), None, 2.0, "Brightening the picture is enough: ×1.11 makes it pass.",
@@ -151,11 +151,11 @@ RULES = {
     ),
     "undecided, with samples": (
         scene(0.03, 0.08, price=price(64)), None, 2.0,
-        "Too close to call: 3.00 % to 8.00 % of the pixels differ, and 5.00 % may. More samples"
-        " (--spp, --noise) decide. 64 samples per pixel pass: 128 times the textbook's time,"
+        "Too close to call: between 3.00 % and 8.00 % of the pixels differ, and at most 5 % may."
+        " More samples (--spp) decide. 64 samples per pixel pass: 128 times the textbook's time,"
         " 640 ms.",
     ),
-    "without a price": (scene(), None, 2.0, "The map shows where it is wrong."),
+    "without a price": (scene(), None, 2.0, "The map shows where the pictures differ."),
     "caution": (scene(caution="No pixel sees light."), None, 2.0, "No pixel sees light."),
 }  # fmt: skip
 
@@ -237,7 +237,7 @@ def test_a_scene_says_what_its_plan_leaves_out_and_saves():
 def test_what_cannot_be_seen_is_exact():
     lead = records.summary(0.009)
     visible = records.visible({2.0: 0.0})
-    for high, expected in ((0.009, "Exact, as far as can be seen."), (0.02, "Nothing to do.")):
+    for high, expected in ((0.009, "No visible difference."), (0.02, "Nothing to do.")):
         metrics = {LEADING.name: structs.replace(lead, high=high, visible=visible)}
         record = structs.replace(records.record(), metrics=metrics)
         assert verdict.sentence(record) == expected

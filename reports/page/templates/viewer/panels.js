@@ -99,6 +99,7 @@ class Panels {
     const marked = flags & SIGNIFICANT ? "yes" : flags & UNDETERMINED ? "undetermined" : "no";
     const short = (/** @type {number} */ value) =>
       significant(value, Math.abs(value) < 1e-3 ? 2 : 3);
+    const isVisible = painter.differences[place] > view.t;
     const isWorst = String(pixel) === String(scene.worst.pixel) && block === 1 && !added;
     const size = added
       ? ` + ${added.name}, at ${width} × ${height}`
@@ -108,7 +109,7 @@ class Panels {
     /** @type {Record<string, string | string[]>} */
     const texts = {
       position: `${isWorst ? "Worst pixel:" : "Pixel"} ${pixel.join(", ")}${size}`,
-      cause: added ? UNKNOWN : causeAt(painter, pixel) || "unknown",
+      cause: added ? UNKNOWN : causeAt(painter, pixel, isVisible) || "unknown",
       heuristic: textbook.map(short),
       reference: physical.map(short),
       heuristic_hex: seen(textbook),
@@ -134,14 +135,16 @@ class Panels {
 
 /**
  * What is missing at a pixel: the effect that dominates there, or in its region; "none" if nothing
- * is, empty if unknown.
+ * is, empty if unknown, as where noise alone is visible.
  * @param {Painter} painter
  * @param {number[]} pixel
+ * @param {boolean} isVisible whether the error is
  */
-function causeAt({ scene }, [x, y]) {
+function causeAt({ scene }, [x, y], isVisible) {
   if (scene.effects) {
     const letter = letterAt(scene.effects, (x + 0.5) / scene.width, (y + 0.5) / scene.height);
-    return letter === NO_EFFECT ? "none" : effectName(scene.effects, letter);
+    if (letter === NO_EFFECT) return isVisible ? "" : "none";
+    return effectName(scene.effects, letter);
   }
   return (
     scene.regions.find(
