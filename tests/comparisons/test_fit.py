@@ -333,7 +333,7 @@ def test_the_command_writes_a_record_and_a_picture_and_repeats_itself(run, tmp_p
     assert [one["form"] for one in data["fits"]] == ["phong", "blinn"]
     losses = [one["loss"] for one in data["fits"]]
     assert losses[data["best"]] == min(losses)
-    assert "fig-8-5a: the paired parameters are exact" in printed
+    assert "fig-8-5a: the paired parameters show no visible difference" in printed
     for word in ("paired", "blinn", "noise alone", "parameter error", "model error"):
         assert word in printed
     page = (tmp_path / "a/fit/fig-8-6a/index.html").read_text(encoding="utf-8")

@@ -79,8 +79,8 @@ def test_page_and_terminal_say_which_sample_count_would_pass(study):
     spp = 16 * (many - left) / (4 - left)
     size = cost_tables.sized(record.resolution)
     more = (
-        f"No measured method looks right at {size}. About {ceil(spp)} samples per pixel of full"
-        " plan would;"
+        f"No measured method looks right at {size}. About {ceil(spp)} samples per pixel with full"
+        " plan would pass;"
     )
     right = structs.replace(record.points[2], tolerance=MeanError(value=1.0, low=0.9, high=1.1))
     time = seconds(right.seconds.value)
