@@ -98,7 +98,7 @@ class Panels {
         .join("")}`;
     const marked = flags & SIGNIFICANT ? "yes" : flags & UNDETERMINED ? "undetermined" : "no";
     const short = (/** @type {number} */ value) =>
-      significant(value, Math.abs(value) < 1e-3 ? 2 : 3);
+      significant(value, Math.abs(value) < 1e-2 ? 2 : 3);
     const isVisible = painter.differences[place] > view.t;
     const isWorst = String(pixel) === String(scene.worst.pixel) && block === 1 && !added;
     const size = added
