@@ -62,7 +62,7 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
     if options.define and path is None:
         raise InputError(
             f"-D {', '.join(options.define)}: only files take values: Mitsuba's for placeholders"
-            " (.xml), and Python's for arguments of `scene` (.py). Omit the option."
+            " (.xml), and Python's for arguments of `scene` (.py). Omit the option, or give a file."
         )
     if path is not None:
         content: Any = path
@@ -84,7 +84,8 @@ def open_case(scene: Scene, options: Options | None = None, name: str | None = N
         return _complete(entry.source(), options.changed(**changes), entry.name)
     if not isinstance(scene, Mapping) and not callable(scene):
         raise InputError(
-            f"a scene of type {type(scene).__name__} is not allowed. Give the name of a built-in"
+            f"a scene of type {type(scene).__name__} is not allowed. Give two pictures, `image` and"
+            " `reference`, or the name of a built-in"
             " scene, the path of one (.xml or .py), a dictionary for mitsuba.load_dict, or a"
             " function that returns one."
         )

@@ -32,7 +32,10 @@ def caution(
             )
         return "Both pictures are black, so their error means nothing."
     if reference_is_black:
-        return "The physical picture is black: check whether its lights reach what the camera sees."
+        return (
+            "The picture to compare with is black: check whether its lights reach what the camera"
+            " sees."
+        )
     if test_is_black and is_picture:
         return "The picture is black."
     if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in sides):

@@ -142,7 +142,7 @@ def read_file(
     """
     path, layer_name = picture_parts(word)
     if word in ARRAYS:
-        layer = _of_values(path, np.asarray(ARRAYS[word]))
+        layer = _of_values(path, np.asarray(ARRAYS[word]), is_light=transfer is None)
     elif not path.is_file():
         fault = "it is not a regular file" if path.exists() else "there is no such file"
         raise InputError(f"{path}: {fault}. Give a {' or '.join(PICTURES)} picture.")
@@ -151,7 +151,7 @@ def read_file(
     elif path.suffix.lower() == ".exr":
         layer = _exr(path, layer_name)
     elif path.suffix.lower() == ".npy":
-        layer = _array(path)
+        layer = _array(path, is_light=transfer is None)
     else:
         layer = _bitmap(path, path.suffix.lower())
     # A NaN would pass the later tests: it is neither above nor below.
@@ -428,17 +428,31 @@ def _by_pillow(path: Path) -> NDArray[Any]:
         return np.array(file)
 
 
-def _array(path: Path) -> Layer:
+def _array(path: Path, is_light: bool) -> Layer:
     try:
         with path.open("rb") as stream:
             values = np.lib.format.read_array(stream, allow_pickle=False)
     except (ValueError, OSError, EOFError, MemoryError) as error:
         raise _unreadable(path, "NPY", error) from error
-    return _of_values(path, values)
+    return _of_values(path, values, is_light)
 
 
-def _of_values(path: Path, values: NDArray[Any]) -> Layer:
-    """Return an array as a layer; InputError if its shape or type is not a picture's."""
+def require_light(values: NDArray[Any], name: str) -> None:
+    """Reject whole numbers, which are codes of a display and not linear light."""
+    if values.dtype.kind in "iu":
+        raise InputError(
+            f"{name}: an array of {values.dtype} is not linear light. Give floats, of which 1 is"
+            " white: divide by the largest code, and decode sRGB. Or give the file itself."
+        )
+
+
+def _of_values(path: Path, values: NDArray[Any], is_light: bool) -> Layer:
+    """Return an array as a layer; InputError if its shape or type is not a picture's.
+
+    If it ``is_light``, it must not have whole numbers.
+    """
+    if is_light:
+        require_light(values, str(path))
     values = values[..., None] if values.ndim == 2 else values
     if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or values.dtype.kind not in "fiu":
         raise InputError(

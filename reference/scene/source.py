@@ -79,7 +79,7 @@ class Script:
             with contained(self.path):
                 scene = runpy.run_path(str(self.path)).get(SCRIPT)
                 self._check(scene)
-                content = scene(**self.values) if callable(scene) else scene
+                content = scene(**self._typed(scene)) if callable(scene) else scene
         except InputError:
             raise
         except (Exception, SystemExit) as error:  # a user's code may raise anything
@@ -90,6 +90,24 @@ class Script:
                 " mitsuba.load_dict, or a function that returns one."
             )
         return content
+
+    def _typed(self, scene: Callable[..., Any]) -> dict[str, Any]:
+        """Return the values for the function: numbers where a default is a number, else text."""
+        known = signature(scene).parameters
+        typed: dict[str, Any] = dict(self.values)
+        for name, text in self.values.items():
+            default = known[name].default if name in known else None
+            if isinstance(default, (int, float)) and not isinstance(default, bool):
+                try:
+                    number = float(text)
+                except ValueError as error:
+                    raise InputError(
+                        f"-D {name}={text}: `{SCRIPT}` of {self.path} takes a number, such as"
+                        f" {default!r}."
+                    ) from error
+                is_whole = isinstance(default, int) and number.is_integer()
+                typed[name] = int(number) if is_whole else number
+        return typed
 
     def _check(self, scene: Any) -> None:
         """Raise InputError if the function takes none of the values, or needs another."""

@@ -174,9 +174,7 @@ def _domain(values: Sequence[float]) -> Ends:
 
 
 def _error(field: str, errors: Ends) -> Any:
-    return _logarithmic(
-        alt.Y(f"{field}:Q"), errors, "mean ΔE2000 to the physical picture (logarithmic)"
-    )
+    return _logarithmic(alt.Y(f"{field}:Q"), errors, "mean ΔE2000 (logarithmic)")
 
 
 def _logarithmic(channel: Any, domain: Ends, title: str) -> Any:

@@ -100,7 +100,7 @@ def gate_outcome(gates: Sequence[Gate]) -> str:
     counts = (
         f"{states.count(state)} {word}" for state, word in outcomes.items() if state in states
     )
-    more = " More samples (--spp, --noise) or repeats decide." if "undecided" in states else ""
+    more = " More samples or repeats decide." if "undecided" in states else ""
     return f"gates: {', '.join(counts)}.{more}"
 
 

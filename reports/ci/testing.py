@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from math import nan
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -25,6 +26,7 @@ from fotismos.comparisons.check.pictures import (
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, checked_threshold
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.picture_files import require_light
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import in_file, known_as
 from fotismos.reference import records
@@ -145,6 +147,7 @@ class Fotismos:
         though nothing changed, the fixture's by default. If the options differ from the baseline's,
         the test fails, or ``--fotismos-update`` writes them.
         """
+        __tracebackhide__ = True  # pytest shows the test, not this
         level = self.significance if significance is None else significance
         scene = self._scene(scene)
         given = self._options(options)
@@ -193,17 +196,18 @@ class Fotismos:
         name: str,
         image: Pictures,
         within: float | None = TOLERANCE,
-        max_visible: float = LIMIT,
+        max_visible: float | str = LIMIT,
         significance: float | None = None,
     ) -> bool:
         """Return True; fail the test if a picture is not as its baseline, or has none.
 
         ``image`` is a linear array (H, W, 3), or several that differ by their noise alone, or a
         file, or a pattern of files, relative to the test's folder. It fails if more than
-        ``max_visible`` of the pixels differ by more than the ΔE2000 ``within``. With ``within``
-        None any drift fails that is more than noise, with the chance ``significance`` of an alarm
-        though nothing changed.
+        ``max_visible`` of the pixels, a share from 0 to 1 or a text such as "5%", differ by more
+        than the ΔE2000 ``within``. With ``within`` None any drift fails that is more than noise,
+        with the chance ``significance`` of an alarm though nothing changed.
         """
+        __tracebackhide__ = True  # pytest shows the test, not this
         path = self.folder / f"{atomic.file_name(name, 'a baseline')}.json"
         after = self._repeats(image)
         if not path.exists():
@@ -219,7 +223,7 @@ class Fotismos:
         if within is None:
             fault = _drift(check_pictures(before, after, level))
         else:
-            fault = _visible(before, after, within, max_visible)
+            fault = _visible(before, after, within, _share(max_visible))
         if fault and self.update:
             pictures.write(path, _noiseless(after), None)
         elif fault:
@@ -237,12 +241,13 @@ class Fotismos:
         image: Pictures,
         reference: Pictures,
         within: float = TOLERANCE,
-        max_visible: float = LIMIT,
+        max_visible: float | str = LIMIT,
     ) -> bool:
         """Return True; fail the test if two pictures differ visibly; see :meth:`picture`."""
+        __tracebackhide__ = True  # pytest shows the test, not this
         before = _noiseless(self._repeats(reference))
         after = self._repeats(image)
-        if fault := _visible(before, after, within, max_visible):
+        if fault := _visible(before, after, within, _share(max_visible)):
             raise AssertionError(f"{fault}\npictures: {self._shown('same', before, after)}")
         return True
 
@@ -254,6 +259,7 @@ class Fotismos:
             return repeats
         arrays = [image] if isinstance(image, np.ndarray) else list(image)
         for array in arrays:
+            require_light(np.asarray(array), "a picture")
             if np.ndim(array) != 3 or np.shape(array)[2] != 3:
                 raise InputError(
                     f"a picture of shape {np.shape(array)} is not allowed: give linear RGB,"
@@ -314,6 +320,21 @@ def _page(
 def _noiseless(repeats: Repeats) -> Repeats:
     """Return a single picture as two that are equal, for one that has no noise to show."""
     return replace(repeats, count=2) if repeats.count == 1 else repeats
+
+
+def _share(max_visible: float | str) -> float:
+    """Return a share from 0 to 1, or that of a text such as "5%"; ``InputError`` for others."""
+    try:
+        is_text = isinstance(max_visible, str)
+        share = float(str(max_visible).removesuffix("%")) / 100 if is_text else float(max_visible)
+    except ValueError:
+        share = nan
+    if not 0.0 <= share <= 1.0:
+        raise InputError(
+            f"max_visible = {max_visible!r} is not a share of the pixels: give a number from 0 to"
+            " 1, such as 0.05, or a text such as '5%'."
+        )
+    return share
 
 
 def _visible(before: Repeats, after: Repeats, within: float, max_visible: float) -> str:

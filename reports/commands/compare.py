@@ -5,6 +5,7 @@ from typing import Any
 
 import click
 
+from fotismos.comparisons.names import PICTURES
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.reports import jobs
 
@@ -91,7 +92,9 @@ def compare(
         )
     for option in ("image", "reference"):
         if rendering[option] and len(scenes) > 1:
-            raise click.UsageError(f"--{option} goes with one scene.")
+            are_files = any(Path(word).suffix.lower() in PICTURES for word in scenes)
+            cure = f" Put a pattern in quotes: --{option} 'name_*.exr'." if are_files else ""
+            raise click.UsageError(f"--{option} goes with one scene.{cure}")
     if scenes:
         processes = jobs.pool(timeout, len(scenes), workers=workers, scheduler=scheduler)
     else:

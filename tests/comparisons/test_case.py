@@ -127,6 +127,14 @@ def test_a_script_takes_values(rgb, tmp_path):
         with pytest.raises(InputError, match=message):
             open_case(script, Options(define=values))
     script.write_text(
+        "def scene(radius=2.0, count=1, name='a'):\n"
+        "    assert (type(radius), type(count), type(name)) == (float, int, str)\n"
+        "    return {'type': 'scene', 'v': {'type': 'perspective'}}"
+    )
+    open_case(script, Options(define={"radius": "3", "count": "2", "name": "1"}))
+    with pytest.raises(InputError, match=r"-D count=two: .* takes a number, such as 1\."):
+        open_case(script, Options(define={"count": "two"}))
+    script.write_text(
         "def scene(**values):\n    return {'type': 'scene', 'v': {'type': 'perspective'}}"
     )
     open_case(script, Options(define={"anything": "1"}))

@@ -255,6 +255,14 @@ REFUSED = (
 )
 
 
+def test_codes_of_a_display_are_not_taken_for_light(tmp_path, reference, capfd):
+    """A colour of 0 to 255 is above white, where nothing differs: it would pass."""
+    path = tmp_path / "codes.npy"
+    np.save(path, np.full((*SIZE, 3), 200, np.uint8))
+    assert "an array of uint8 is not linear light" in refusal(capfd, [path], reference)
+    assert compared([path], [reference], transfer="linear").picture  # as the user says
+
+
 def test_values_that_are_no_picture_are_refused(tmp_path, reference, capfd):
     for image, message in REFUSED:
         np.save(tmp_path / "x.npy", image)
@@ -265,7 +273,10 @@ def test_black_pictures_have_no_mistake_but_a_caution(tmp_path):
     """From 0 to subnormal values; two black ones are refused."""
     for value in (0.0, 1e-310, 1e-40, 1e-20, 1e-6):
         black = np.full((*SIZE, 3), value)
-        for image, other, named in ((black, sound(), "picture"), (sound(), black, "reference")):
+        for image, other, named in (
+            (black, sound(), "picture"),
+            (sound(), black, "picture to compare with"),
+        ):
             record = of_arrays(tmp_path, image, other)
             assert record.caution.startswith(f"The {named} is black")
             assert record.agreement.mistakes == ()

@@ -126,7 +126,7 @@ def test_doubts_about_pictures_are_told_from_their_values():
         return Prepared.require_light(view(seen), test, reference)
 
     assert doubt(noise, noise) == doubt(grey, noise) == doubt(black, noise) == ""
-    assert doubt(noise, black).startswith("The physical picture is black")
+    assert doubt(noise, black).startswith("The picture to compare with is black")
     assert doubt(grey, 2 * grey).startswith("Each picture is one colour")
     assert not Prepared.require_light(view(np.zeros((4, 5), bool)), black, black)
     with pytest.raises(InputError, match="a: both pictures are black"):

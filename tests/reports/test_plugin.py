@@ -245,6 +245,14 @@ def test_a_picture_is_as_its_baseline_or_fails_with_a_map(fixtures, tmp_path):
     wrong[:2] *= 1.5  # a twelfth of the pixels
     assert plain.picture("hall", RAMP * 1.002)
     assert plain.picture("hall", wrong, max_visible=0.1)
+    assert plain.picture("hall", wrong, max_visible="9%")
+    with pytest.raises(AssertionError, match="it fails"):
+        plain.picture("hall", wrong, max_visible="8 %")
+    for share in (5, "500%", "a lot", -0.1):  # 5 would pass whatever differs
+        with pytest.raises(InputError, match=r"is not a share of the pixels: .* '5%'"):
+            plain.picture("hall", wrong, max_visible=share)
+    with pytest.raises(InputError, match=r"array of uint8 is not linear light"):
+        plain.same((255 * RAMP).astype(np.uint8), RAMP)
     with pytest.raises(AssertionError, match=r"8\.33% of the pixels differ .* it fails"):
         plain.picture("hall", wrong)
     shown = {path.name for path in (tmp_path / "hall").glob("[!.]*")}
