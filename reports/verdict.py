@@ -408,6 +408,9 @@ def _difference(record: ComparisonRecord, subject: str, threshold: float) -> str
         case "pass":
             return f"{record.scene}: {subject} looks like the reference."
         case "undecided":
+            if record.significant.certain:
+                hidden = "noise hides in how many pixels it is visible"
+                return f"{record.scene}: {subject} differs from the reference; {hidden}."
             return f"{record.scene}: {subject} may look like the reference."
     wrong = percent(share(record, threshold).value)
     return f"{record.scene}: {subject} differs visibly from the reference in {wrong} of the pixels."

@@ -20,6 +20,7 @@ from fotismos.comparisons.picture_files import as_files, read_file
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic.errors import InputError
+from fotismos.reports import verdict
 
 SIDE = 64
 
@@ -180,6 +181,17 @@ def test_single_pictures_tell_a_difference_from_noise():
         assert record.metrics["dE2000"].mean > 3
         assert not record.significant.certain
     assert any("noise is unknown" in words for words in record.warnings)
+
+
+def test_what_is_certain_is_said_though_noise_hides_its_share():
+    image = landscape(side=128)
+    changed = image.copy()
+    changed[32:80, 32:80] *= 0.6
+    reference = noisy(image, 4, size=0.15)
+    for given, said in ((changed, "noise hides in how many pixels"), (image, "may look like")):
+        record = record_of(noisy(given, 4, seed=2, size=0.15), reference)
+        assert verdict.decision(record) == "undecided"
+        assert said in verdict.headline([record])
 
 
 @pytest.mark.guarantee("marks", "Filtered noise of single pictures is not taken for a difference.")
