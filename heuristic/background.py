@@ -1,4 +1,4 @@
-"""The light of a scene's background, as shaders read it (:meth:`Point.environment`).
+"""The light of a scene's background, as shaders read it (``point.environment``).
 
 It is that of Mitsuba's environment emitter, such as ``constant``, ``envmap`` or ``sunsky``. In a
 scene without one it is ``I_a`` in every direction; in a scene with one, ``I_a`` is its mean,

@@ -305,7 +305,7 @@ class _WatchedMaterial:
 
 
 @dataclass(frozen=True)
-class _TrialPoint(Point):
+class TrialPoint(Point):
     """Points that note in ``read`` which of their inputs are read."""
 
     read: set[str] = field(default_factory=set)
@@ -319,10 +319,10 @@ class _TrialPoint(Point):
         return _WatchedMaterial(Point.material.func(self), self.read.add)
 
 
-_TrialPoint.__name__ = "Point"  # for users' AttributeErrors
+TrialPoint.__name__ = "Point"  # for users' AttributeErrors
 
 
-def trial_points(heuristic: Heuristic) -> _TrialPoint:
+def trial_points(heuristic: Heuristic) -> TrialPoint:
     """Return the points of a trial."""
     random = default_rng(8)
 
@@ -362,7 +362,7 @@ def trial_points(heuristic: Heuristic) -> _TrialPoint:
     )
     uv = mi.Point2f(numbers(0, 1), numbers(0, 1))
     parameters = {parameter.name: mi.Float(parameter.default) for parameter in heuristic.parameters}
-    return _TrialPoint(
+    return TrialPoint(
         needs=heuristic.needs,
         arguments=arguments,
         _uv=uv,

@@ -87,7 +87,7 @@ def deviations(
     """Return the largest deviation of each metric's ``values`` (N,), for linear colours (N, 3).
 
     ΔE2000 jumps where hues are 180 degrees apart: the mean hue turns to the other side, and
-    rounding decides. So a deviation counts only if it is one from :func:`_nearby` colours, too.
+    rounding decides. So a deviation counts only if it is one from colours nearby, too.
     """
     apart = {}
     for name, (space, difference) in DEFINED.items():

@@ -31,8 +31,12 @@ extensions = [
     "docs.website.typeset",
 ]
 nitpicky = True
-# Names in signatures of click, which its own pages do not list.
-nitpick_ignore_regex = [("py:class", r"t\.(Any|Callable)|_AnyCallable|CmdType|Command")]
+nitpick_ignore_regex = [
+    # Names in signatures of click, which its own pages do not list.
+    ("py:class", r"t\.(Any|Callable)|_AnyCallable|CmdType|Command"),
+    # Names that modules give to types for the checker alone.
+    ("py:class", r"Rule|Sites|AnyStudy"),
+]
 default_role = "code"
 highlight_language = "text"  # of blocks that name none: commands
 myst_heading_anchors = 4

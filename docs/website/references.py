@@ -54,18 +54,20 @@ def qualify(app: Sphinx, page: document) -> None:
     for node in page.findall(pending_xref):
         if node.get("refdomain") == "py" and node.get("py:module"):
             names = imported(node["py:module"])
-            node["reftarget"] = names.get(node["reftarget"], node["reftarget"])
+            first, dot, rest = node["reftarget"].partition(".")
+            node["reftarget"] = f"{names.get(first, first)}{dot}{rest}"
 
 
 @cache
 def imported(module: str) -> dict[str, str]:
     """Return the full names of what a module imports from others, also for types alone."""
-    return {
-        alias.name: f"{node.module}.{alias.name}"
-        for node in ast.walk(ast.parse(getsource(import_module(module))))
-        if isinstance(node, ast.ImportFrom)
-        for alias in node.names
-    }
+    names = {}
+    for node in ast.walk(ast.parse(getsource(import_module(module)))):
+        if isinstance(node, ast.ImportFrom):
+            names |= {alias.name: f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Import):
+            names |= {alias.asname: alias.name for alias in node.names if alias.asname}
+    return names
 
 
 def resolved(
