@@ -263,7 +263,7 @@ def _engines() -> None:
     """Measure what approximations of engines lose and cost."""
     found = engines.measured()
     engines.write(found, DOCS)
-    for part in ("lead", "table"):
+    for part in ("lead", "table", "bias"):
         replace("engines.md", part, getattr(engines, part)(found))
     atomic.write(DOCS / "engines.webp", hero.encoded(engines.chart(found)))
 

@@ -228,7 +228,7 @@ def table(rows: Sequence[Measured]) -> Iterator[str]:
     lines = []
     for method in APPROXIMATIONS:
         own = {one.scene: one for one in rows if one.approximation == method.name}
-        cells = (_cell(own[scene]) if scene in own else "–" for scene in SCENES)
+        cells = (number(own[scene].de2000) if scene in own else "–" for scene in SCENES)
         time = median(one.time for one in own.values())
         prepare = median(one.prepare_s for one in own.values())
         lines.append((method.name, *cells, f"{time:.2f}", seconds(prepare) if prepare else "–"))
@@ -240,9 +240,18 @@ def table(rows: Sequence[Measured]) -> Iterator[str]:
     )
 
 
-def _cell(one: Measured) -> str:
-    """Return the mean error, and the bias of direct light and of the whole, in stops."""
-    return f"{number(one.de2000)} ({one.stops_direct:+.2f}; {one.stops:+.2f})"
+def bias(rows: Sequence[Measured]) -> Iterator[str]:
+    """Yield the bias of each shader by scene: that of direct light, and of all light."""
+    lines = []
+    for method in filter(lambda one: one.is_kernel, APPROXIMATIONS):
+        own = {one.scene: one for one in rows if one.approximation == method.name}
+        lines.append((method.name, *(_stops_of(own.get(scene)) for scene in SCENES)))
+    yield from markdown([("Approximation", *SCENES), *lines], right=1)
+
+
+def _stops_of(one: Measured | None) -> str:
+    """Return the bias of direct light, and of all light."""
+    return "–" if one is None else f"{one.stops_direct:+.2f}/{one.stops:+.2f}"
 
 
 def write(rows: Sequence[Measured], folder: Path) -> None:
