@@ -183,7 +183,7 @@ def test_rows_chart_sentence_and_address_agree_about_prices(prices):
     assert centre("b") == pytest.approx(plot["x"] + plot["width"] * math.log10(8) / 3, abs=3)
     points["a"].click()
     # The link names the scene; then the page adds its threshold.
-    page.wait_for_function("location.hash === '#scene=a&t=3'")
+    page.wait_for_function("() => location.hash === '#scene=a&t=3'")
     command = page.locator(".scene:visible [data-command]").text_content()
     assert command.endswith("--within 3")
 

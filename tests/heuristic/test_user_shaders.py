@@ -294,7 +294,7 @@ def test_a_process_apart_reads_the_file_and_a_changed_one_again(run, apart, writ
         written(text, "level.py")
         code, said, messages = run(*words, "-o", "out")
         assert (code, messages) == (0, "")
-        assert f"heuristic {name}" in said
+        assert f"shading {name}" in said
         means.append(record_of(tmp_path / "out")["metrics"]["rmse"]["mean"])
         (path,) = (tmp_path / "out").glob("*/comparison.json")
         stamps.append(path.stat().st_mtime_ns)
