@@ -125,7 +125,7 @@ def test_details_give_the_largest_deviation_of_all_scenes():
     assert text.count('<data value="3.75e-05">') == len(DEFINED)
     assert "1.25e-06" not in text
     absent = [metric.label for name, metric in METRICS.items() if name not in DEFINED]
-    assert f"It has no {', '.join(absent)}." in text
+    assert f"It has no {'; '.join(absent)}." in text
     assert "Colours against" not in page.details(records=[records.record()])
 
 
