@@ -437,7 +437,7 @@ def _array(path: Path, is_light: bool) -> Layer:
     return _of_values(path, values, is_light)
 
 
-def require_light(values: NDArray[Any], name: str) -> None:
+def require_linear(values: NDArray[Any], name: str) -> None:
     """Reject whole numbers, which are codes of a display and not linear light."""
     if values.dtype.kind in "iu":
         raise InputError(
@@ -452,7 +452,7 @@ def _of_values(path: Path, values: NDArray[Any], is_light: bool) -> Layer:
     If it ``is_light``, it must not have whole numbers.
     """
     if is_light:
-        require_light(values, str(path))
+        require_linear(values, str(path))
     values = values[..., None] if values.ndim == 2 else values
     if values.ndim != 3 or values.shape[2] not in (1, 3, 4) or values.dtype.kind not in "fiu":
         raise InputError(

@@ -268,14 +268,20 @@ process_options = with_options(timeout_option, workers_option, scheduler_option)
 verbosity_options = with_options(quiet_option, verbose_option)
 
 
-def percentage(text: str) -> float:
-    """Parse a percentage, with or without its sign, from 0 % to 100 %, as a share from 0 to 1."""
+def share_of(text: str) -> float:
+    """Return the share from 0 to 1 of a percentage, with or without its sign; NaN for others."""
     digits, _, rest = text.strip().partition("%")
     try:
         share = float(digits) / 100.0
     except ValueError:
-        share = math.nan
-    if rest or not 0.0 <= share <= 1.0:
+        return math.nan
+    return share if not rest and 0.0 <= share <= 1.0 else math.nan
+
+
+def percentage(text: str) -> float:
+    """Parse a percentage of the command line as a share; see :func:`share_of`."""
+    share = share_of(text)
+    if math.isnan(share):
         raise click.BadParameter(
             f"{text!r} is not a percentage: give one from 0% to 100%, such as 5%."
         )

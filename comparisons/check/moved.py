@@ -39,6 +39,9 @@ ALIKE = 0.02
 DARK = 1e-3
 """Luminance below which a block has no meaningful factor."""
 
+READERS = {"heuristic": "textbook", "reference": "physical"}
+"""What readers call the halves."""
+
 CAUSES = {
     (): "The colours of neither half moved, only the error between them: look at the noise, the"
     " samples, or how metrics are computed.",
@@ -80,7 +83,10 @@ class Move(Record):
     @property
     def name(self) -> str:
         """What readers call the quantity: halves are textbook and physical."""
-        return self.quantity.replace("heuristic", "textbook").replace("reference", "physical")
+        name = self.quantity
+        for half, shown in READERS.items():
+            name = name.replace(half, shown)
+        return name
 
     @property
     def size(self) -> float:
@@ -226,9 +232,8 @@ class Check:
         halves = tuple(half for half in HALVES if any(move.half == half for move in self.moved))
         sentences = [CAUSES[halves]]
         for half in halves:
-            name = {"heuristic": "textbook", "reference": "physical"}[half]
             moves = [move for move in self.moved if move.half == half]
-            sentences.append(f"The {name} half {self._where(half, moves)}.")
+            sentences.append(f"The {READERS[half]} half {self._where(half, moves)}.")
         return sentences
 
     def _where(self, half: str, moves: Sequence[Move]) -> str:

@@ -67,7 +67,8 @@ def placeholders(path: Path) -> set[str]:
 class Script:
     """A function that runs a Python file and returns its scene, a dictionary.
 
-    ``values`` are passed to the file's function as its arguments, by name.
+    It passes ``values`` to the file's function as keyword arguments: numbers where the default is a
+    number, else text.
     """
 
     path: Path
@@ -78,8 +79,8 @@ class Script:
         try:
             with contained(self.path):
                 scene = runpy.run_path(str(self.path)).get(SCRIPT)
-                self._check(scene)
-                content = scene(**self._typed(scene)) if callable(scene) else scene
+                arguments = self._arguments(scene)
+                content = scene(**arguments) if callable(scene) else scene
         except InputError:
             raise
         except (Exception, SystemExit) as error:  # a user's code may raise anything
@@ -91,29 +92,18 @@ class Script:
             )
         return content
 
-    def _typed(self, scene: Callable[..., Any]) -> dict[str, Any]:
-        """Return the values for the function: numbers where a default is a number, else text."""
-        known = signature(scene).parameters
-        typed: dict[str, Any] = dict(self.values)
-        for name, text in self.values.items():
-            default = known[name].default if name in known else None
-            if isinstance(default, (int, float)) and not isinstance(default, bool):
-                try:
-                    number = float(text)
-                except ValueError as error:
-                    raise InputError(
-                        f"-D {name}={text}: `{SCRIPT}` of {self.path} takes a number, such as"
-                        f" {default!r}."
-                    ) from error
-                is_whole = isinstance(default, int) and number.is_integer()
-                typed[name] = int(number) if is_whole else number
-        return typed
-
-    def _check(self, scene: Any) -> None:
-        """Raise InputError if the function takes none of the values, or needs another."""
+    def _arguments(self, scene: Any) -> dict[str, Any]:
+        """Return the values for the function; InputError if it takes others, or needs more."""
         known = dict(signature(scene).parameters) if callable(scene) else {}
+        defaults = {name: one.default for name, one in known.items()}
+        typed = {
+            name: self._number(name, text, defaults[name])
+            if type(defaults.get(name)) in (int, float)
+            else text
+            for name, text in self.values.items()
+        }
         if any(one.kind is Argument.VAR_KEYWORD for one in known.values()):
-            return
+            return typed
         takes = ", ".join(known) or "none"
         for name in self.values:
             if name not in known:
@@ -126,6 +116,17 @@ class Script:
             raise InputError(
                 f"`{SCRIPT}` of {self.path} needs {missing}. Give -D NAME=VALUE for each."
             )
+        return typed
+
+    def _number(self, name: str, text: str, default: float) -> float:
+        """Return a value for an argument with a number as its default, whole as that is."""
+        try:
+            number = float(text)
+        except ValueError as error:
+            raise InputError(
+                f"-D {name}={text}: `{SCRIPT}` of {self.path} takes a number, such as {default!r}."
+            ) from error
+        return int(number) if isinstance(default, int) and number.is_integer() else number
 
 
 @dataclass(eq=False)

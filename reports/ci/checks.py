@@ -10,7 +10,7 @@ from msgspec import Meta, field, structs
 
 from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.check.measurement import baseline_of, made_small, measure_scene
-from fotismos.comparisons.check.moved import LEVEL, Check, Move, check, level_of_each
+from fotismos.comparisons.check.moved import LEVEL, READERS, Check, Move, check, level_of_each
 from fotismos.comparisons.check.pictures import (
     PictureCheck,
     PictureGate,
@@ -46,9 +46,6 @@ Judging = Callable[..., tuple["CheckRecord", SceneView | Before | None]]
 
 LARGEST_ERROR = 2.0
 """ΔE2000 at which the map's colours end: changes are often hardly noticeable."""
-
-READERS = {"heuristic": "textbook", "reference": "physical"}
-"""What captions call the halves."""
 
 
 @dataclass(frozen=True)

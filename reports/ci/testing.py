@@ -4,7 +4,6 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from math import nan
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -26,7 +25,7 @@ from fotismos.comparisons.check.pictures import (
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, checked_threshold
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import require_light
+from fotismos.comparisons.picture_files import require_linear
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import in_file, known_as
 from fotismos.reference import records
@@ -35,6 +34,7 @@ from fotismos.reference.rendering.sums import student
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines, checks, pictures, summary
 from fotismos.reports.files import images, results
+from fotismos.reports.jobs import share_of
 from fotismos.reports.page.scene_view import Before, SceneView
 
 Pictures = np.ndarray | Sequence[np.ndarray] | str | Path
@@ -220,15 +220,17 @@ class Fotismos:
         _, before = pictures.read(path)
         begin = perf_counter()
         level = self.significance if significance is None else significance
+        found = None
         if within is None:
-            fault = _drift(check_pictures(before, after, level))
+            found = check_pictures(before, after, level)
+            fault = _drift(found)
         else:
             fault = _visible(before, after, within, _share(max_visible))
         if fault and self.update:
             pictures.write(path, _noiseless(after), None)
         elif fault:
             folder = self._shown(name, before, after)
-            found = check_pictures(before, after, level)
+            found = found or check_pictures(before, after, level)
             made = checks.of_pictures(path, name, status="failed", found=found, begin=begin)
             _, section = checks.picture_section(made, before, found)
             section = structs.replace(section, headline=fault, command="pytest --fotismos-update")
@@ -259,7 +261,7 @@ class Fotismos:
             return repeats
         arrays = [image] if isinstance(image, np.ndarray) else list(image)
         for array in arrays:
-            require_light(np.asarray(array), "a picture")
+            require_linear(np.asarray(array), "a picture")
             if np.ndim(array) != 3 or np.shape(array)[2] != 3:
                 raise InputError(
                     f"a picture of shape {np.shape(array)} is not allowed: give linear RGB,"
@@ -324,11 +326,7 @@ def _noiseless(repeats: Repeats) -> Repeats:
 
 def _share(max_visible: float | str) -> float:
     """Return a share from 0 to 1, or that of a text such as "5%"; ``InputError`` for others."""
-    try:
-        is_text = isinstance(max_visible, str)
-        share = float(str(max_visible).removesuffix("%")) / 100 if is_text else float(max_visible)
-    except ValueError:
-        share = nan
+    share = share_of(max_visible) if isinstance(max_visible, str) else max_visible
     if not 0.0 <= share <= 1.0:
         raise InputError(
             f"max_visible = {max_visible!r} is not a share of the pixels: give a number from 0 to"

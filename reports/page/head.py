@@ -1,6 +1,6 @@
 """What the page of one command begins with: its name, version and date, and links to others."""
 
-from datetime import datetime
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -33,5 +33,5 @@ def head(command: str, folder: Path | None, scene: str = "") -> dict[str, Any]:
         "home": home,
         "links": links,
         "version": __version__,
-        "date": datetime.now().date().isoformat(),
+        "date": date.today().isoformat(),
     }

@@ -214,7 +214,7 @@ def _settings(records: Sequence[ComparisonRecord]) -> str:
         ", ".join(variants),
         ", ".join(f"{name} {version}" for name, version in versions),
         f"{computer.processor}, {computer.cores} cores",
-        f"{date.today():%Y-%m-%d}",
+        date.today().isoformat(),
     )
     return f"{'; '.join(filter(None, parts))}."
 

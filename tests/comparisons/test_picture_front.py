@@ -13,6 +13,7 @@ import fotismos
 from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.tone_maps import TONE_MAPS
 from fotismos.heuristic.errors import InputError, NonFiniteError
+from tests.shared.patches import patches
 from tests.shared.schemas import schema
 
 HEIGHT, WIDTH = 48, 64
@@ -20,14 +21,7 @@ UNKNOWN = "The reference is one file, so its noise is unknown"
 
 
 def view(seed=0):
-    """A picture of soft patches and hard boxes, (H, W, 3)."""
-    random = np.random.default_rng(seed)
-    y, x = np.mgrid[0:HEIGHT, 0:WIDTH] / HEIGHT
-    image = np.stack([0.3 + 0.2 * np.sin(k * x + y) for k in (3, 4, 5)], axis=-1)
-    for _ in range(5):
-        left, top = random.integers(0, HEIGHT - 16, 2)
-        image[top : top + 12, left : left + 12] = random.uniform(0.05, 0.9, 3)
-    return image
+    return patches(HEIGHT, WIDTH, boxes=5, size=12, seed=seed)
 
 
 def noisy(image, count, size, seed=1):

@@ -21,19 +21,13 @@ from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic.errors import InputError
 from fotismos.reports import verdict
+from tests.shared.patches import patches
 
 SIDE = 64
 
 
 def landscape(seed=0, side=SIDE):
-    """Return a picture of soft patches and hard boxes, (side, side, 3)."""
-    random = np.random.default_rng(seed)
-    y, x = np.mgrid[0:side, 0:side] / side
-    image = np.stack([0.3 + 0.2 * np.sin(k * x + y) for k in (3, 4, 5)], axis=-1)
-    for _ in range(6):
-        left, top = random.integers(0, side - 20, 2)
-        image[top : top + 16, left : left + 16] = random.uniform(0.05, 0.9, 3)
-    return image
+    return patches(side, side, boxes=6, size=16, seed=seed)
 
 
 def noisy(image, count, seed=1, size=0.1):

@@ -15,8 +15,8 @@ const AS_GIVEN = -1;
 const vectorOf = light => light.position ?? light.direction ?? [0, 0, 0];
 
 /**
- * The numbers of a scene, by name and then by owner. For a light, the owner is its index in
- * `lights`; for a material, the index of its name in `names`; for all else it is 0.
+ * The numbers of a scene, each with a name and an owner. A light is known by its index in `lights`,
+ * a material by that of its name in `names`; all else has the owner 0.
  */
 class Numbers {
   /** @param {Live} live @param {Points} points */
