@@ -6,9 +6,10 @@ Pictures and tables come from renderings with fixed seeds. Marked parts of pages
 rest is written by hand.
 """
 
-import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
@@ -20,6 +21,7 @@ from docs.figures import (
     accuracy,
     audits,
     charts,
+    commands,
     density,
     engines,
     examples,
@@ -35,7 +37,6 @@ from docs.figures import (
     renderers,
     rooms,
     schemes,
-    study_sheet,
     two_pictures,
 )
 from docs.figures.from_tests import ROOT, fact
@@ -222,8 +223,8 @@ def _site() -> None:
         raise SystemExit(f"The site in {folder} is not whole: mend the faults above.")
     # The lessons' scenes, with live shading: nothing has to be installed to move the sliders.
     size = f"{lessons.SIDE}x{lessons.SIDE}"
-    words = ["compare", *lessons.scenes(), "--resolution", size, "--output", str(folder / "live")]
-    subprocess.run([sys.executable, "-P", "-m", "fotismos.reports", *words], cwd=ROOT, check=True)
+    live = str(folder / "live")
+    commands.run("compare", *lessons.scenes(), "--resolution", size, "--output", live)
     print(folder / "index.html")
 
 
@@ -303,8 +304,11 @@ def _page() -> None:
 
 
 def _study() -> None:
-    """Draw both halves of an example study at each of its points."""
-    atomic.write(DOCS / "study.webp", hero.encoded(study_sheet.picture()))
+    """Keep the contact sheet that the example study makes."""
+    with TemporaryDirectory() as folder:
+        commands.run("study", "studies/lamp-and-roughness.toml", "-o", folder)
+        (sheet,) = Path(folder).glob("study/*/figures/sheet-*.webp")
+        atomic.write(DOCS / "study.webp", sheet.read_bytes())
 
 
 def _witnesses() -> None:

@@ -1,8 +1,6 @@
 """The picture of a comparison's page, in README and docs/page.md: a browser opens it."""
 
-import os
 import subprocess
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -10,8 +8,7 @@ import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is impor
 
 from PIL import Image
 
-from docs.figures import hero
-from docs.figures.from_tests import ROOT
+from docs.figures import commands, hero
 from fotismos.reports.files.images import webp
 
 WIDTH, HEIGHT = 1080, 880
@@ -26,9 +23,7 @@ WAIT = 8000
 def of_page() -> bytes:
     """Compare the README's scene, open its page in light colours, and return what is seen."""
     with TemporaryDirectory() as folder:
-        command = (sys.executable, "-P", "-m", "fotismos.reports", "compare", hero.SCENE)
-        shown_as = os.environ | {"FOTISMOS_PROGRAM": "./run"}
-        subprocess.run([*command, "-o", folder], cwd=ROOT, env=shown_as, check=True)
+        commands.run("compare", hero.SCENE, "-o", folder)
         seen = Path(folder, "seen.png")
         options = (
             f"--window-size={WIDTH},{HEIGHT}",
