@@ -144,24 +144,6 @@ def marks(part: str) -> tuple[str, str]:
     return f"<!-- {part}: made by ./run docs -->", f"<!-- end of {part} -->"
 
 
-LEFT_OUT = {
-    "light by light": (
-        "the noise of picking one light at random. The sum over all lights is the mean of one light"
-        " divided by its probability."
-    ),
-    "no shadow rays": (
-        "shadow rays, because no shape can stand between a light and a reflecting surface."
-    ),
-    "direct light alone": (
-        "interreflection, because no point of a reflecting surface sees another one."
-    ),
-    "environment from a table": (
-        "the noise of the environment: what is reflected is its radiance times an albedo."
-    ),
-}
-"""What each rule of pruning leaves out, and why it may."""
-
-
 def rules() -> Iterator[str]:
     """Yield the rules of pruning: what each leaves out, and its premises, numbered once."""
     numbers: dict[str, int] = {}
@@ -170,7 +152,7 @@ def rules() -> Iterator[str]:
         if rule is not RULES[0]:
             yield ""
         yield f"### {rule.name[0].upper()}{rule.name[1:]}"
-        yield from ("", f"*Left out:* {LEFT_OUT[rule.name]}", "")
+        yield from ("", f"*Left out:* {rule.omits}, because {rule.absent}.", "")
         yield f"*Premises*{' ' * bool(known)}{known}:"
         yield ""
         for premise in rule.premises:

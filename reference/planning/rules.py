@@ -44,9 +44,9 @@ class Premise:
 
 @dataclass(frozen=True)
 class PruningRule:
-    """A rule of pruning: what is done if it applies, what is ``absent`` then, and why.
+    """A rule of pruning: what it leaves out if it applies, and why that changes nothing.
 
-    ``omits`` is what is not simulated, as a noun.
+    ``omits`` is what is not simulated, as a noun, and ``absent`` the reason, as a clause.
     """
 
     name: str
@@ -161,7 +161,7 @@ SAMPLED_AS_HIT = Premise(
 LIGHT_BY_LIGHT = PruningRule(
     name="light by light",
     omits="picking one light at random",
-    absent="noise of picking one light at random: all lights are summed",
+    absent="all lights are summed: the sum is the mean of one light divided by its probability",
     proof="The mean is the sum over all lights, which `direct_all` takes at each sample, if each"
     " estimate of a light has the right mean, however samples of the BSDF are weighted against it.",
     premises=(
@@ -358,7 +358,7 @@ def _uneven(facts: Facts) -> str | None:
 TABULATED_ENVIRONMENT = PruningRule(
     name="environment from a table",
     omits="the sampled environment",
-    absent="noise: the reflected environment is its radiance times an albedo",
+    absent="what is reflected is the environment's radiance times an albedo",
     proof="If nothing is hidden, a surface point reflects the radiance L times the albedo of its"
     " BSDF for the view direction. For an isotropic BSDF that is the same everywhere this depends"
     " only on the cosine; for a two-sided one, on its absolute value.",
