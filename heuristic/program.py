@@ -7,7 +7,7 @@ import sys
 from functools import lru_cache
 from pathlib import Path
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 ROOT = Path(__file__).resolve().parents[1]
 """The folder of the rooms, also where they were imported through the links in fotismos/."""
