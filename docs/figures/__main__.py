@@ -211,7 +211,7 @@ def _site() -> None:
 
 
 def _measurements() -> None:
-    """Measure all errors and times in the documents again, for three quarters of an hour."""
+    """Measure all errors and times in the documents again."""
     found = density.measured()
     atomic.write(DOCS / "models-density.svg", figures.drawn(density.chart(found), "svg"))
     replace("models.md", "density", density.sentences(found))
@@ -230,7 +230,7 @@ def _measurements() -> None:
 
 
 def _accuracy() -> None:
-    """Study what accuracy costs over many scenes, for 40 minutes on an idle machine."""
+    """Study what accuracy costs over many scenes."""
     records = accuracy.measured()
     for part in ("setting", "findings", "attribution", "pictures"):
         replace("accuracy.md", part, getattr(accuracy, part)(records))

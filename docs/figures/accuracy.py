@@ -1,6 +1,6 @@
 """The content of docs/accuracy.md: studies of cost over many scenes, and their common findings.
 
-``./run docs --accuracy`` measures for 40 minutes on an idle machine, and writes the page.
+``./run docs --accuracy`` measures on an idle machine, and writes the page.
 """
 
 from collections import Counter
