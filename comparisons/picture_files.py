@@ -46,6 +46,9 @@ MOST_NEGATIVE = -1e-3
 OPAQUE = 1 - 1 / 512
 """The smallest alpha that is opaque: 8 bits round it."""
 
+MOST_PIXELS = 2**27
+"""Pixels of the largest window that a data window is put into."""
+
 COLOURS = {"black": (0.0, 0.0, 0.0), "white": (1.0, 1.0, 1.0)}
 """The names of colours that a picture can be put over."""
 
@@ -311,6 +314,11 @@ def _in_window(path: Path, values: Floats, data: Any, display: Any) -> Floats:
     (data_left, data_top), _ = data
     width = right - left + 1
     height = bottom - top + 1
+    if width * height > MOST_PIXELS:
+        raise InputError(
+            f"{path}: its display window has {width}x{height} pixels, and at most {MOST_PIXELS} are"
+            " read. Save the picture again."
+        )
     whole = np.zeros((height, width, values.shape[2]))
     # What lies outside the display window, such as overscan, is not seen.
     down = data_top - top

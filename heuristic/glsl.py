@@ -70,7 +70,7 @@ LIGHT = {
 """Fields of the structures, and how many floats each is."""
 
 _kept = threading.local()
-_known: dict[tuple[str, Path], Heuristic] = {}
+_known: dict[tuple[str, str], Heuristic] = {}
 
 
 def opengl() -> Any:
@@ -107,7 +107,7 @@ def device() -> tuple[str, bool]:
 def from_file(word: str) -> Heuristic:
     """Return the heuristic in a GLSL file, after a trial; a file that changed is read again."""
     path = Path(word)
-    key = word, path.resolve()
+    key = word, os.path.realpath(path)  # `resolve` fails for links that go round
     known = _known.get(key)
     if known is None or known.code != content_digest(known.files):
         _known[key] = known = _read(word, path)

@@ -42,7 +42,7 @@ def contained(path: Path) -> Iterator[set[Path]]:
     numpy_errors = np.geterr()
     files: set[Path] = set()
     try:
-        sys.path.insert(0, str(path.resolve().parent))
+        sys.path.insert(0, os.path.dirname(os.path.realpath(path)))
         yield files
     finally:
         if os.getpid() != pid:

@@ -20,6 +20,7 @@ fails or gives infinite or negative values in most scenes, and what the code rea
 """
 
 import inspect
+import os
 import runpy
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -66,7 +67,7 @@ DEFAULT_VARIANT = "llvm_ad_rgb"
 ROUNDING = 1e-5
 """A value below 0 by less than this, in units of display white, is a rounding error."""
 
-_known: dict[tuple[str, Path, str | None], Heuristic] = {}
+_known: dict[tuple[str, str, str | None], Heuristic] = {}
 
 
 def from_file(word: str) -> Heuristic:
@@ -74,7 +75,7 @@ def from_file(word: str) -> Heuristic:
     name, function = in_file(word) or (word, "")
     path = Path(name)
     function = function or FUNCTION
-    key = word, path.resolve(), mi.variant()
+    key = word, os.path.realpath(path), mi.variant()  # `resolve` fails for links that go round
     known = _known.get(key)
     if known is None or known.code != content_digest(known.files):
         _known[key] = known = _read(word, path, function)

@@ -457,7 +457,7 @@ class ScatteringSubject(Subject):
     def _made(self, **instead: Any) -> Any:
         parameters = WHITE.get(self.plugin, {}) | self.parameters | instead
         try:
-            return mi.load_dict({"type": self.plugin} | parameters)
+            made = mi.load_dict({"type": self.plugin} | parameters)
         except RuntimeError as error:
             said = str(error).strip().splitlines()
             reason = " ".join(" ".join(said[-2:] if "Traceback" in str(error) else said).split())
@@ -466,6 +466,12 @@ class ScatteringSubject(Subject):
                 " Mitsuba or of a file, FILE.py:NAME, and its parameters as -p name=value. Mitsuba"
                 f" reports: {reason}"
             ) from error
+        if not isinstance(made, mi.BSDF):
+            raise InputError(
+                f"{self.plugin!r} is a plugin of Mitsuba, but no BSDF. Give a BSDF, such as"
+                " roughplastic."
+            )
+        return made
 
     def _changed(
         self, key: str, kind: type, light: np.ndarray, view: np.ndarray, number: Any

@@ -218,6 +218,25 @@ def rows(data: pa.Table, part: str, where: dict[str, Any] | None = None) -> list
     return matching
 
 
+def check_figures(study: StudyFile) -> None:
+    """Ensure that figures show columns that datasets may have, and points that a grid has."""
+    for figure in study.figures:
+        where = f"figure {figure.name!r}:"
+        part = next(part for part in study.parts if part.name == figure.part)
+        known = {*part.levels, *IDENTITY, *PARAMETERS, *results()}
+        for column in figure.values:
+            if column not in known:
+                raise unknown(f"{where} column", column, sorted(known))
+        for name, allowed in figure.where.items():
+            values = part.levels[name].values
+            is_there = any(_matches(value, allowed) for value in values)
+            if part.design == "grid" and not is_there:
+                listed = ", ".join(f"{value:g}" for value in values)
+                raise InputError(
+                    f"{where} no point has {name} = {allowed}. Give values among {listed}."
+                )
+
+
 def require(data: pa.Table, column: str) -> None:
     """Ensure that a column exists."""
     if column not in data.column_names:

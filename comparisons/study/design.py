@@ -140,7 +140,7 @@ class StudyFigure(Record):
     values: tuple[str, ...]
     y: str | None = None
     series: str | None = None
-    where: dict[str, Any] = msgspec.field(default_factory=dict)
+    where: dict[str, float | list[float]] = msgspec.field(default_factory=dict)
     rule: float | None = None
     log: tuple[Literal["x", "y"], ...] = ()
 

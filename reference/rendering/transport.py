@@ -24,7 +24,10 @@ def power_share(density: Any, other: Any) -> Any:
     ``p / (p + q)``. Source: E. Veach, *Robust Monte Carlo methods for light transport simulation*,
     1997, section 9.2.4.
     """
-    return dr.rcp(1 + dr.square(other / density))
+    share = dr.rcp(1 + dr.square(other / density))
+    # Where Mitsuba's `roughplastic` reflects nothing, its density is NaN. Mitsuba's own integrators
+    # give such samples no weight.
+    return dr.select(dr.isfinite(share), share, 0)
 
 
 def sums(colours: Iterable[Colour], others: Iterable[Colour]) -> list[Colour]:

@@ -42,9 +42,11 @@ def find(folder: Path) -> tuple[Path, dict[str, Any]] | None:
             continue
         try:
             whole = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
+        # Values nested too deeply raise RecursionError.
+        except (OSError, ValueError, RecursionError) as error:
             raise InputError(f"{path} cannot be read: {error}. Correct it.") from error
-        table = whole.get("tool", {}).get("fotismos")
+        tools = whole.get("tool")
+        table = tools.get("fotismos") if isinstance(tools, dict) else None
         if isinstance(table, dict):
             return path, table
     return None

@@ -114,7 +114,7 @@ def require_free(junit: Path | None, summary: Path | None, inputs: Iterable[str 
     ``$GITHUB_STEP_SUMMARY``. Devices and pipes are free.
     """
     paths = [Path(file) for file in inputs]
-    if junit and summary and junit.resolve() == summary.resolve():
+    if junit and summary and os.path.realpath(junit) == os.path.realpath(summary):
         raise InputError(f"--junit {junit} and --summary: they are one file. Name two.")
     for option, path in (("--junit", junit), ("--summary", summary)):
         if path is None or not path.is_file():

@@ -5,6 +5,7 @@ command ends with that error's exit code. Scenes are compared in separate proces
 them may kill. The page is written again after each scene.
 """
 
+import os
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -287,7 +288,9 @@ def _require_inputs_apart(options: Options, places: Sequence[Path]) -> None:
     """Refuse pictures in a folder whose files are about to be replaced."""
     for word in options.picture_files:
         path, _ = picture_parts(word)
-        if path.resolve().parent in [target.resolve() for target in places]:
+        # Not by `resolve`, which fails for links that go round.
+        folder = Path(os.path.realpath(path)).parent
+        if folder in [target.resolve() for target in places]:
             raise InputError(
                 f"{path}: this picture is in the folder of the results, and would be replaced by"
                 " them. Choose another output folder with -o."

@@ -38,6 +38,7 @@ def run(pool: Pool, file: Path, output: Path, many: Callable[[int], Pool]) -> No
     """
     dataset.arrow()  # before anything is rendered
     chosen = design.read(file)
+    dataset.check_figures(chosen)
     with hold_results(output / "study", [(chosen.name, file)], command_line()) as (folder,):
         points = pool.do(Task(chosen.name, running.all_points, (chosen,)))
         # Its work is done, and the renderers get the cores and the memory.

@@ -151,6 +151,13 @@ def test_channels_that_are_no_colours_are_refused(
     assert message in refusal(capfd, [f"{tmp_path / 'x.exr'}{layer}"], reference)
 
 
+def test_a_window_of_too_many_pixels_is_refused(tmp_path, reference, capfd):
+    window = (np.array((0, 0), np.int32), np.array((200_000, 200_000), np.int32))
+    exr(tmp_path / "x.exr", {"RGB": sound()}, displayWindow=window)
+    message = refusal(capfd, [tmp_path / "x.exr"], reference)
+    assert "its display window has 200001x200001 pixels, and at most" in message
+
+
 def test_layers_are_those_of_exr_files(tmp_path, reference, capfd):
     for suffix in (".png", ".npy"):
         WRITERS[suffix](tmp_path / f"x{suffix}", sound())

@@ -81,6 +81,7 @@ MISTAKES = (
     (part("alpha = 0.1", "lobe", "name = '../../evil'"), "name = '../../evil': .*slash"),
     (part("alpha = 0.1") + FIGURE, "`values`"),
     (part("alpha = 0.1") + FIGURE + "values = ['dE2000']", "a map needs y"),
+    (part("alpha = 0.1") + FIGURE + "values = []\nwhere = {alpha = 'x'}", "got `str`.*where"),
     (part("alpha = 0.1") + FIGURE + "y = 'n'\nvalues = ['dE2000']", "'n' is not known"),
     (part("alpha = 0.1") + FIGURE.replace("'f'", "'../evil'") + "values = []", "'../evil'.*slash"),
     (part("alpha = 0.1") + FIGURE.replace("'lobe'", "'nix'") + "values = []", "part = 'nix'"),
@@ -365,6 +366,23 @@ def test_the_command_writes_dataset_and_figures(run, tmp_path):
     code, printed, messages = run("study", file, "-o", out)
     assert (code, printed) == (2, "")
     assert "small.toml: part 1: 'alfa' is not known" in messages
+
+
+@pytest.mark.parametrize(
+    ("shown", "message"),
+    [
+        ("values = ['dE200']", "figure 'f': column 'dE200' is not known (did you mean dE2000?)"),
+        ("values = ['dE2000']\nwhere = {alpha = [0.3]}", "no point has alpha = [0.3]"),
+    ],
+)
+def test_a_figure_of_nothing_is_refused_before_anything_runs(run, tmp_path, shown, message):
+    file = tmp_path / "small.toml"
+    lines = FIGURE.replace("'map'", "'lines'") + shown
+    file.write_text(part("alpha = [0.2, 0.4]") + lines)
+    code, printed, messages = run("study", file, "-o", tmp_path / "out")
+    assert (code, printed) == (2, "")
+    assert message in messages
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_study_sweeps_declared_parameters(rgb, written):

@@ -262,6 +262,13 @@ def test_a_mistake_is_named_with_file_and_line(rgb, written):
         named("none.py")
 
 
+@pytest.mark.parametrize("name", ["round.py", "round.glsl"])
+def test_a_link_that_goes_round_is_no_file(rgb, tmp_path, name):
+    (tmp_path / name).symlink_to(name)
+    with pytest.raises(InputError, match="there is no such file"):
+        named(str(tmp_path / name))
+
+
 def test_values_that_only_a_scene_shows_name_pixel_and_file(rgb, written):
     scene = {
         "type": "scene",

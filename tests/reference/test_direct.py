@@ -57,6 +57,22 @@ def test_kernel_and_plugins_agree_on_every_pixel_with_occluders(variant):
         oracle.require_close(shaded, direct, relative=1e-5, absolute=2.0**-23)
 
 
+def test_a_surface_without_a_density_is_black(rgb):
+    """Mitsuba's `roughplastic` has the density NaN where it reflects nothing, as from behind."""
+    black = {"type": "roughplastic", "diffuse_reflectance": 0.0, "specular_reflectance": 0.0}
+    lamp = {"type": "rectangle", "to_world": moved((0, 0, 2)).rotate((1, 0, 0), 180)}
+    for bsdf, below in ((black, 1), (black | {"diffuse_reflectance": 0.5}, -1)):
+        scene = {
+            "type": "scene",
+            "sensor": camera((0, -3, 2 * below), size=16),
+            "floor": {"type": "rectangle", "bsdf": bsdf},
+            "lamp": lamp | {"emitter": {"type": "area", "radiance": 3.0}},
+        }
+        for name in ("direct_all", "path"):
+            image = checks.render(scene, 4, 1, {"type": name, "hide_emitters": True})
+            assert not image.any(), name
+
+
 def many(count, seed=1):
     """Point, spot and directional lights in no order, of intensities that differ a thousandfold."""
     rng = np.random.default_rng(seed)

@@ -52,8 +52,9 @@ def test_a_tolerance_of_the_table_is_for_pictures_alone(asked):
     assert (made["within"], made["max_visible"]) == (None, None)
 
 
-def test_nearer_files_without_the_table_are_passed_over(asked, tmp_path):
-    (tmp_path / "tests/pyproject.toml").write_text("[tool.other]\nbaselines = 'no'\n")
+@pytest.mark.parametrize("nearer", ["[tool.other]\nbaselines = 'no'", "tool = 3"])
+def test_nearer_files_without_the_table_are_passed_over(asked, tmp_path, nearer):
+    (tmp_path / "tests/pyproject.toml").write_text(nearer)
     assert asked(TABLE)["baseline"].name == "kept"
 
 
@@ -66,6 +67,7 @@ def test_nearer_files_without_the_table_are_passed_over(asked, tmp_path):
         ("baselines = 3", r"baselines = 3 is not a folder"),
         ("within = [2]", r"within = \[2\] is not a number or a text"),
         ("within", r"pyproject.toml cannot be read"),
+        ("within = " + 9999 * "[" + 9999 * "]", r"pyproject.toml cannot be read"),
     ],
 )
 def test_what_is_wrong_in_the_table_is_named_with_its_file(table, message, tmp_path, monkeypatch):
