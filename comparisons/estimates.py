@@ -13,7 +13,6 @@ from fotismos.comparisons.comparison import (
 )
 from fotismos.comparisons.departure import marks, regions, statistics
 from fotismos.comparisons.departure.blocks import bands
-from fotismos.comparisons.departure.mapped_sums import Light, MappedReference, reference_sums
 from fotismos.comparisons.departure.metrics import (
     LEADING,
     METRICS,
@@ -25,13 +24,16 @@ from fotismos.comparisons.departure.statistics import Summary
 from fotismos.comparisons.options import Options
 from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.sums import (
+    DEVIATION,
     MEAN,
     Accumulator,
     DifferenceEstimate,
+    DifferenceSums,
     add_difference,
 )
 
-if TYPE_CHECKING:  # two pictures have no scene
+if TYPE_CHECKING:  # two pictures have no scene, and few pictures a tone map
+    from fotismos.comparisons.departure.mapped_sums import Light
     from fotismos.reference.rendering.gbuffer import GBuffer
 
 PERCENTILE = 95
@@ -55,7 +57,7 @@ class Estimates:
     difference: DifferenceEstimate
     passes: int
     stop: NoiseTarget | None = None
-    light: Light | None = None
+    light: "Light | None" = None
 
 
 class PassSums:
@@ -69,7 +71,14 @@ class PassSums:
         self.counted = counted
         self.passes = 0
         self._heuristic = Accumulator(MEAN)
-        self._reference, self._difference = reference_sums(tone_map, counted)
+        self._reference: Any = Accumulator(DEVIATION)
+        self._difference = DifferenceSums(counted)
+        self._is_mapped = tone_map is not None
+        if self._is_mapped:
+            # Loaded late: few pictures have a tone map.
+            from fotismos.comparisons.departure.mapped_sums import reference_sums
+
+            self._reference, self._difference = reference_sums(tone_map, counted)
 
     def add(self, heuristic: Any, reference: Any) -> None:
         """Add a pass of each half, (H, W, 3)."""
@@ -103,7 +112,7 @@ class PassSums:
             standard_error=reference.standard_error(np.float32),
             difference=self._difference.estimate(np.float32),
             passes=self.passes,
-            light=reference.light() if isinstance(reference, MappedReference) else None,
+            light=reference.light() if self._is_mapped else None,
         )
 
 

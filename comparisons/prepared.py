@@ -12,7 +12,6 @@ import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons import alignment
 from fotismos.comparisons.caution import caution
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Scene
@@ -94,17 +93,15 @@ class Prepared:
     guard: Guard | None = None
     given: "GivenPictures | None" = None
 
-    def traced(self) -> GBuffer:
-        """Return what each pixel sees; traced at each call, since it takes much memory."""
-        surface = gbuffer(self.scene, image_size(self.scene))
+    def traced(self, finer: int = 1) -> GBuffer:
+        """Return what each pixel sees; traced at each call, since it takes much memory.
+
+        Each side of a pixel has ``finer`` rays.
+        """
+        width, height = image_size(self.scene)
+        surface = gbuffer(self.scene, (finer * width, finer * height))
         dr.flush_malloc_cache()
         return surface
-
-    def geometry_edges(self) -> np.ndarray:
-        """Return how much the geometry changes at each pixel, (H, W)."""
-        width, height = image_size(self.scene)
-        fine = (alignment.FINER * width, alignment.FINER * height)
-        return alignment.geometry_edges(gbuffer(self.scene, fine), width, height)
 
     def shaded_by(self, heuristic: str) -> Renderer:
         """Return what renders the textbook half with another heuristic."""

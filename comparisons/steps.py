@@ -22,6 +22,7 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.price import with_price
 from fotismos.heuristic import heuristics
+from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.renderer import Progress, passes
 from fotismos.reference.rendering.sums import MEAN, Accumulator
 
@@ -48,7 +49,9 @@ def with_pictures(comparison: Comparison, ready: Prepared, progress: Progress | 
     given = ready.given
     assert given is not None
     # Edges that they may contain: of the geometry, and of the textbook half.
-    expected = [ready.geometry_edges()]
+    width, height = image_size(ready.scene)
+    surface = ready.traced(alignment.FINER)
+    expected = [alignment.geometry_edges(surface, width, height)]
     textbook = None
     if given.image is not None:
         half: Any = ready.heuristic
