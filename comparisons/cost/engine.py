@@ -33,8 +33,8 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.departure.statistics import Summary, summarise
 from fotismos.comparisons.departure.tone_maps import TONE_MAPS
+from fotismos.comparisons.names import matching, with_files
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import matching, with_files
 from fotismos.comparisons.picture_mistakes import Names
 from fotismos.comparisons.pictures import (
     FEWEST,
