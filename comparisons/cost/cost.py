@@ -7,9 +7,10 @@ import drjit as dr
 import numpy as np
 from msgspec import structs
 
+from fotismos.comparisons import timing
 from fotismos.comparisons.alignment import FINER, geometry_edges, picture_edges
 from fotismos.comparisons.comparison import Causes, machine, versions
-from fotismos.comparisons.cost import engine, times
+from fotismos.comparisons.cost import engine
 from fotismos.comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
 from fotismos.comparisons.cost.engine import Study
 from fotismos.comparisons.cost.front import Reach, at_size, fronted, reach, sufficient
@@ -196,7 +197,7 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
     last = found.steps[-1].after
 
     def adds(effect: str) -> Any:
-        return times.difference(
+        return timing.difference(
             [
                 (step.weight, found.lines[step.before.name], found.lines[step.after.name])
                 for step in found.steps
@@ -207,7 +208,7 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
 
     def takes(name: str) -> Any:
         values = samples * found.lines[name].per_sample
-        return times.interval(values, times.UNSEEN * float(values[0]))
+        return timing.interval(values, timing.UNSEEN * float(values[0]))
 
     effects = (
         EffectCost(**structs.asdict(contribution), adds_s=adds(contribution.effect))
