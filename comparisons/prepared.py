@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons.caution import caution
+from fotismos.comparisons.departure.criterion import caution
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError

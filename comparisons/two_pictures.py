@@ -6,7 +6,6 @@ from time import perf_counter
 from msgspec import structs
 
 from fotismos.comparisons import pictures
-from fotismos.comparisons.caution import caution
 from fotismos.comparisons.comparison import (
     PICTURE_LIBRARIES,
     Comparison,
@@ -14,6 +13,7 @@ from fotismos.comparisons.comparison import (
     TimeSpent,
     versions,
 )
+from fotismos.comparisons.departure.criterion import caution
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, declared
 from fotismos.comparisons.estimates import Estimates, PassSums, measure, summarised
 from fotismos.comparisons.options import Options

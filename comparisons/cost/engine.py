@@ -21,13 +21,12 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from fotismos.comparisons.caution import caution
 from fotismos.comparisons.comparison import PICTURE_LIBRARIES, Images, MeanError, versions
 from fotismos.comparisons.cost.engine_record import Engine, EngineCost, EngineSetting
 from fotismos.comparisons.cost.front import fronted
 from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
 from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.departure.criterion import decide
+from fotismos.comparisons.departure.criterion import caution, decide
 from fotismos.comparisons.departure.mapped_sums import Light, MappedReference
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
