@@ -42,7 +42,7 @@ from fotismos.reference.records import (
 )
 
 if TYPE_CHECKING:
-    from fotismos.comparisons.departure.mapped_sums import Light
+    from fotismos.comparisons.departure.tone_maps import Light
     from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
 
 

@@ -33,7 +33,7 @@ from fotismos.reference.rendering.sums import (
 )
 
 if TYPE_CHECKING:  # two pictures have no scene, and few pictures a tone map
-    from fotismos.comparisons.departure.mapped_sums import Light
+    from fotismos.comparisons.departure.tone_maps import Light
     from fotismos.reference.rendering.gbuffer import GBuffer
 
 PERCENTILE = 95

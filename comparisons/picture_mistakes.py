@@ -20,9 +20,8 @@ from fotismos.comparisons import alignment
 from fotismos.comparisons.departure.blocks import averaged, block_sums, shrunk
 from fotismos.comparisons.departure.colour import BLACK, Array, from_srgb, to_srgb
 from fotismos.comparisons.departure.criterion import TOLERANCE
-from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.tone_maps import BETTER_CURVE, Curves, FittedCurve
+from fotismos.comparisons.departure.tone_maps import BETTER_CURVE, Curves, FittedCurve, Light
 
 Mending = Callable[[Array], Array]
 """A function from a picture (H, W, 3) to the one without a mistake."""

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from fotismos.comparisons import alignment, picture_mistakes
 from fotismos.comparisons.comparison import Agreement, Comparison, Images, PictureFiles
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.tone_maps import Light
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.comparisons.picture_mistakes import Names, NoisyImage

@@ -22,7 +22,6 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.price import with_price
 from fotismos.heuristic import heuristics
-from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.renderer import Progress, passes
 from fotismos.reference.rendering.sums import MEAN, Accumulator
 
@@ -48,15 +47,11 @@ def with_pictures(comparison: Comparison, ready: Prepared, progress: Progress | 
 
     given = ready.given
     assert given is not None
-    # Edges that they may contain: of the geometry, and of the textbook half.
-    width, height = image_size(ready.scene)
-    surface = ready.traced(alignment.FINER)
-    expected = [alignment.geometry_edges(surface, width, height)]
     textbook = None
     if given.image is not None:
         half: Any = ready.heuristic
         textbook = np.array(half.replaced.sampled(pictures.TEMPLATE_SPP).render(0), float)
-        expected.append(alignment.picture_edges(textbook))
+    expected = alignment.scene_edges(ready.traced(alignment.FINER), textbook)
     return pictures.with_records(comparison, given, expected, textbook)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons import timing
-from fotismos.comparisons.alignment import FINER, geometry_edges, picture_edges
+from fotismos.comparisons.alignment import FINER, scene_edges
 from fotismos.comparisons.comparison import Causes, machine, versions
 from fotismos.comparisons.cost import engine
 from fotismos.comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
@@ -143,13 +143,11 @@ def require_other_names(engine_times: EngineTimes) -> None:
 def truth(found: Measurements) -> engine.Truth:
     """Return what pictures of a scene are judged by: the reference of its methods."""
     textbook = np.array(found.ready.heuristic.sampled(TEMPLATE_SPP).render(0), float)
-    width, height = found.size
-    surface = found.ready.traced(FINER)
     return engine.Truth(
         reference=found.reference,
         counted=found.ready.counted,
         viewing=found.options.viewing,
-        edges=[geometry_edges(surface, width, height), picture_edges(textbook)],
+        edges=scene_edges(found.ready.traced(FINER), textbook),
         textbook=textbook,
     )
 

@@ -27,11 +27,11 @@ from fotismos.comparisons.cost.front import fronted
 from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import caution, decide
-from fotismos.comparisons.departure.mapped_sums import Light, MappedReference
+from fotismos.comparisons.departure.mapped_sums import MappedReference
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.departure.statistics import Summary, summarise
-from fotismos.comparisons.departure.tone_maps import TONE_MAPS
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light
 from fotismos.comparisons.names import matching, with_files
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_mistakes import Names

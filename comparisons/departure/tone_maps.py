@@ -6,19 +6,13 @@ light before the curve, and is not part of it. Light below 0 counts as none. :cl
 the one by which a picture shows the light of its reference.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fotismos.comparisons.departure.colour import BT709, BT2020, Array, rgb_to_xyz, to_srgb
 from fotismos.comparisons.departure.minimum import minimum
-
-if TYPE_CHECKING:
-    from fotismos.comparisons.departure.mapped_sums import Light
 
 ToneMap = Callable[[Array], Array]
 Primaries = tuple[tuple[float, float], ...]
@@ -179,6 +173,14 @@ class FittedCurve:
 
 
 @dataclass(frozen=True)
+class Light:
+    """The reference before a tone map: its mean and standard error, (H, W, 3), linear."""
+
+    mean: np.ndarray
+    standard_error: np.ndarray
+
+
+@dataclass(frozen=True)
 class Curves:
     """Pixels of a picture and of the light of the reference, to fit curves to; all (N, 3)."""
 
@@ -187,7 +189,7 @@ class Curves:
     standard_error: np.ndarray
 
     @classmethod
-    def of(cls, picture: np.ndarray, light: Light, counted: np.ndarray) -> Curves:
+    def of(cls, picture: np.ndarray, light: Light, counted: np.ndarray) -> "Curves":
         """Draw counted pixels of images (H, W, 3), always the same."""
         places = np.flatnonzero(counted)
         some = np.random.default_rng(0).permutation(places)[:CURVE_PIXELS]

@@ -240,18 +240,14 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
         add_difference(sums, rendered.images)
     before = sums[0].estimate()
     reference = sums[1].estimate()
-    difference = difference_sums.estimate()
-    seeds = tuple(pass_seed(options.seed, number) for number in range(ready.passes))
-    counted = ready.counted
-    viewing = options.viewing
     return RenderedHalves(
         ready=ready,
-        seeds=seeds,
+        seeds=tuple(pass_seed(options.seed, number) for number in range(ready.passes)),
         before=before.mean,
         reference=reference,
-        difference=difference,
-        counted=counted,
-        viewing=viewing,
+        difference=difference_sums.estimate(),
+        counted=ready.counted,
+        viewing=options.viewing,
     )
 
 
