@@ -297,22 +297,21 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
     """
     options = options or Options()
     ready = prepare(source, options)
-    if options.reference:  # no plan is followed
-        ready = replace(ready, options=options)
-        if not options.allow_empty:
-            require_surface(ready.counted, source.name)
-        return ready
-    width, height = image_size(ready.scene)
-    samples = ready.reference.pass_spp * ready.passes * width * height
-    hidden = ready.pair.hide_emitters
-    found = examine_plan(
-        ready.plan, ready.scene, hide_emitters=hidden, samples=samples, seed=options.seed
-    )
-    if found.state == "disagreed":
-        ready = prepare(source, options.changed(everything=True))
-        ready = replace(ready, plan=ready.plan.unpruned("guard", found.words))
+    if not options.reference:  # else no plan is followed
+        width, height = image_size(ready.scene)
+        found = examine_plan(
+            ready.plan,
+            ready.scene,
+            hide_emitters=ready.pair.hide_emitters,
+            samples=ready.reference.pass_spp * ready.passes * width * height,
+            seed=options.seed,
+        )
+        if found.state == "disagreed":
+            ready = prepare(source, options.changed(everything=True))
+            ready = replace(ready, plan=ready.plan.unpruned("guard", found.words))
+        ready = replace(ready, guard=found)
     # The options are those given, even if everything had to be simulated.
-    ready = replace(ready, options=options, guard=found)
+    ready = replace(ready, options=options)
     if not options.allow_empty:
         require_surface(ready.counted, source.name)
     return ready

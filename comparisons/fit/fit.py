@@ -140,18 +140,18 @@ def fit(
     # Both halves are rendered once; every form is fitted to the same images.
     rendered = render(guarded(source.edited(filter_by_box), options), options, progress)
     rendering = perf_counter() - begin
+    ready = rendered.ready
     if heuristic is PHONG:
         with variant(VARIANT):
-            surface = model.see(rendered.ready.heuristic, rendered.seeds)
+            surface = model.see(ready.heuristic, rendered.seeds)
             models = [PhongModel(surface, form, rendered.counted.ravel()) for form in forms]
             fits = [_best(rendered, form_model, form_starts, LOSSES[loss]) for form_model in models]
     else:
-        half = rendered.ready.heuristic
-        seeds = rendered.seeds
-        own_model = OwnModel(half, heuristic, seeds=seeds, counted=rendered.counted)
+        own_model = OwnModel(
+            ready.heuristic, heuristic, seeds=rendered.seeds, counted=rendered.counted
+        )
         fits = [_best(rendered, own_model, own_starts, LOSSES[loss])]
     best = min(range(len(fits)), key=lambda number: fits[number][0].loss)
-    ready = rendered.ready
     record = FitRecord(
         scene=source.name,
         variant=ready.reference.variant,
