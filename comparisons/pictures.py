@@ -7,6 +7,7 @@ They are read by :mod:`fotismos.comparisons.picture_files`, placed by
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import repeat
 from pathlib import Path
 from time import perf_counter
@@ -71,7 +72,7 @@ class Pictures:
         count = len(self.files)
         return None if count == 1 else count - count % 2
 
-    @property
+    @cached_property
     def mean(self) -> Array:
         """Their mean, (H, W, 3)."""
         mean: Array = np.mean([file.image for file in self.files], axis=0)
