@@ -35,7 +35,7 @@ def steps(options: Options, why: bool) -> list[Step]:
         added += [with_pictures, with_terms] if why else [with_pictures]
         return [*added, with_price]
     if why:
-        from fotismos.comparisons.hybrids.attribution import with_causes  # see above
+        from fotismos.comparisons.attribution import with_causes  # see above
 
         added += [with_terms, with_causes]
     return [*added, with_price]

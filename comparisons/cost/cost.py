@@ -9,6 +9,7 @@ from msgspec import structs
 
 from fotismos.comparisons import timing
 from fotismos.comparisons.alignment import FINER, scene_edges
+from fotismos.comparisons.attribution import find
 from fotismos.comparisons.comparison import Causes, machine, versions
 from fotismos.comparisons.cost import engine
 from fotismos.comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
@@ -30,7 +31,6 @@ from fotismos.comparisons.cost.measure import (
 from fotismos.comparisons.cost.methods import FULL_PLAN, all_methods
 from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.criterion import checked_threshold
-from fotismos.comparisons.hybrids.attribution import find
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.pictures import TEMPLATE_SPP, GivenPictures, at_size_of_pictures
 from fotismos.comparisons.price_record import Price
