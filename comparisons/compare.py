@@ -142,8 +142,7 @@ def _render_and_measure(
     stages |= {"planning": ready.planning_seconds, "guard": guard_seconds}
 
     # The passes, and their times.
-    counted = ready.counted
-    estimates = render(ready, counted, progress)
+    estimates = render(ready, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
     if prepared := getattr(heuristic, "preparation", 0.0):  # pictures have none
         stages["preparation"] = prepared
@@ -154,7 +153,7 @@ def _render_and_measure(
     _load()  # not beside the passes, whose times are compared
     # A picture has noise of its own, whatever the plan is.
     exact = ready.plan.exact and not options.has_pictures
-    numbers, images = measure(estimates, counted, options, ready.traced(), exact)
+    numbers, images = measure(estimates, ready.counted, options, ready.traced(), exact)
     caution = ready.caution() or ready.require_light(images.heuristic, images.reference)
     done("metrics")
     record = ComparisonRecord(
@@ -211,14 +210,11 @@ def _price(ready: Prepared, alone: AbstractContextManager[Any] | None) -> Price 
     )
 
 
-def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> Estimates:
-    """Render the passes of both halves in turn: a drift of the machine then affects both.
-
-    ``counted`` (H, W) are the pixels whose noise counts.
-    """
+def render(ready: Prepared, progress: Progress | None) -> Estimates:
+    """Render the passes of both halves in turn: a drift of the machine then affects both."""
     options = ready.options
     distance = leading_distance(options.viewing, metrics_for(options))
-    sums = PassSums(counted, options.tone_map)
+    sums = PassSums(ready.counted, options.tone_map)
     reached = None
     loop = passes((ready.heuristic, ready.reference), options.seed, ready.passes, progress=progress)
     for rendered in loop:

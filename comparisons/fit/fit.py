@@ -138,7 +138,7 @@ def fit(
     options = _completed(options or Options())
     heuristic = named(options.heuristic)
     # Both halves are rendered once; every form is fitted to the same images.
-    rendered = render(guarded(source.edited(filter_by_box), options), options, progress)
+    rendered = render(guarded(source.edited(filter_by_box), options), progress)
     rendering = perf_counter() - begin
     ready = rendered.ready
     if heuristic is PHONG:
@@ -226,8 +226,9 @@ def filter_by_box(graph: Graph) -> None:
         graph.attach(film, "rfilter", box)
 
 
-def render(ready: Prepared, options: Options, progress: Progress | None = None) -> RenderedHalves:
+def render(ready: Prepared, progress: Progress | None) -> RenderedHalves:
     """Render the passes of both halves in turn."""
+    options = ready.options
     if ready.heuristic.variant != VARIANT:
         raise InputError(
             f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"
