@@ -142,7 +142,7 @@ def _render_and_measure(
     stages |= {"planning": ready.planning_seconds, "guard": guard_seconds}
 
     # The passes, and their times.
-    estimates = render(ready, progress)
+    estimates, noise_target = render(ready, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
     if prepared := getattr(heuristic, "preparation", 0.0):  # pictures have none
         stages["preparation"] = prepared
@@ -177,7 +177,7 @@ def _render_and_measure(
         versions=versions(),
         command=command,
         caution=caution,
-        noise_target=estimates.stop,
+        noise_target=noise_target,
         **numbers,
     )
     return Comparison(record=record, images=images), ready
@@ -210,8 +210,11 @@ def _price(ready: Prepared, alone: AbstractContextManager[Any] | None) -> Price 
     )
 
 
-def render(ready: Prepared, progress: Progress | None) -> Estimates:
-    """Render the passes of both halves in turn: a drift of the machine then affects both."""
+def render(ready: Prepared, progress: Progress | None) -> tuple[Estimates, NoiseTarget | None]:
+    """Render the passes of both halves in turn: a drift of the machine then affects both.
+
+    Return also where a run with a noise target ended.
+    """
     options = ready.options
     distance = leading_distance(options.viewing, metrics_for(options))
     sums = PassSums(ready.counted, options.tone_map)
@@ -226,16 +229,15 @@ def render(ready: Prepared, progress: Progress | None) -> Estimates:
             if reached <= options.noise:
                 break
     loop.close()
-    stop = None
-    if options.noise is not None:
-        assert reached is not None, "the noise is checked after the last pass"
-        stop = NoiseTarget(
-            target=options.noise,
-            reached=reached,
-            stopped_by="target" if reached <= options.noise else "samples",
-            limit_spp=ready.passes * ready.reference.pass_spp,
-        )
-    return replace(sums.estimates(), stop=stop)
+    if options.noise is None:
+        return sums.estimates(), None
+    assert reached is not None, "the noise is checked after the last pass"
+    return sums.estimates(), NoiseTarget(
+        target=options.noise,
+        reached=reached,
+        stopped_by="target" if reached <= options.noise else "samples",
+        limit_spp=ready.passes * ready.reference.pass_spp,
+    )
 
 
 def is_checked(done: int, passes: int) -> bool:

@@ -6,11 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fotismos.comparisons.comparison import (
-    Images,
-    NoiseTarget,
-    Significant,
-)
+from fotismos.comparisons.comparison import Images, Significant
 from fotismos.comparisons.departure import marks, regions, statistics
 from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.metrics import (
@@ -45,7 +41,7 @@ PERCENTILE = 95
 
 @dataclass(frozen=True)
 class Estimates:
-    """The passes of both halves and of their difference, and where they stopped (or None).
+    """The passes of both halves, and of their difference.
 
     The halves have only means (H, W, 3) and the reference's standard error: the relevant
     uncertainty is the difference's. ``light`` is the reference before its tone map, if it has one.
@@ -56,7 +52,6 @@ class Estimates:
     standard_error: np.ndarray
     difference: DifferenceEstimate
     passes: int
-    stop: NoiseTarget | None = None
     light: "Light | None" = None
 
 
