@@ -30,7 +30,7 @@ from fotismos.comparisons.departure.criterion import caution, decide
 from fotismos.comparisons.departure.mapped_sums import MappedReference
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
-from fotismos.comparisons.departure.statistics import Summary, summarise
+from fotismos.comparisons.departure.statistics import Summary, noise_floor, summarise
 from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light
 from fotismos.comparisons.names import matching, with_files
 from fotismos.comparisons.options import Options
@@ -100,11 +100,12 @@ def front_of_pictures(
         raise InputError("pictures without a scene need a `reference`: give one, or a scene.")
     truth = _truth(reference, given.where(), options)
     engine = judged(given, times, truth, options.allow_empty)
+    estimate = truth.reference
     floor = None
     if reference.passes is not None:
-        mean = truth.reference.mean
-        distances = LEADING.against(mean, truth.counted, truth.viewing)
-        floor = LEADING.mean(distances(mean + truth.reference.noise))
+        floor = noise_floor(
+            LEADING, estimate.mean, estimate.noise, mask=truth.counted, viewing=truth.viewing
+        )
     record = EngineCost(
         scene=name,
         resolution=reference.size,
