@@ -217,7 +217,8 @@ def render(ready: Prepared, progress: Progress | None) -> tuple[Estimates, Noise
     """
     options = ready.options
     distance = leading_distance(options.viewing, metrics_for(options))
-    sums = PassSums(ready.counted, options.tone_map)
+    given = ready.given
+    sums = PassSums(ready.counted) if given is None else given.pass_sums(ready.counted)
     reached = None
     loop = passes((ready.heuristic, ready.reference), options.seed, ready.passes, progress=progress)
     for rendered in loop:

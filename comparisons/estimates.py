@@ -58,22 +58,15 @@ class Estimates:
 class PassSums:
     """Running sums of the passes of both halves, and of their difference.
 
-    ``counted`` (H, W) are the pixels whose noise counts. ``tone_map`` names the curve by which the
-    reference is shown; without one it is linear light.
+    ``counted`` (H, W) are the pixels whose noise counts.
     """
 
-    def __init__(self, counted: np.ndarray, tone_map: str | None = None) -> None:
+    def __init__(self, counted: np.ndarray) -> None:
         self.counted = counted
         self.passes = 0
         self._heuristic = Accumulator(MEAN)
-        self._reference: Any = Accumulator(DEVIATION)
+        self._reference = Accumulator(DEVIATION)
         self._difference = DifferenceSums(counted)
-        self._is_mapped = tone_map is not None
-        if self._is_mapped:
-            # Loaded late: few pictures have a tone map.
-            from fotismos.comparisons.departure.mapped_sums import reference_sums
-
-            self._reference, self._difference = reference_sums(tone_map, counted)
 
     def add(self, heuristic: Any, reference: Any) -> None:
         """Add a pass of each half, (H, W, 3)."""
@@ -107,7 +100,6 @@ class PassSums:
             standard_error=reference.standard_error(np.float32),
             difference=self._difference.estimate(np.float32),
             passes=self.passes,
-            light=reference.light() if self._is_mapped else None,
         )
 
 

@@ -121,7 +121,7 @@ def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "
 
     In the current variant. ``command`` is the one that was run, for the record.
     """
-    record, _ = audit_with_subject(kind, name, parameters, command)
+    record, _ = audit_with_subject(kind, name, parameters=parameters, command=command)
     return record
 
 

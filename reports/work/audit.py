@@ -47,7 +47,7 @@ def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, tar
     """Audit a heuristic or a BSDF, and write the audit's files."""
     set_variant(RGB)
     plugins.register()
-    record, subject = audit_with_subject(kind, name, parameters, command)
+    record, subject = audit_with_subject(kind, name, parameters=parameters, command=command)
     shown = [curve.material for curve in record.curves if curve.lobes]
     audit_files.write(target, record, spheres(subject, shown))
     return record
