@@ -64,6 +64,16 @@ def geometry_edges(surface: "GBuffer", width: int, height: int) -> np.ndarray:
     return _edges(layers.reshape(height, FINER, width, FINER, 4).mean(axis=(1, 3)))
 
 
+def scene_edges(surface: "GBuffer", textbook: np.ndarray | None) -> list[np.ndarray]:
+    """Return maps of edges that a picture of a scene may contain: of its geometry, and its half's.
+
+    For ``surface`` see :func:`geometry_edges`; ``textbook`` is the textbook half, (H, W, 3).
+    """
+    height, width = surface.hit.shape
+    edges = [geometry_edges(surface, width // FINER, height // FINER)]
+    return edges if textbook is None else [*edges, picture_edges(textbook)]
+
+
 def picture_edges(image: np.ndarray) -> np.ndarray:
     """Return how much an image changes at each pixel, in stops, up to 1."""
     light = np.maximum(luminance(image), 0)

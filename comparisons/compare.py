@@ -142,8 +142,7 @@ def _render_and_measure(
     stages |= {"planning": ready.planning_seconds, "guard": guard_seconds}
 
     # The passes, and their times.
-    counted = ready.counted
-    estimates = render(ready, counted, progress)
+    estimates, noise_target = render(ready, progress)
     done("sums of passes", sum(heuristic.times) + sum(reference.times))
     if prepared := getattr(heuristic, "preparation", 0.0):  # pictures have none
         stages["preparation"] = prepared
@@ -154,7 +153,7 @@ def _render_and_measure(
     _load()  # not beside the passes, whose times are compared
     # A picture has noise of its own, whatever the plan is.
     exact = ready.plan.exact and not options.has_pictures
-    numbers, images = measure(estimates, counted, options, ready.traced(), exact)
+    numbers, images = measure(estimates, ready.counted, options, ready.traced(), exact)
     caution = ready.caution() or ready.require_light(images.heuristic, images.reference)
     done("metrics")
     record = ComparisonRecord(
@@ -178,7 +177,7 @@ def _render_and_measure(
         versions=versions(),
         command=command,
         caution=caution,
-        noise_target=estimates.stop,
+        noise_target=noise_target,
         **numbers,
     )
     return Comparison(record=record, images=images), ready
@@ -211,14 +210,15 @@ def _price(ready: Prepared, alone: AbstractContextManager[Any] | None) -> Price 
     )
 
 
-def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> Estimates:
+def render(ready: Prepared, progress: Progress | None) -> tuple[Estimates, NoiseTarget | None]:
     """Render the passes of both halves in turn: a drift of the machine then affects both.
 
-    ``counted`` (H, W) are the pixels whose noise counts.
+    Return also where a run with a noise target ended.
     """
     options = ready.options
     distance = leading_distance(options.viewing, metrics_for(options))
-    sums = PassSums(counted, options.tone_map)
+    given = ready.given
+    sums = PassSums(ready.counted) if given is None else given.pass_sums(ready.counted)
     reached = None
     loop = passes((ready.heuristic, ready.reference), options.seed, ready.passes, progress=progress)
     for rendered in loop:
@@ -230,16 +230,15 @@ def render(ready: Prepared, counted: np.ndarray, progress: Progress | None) -> E
             if reached <= options.noise:
                 break
     loop.close()
-    stop = None
-    if options.noise is not None:
-        assert reached is not None, "the noise is checked after the last pass"
-        stop = NoiseTarget(
-            target=options.noise,
-            reached=reached,
-            stopped_by="target" if reached <= options.noise else "samples",
-            limit_spp=ready.passes * ready.reference.pass_spp,
-        )
-    return replace(sums.estimates(), stop=stop)
+    if options.noise is None:
+        return sums.estimates(), None
+    assert reached is not None, "the noise is checked after the last pass"
+    return sums.estimates(), NoiseTarget(
+        target=options.noise,
+        reached=reached,
+        stopped_by="target" if reached <= options.noise else "samples",
+        limit_spp=ready.passes * ready.reference.pass_spp,
+    )
 
 
 def is_checked(done: int, passes: int) -> bool:

@@ -15,7 +15,6 @@ from msgspec import Meta, structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.departure.regions import ObjectShare, Region
 from fotismos.comparisons.departure.statistics import RatioSummary, Summary
@@ -43,6 +42,7 @@ from fotismos.reference.records import (
 )
 
 if TYPE_CHECKING:
+    from fotismos.comparisons.departure.tone_maps import Light
     from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
 
 

@@ -6,14 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fotismos.comparisons.comparison import (
-    Images,
-    NoiseTarget,
-    Significant,
-)
+from fotismos.comparisons.comparison import Images, Significant
 from fotismos.comparisons.departure import marks, regions, statistics
 from fotismos.comparisons.departure.blocks import bands
-from fotismos.comparisons.departure.mapped_sums import Light, MappedReference, reference_sums
 from fotismos.comparisons.departure.metrics import (
     LEADING,
     METRICS,
@@ -25,13 +20,16 @@ from fotismos.comparisons.departure.statistics import Summary
 from fotismos.comparisons.options import Options
 from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.sums import (
+    DEVIATION,
     MEAN,
     Accumulator,
     DifferenceEstimate,
+    DifferenceSums,
     add_difference,
 )
 
-if TYPE_CHECKING:  # two pictures have no scene
+if TYPE_CHECKING:  # two pictures have no scene, and few pictures a tone map
+    from fotismos.comparisons.departure.tone_maps import Light
     from fotismos.reference.rendering.gbuffer import GBuffer
 
 PERCENTILE = 95
@@ -43,7 +41,7 @@ PERCENTILE = 95
 
 @dataclass(frozen=True)
 class Estimates:
-    """The passes of both halves and of their difference, and where they stopped (or None).
+    """The passes of both halves, and of their difference.
 
     The halves have only means (H, W, 3) and the reference's standard error: the relevant
     uncertainty is the difference's. ``light`` is the reference before its tone map, if it has one.
@@ -54,22 +52,21 @@ class Estimates:
     standard_error: np.ndarray
     difference: DifferenceEstimate
     passes: int
-    stop: NoiseTarget | None = None
-    light: Light | None = None
+    light: "Light | None" = None
 
 
 class PassSums:
     """Running sums of the passes of both halves, and of their difference.
 
-    ``counted`` (H, W) are the pixels whose noise counts. ``tone_map`` names the curve by which the
-    reference is shown; without one it is linear light.
+    ``counted`` (H, W) are the pixels whose noise counts.
     """
 
-    def __init__(self, counted: np.ndarray, tone_map: str | None = None) -> None:
+    def __init__(self, counted: np.ndarray) -> None:
         self.counted = counted
         self.passes = 0
         self._heuristic = Accumulator(MEAN)
-        self._reference, self._difference = reference_sums(tone_map, counted)
+        self._reference = Accumulator(DEVIATION)
+        self._difference = DifferenceSums(counted)
 
     def add(self, heuristic: Any, reference: Any) -> None:
         """Add a pass of each half, (H, W, 3)."""
@@ -103,7 +100,6 @@ class PassSums:
             standard_error=reference.standard_error(np.float32),
             difference=self._difference.estimate(np.float32),
             passes=self.passes,
-            light=reference.light() if isinstance(reference, MappedReference) else None,
         )
 
 

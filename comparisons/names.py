@@ -1,11 +1,21 @@
-"""What words of a command name: a built-in scene, the file of one, a picture and its layer."""
+"""What words of a command name: a built-in scene, the file of one, pictures and their layers."""
 
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from glob import glob, has_magic
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fotismos.comparisons import atomic
 from fotismos.comparisons.gallery.builtin import builtin
+from fotismos.comparisons.options import Options
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError, suggestion
+
+if TYPE_CHECKING:  # help needs no NumPy
+    import numpy as np
 
 SUFFIXES = (".xml", ".py")
 """Suffixes of scene files: Mitsuba's, and Python's."""
@@ -55,3 +65,43 @@ def picture_parts(word: str) -> tuple[Path, str]:
     if not word.lower().endswith(PICTURES):
         raise InputError(f"{word}: pictures are {' or '.join(PICTURES)} files. Convert it to EXR.")
     return Path(word), ""
+
+
+def matching(patterns: Iterable[str]) -> tuple[str, ...]:
+    """Return the files that match patterns such as ``render_*.exr`` or ``render_*.exr:LAYER``.
+
+    A name of a file is a pattern that matches it; one that is not there is returned as it is.
+    """
+    files: list[str] = []
+    for pattern in patterns:
+        path, layer = picture_parts(pattern)
+        if path.is_file() or pattern in ARRAYS:
+            files.append(pattern)
+            continue
+        found = sorted(glob(str(path), recursive=True))
+        if not found and has_magic(str(path)):
+            raise InputError(
+                f"{pattern}: no file matches. Give repeats, such as 'render_*.exr' in quotes."
+            )
+        files += [f"{file}:{layer}" if layer else file for file in found or [str(path)]]
+    return tuple(files)
+
+
+def with_files(options: Options) -> Options:
+    """Return options in which the files that match stand for the patterns of both halves."""
+    return options.changed(image=matching(options.image), reference=matching(options.reference))
+
+
+ARRAYS: dict[str, np.ndarray] = {}
+"""Pictures of this process by names like those of files; see :func:`as_files`."""
+
+
+@contextmanager
+def as_files(arrays: Mapping[str, np.ndarray]) -> Iterator[None]:
+    """Let arrays (H, W, 3) be read by names like those of NumPy's files, within the block."""
+    ARRAYS.update(arrays)
+    try:
+        yield
+    finally:
+        for name in arrays:
+            del ARRAYS[name]

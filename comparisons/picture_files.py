@@ -18,10 +18,9 @@ files they are not. Without that colour, these pixels do not count.
 
 import hashlib
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from glob import glob, has_magic
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +30,7 @@ from PIL import Image
 
 from fotismos.comparisons import picture_formats
 from fotismos.comparisons.departure.colour import BT709, CHROMATICITIES, Array, from_srgb
-from fotismos.comparisons.names import PICTURES, picture_parts
-from fotismos.comparisons.options import Options
+from fotismos.comparisons.names import ARRAYS, PICTURES, picture_parts
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
 from fotismos.reference.rendering.finite import LARGEST_VALUE
@@ -93,46 +91,6 @@ class PictureFile:
     digest: str
     is_encoded: bool = False
     notes: tuple[str, ...] = ()
-
-
-def matching(patterns: Iterable[str]) -> tuple[str, ...]:
-    """Return the files that match patterns such as ``render_*.exr`` or ``render_*.exr:LAYER``.
-
-    A name of a file is a pattern that matches it; one that is not there is returned as it is.
-    """
-    files: list[str] = []
-    for pattern in patterns:
-        path, layer = picture_parts(pattern)
-        if path.is_file() or pattern in ARRAYS:
-            files.append(pattern)
-            continue
-        found = sorted(glob(str(path), recursive=True))
-        if not found and has_magic(str(path)):
-            raise InputError(
-                f"{pattern}: no file matches. Give repeats, such as 'render_*.exr' in quotes."
-            )
-        files += [f"{file}:{layer}" if layer else file for file in found or [str(path)]]
-    return tuple(files)
-
-
-def with_files(options: Options) -> Options:
-    """Return options in which the files that match stand for the patterns of both halves."""
-    return options.changed(image=matching(options.image), reference=matching(options.reference))
-
-
-ARRAYS: dict[str, np.ndarray] = {}
-"""Pictures of this process by names like those of files; see :func:`as_files`."""
-
-
-@contextmanager
-def as_files(arrays: Mapping[str, np.ndarray]) -> Iterator[None]:
-    """Let arrays (H, W, 3) be read by names like those of NumPy's files, within the block."""
-    ARRAYS.update(arrays)
-    try:
-        yield
-    finally:
-        for name in arrays:
-            del ARRAYS[name]
 
 
 def read_file(

@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from fotismos.comparisons import alignment
-from fotismos.comparisons.departure.blocks import block_sums
+from fotismos.comparisons.departure.blocks import averaged, block_sums, shrunk
 from fotismos.comparisons.departure.colour import BLACK, Array, from_srgb, to_srgb
 from fotismos.comparisons.departure.criterion import TOLERANCE
-from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.picture_curves import BETTER_CURVE, Curves, FittedCurve
+from fotismos.comparisons.departure.tone_maps import BETTER_CURVE, Curves, FittedCurve, Light
 
 Mending = Callable[[Array], Array]
 """A function from a picture (H, W, 3) to the one without a mistake."""
@@ -405,10 +404,9 @@ def _zoom(picture: Array, other: Array) -> float | None:
     height, width = picture.shape[:2]
     if min(height, width) < 2 * BLOCK:  # edges agree by chance
         return None
-    scale = min(1.0, SMALL / max(height, width))
-    size = (max(1, round(scale * width)), max(1, round(scale * height)))
-    small = _resized(picture, size)
-    small_other = _resized(other, size)
+    shape = shrunk((height, width), SMALL)
+    small = averaged(picture, shape)
+    small_other = averaged(other, shape)
     agreement = []
     for zoom in ZOOMS:
         # The smaller one is enlarged, since nothing is known beyond its edges.
@@ -433,12 +431,6 @@ def _best_correlation(seen: Array, expected: Array) -> float:
         return 0.0
     products = np.fft.irfft2(np.fft.rfft2(a) * np.conj(np.fft.rfft2(b)), a.shape)
     return float(products.max() / size)
-
-
-def _resized(picture: Array, size: tuple[int, int]) -> Array:
-    planes = [Image.fromarray(picture[..., c].astype(np.float32)) for c in range(3)]
-    small = [plane.resize(size, Image.Resampling.BOX) for plane in planes]
-    return np.stack([np.asarray(plane, float) for plane in small], axis=-1)
 
 
 def _zoomed(picture: Array, zoom: float) -> Array:

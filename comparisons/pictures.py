@@ -7,6 +7,7 @@ They are read by :mod:`fotismos.comparisons.picture_files`, placed by
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import repeat
 from pathlib import Path
 from time import perf_counter
@@ -19,8 +20,10 @@ from numpy.typing import NDArray
 from fotismos.comparisons import alignment, picture_mistakes
 from fotismos.comparisons.comparison import Agreement, Comparison, Images, PictureFiles
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.mapped_sums import Light
+from fotismos.comparisons.departure.mapped_sums import MappedReference, reference_sums
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.tone_maps import Light
+from fotismos.comparisons.estimates import Estimates, PassSums
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.comparisons.picture_mistakes import Names, NoisyImage
@@ -71,7 +74,7 @@ class Pictures:
         count = len(self.files)
         return None if count == 1 else count - count % 2
 
-    @property
+    @cached_property
     def mean(self) -> Array:
         """Their mean, (H, W, 3)."""
         mean: Array = np.mean([file.image for file in self.files], axis=0)
@@ -135,6 +138,20 @@ class PictureHalf:
         return Times.of(self.times, 0.0)
 
 
+class PicturePassSums(PassSums):
+    """Running sums of passes; the reference is shown by a tone map, if its name is given."""
+
+    def __init__(self, counted: NDArray[np.bool_], tone_map: str | None) -> None:
+        super().__init__(counted)
+        self._reference, self._difference = reference_sums(tone_map, counted)
+
+    def estimates(self) -> Estimates:
+        """Return the estimates so far, in single precision, like the files."""
+        reference = self._reference
+        light = reference.light() if isinstance(reference, MappedReference) else None
+        return replace(super().estimates(), light=light)
+
+
 # --- Reading -----------------------------------------------------------------------------------
 
 
@@ -162,6 +179,10 @@ class GivenPictures:
         halves = (self.image, self.reference)
         counts = [half.passes for half in halves if half is not None and half.passes is not None]
         return min(counts, default=None)
+
+    def pass_sums(self, counted: NDArray[np.bool_]) -> PassSums:
+        """Return sums of passes, in which the reference is shown as the pictures show light."""
+        return PicturePassSums(counted, self.image.tone_map if self.image else None)
 
     def where(self) -> NDArray[np.bool_]:
         """Return the pixels (H, W) that count: in the mask, and opaque in all pictures."""

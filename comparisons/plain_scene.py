@@ -143,17 +143,14 @@ def triangles_of(shape: mi.Shape, material: int, resolution: int | None) -> Tria
     """Return a shape as the triangles of :func:`fotismos.heuristic.tessellation.to_mesh`."""
     mesh = to_mesh(shape, resolution or RESOLUTION)
     positions = meshes.rows(mesh, meshes.POSITIONS)
-    normals = meshes.rows(mesh, meshes.NORMALS)
-    texcoords = meshes.rows(mesh, meshes.TEXCOORDS)
     faces = meshes.rows(mesh, meshes.FACES)
     assert positions is not None
     assert faces is not None
-    normals = None if mesh.has_face_normals() else normals
     return Triangles(
         name=shape.id(),
         positions=positions,
-        normals=normals,
-        texcoords=texcoords,
+        normals=None if mesh.has_face_normals() else meshes.rows(mesh, meshes.NORMALS),
+        texcoords=meshes.rows(mesh, meshes.TEXCOORDS),
         faces=faces,
         material=material,
     )

@@ -12,8 +12,7 @@ import mitsuba as mi
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons import alignment
-from fotismos.comparisons.caution import caution
+from fotismos.comparisons.departure.criterion import caution
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
@@ -94,17 +93,15 @@ class Prepared:
     guard: Guard | None = None
     given: "GivenPictures | None" = None
 
-    def traced(self) -> GBuffer:
-        """Return what each pixel sees; traced at each call, since it takes much memory."""
-        surface = gbuffer(self.scene, image_size(self.scene))
+    def traced(self, finer: int = 1) -> GBuffer:
+        """Return what each pixel sees; traced at each call, since it takes much memory.
+
+        Each side of a pixel has ``finer`` rays.
+        """
+        width, height = image_size(self.scene)
+        surface = gbuffer(self.scene, (finer * width, finer * height))
         dr.flush_malloc_cache()
         return surface
-
-    def geometry_edges(self) -> np.ndarray:
-        """Return how much the geometry changes at each pixel, (H, W)."""
-        width, height = image_size(self.scene)
-        fine = (alignment.FINER * width, alignment.FINER * height)
-        return alignment.geometry_edges(gbuffer(self.scene, fine), width, height)
 
     def shaded_by(self, heuristic: str) -> Renderer:
         """Return what renders the textbook half with another heuristic."""
@@ -300,22 +297,21 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
     """
     options = options or Options()
     ready = prepare(source, options)
-    if options.reference:  # no plan is followed
-        ready = replace(ready, options=options)
-        if not options.allow_empty:
-            require_surface(ready.counted, source.name)
-        return ready
-    width, height = image_size(ready.scene)
-    samples = ready.reference.pass_spp * ready.passes * width * height
-    hidden = ready.pair.hide_emitters
-    found = examine_plan(
-        ready.plan, ready.scene, hide_emitters=hidden, samples=samples, seed=options.seed
-    )
-    if found.state == "disagreed":
-        ready = prepare(source, options.changed(everything=True))
-        ready = replace(ready, plan=ready.plan.unpruned("guard", found.words))
+    if not options.reference:  # else no plan is followed
+        width, height = image_size(ready.scene)
+        found = examine_plan(
+            ready.plan,
+            ready.scene,
+            hide_emitters=ready.pair.hide_emitters,
+            samples=ready.reference.pass_spp * ready.passes * width * height,
+            seed=options.seed,
+        )
+        if found.state == "disagreed":
+            ready = prepare(source, options.changed(everything=True))
+            ready = replace(ready, plan=ready.plan.unpruned("guard", found.words))
+        ready = replace(ready, guard=found)
     # The options are those given, even if everything had to be simulated.
-    ready = replace(ready, options=options, guard=found)
+    ready = replace(ready, options=options)
     if not options.allow_empty:
         require_surface(ready.counted, source.name)
     return ready

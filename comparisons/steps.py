@@ -35,7 +35,7 @@ def steps(options: Options, why: bool) -> list[Step]:
         added += [with_pictures, with_terms] if why else [with_pictures]
         return [*added, with_price]
     if why:
-        from fotismos.comparisons.hybrids.attribution import with_causes  # see above
+        from fotismos.comparisons.attribution import with_causes  # see above
 
         added += [with_terms, with_causes]
     return [*added, with_price]
@@ -47,13 +47,11 @@ def with_pictures(comparison: Comparison, ready: Prepared, progress: Progress | 
 
     given = ready.given
     assert given is not None
-    # Edges that they may contain: of the geometry, and of the textbook half.
-    expected = [ready.geometry_edges()]
     textbook = None
     if given.image is not None:
         half: Any = ready.heuristic
         textbook = np.array(half.replaced.sampled(pictures.TEMPLATE_SPP).render(0), float)
-        expected.append(alignment.picture_edges(textbook))
+    expected = alignment.scene_edges(ready.traced(alignment.FINER), textbook)
     return pictures.with_records(comparison, given, expected, textbook)
 
 

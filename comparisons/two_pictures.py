@@ -6,7 +6,6 @@ from time import perf_counter
 from msgspec import structs
 
 from fotismos.comparisons import pictures
-from fotismos.comparisons.caution import caution
 from fotismos.comparisons.comparison import (
     PICTURE_LIBRARIES,
     Comparison,
@@ -14,8 +13,9 @@ from fotismos.comparisons.comparison import (
     TimeSpent,
     versions,
 )
+from fotismos.comparisons.departure.criterion import caution
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, declared
-from fotismos.comparisons.estimates import Estimates, PassSums, measure, summarised
+from fotismos.comparisons.estimates import Estimates, measure, summarised
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.errors import InputError
 
@@ -58,7 +58,7 @@ def look(options: Options, name: str, command: str = "") -> FirstLook:
     passes = given.passes or pictures.FEWEST
     first = pictures.PictureHalf(given.image, passes)
     second = pictures.PictureHalf(given.reference, passes)
-    sums = PassSums(counted, options.tone_map)
+    sums = given.pass_sums(counted)
     for number in range(passes):
         sums.add(first.render(number), second.render(number))
     estimates = sums.estimates()

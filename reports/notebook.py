@@ -36,8 +36,8 @@ from fotismos.comparisons.departure.metrics import Metric
 from fotismos.comparisons.departure.metrics import declare as declare_metric
 from fotismos.comparisons.fit.fit import fit as fit_parameters
 from fotismos.comparisons.fit.fit_record import FitRecord
+from fotismos.comparisons.names import as_files, with_files
 from fotismos.comparisons.options import Options, OptionValues
-from fotismos.comparisons.picture_files import as_files, with_files
 from fotismos.comparisons.pictures import require_no_scene
 from fotismos.comparisons.pixel_terms import PixelTerms
 from fotismos.comparisons.prepared import prepare

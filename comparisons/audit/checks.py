@@ -1,6 +1,6 @@
 """The checks of an audit, and the audit itself, from a heuristic's or BSDF's values alone."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import partial
 from typing import Annotated, Any, Literal
 
@@ -19,6 +19,7 @@ from fotismos.comparisons.audit.subjects import (
 )
 from fotismos.comparisons.comparison import versions
 from fotismos.heuristic import heuristics
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.heuristic.user_code import error_text
 from fotismos.reference.records import VERSION, Amount, Record, Versions
@@ -120,8 +121,17 @@ def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "
 
     In the current variant. ``command`` is the one that was run, for the record.
     """
+    record, _ = audit_with_subject(kind, name, parameters=parameters, command=command)
+    return record
+
+
+def audit_with_subject(
+    kind: Kind, name: str, parameters: Mapping[str, Any], command: str
+) -> tuple[Audit, Subject]:
+    """Return what :func:`audit` returns, and what was audited."""
     try:
-        return _audited(kind, name, parameters=parameters, command=command)
+        subject = _subject_of(kind, name, parameters)
+        return _audited(subject, kind, name=name, parameters=parameters, command=command), subject
     except Exception as error:  # a user's code may raise anything
         is_users = kind == "bsdf" and heuristics.in_file(name)
         if isinstance(error, FotismosError) or not is_users:
@@ -129,8 +139,16 @@ def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "
         raise InputError(f"{error_text(error)} (BSDF {name}).") from error
 
 
-def _audited(kind: Kind, name: str, parameters: Mapping[str, Any], command: str) -> Audit:
-    subject = subject_of(kind, name, parameters)
+def _subject_of(kind: Kind, name: str, parameters: Mapping[str, Any]) -> Subject:
+    """Return what is audited, with its white materials."""
+    if kind == "bsdf":
+        return ScatteringSubject(name, parameters)
+    return ShadingSubject(heuristics.named(name), parameters)
+
+
+def _audited(
+    subject: Subject, kind: Kind, name: str, parameters: Mapping[str, Any], command: str
+) -> Audit:
     curves = tuple(curve(subject, material) for material in subject.materials)
     derivatives = {by: disagreement(value, shade) for by, value, shade in subject.numbers()}
     return Audit(
@@ -149,13 +167,6 @@ def _audited(kind: Kind, name: str, parameters: Mapping[str, Any], command: str)
         command=command,
         versions=versions(),
     )
-
-
-def subject_of(kind: Kind, name: str, parameters: Mapping[str, Any]) -> Subject:
-    """Return what is audited, with its white materials."""
-    if kind == "bsdf":
-        return ScatteringSubject(name, parameters)
-    return ShadingSubject(heuristics.named(name), parameters)
 
 
 def all_checks(
@@ -363,3 +374,39 @@ def _central(shade: Any, centre: float, step: float) -> np.ndarray:
     below = np.array(dr.detach(shade(mi.Float(centre + (-step)))), float)
     slope: np.ndarray = (above - below) / (2 * step)
     return slope
+
+
+# --- Pictures of what is audited ----------------------------------------------------------------
+
+SIDE = 96
+FINER = 3
+"""Pixels of a side, and points of each pixel's side."""
+
+TOWARD_LIGHT = np.array([-0.5, 0.6, 0.7]) / np.linalg.norm([-0.5, 0.6, 0.7])
+"""The direction to the light: from the left, above and before the sphere."""
+
+BACKGROUND = 0.03
+"""Shows where the sphere ends on its dark side."""
+
+
+def spheres(subject: Subject, materials: Iterable[str]) -> dict[str, Floats]:
+    """Return a linear picture (H, W, 3) of a sphere of each material under one parallel light.
+
+    White diffuse is 1 facing the light. The viewer is far away, in the direction z.
+    """
+    count = SIDE * FINER
+    x, y = np.meshgrid(*2 * [(2 * np.arange(count) + 1) / count - 1])
+    is_hit = x**2 + y**2 < 1
+    x, y = x[is_hit], -y[is_hit]
+    normal = np.stack([x, y, np.sqrt(1 - x**2 - y**2)])
+    # Frames whose third axis is the normal; the first is level.
+    tangent = np.stack([normal[2], 0 * x, -normal[0]]) / np.hypot(normal[0], normal[2])
+    frame = np.stack([tangent, np.cross(normal, tangent, axis=0), normal])
+    light = np.einsum("acn,c->an", frame, TOWARD_LIGHT)
+    view = frame[:, 2]
+    made = {}
+    for material in materials:
+        whole = np.full((count, count, 3), BACKGROUND)
+        whole[is_hit] = subject.response(material, light, view).T
+        made[material] = whole.reshape(SIDE, FINER, SIDE, FINER, 3).mean(axis=(1, 3))
+    return made

@@ -7,9 +7,11 @@ import drjit as dr
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons.alignment import picture_edges
+from fotismos.comparisons import timing
+from fotismos.comparisons.alignment import FINER, scene_edges
+from fotismos.comparisons.attribution import find
 from fotismos.comparisons.comparison import Causes, machine, versions
-from fotismos.comparisons.cost import engine, times
+from fotismos.comparisons.cost import engine
 from fotismos.comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
 from fotismos.comparisons.cost.engine import Study
 from fotismos.comparisons.cost.front import Reach, at_size, fronted, reach, sufficient
@@ -29,7 +31,6 @@ from fotismos.comparisons.cost.measure import (
 from fotismos.comparisons.cost.methods import FULL_PLAN, all_methods
 from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.criterion import checked_threshold
-from fotismos.comparisons.hybrids.attribution import find
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.pictures import TEMPLATE_SPP, GivenPictures, at_size_of_pictures
 from fotismos.comparisons.price_record import Price
@@ -146,7 +147,7 @@ def truth(found: Measurements) -> engine.Truth:
         reference=found.reference,
         counted=found.ready.counted,
         viewing=found.options.viewing,
-        edges=[found.ready.geometry_edges(), picture_edges(textbook)],
+        edges=scene_edges(found.ready.traced(FINER), textbook),
         textbook=textbook,
     )
 
@@ -194,7 +195,7 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
     last = found.steps[-1].after
 
     def adds(effect: str) -> Any:
-        return times.difference(
+        return timing.difference(
             [
                 (step.weight, found.lines[step.before.name], found.lines[step.after.name])
                 for step in found.steps
@@ -205,7 +206,7 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
 
     def takes(name: str) -> Any:
         values = samples * found.lines[name].per_sample
-        return times.interval(values, times.UNSEEN * float(values[0]))
+        return timing.interval(values, timing.UNSEEN * float(values[0]))
 
     effects = (
         EffectCost(**structs.asdict(contribution), adds_s=adds(contribution.effect))

@@ -21,20 +21,19 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from fotismos.comparisons.caution import caution
 from fotismos.comparisons.comparison import PICTURE_LIBRARIES, Images, MeanError, versions
 from fotismos.comparisons.cost.engine_record import Engine, EngineCost, EngineSetting
 from fotismos.comparisons.cost.front import fronted
 from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
 from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.departure.criterion import decide
-from fotismos.comparisons.departure.mapped_sums import Light, MappedReference
+from fotismos.comparisons.departure.criterion import caution, decide
+from fotismos.comparisons.departure.mapped_sums import MappedReference
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
-from fotismos.comparisons.departure.statistics import Summary, summarise
-from fotismos.comparisons.departure.tone_maps import TONE_MAPS
+from fotismos.comparisons.departure.statistics import Summary, noise_floor, summarise
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light
+from fotismos.comparisons.names import matching, with_files
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import matching, with_files
 from fotismos.comparisons.picture_mistakes import Names
 from fotismos.comparisons.pictures import (
     FEWEST,
@@ -101,11 +100,12 @@ def front_of_pictures(
         raise InputError("pictures without a scene need a `reference`: give one, or a scene.")
     truth = _truth(reference, given.where(), options)
     engine = judged(given, times, truth, options.allow_empty)
+    estimate = truth.reference
     floor = None
     if reference.passes is not None:
-        mean = truth.reference.mean
-        distances = LEADING.against(mean, truth.counted, truth.viewing)
-        floor = LEADING.mean(distances(mean + truth.reference.noise))
+        floor = noise_floor(
+            LEADING, estimate.mean, estimate.noise, mask=truth.counted, viewing=truth.viewing
+        )
     record = EngineCost(
         scene=name,
         resolution=reference.size,

@@ -1,7 +1,7 @@
 """Measure the ladder: the time of each method, and its error against a converged reference.
 
 The first image of a method traces and compiles, and is reported separately. Then all methods take
-turns, at several sample counts; :mod:`fotismos.comparisons.cost.times` makes overhead and time per
+turns, at several sample counts; :mod:`fotismos.comparisons.timing` makes overhead and time per
 sample of it. Each round has its own seed, so the errors of the rounds are independent.
 """
 
@@ -19,8 +19,8 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
+from fotismos.comparisons import timing
 from fotismos.comparisons.comparison import MeanError
-from fotismos.comparisons.cost import times
 from fotismos.comparisons.cost.cost_record import Converged, Method, Point, TimedMethod
 from fotismos.comparisons.cost.methods import Ladder, Step
 from fotismos.comparisons.departure.colour import Viewing
@@ -149,7 +149,7 @@ class Measurements:
     converged: Converged
     methods: tuple[TimedMethod, ...]
     points: tuple[Point, ...]
-    lines: Mapping[str, times.Line]
+    lines: Mapping[str, timing.Line]
     steps: tuple[Step, ...]
     images: Mapping[str, Floats]
 
@@ -274,7 +274,7 @@ def tried(
 ) -> dict[Key, Renderer]:
     """Return ``{(name, samples per pixel): renderer}`` for ``counts``, and some for the time.
 
-    The largest takes at least :data:`times.LEAST_S`, and one a fourth of its samples. ``firsts``
+    The largest takes at least :data:`timing.LEAST_S`, and one a fourth of its samples. ``firsts``
     have the most samples of the method's counts. All are warm.
     """
     renderers: dict[Key, Renderer] = {}
@@ -286,12 +286,12 @@ def tried(
         while True:
             warm(last)
             seconds = last.times[-1]
-            if seconds >= times.LEAST_S or 4 * last.pass_spp * pixels > MOST_SAMPLES:
+            if seconds >= timing.LEAST_S or 4 * last.pass_spp * pixels > MOST_SAMPLES:
                 break
             # With a fourth of these samples it would take less than LEAST_S: counts are skipped.
             most = MOST_SAMPLES / (last.pass_spp * pixels)
             more = 4
-            while more * seconds < times.LEAST_S and 4 * more <= most:
+            while more * seconds < timing.LEAST_S and 4 * more <= most:
                 more *= 4
             last = first.sampled(more * last.pass_spp)
             by_spp[last.pass_spp] = last
@@ -343,27 +343,27 @@ def _mean_errors(errors: ArrayLike) -> tuple[MeanError, MeanError]:
 
 def timed(
     renderers: Mapping[Key, Renderer], rounds: int, pixels: int, seed: int = 0
-) -> dict[str, times.Line]:
+) -> dict[str, timing.Line]:
     """Return the time of each method from the last rounds of its renderers."""
     seconds: dict[str, dict[int, tuple[Any, Any]]] = {}
     for (name, spp), renderer in renderers.items():
         # The first images, which warmed up, are not among the last rounds.
         both_times = renderer.times[-rounds:], renderer.processor_times[-rounds:]
         seconds.setdefault(name, {})[spp * pixels] = both_times
-    return times.lines(seconds, seed)
+    return timing.lines(seconds, seed)
 
 
 def timed_method(
-    method: Method, found: Mapping[str, times.Line], textbook: str, first: Renderer
+    method: Method, found: Mapping[str, timing.Line], textbook: str, first: Renderer
 ) -> TimedMethod:
     """Return a method with its times; ``first`` rendered its first image."""
     line = found[method.name]
     return TimedMethod(
         **structs.asdict(method),
         # A difference from the shortest image's time, whose unseen share it inherits.
-        overhead_s=times.interval(line.overhead, times.UNSEEN * line.shortest),
-        per_sample_s=times.interval(line.per_sample, times.UNSEEN * float(line.per_sample[0])),
-        ratio=times.ratio(line, found[textbook]),
+        overhead_s=timing.interval(line.overhead, timing.UNSEEN * line.shortest),
+        per_sample_s=timing.interval(line.per_sample, timing.UNSEEN * float(line.per_sample[0])),
+        ratio=timing.ratio(line, found[textbook]),
         processor_s=float(line.per_sample[0]) * line.processors,
         bend=line.bend,
         first_s=first.times[0],

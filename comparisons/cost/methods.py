@@ -18,7 +18,7 @@ import mitsuba as mi
 from msgspec import structs
 
 from fotismos.comparisons.cost.cost_record import Method
-from fotismos.comparisons.hybrids.hybrids import HybridScenes, Pairs
+from fotismos.comparisons.hybrids import HybridScenes, Pairs
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.heuristic.declared import Declared

@@ -290,16 +290,11 @@ def _apart(first: Colours, second: Colours) -> Numbers:
     return arrays.power(arrays.absolute(lightness) + arrays.hypot(a, b), _POWER)
 
 
-@lru_cache(maxsize=1)
-def _largest() -> float:
-    """Return the distance of green and blue."""
-    # NumPy's arrays (3, 1), so that it is the same whoever computes.
-    green = _OPPONENT[:, 1:2]
-    blue = _OPPONENT[:, 2:3]
-    return float(_apart(_hunted(green), _hunted(blue))[0])
+# The distance of green and blue; of NumPy's arrays (3, 1), so that it is one whoever computes.
+_FARTHEST = float(_apart(_hunted(_OPPONENT[:, 1:2]), _hunted(_OPPONENT[:, 2:3]))[0])
 
 
 def _redistributed(distance: Numbers) -> Numbers:
-    knee = _KNEE * _largest()
-    above = _KNEE_SHOWN + (distance - knee) * ((1.0 - _KNEE_SHOWN) / (_largest() - knee))
+    knee = _KNEE * _FARTHEST
+    above = _KNEE_SHOWN + (distance - knee) * ((1.0 - _KNEE_SHOWN) / (_FARTHEST - knee))
     return arrays.select(distance < knee, distance * (_KNEE_SHOWN / knee), above)

@@ -7,28 +7,20 @@ holds where the noise is small against the bend of the curve. Noise of the pictu
 picture shares no random numbers with the reference, so the two are independent.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.tone_maps import TONE_MAPS, ToneMap, derivative
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light, ToneMap, derivative
 from fotismos.reference.rendering.sums import (
     DEVIATION,
     Accumulator,
     DifferenceEstimate,
     DifferenceSums,
 )
-
-
-@dataclass(frozen=True)
-class Light:
-    """The reference before a tone map: its mean and standard error, (H, W, 3), linear."""
-
-    mean: np.ndarray
-    standard_error: np.ndarray
 
 
 def reference_sums(tone_map: str | None, counted: np.ndarray) -> tuple[Accumulator, DifferenceSums]:

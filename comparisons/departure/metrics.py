@@ -1,36 +1,12 @@
 """Metrics: distances between two images, each declared with its definition, unit and range.
 
-=============  ================================  ==========================================
-dE2000         CIE DE2000                        display-referred: exposed, clipped to [0, 1]
-dE_ITP         ITU-R BT.2124                     HDR: absolute luminance up to 10,000 cd/m²
-dE_CAM16UCS    CAM16-UCS (Li et al. 2017)        display-referred, with viewing conditions
-rmse           root mean square                  linear light, neither exposed nor clipped
-relmse         relative mean square              linear light, as rmse
-smape          symmetric mean absolute error     linear light, as rmse
-srgb_rmse      root mean square, and PSNR        display-referred: values of sRGB
-ldr_flip       FLIP (Andersson et al. 2020)      display-referred, knows spatial frequency
-hdr_flip       HDR-FLIP (2021)                   the largest of FLIP over many exposures
-=============  ================================  ==========================================
-
 A metric is a function of two images and the viewing conditions that returns a map. One declaration
 is enough: records, tables, the page and checks list all declared metrics. :class:`Metric` takes any
 such function, also one of neighbourhoods. :class:`Pixelwise` splits it into a colour space and a
 distance; a reference is then converted once, and compared with many images.
 
 Declare a metric from outside with :func:`declare`, or with an entry point of the group
-``fotismos.metrics`` whose object is a :class:`Metric`::
-
-    declare(
-        Metric(
-            name="absolute",
-            label="Mean absolute difference",
-            unit="1 is display white",
-            definition="Mean over the channels of the absolute linear difference.",
-            caution="It knows nothing of eyes.",
-            map_range=(0.0, 1.0),
-            function=lambda test, reference, viewing: np.abs(test - reference).mean(axis=-1),
-        )
-    )
+``fotismos.metrics`` whose object is a :class:`Metric` (docs/api.md has one).
 
 Every image is a float array (H, W, 3) of linear light with the sRGB primaries (ITU-R BT.709, D65);
 1.0 is display white. Statistics over an image are in `fotismos.comparisons.departure.statistics`.

@@ -138,20 +138,20 @@ def fit(
     options = _completed(options or Options())
     heuristic = named(options.heuristic)
     # Both halves are rendered once; every form is fitted to the same images.
-    rendered = render(guarded(source.edited(filter_by_box), options), options, progress)
+    rendered = render(guarded(source.edited(filter_by_box), options), progress)
     rendering = perf_counter() - begin
+    ready = rendered.ready
     if heuristic is PHONG:
         with variant(VARIANT):
-            surface = model.see(rendered.ready.heuristic, rendered.seeds)
+            surface = model.see(ready.heuristic, rendered.seeds)
             models = [PhongModel(surface, form, rendered.counted.ravel()) for form in forms]
             fits = [_best(rendered, form_model, form_starts, LOSSES[loss]) for form_model in models]
     else:
-        half = rendered.ready.heuristic
-        seeds = rendered.seeds
-        own_model = OwnModel(half, heuristic, seeds=seeds, counted=rendered.counted)
+        own_model = OwnModel(
+            ready.heuristic, heuristic, seeds=rendered.seeds, counted=rendered.counted
+        )
         fits = [_best(rendered, own_model, own_starts, LOSSES[loss])]
     best = min(range(len(fits)), key=lambda number: fits[number][0].loss)
-    ready = rendered.ready
     record = FitRecord(
         scene=source.name,
         variant=ready.reference.variant,
@@ -226,8 +226,9 @@ def filter_by_box(graph: Graph) -> None:
         graph.attach(film, "rfilter", box)
 
 
-def render(ready: Prepared, options: Options, progress: Progress | None = None) -> RenderedHalves:
+def render(ready: Prepared, progress: Progress | None) -> RenderedHalves:
     """Render the passes of both halves in turn."""
+    options = ready.options
     if ready.heuristic.variant != VARIANT:
         raise InputError(
             f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"
@@ -240,18 +241,14 @@ def render(ready: Prepared, options: Options, progress: Progress | None = None) 
         add_difference(sums, rendered.images)
     before = sums[0].estimate()
     reference = sums[1].estimate()
-    difference = difference_sums.estimate()
-    seeds = tuple(pass_seed(options.seed, number) for number in range(ready.passes))
-    counted = ready.counted
-    viewing = options.viewing
     return RenderedHalves(
         ready=ready,
-        seeds=seeds,
+        seeds=tuple(pass_seed(options.seed, number) for number in range(ready.passes)),
         before=before.mean,
         reference=reference,
-        difference=difference,
-        counted=counted,
-        viewing=viewing,
+        difference=difference_sums.estimate(),
+        counted=ready.counted,
+        viewing=options.viewing,
     )
 
 

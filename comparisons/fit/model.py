@@ -26,7 +26,7 @@ rendered once, sample by sample, with the reference's rays (the same sampler, se
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache, partial
 from math import log
 from typing import Any
@@ -295,38 +295,23 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
         if isinstance(surface.ambient, int):  # no ambient light
             del paired["k_a"]
         for name, colour in paired.items():
-            if name in surface.samples[owner]:
-                value = float(colour[0])
+            has_texture = name in surface.samples[owner]
+            whole = FitParameter(
+                name=name,
+                owner=owner,
+                paired=float(max(colour)),
+                low=0.0,
+                high=LARGEST_FACTOR if has_texture else 1.0,
+                is_factor=has_texture,
+            )
+            if has_texture or np.ptp(colour) <= 1e-6 * max(colour):
+                fitted.append(whole)
+                continue
+            # A number for each channel: its tint is 0 in the two others.
+            for value, tint, channel in zip(colour, np.eye(3), "RGB", strict=True):
                 fitted.append(
-                    FitParameter(
-                        name=name,
-                        owner=owner,
-                        paired=value,
-                        low=0.0,
-                        high=LARGEST_FACTOR,
-                        is_factor=True,
-                    )
+                    replace(whole, paired=float(value), tint=tuple(tint), channel=channel)
                 )
-            elif np.ptp(colour) <= 1e-6 * max(colour):
-                fitted.append(
-                    FitParameter(
-                        name=name, owner=owner, paired=float(max(colour)), low=0.0, high=1.0
-                    )
-                )
-            else:
-                # A number for each channel: its tint is 0 in the two others.
-                fitted += [
-                    FitParameter(
-                        name=name,
-                        owner=owner,
-                        paired=float(value),
-                        low=0.0,
-                        high=1.0,
-                        tint=tuple(tint),
-                        channel=channel,
-                    )
-                    for value, tint, channel in zip(colour, np.eye(3), "RGB", strict=True)
-                ]
         # The exponent of this form whose lobe is as wide as the scene's.
         n = exponent_of(alpha_of(material.n, material.form), form)
         fitted.append(

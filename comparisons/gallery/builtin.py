@@ -61,21 +61,20 @@ def builtin(name: str) -> BuiltIn:
     return SCENES[name]
 
 
-def _scene(module: str, function: str, **values: Any) -> dict[str, Any]:
-    """Make a scene by a function of a module of the gallery, loaded here: it imports Mitsuba."""
-    maker = import_module(f"fotismos.comparisons.gallery.{module}")
+def _scene(function: str, **values: Any) -> dict[str, Any]:
+    """Make a scene by a function of the gallery, which is loaded here: it imports Mitsuba."""
+    maker = import_module("fotismos.comparisons.gallery.scenes")
     scene: dict[str, Any] = getattr(maker, function)(**values)
     return scene
 
 
-def _named(name: str, title: str, module: str = "scenes", **settings: Any) -> BuiltIn:
+def _named(name: str, title: str, **settings: Any) -> BuiltIn:
     """Return the scene that the function of its name makes."""
-    make = partial(_scene, module, name.replace("-", "_"))
-    return BuiltIn(name, title, make, **settings)
+    return BuiltIn(name, title, partial(_scene, name.replace("-", "_")), **settings)
 
 
 def _figure(name: str, title: str, lights: Any, viewer: Any, **coefficients: float) -> BuiltIn:
-    make = partial(_scene, "scenes", "figure", lights=lights, viewer=viewer, **coefficients)
+    make = partial(_scene, "figure", lights=lights, viewer=viewer, **coefficients)
     return BuiltIn(name, title, make)
 
 
@@ -119,18 +118,18 @@ def _chapter_six() -> Iterator[BuiltIn]:
     )
     for m in (1.0, 40.0):
         title = f"Figure 6.5: a spot of {'small' if m < 10 else 'large'} exponent, m = {m:g}"
-        yield BuiltIn(f"fig-6-5-m{m:g}", title, partial(_scene, "scenes", "spot", exponent=m))
+        yield BuiltIn(f"fig-6-5-m{m:g}", title, partial(_scene, "spot", exponent=m))
     yield BuiltIn(
         "fig-6-10",
         "Figure 6.10: flat shading of a coarse sphere; see it with gouraud or phong interpolation",
-        partial(_scene, "scenes", "coarse_sphere"),
+        partial(_scene, "coarse_sphere"),
         interpolation="flat",
         tessellation=4,
     )
     yield BuiltIn(
         "fig-6-14",
         "Figure 6.14: a highlight inside a triangle, lost by Gouraud shading, kept by Phong's",
-        partial(_scene, "scenes", "highlight_in_a_triangle"),
+        partial(_scene, "highlight_in_a_triangle"),
         interpolation="gouraud",
         tessellation=1,
     )
@@ -153,7 +152,6 @@ def _physical() -> Iterator[BuiltIn]:
         yield _named(
             name,
             title,
-            module="spectra" if is_spectral else "scenes",
             variant="llvm_ad_spectral" if is_spectral else "llvm_ad_rgb",
             heuristic_variant="llvm_ad_rgb" if is_spectral else None,
         )

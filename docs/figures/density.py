@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 
 from docs.figures.model_figures import COLOURS, GROUND, STYLE, quiet
 from fotismos.comparisons.cost import measure
-from fotismos.comparisons.cost.times import ratio
 from fotismos.comparisons.gallery import scenes
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.timing import ratio
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering.renderer import Renderer

@@ -22,9 +22,10 @@ from pyarrow import csv, parquet
 
 from docs.figures.from_tests import ROOT
 from docs.figures.model_figures import GROUND, STYLE
+from fotismos.comparisons import timing
 from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.comparison import machine
-from fotismos.comparisons.cost import measure, times
+from fotismos.comparisons.cost import measure
 from fotismos.comparisons.cost.cost_record import Method
 from fotismos.comparisons.cost.methods import DIRECT, FULL_PLAN, Ladder
 from fotismos.comparisons.departure.colour import luminance
@@ -172,7 +173,7 @@ def _rendered(case: Case, method: Method) -> Rendered:
         total.add(one.images[0])
     return Rendered(
         picture=total.mean(),
-        time=times.ratio(lines[method.name], lines[KERNEL.name]).value,
+        time=timing.ratio(lines[method.name], lines[KERNEL.name]).value,
         prepare_s=getattr(firsts[method.name].integrator, "preparation", 0.0),
     )
 

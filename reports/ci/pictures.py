@@ -16,7 +16,8 @@ from fotismos.comparisons.check.pictures import (
     means,
 )
 from fotismos.comparisons.comparison import PictureFiles
-from fotismos.comparisons.picture_files import matching, read_file
+from fotismos.comparisons.names import matching
+from fotismos.comparisons.picture_files import read_file
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError
 from fotismos.reference import records

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from fotismos.comparisons.attribution import dominating
 from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.hybrids.attribution import dominating
 from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
 from fotismos.reference.records import Missing
 from fotismos.reports.charts.theme import EFFECT_COLOURS

@@ -5,8 +5,7 @@ from typing import Any
 
 import click
 
-from fotismos.comparisons.audit.checks import Audit, Kind, audit, subject_of
-from fotismos.comparisons.audit.spheres import pictures
+from fotismos.comparisons.audit.checks import Audit, Kind, audit_with_subject, spheres
 from fotismos.comparisons.case import RGB
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic import plugins
@@ -48,8 +47,7 @@ def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, tar
     """Audit a heuristic or a BSDF, and write the audit's files."""
     set_variant(RGB)
     plugins.register()
-    record = audit(kind, name, parameters, command)
+    record, subject = audit_with_subject(kind, name, parameters=parameters, command=command)
     shown = [curve.material for curve in record.curves if curve.lobes]
-    spheres = pictures(subject_of(kind, name, parameters), shown)
-    audit_files.write(target, record, spheres)
+    audit_files.write(target, record, spheres(subject, shown))
     return record

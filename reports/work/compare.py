@@ -4,9 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from fotismos.comparisons.names import picture_parts
+from fotismos.comparisons.names import picture_parts, with_files
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import with_files
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.errors import FotismosError
 from fotismos.reports.jobs import Job, open_page

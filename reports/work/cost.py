@@ -11,9 +11,8 @@ from fotismos.comparisons.cost import engine as engines
 from fotismos.comparisons.cost.engine_record import EngineCost
 from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.criterion import TOLERANCE, checked_threshold
-from fotismos.comparisons.names import picture_parts
+from fotismos.comparisons.names import matching, picture_parts
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import matching
 from fotismos.comparisons.pictures import require_no_scene
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.reference.records import to_json

@@ -10,8 +10,8 @@ import click
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.fit.fit import fit
 from fotismos.comparisons.fit.fit_record import FitRecord
+from fotismos.comparisons.names import with_files
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import with_files
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.materials import FORMS
 from fotismos.reference.records import plain

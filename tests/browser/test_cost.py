@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fotismos.comparisons.hybrids.attribution import dominating
+from fotismos.comparisons.attribution import dominating
 from fotismos.reports.charts import theme
 from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
 from tests.shared.cost_records import HEIGHT as ROWS

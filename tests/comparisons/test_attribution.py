@@ -6,10 +6,7 @@ from math import comb
 import numpy as np
 import pytest
 
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
-from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.noise import USUAL
-from fotismos.comparisons.hybrids.attribution import (
+from fotismos.comparisons.attribution import (
     LEAST,
     NONE,
     SLOWEST,
@@ -20,6 +17,9 @@ from fotismos.comparisons.hybrids.attribution import (
     in_words,
     shares,
 )
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.noise import USUAL
 from fotismos.reference.rendering.sums import jackknifed
 
 # -- Shapley values --------------------------------------------------------------------------------

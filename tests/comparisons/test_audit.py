@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from fotismos.comparisons.audit import checks, furnace, spheres
+from fotismos.comparisons.audit import checks, furnace
 from fotismos.comparisons.audit.subjects import (
     DISTANCES,
     EXTREMES,
@@ -386,15 +386,15 @@ def test_mistakes_in_words_are_refused(run, tmp_path, rgb, written):
 
 def test_spheres_show_the_response_to_their_light(rgb):
     """Lambert's is the cosine; Blinn's highlight lies where the half vector is the normal."""
-    side = spheres.SIDE
+    side = checks.SIDE
     x, y = np.meshgrid(*2 * [(2 * np.arange(side) + 1) / side - 1])
     inside = np.hypot(x, y) < 0.95
     normal = np.stack([x, -y, np.sqrt(np.clip(1 - x**2 - y**2, 0, None))])
-    cosine = np.einsum("cij,c->ij", normal, spheres.LIGHT)
-    found = spheres.pictures(named("blinn"), ["matte", "metal, alpha 0.1"])
+    cosine = np.einsum("cij,c->ij", normal, checks.TOWARD_LIGHT)
+    found = checks.spheres(named("blinn"), ["matte", "metal, alpha 0.1"])
     is_lit = inside & (cosine > 0.05)
     np.testing.assert_allclose(found["matte"][is_lit, 0], cosine[is_lit], atol=0.01)
     assert not found["matte"][inside & (cosine < -0.05)].any()
-    half = np.add(spheres.LIGHT, (0, 0, 1))
+    half = np.add(checks.TOWARD_LIGHT, (0, 0, 1))
     peak = np.unravel_index(found["metal, alpha 0.1"][..., 0].argmax(), (side, side))
     np.testing.assert_allclose(normal[:, *peak], half / np.linalg.norm(half), atol=0.03)

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from msgspec import structs
 
+from fotismos.comparisons import timing
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.comparison import MeanError
 from fotismos.comparisons.cost import cost as studies
-from fotismos.comparisons.cost import measure, methods, times
+from fotismos.comparisons.cost import measure, methods
 from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.cost.cost_record import Cost, Method
 from fotismos.comparisons.cost.measure import WIDTH, Effort, measure_ladder, reduced
@@ -43,7 +44,7 @@ CORPUS = Path(__file__).parents[1] / "corpus"
 def short():
     """Times of these scenes need not repeat."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(times, "LEAST_S", 0.0)
+        patched.setattr(timing, "LEAST_S", 0.0)
         patched.setattr(measure, "REFERENCE_SPP", 4)
         yield
 

@@ -7,8 +7,8 @@ import pytest
 from msgspec import structs
 from msgspec.structs import astuple
 
+from fotismos.comparisons import timing
 from fotismos.comparisons.comparison import MeanError
-from fotismos.comparisons.cost import times
 from fotismos.comparisons.cost.cost_record import Method, Point
 from fotismos.comparisons.cost.front import at_size, beats, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import QUICK, Effort, timed, tried
@@ -67,7 +67,7 @@ def test_the_largest_rendering_takes_long_enough(rgb):
     _, renderers = lines_of(slow, np.random.default_rng(0))
     for name, counts in (("plan", [4, 16, 64]), ("kernel", [4, 16, 64, 256, 1024])):
         assert [spp for own, spp in renderers if own == name] == counts
-        assert min(renderers[name, counts[-1]].times) >= times.LEAST_S
+        assert min(renderers[name, counts[-1]].times) >= timing.LEAST_S
 
 
 def test_overhead_and_time_per_sample_are_found_beside_bursts(rgb):
@@ -77,7 +77,7 @@ def test_overhead_and_time_per_sample_are_found_beside_bursts(rgb):
     assert plan.per_sample[0] == pytest.approx(10 * KERNEL, rel=0.03)
     assert plan.processors == pytest.approx(2, rel=0.03)
     assert abs(plan.bend) < 0.05
-    own = times.ratio(kernel, kernel)
+    own = timing.ratio(kernel, kernel)
     assert (own.low, own.value, own.high) == (1.0, 1.0, 1.0)
 
 
@@ -93,7 +93,7 @@ def test_ratios_and_times_of_a_busy_machine(rgb):
     for taken in (0.0, 0.5, 1.0):
         lines, _ = lines_of(slow, rng, taken=taken)
         for name, time in slow.items():
-            found = times.ratio(lines[name], lines["kernel"])
+            found = timing.ratio(lines[name], lines["kernel"])
             assert found.value == pytest.approx(time / KERNEL, rel=0.1)
         assert lines["plan"].processors == pytest.approx(2 / (1 + taken), rel=0.12)
 
@@ -106,8 +106,8 @@ def test_a_tenth_of_the_kernel_is_detected_and_nothing_is_not(rgb):
     for _ in range(60):
         slow = {"kernel": KERNEL, "same": KERNEL, "more": 1.1 * KERNEL}
         lines, _ = lines_of(slow, rng)
-        more = times.difference([(1.0, lines["kernel"], lines["more"])], 1_000_000)
-        none = times.difference([(1.0, lines["kernel"], lines["same"])], 1_000_000)
+        more = timing.difference([(1.0, lines["kernel"], lines["more"])], 1_000_000)
+        none = timing.difference([(1.0, lines["kernel"], lines["same"])], 1_000_000)
         found += more.low > 0
         false += not none.low <= 0 <= none.high
         assert more.value == pytest.approx(1.5e-3, rel=0.7)
@@ -121,11 +121,11 @@ def test_intervals_hold_the_time_and_what_steps_add_is_the_whole(rgb):
     for _ in range(40):
         a, b, c, d = lines_of(slow, rng)[0].values()
         steps = [(0.5, a, b), (0.5, b, d), (0.5, a, c), (0.5, c, d)]
-        parts = [times.difference([step], 1000).value for step in steps]
-        whole = times.difference(steps, 1000)
+        parts = [timing.difference([step], 1000).value for step in steps]
+        whole = timing.difference(steps, 1000)
         assert sum(parts) == pytest.approx(whole.value)
-        assert whole.value == pytest.approx(times.difference([(1.0, a, d)], 1000).value)
-        per_sample = times.interval(d.per_sample, times.UNSEEN * d.per_sample[0])
+        assert whole.value == pytest.approx(timing.difference([(1.0, a, d)], 1000).value)
+        per_sample = timing.interval(d.per_sample, timing.UNSEEN * d.per_sample[0])
         held += per_sample.low <= 22 * KERNEL <= per_sample.high
     assert held >= 34
 

@@ -12,8 +12,8 @@ import OpenEXR
 import pytest
 from PIL import Image
 
+from fotismos.comparisons.names import matching
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import matching
 from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic.errors import InputError, NonFiniteError
 

@@ -6,10 +6,10 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from fotismos.comparisons.attribution import BIAS, by_object, with_effects_named
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure import regions
-from fotismos.comparisons.hybrids.attribution import BIAS, by_object, with_effects_named
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.steps import steps
 from fotismos.reference.rendering import sums

@@ -11,9 +11,9 @@ import pytest
 from numpy.testing import assert_allclose
 from numpy.typing import ArrayLike
 
-from fotismos.comparisons import alignment, picture_curves, picture_mistakes
+from fotismos.comparisons import alignment, picture_mistakes
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.departure import mapped_sums
+from fotismos.comparisons.departure import mapped_sums, tone_maps
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.departure.mapped_sums import Light, reference_sums
 from fotismos.comparisons.departure.tone_maps import TONE_MAPS, aces, agx, neutral, reinhard
@@ -226,11 +226,11 @@ def test_the_curve_of_a_picture_is_named_at_any_exposure(halves):
             exposure = 2 ** rng.uniform(-3, 3)
             picture = saved(tone_map(exposure * other))
             words = said(picture, light, counted)
-            fits = {key: picture_curves.Curves.of(picture, light, counted).fit(key)
-                    for key in picture_curves.CURVES}  # fmt: skip
+            fits = {key: tone_maps.Curves.of(picture, light, counted).fit(key)
+                    for key in tone_maps.CURVES}  # fmt: skip
             best = min(fits.values(), key=lambda fit: fit.distance)
-            is_linear = fits[None].distance < picture_curves.LEAST_CURVE
-            is_another = fits[name].distance - best.distance < 0.1 * picture_curves.LEAST_CURVE
+            is_linear = fits[None].distance < tone_maps.LEAST_CURVE
+            is_another = fits[name].distance - best.distance < 0.1 * tone_maps.LEAST_CURVE
             assert f"tone_map={name}`" in words or is_linear or is_another
             named += f"tone_map={name}`" in words
             # Nothing is said where the right curve is given.

@@ -15,8 +15,9 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.metrics import LEADING, METRICS
+from fotismos.comparisons.names import as_files
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import as_files, read_file
+from fotismos.comparisons.picture_files import read_file
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic.errors import InputError

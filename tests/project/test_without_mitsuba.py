@@ -12,7 +12,6 @@ from tests.shared.two_pictures import measured
 MODULES = (
     "fotismos",
     "fotismos.comparisons.comparison",
-    "fotismos.comparisons.caution",
     "fotismos.comparisons.cost.engine",
     "fotismos.comparisons.cost.engine_record",
     "fotismos.comparisons.cost.front",

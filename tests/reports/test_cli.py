@@ -94,7 +94,7 @@ def test_causes_that_cannot_be_found_leave_the_comparison_and_a_warning(
     def fails(*_args, **_kwargs):
         raise InputError("the effects are unknown")
 
-    monkeypatch.setattr("fotismos.comparisons.hybrids.attribution.find", fails)
+    monkeypatch.setattr("fotismos.comparisons.attribution.find", fails)
     words = ("--spp", 4, "--resolution", "12x8", "-o", tmp_path)
     assert run("compare", scene_file, "--why", *words)[0] == 0
     record = read(tmp_path / "my-scene/comparison.json")

@@ -23,12 +23,12 @@ import fotismos  # noqa: F401  isort: skip  it finds LLVM before Mitsuba is impo
 import mitsuba as mi
 import numpy as np
 
+from fotismos.comparisons import attribution
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.comparison import Attribution
 from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.hybrids import attribution
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.steps import steps

@@ -49,7 +49,7 @@ from fotismos.comparisons.departure.noise import (
 )
 from fotismos.comparisons.departure.regions import Region, find_objects
 from fotismos.comparisons.estimates import metrics_for
-from fotismos.comparisons.hybrids.hybrids import HybridImages, HybridScenes, Pairs, labels
+from fotismos.comparisons.hybrids import HybridImages, HybridScenes, Pairs, labels
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.heuristic.convention import Doubles, Floats

@@ -1,1 +1,0 @@
-"""Images in which some effects are simulated, and what they say about the departure."""
