@@ -182,7 +182,7 @@ def test_a_comparison_of_a_built_in_scene_imports_what_it_needs(tmp_path):
     modules = done.stdout.split()
     assert "fotismos.comparisons.compare" in modules
     assert "altair" not in modules, "the charts of a study of cost alone need it"
-    elsewhere = ("hard", "fit", "study", "check")
+    elsewhere = ("alignment", "check", "cost", "departure.tone", "fit", "hard", "picture", "study")
     unneeded = tuple(f"fotismos.comparisons.{name}" for name in elsewhere)
     assert [name for name in modules if name.startswith(unneeded)] == []
 
