@@ -215,22 +215,6 @@ def test_each_layer_is_the_image_of_a_scene_with_that_term_alone(form):
         np.testing.assert_allclose(layers[name], alone, atol=2e-6 * whole.max(), err_msg=name)
 
 
-def test_layers_hold_the_terms_in_closed_form():
-    """Figure 8.11 in float64: each light has a channel of its own."""
-    layers, _ = images("fig-8-11-n9", resolution=(64, 64), spp=32)
-    viewer = np.array((-3.0, 0.0, 1.0))
-    lamps = np.array([(-4.24, 0, 0), (-3.5, -3.5, 0), (0, -4.24, 0)])
-    for x, y in ((26, 28), (32, 32), (44, 36)):
-        normal = seen_on_the_unit_sphere(x, y, 64, viewer)
-        toward = unit(lamps - normal)
-        cosine = toward @ normal
-        reflection = (2 * cosine[:, None] * normal - toward) @ unit(viewer - normal)
-        lobe = np.where(cosine > 0, np.maximum(reflection, 0) ** 9, 0)
-        expected = {"emission": 0, "ambient": 0.3, "diffuse": 0.5 * np.maximum(cosine, 0)}
-        for name, value in (expected | {"specular": 0.7 * lobe}).items():
-            np.testing.assert_allclose(layers[f"term.{name}"][y, x], value, atol=0.01, err_msg=name)
-
-
 def test_with_more_passes_shares_of_the_first_one_are_near(rgb):
     """Exactly a sum, and off by little where shares change within a pixel."""
     ready, given = prepared(of_terms(**WHOLE), resolution=(24, 24), spp=128)
