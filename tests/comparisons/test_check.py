@@ -13,7 +13,7 @@ from fotismos.comparisons.check.measurement import (
     measurement,
     read_baseline,
 )
-from fotismos.comparisons.check.moved import Move, differences, moved
+from fotismos.comparisons.check.moved import differences, moved
 from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
@@ -61,16 +61,6 @@ def test_the_noise_floor_has_no_light_in_it_for_an_odd_number_of_passes():
     numbers = measurement(images, np.ones((8, 8), bool), DEFAULT_VIEWING)
     assert numbers.metrics["dE2000"].value > 10
     assert numbers.metrics["dE2000"].noise_floor == pytest.approx(0, abs=1e-4)
-
-
-def test_a_signed_metric_moves_by_its_share_below_zero_too():
-    def size(before, after):
-        return Move(
-            quantity="log2_luminance", half=None, block=None, before=before, after=after,
-            error=0.1, standard_errors=1.0, p=0.5, p_corrected=0.5,
-        ).size  # fmt: skip
-
-    assert size(-0.5, -0.6) == pytest.approx(size(0.5, 0.6)) == pytest.approx(1 / 6)
 
 
 # --- Power -----------------------------------------------------------------------------------

@@ -185,30 +185,6 @@ def test_the_right_picture_passes_at_the_smallest_threshold_and_a_changed_one_do
         assert any(odd.startswith(SINGLE) for odd in setting.agreement.odd)
 
 
-def test_the_spread_of_repeats_widens_the_interval_and_a_mean_is_of_single_pictures(
-    found, tmp_path
-):
-    rng = np.random.default_rng(5)
-    noisy = [
-        np.maximum(found.reference.mean + rng.normal(0, 0.02 * n, (SIDE, SIDE, 3)), 0)
-        for n in (1, 2, 1, 2)
-    ]
-    settings = judged(found, tmp_path, {"all": noisy, **{f"no {n}": [noisy[n]] for n in range(4)}})
-    single = [settings[f"no {n}"] for n in range(4)]
-    every = settings["all"]
-    values = [one.error.value for one in single]
-    assert every.error.value == pytest.approx(np.mean(values))
-    for share, *alone in zip(every.visible, *(one.visible for one in single), strict=True):
-        assert share.value == pytest.approx(np.mean([one.value for one in alone]))
-    # Student's quantile of three degrees of freedom.
-    spread = 3.182446 * np.std(values, ddof=1) / 2
-    assert every.error.high - every.error.value >= spread
-    assert every.error.high - every.error.value <= spread + max(
-        one.error.high - one.error.value for one in single
-    )
-    assert not any(odd.startswith(SINGLE) for odd in every.agreement.odd)
-
-
 def test_intervals_of_repeats_hold_the_mean():
     rng, held, count = np.random.default_rng(6), 0, 2000
     for _ in range(count):
