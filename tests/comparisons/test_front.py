@@ -59,14 +59,6 @@ def lines_of(per_sample, rng, rounds=7, taken=0.0, overhead=6e-3, **more):
 # -- Times -----------------------------------------------------------------------------------------
 
 
-def test_the_largest_rendering_takes_long_enough(rgb):
-    slow = {"kernel": KERNEL, "plan": 100 * KERNEL}
-    _, renderers = lines_of(slow, np.random.default_rng(0))
-    for name, counts in (("plan", [4, 16, 64]), ("kernel", [4, 16, 64, 256, 1024])):
-        assert [spp for own, spp in renderers if own == name] == counts
-        assert min(renderers[name, counts[-1]].times) >= times.LEAST_S
-
-
 def test_overhead_and_time_per_sample_are_found_beside_bursts(rgb):
     lines, _ = lines_of({"kernel": KERNEL, "plan": 10 * KERNEL}, np.random.default_rng(1))
     kernel, plan = lines["kernel"], lines["plan"]

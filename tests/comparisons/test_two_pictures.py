@@ -150,7 +150,7 @@ def test_single_pictures_tell_a_difference_from_noise():
     image = landscape()
     apart = record_of([1.3 * image], [image])
     assert apart.significant.certain
-    for seed in range(20):
+    for seed in range(5):
         first, second = noisy(image, 2, seed, 0.3)
         record = record_of([first], [second])
         assert record.metrics["dE2000"].mean > 3
