@@ -250,6 +250,7 @@ def test_another_curve_than_the_given_one_is_named(rgb):
     assert re.search(r"3\.1\d times as bright as the reference: a missing division by pi", words)
 
 
+@pytest.mark.thorough
 def test_a_picture_is_compared_under_its_curve(run, tmp_path, monkeypatch):
     """A tone-mapped picture of another run is as far as a linear one is: only by noise."""
     monkeypatch.chdir(tmp_path)
