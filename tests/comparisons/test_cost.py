@@ -249,6 +249,7 @@ def test_sizes_that_cannot_be_predicted_or_measured_are_refused(run):
         assert reason in error
 
 
+@pytest.mark.thorough
 def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does(
     rgb, run, monkeypatch
 ):

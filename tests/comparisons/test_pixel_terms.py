@@ -53,6 +53,7 @@ def test_the_grid_has_the_pixel_of_interest_and_the_kernels_value_there():
     require_sum(grid, ready)
 
 
+@pytest.mark.thorough
 @pytest.mark.guarantee("kernel", "The terms of 8.10 on a page add up to the kernel's value.")
 def test_the_terms_add_up_to_what_the_kernel_has():
     for name in [n for n, s in SCENES.items() if s.interpolation == "phong"]:
@@ -196,10 +197,17 @@ FORMS = {
     "flat": {"interpolation": "flat", "tessellation": 8},
     "Gouraud": {"interpolation": "gouraud", "tessellation": 8},
 }
+QUICK = ("wide filter", "Blinn")
 
 
 @pytest.mark.guarantee("kernel", "The layer of each term is the image of that term alone.")
-@pytest.mark.parametrize("form", FORMS.values(), ids=FORMS)
+@pytest.mark.parametrize(
+    "form",
+    [
+        pytest.param(form, id=name, marks=[] if name in QUICK else pytest.mark.thorough)
+        for name, form in FORMS.items()
+    ],
+)
 def test_each_layer_is_the_image_of_a_scene_with_that_term_alone(form):
     def made(coefficients, rfilter="box", **options):
         scene = of_terms(**coefficients)
@@ -238,6 +246,7 @@ def test_what_shines_behind_a_surface_is_emission(rgb):
     assert abs(sum(layers.values()) - whole).max() <= 1e-5 * whole.max()
 
 
+@pytest.mark.thorough
 def test_other_heuristics_and_more_than_64_lights_have_no_layers(rgb):
     assert images("fig-8-9", resolution=(8, 8), heuristic="hemisphere-ambient")[0] == {}
     for count in (64, 65):
