@@ -384,6 +384,12 @@ def test_noise_floor_is_what_noise_alone_gives(metric):
 # --- Blocks, and the doctor -----------------------------------------------------------------------
 
 
+def test_single_precision_is_widened_first():
+    images = np.random.default_rng(0).random((2, 15, 3)).astype(np.float32)
+    found = METRICS["dE2000"](*images[:, None])
+    np.testing.assert_allclose(found, METRICS["dE2000"](*images[:, None].astype(float)), rtol=1e-9)
+
+
 def test_numpy_takes_blocks_of_any_number_of_pixels(monkeypatch):
     images = np.random.default_rng(0).random((2, 15, 3))
     whole = METRICS["dE2000"].difference(*images)
