@@ -155,15 +155,8 @@ def test_the_derivatives_are_those_of_central_differences_in_double_precision(fo
 
 
 @pytest.mark.guarantee("pairing", "A fit recovers the parameters that made an image.")
-@pytest.mark.parametrize(
-    ("form", "loss"),
-    [
-        ("phong", "perceptual"),
-        pytest.param("phong", "linear", marks=pytest.mark.thorough),
-        pytest.param("blinn", "perceptual", marks=pytest.mark.thorough),
-        pytest.param("blinn", "linear", marks=pytest.mark.thorough),
-    ],
-)
+@pytest.mark.parametrize("loss", LOSSES)
+@pytest.mark.parametrize("form", ["phong", "blinn"])
 def test_known_parameters_are_recovered_from_an_image_made_with_them(form, loss, rgb):
     _, image = surface_of(spheres(form))
     wrong = {"k_a": 0.5, "k_d": 0.5, "k_s": 0.2, "n": 5.0}
@@ -245,7 +238,6 @@ def test_a_parameter_under_the_noise_is_not_identifiable(rgb):
     assert lost["n of grey"].reason == "lost in the noise of the physical picture"
 
 
-@pytest.mark.thorough
 def test_the_standard_error_is_the_spread_of_fits_to_noisy_images(rgb):
     surface, image = surface_of(spheres())
     rng, noise, fits = np.random.default_rng(3), 0.01, []
