@@ -60,16 +60,14 @@ def test_shares_are_the_mean_gains_over_all_orders():
 
 def test_drawn_shares_lie_within_their_error_and_add_up():
     players = "abcdefg"
-    for orders in (4, 48):
-        value = game(players)
-        found, errors, drawn = of(players, value, orders=orders)
-        assert drawn == orders
-        whole = value(frozenset(players)) - value(frozenset())
-        assert sum(found) == pytest.approx(whole)
-        assert min(errors) > 0
-        if orders == 48:
-            missed = np.abs(np.subtract(found, by_definition(players, value)))
-            assert (missed < 4 * np.array(errors)).all()
+    value = game(players)
+    found, errors, drawn = of(players, value, orders=48)
+    assert drawn == 48
+    whole = value(frozenset(players)) - value(frozenset())
+    assert sum(found) == pytest.approx(whole)
+    assert min(errors) > 0
+    missed = np.abs(np.subtract(found, by_definition(players, value)))
+    assert (missed < 4 * np.array(errors)).all()
 
 
 # -- Errors without noise --------------------------------------------------------------------------
@@ -115,14 +113,6 @@ def test_noise_is_taken_out_at_any_departure(draw):
         assert floor > 1
         left = abs(np.mean([errors[0] for errors, _ in found]) - true(value))
         assert left < share * floor, value
-
-
-def test_the_jackknife_tells_the_spread():
-    rng = np.random.default_rng(5)
-    repeats = [without_noise(rng, DRAWN["normal"], 0.33)[0] for _ in range(40)]
-    found = np.array([values[0] for values in repeats])
-    stated = [np.sqrt((REPLICATES - 1) * values[1:].var()) for values in repeats]
-    assert 0.8 * found.std() < np.sqrt(np.mean(np.square(stated))) < 2.5 * found.std()
 
 
 @pytest.mark.guarantee(

@@ -7,7 +7,7 @@ from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import LIMIT_SPP, WAVEFRONT, prepare, schedule
+from fotismos.comparisons.prepared import LIMIT_SPP
 
 SMALL = (24, 24)
 
@@ -35,15 +35,3 @@ def test_a_limit_on_samples_stops_first_and_says_so(rgb):
     assert stop.reached > 0.01
     assert plan.spp <= 40
     assert plan.spp == stop.limit_spp
-
-
-def test_a_pass_holds_no_more_samples_than_the_wavefront(rgb):
-    plan = prepare(SCENES["fig-8-9"].source(), Options(resolution=SMALL)).plan
-    for side in (64, 512, 2048, 4096):
-        for spp in (None, 2, 8, 100, 1024):
-            each, passes = schedule(plan, side * side, spp)
-            assert passes % 2 == 0
-            assert passes >= 2
-            assert each == 1 or each * side * side <= WAVEFRONT
-            assert each * passes >= (spp or plan.spp) - passes
-    assert np.prod(schedule(plan, 24 * 24, 64)) == 64

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import jsonschema
 import msgspec
-import numpy as np
 import pytest
 from msgspec import structs
 
@@ -24,7 +23,6 @@ from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.heuristic.errors import InputError
-from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Source
 from fotismos.reports.run import cost_files
@@ -52,7 +50,9 @@ def short():
 # -- A study ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["shadowed", "narrow-band-lamp"])
+@pytest.mark.parametrize(
+    "name", ["shadowed", pytest.param("narrow-band-lamp", marks=pytest.mark.thorough)]
+)
 def test_a_study_has_its_effects_files_and_tables(name, scene_file):
     scene_file.write_text(PLAIN)
     word = scene_file if name == "shadowed" else name
@@ -204,21 +204,13 @@ def test_a_scene_says_why_it_cannot_have_a_method(rgb, tmp_path):
     assert kernels == {"Phong kernel", "kernel with shadows"}
 
 
-def test_size_and_methods_are_of_the_chosen_sensor(rgb):
+def test_the_size_is_of_the_chosen_sensor(rgb):
     several = described(ball={"type": "sphere"}, size=32)
     other = described((4, 0, 1), size=16)["sensor"]
     source = Source("several", several | {"second": other})
     assert reduced(source, Options(sensor=1), WIDTH) == (16, 16)
     assert reduced(source, Options(sensor=1), 8) == (8, 8)
     assert reduced(source, Options(resolution=(48, 24)), 12) == (12, 6)
-
-    def place(sensor, interpolation):
-        graph = ladder(source, sensor=sensor).pairs.of(interpolation).heuristic
-        return graph.instantiate().sensors()[0].world_transform().matrix.numpy()
-
-    flat = place(1, Interpolation.FLAT)
-    np.testing.assert_array_equal(place(1, Interpolation.PHONG), flat)
-    assert (place(0, Interpolation.PHONG) != flat).any()
 
 
 # -- Commands --------------------------------------------------------------------------------------
@@ -258,6 +250,7 @@ def test_sizes_that_cannot_be_predicted_or_measured_are_refused(run):
         assert reason in error
 
 
+@pytest.mark.thorough
 def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does(
     rgb, run, monkeypatch
 ):
@@ -275,8 +268,7 @@ def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does
     assert made["price"]["left_out"]
     assert {sample["threshold"] for sample in made["price"]["samples"]} >= {10.0}
     assert sentence.startswith("At 64x64: ")
-    assert sentence.count(": measured at 12x12, 5 % of the pixels exceed ΔE2000") >= 1
-    assert sentence.count("5 % of the pixels exceed") == sentence.count("measured at 12x12, 5 %")
+    assert ": measured at 12x12, 5 % of the pixels exceed ΔE2000" in sentence
     best, full, chosen = (made[name]["tolerance"]["mean"] for name in ("best", "full", "chosen"))
     assert 0 < best <= full < 10 > chosen
     assert made["chosen"]["seconds"]["low"] <= made["full"]["seconds"]["high"]

@@ -51,7 +51,7 @@ def text_of(rng, most):
 def test_random_settings_are_read_and_come_back_from_the_command_of_a_record():
     """Names of any characters, but for an at sign that an equals sign follows."""
     rng, count = np.random.default_rng(1), 0
-    for _ in range(1500):
+    for _ in range(300):
         name, pattern = text_of(rng, 20).strip(), f"{text_of(rng, 15)}.exr"
         if not name or re.search("@.*=", name):
             continue
@@ -70,7 +70,7 @@ def test_random_settings_are_read_and_come_back_from_the_command_of_a_record():
         words = [options["--picture"]]
         assert EngineTimes.of(words, options["--machine"], options["--kernel-time"]) == given
         count += 1
-    assert count > 1000
+    assert count > 200
 
 
 def test_a_name_ends_at_the_first_time():
@@ -186,30 +186,6 @@ def test_the_right_picture_passes_at_the_smallest_threshold_and_a_changed_one_do
         assert any(odd.startswith(SINGLE) for odd in setting.agreement.odd)
 
 
-def test_the_spread_of_repeats_widens_the_interval_and_a_mean_is_of_single_pictures(
-    found, tmp_path
-):
-    rng = np.random.default_rng(5)
-    noisy = [
-        np.maximum(found.reference.mean + rng.normal(0, 0.02 * n, (SIDE, SIDE, 3)), 0)
-        for n in (1, 2, 1, 2)
-    ]
-    settings = judged(found, tmp_path, {"all": noisy, **{f"no {n}": [noisy[n]] for n in range(4)}})
-    single = [settings[f"no {n}"] for n in range(4)]
-    every = settings["all"]
-    values = [one.error.value for one in single]
-    assert every.error.value == pytest.approx(np.mean(values))
-    for share, *alone in zip(every.visible, *(one.visible for one in single), strict=True):
-        assert share.value == pytest.approx(np.mean([one.value for one in alone]))
-    # Student's quantile of three degrees of freedom.
-    spread = 3.182446 * np.std(values, ddof=1) / 2
-    assert every.error.high - every.error.value >= spread
-    assert every.error.high - every.error.value <= spread + max(
-        one.error.high - one.error.value for one in single
-    )
-    assert not any(odd.startswith(SINGLE) for odd in every.agreement.odd)
-
-
 def test_intervals_of_repeats_hold_the_mean():
     rng, held, count = np.random.default_rng(6), 0, 2000
     for _ in range(count):
@@ -219,51 +195,32 @@ def test_intervals_of_repeats_hold_the_mean():
     assert 0.93 < held / count < 0.97
 
 
-def test_a_picture_that_is_misread_or_moved_is_named(found, tmp_path):
+def test_a_mistake_in_a_picture_is_named(found, tmp_path):
     right = found.reference.mean
-    encoded = np.where(right < 0.0031308, 12.92 * right, 1.055 * right ** (1 / 2.4) - 0.055)
-    wrong = {"encoded": encoded, "mirrored": right[:, ::-1], "right": right, "pi": np.pi * right}
-    settings = judged(found, tmp_path, {name: [image] for name, image in wrong.items()})
-    said = {
-        name: " ".join((*one.agreement.mistakes, *one.agreement.odd))
-        for name, one in settings.items()
-    }
-    assert "values look sRGB-encoded" in said["encoded"]
-    assert "mirrored left to right" in said["mirrored"]
-    assert "a missing division by pi" in said["pi"]
-    for mistake in ("misread", "shifted", "times as bright"):
-        assert mistake not in said["right"]
+    settings = judged(found, tmp_path, {"mirrored": [right[:, ::-1]], "right": [right]})
+    assert any("mirrored left to right" in one for one in settings["mirrored"].agreement.mistakes)
+    assert settings["right"].agreement.mistakes == ()
 
 
 # -- The front -------------------------------------------------------------------------------------
 
 
 def test_given_times_make_a_front_of_their_own_and_no_ratio(found, tmp_path):
-    """Whatever is given, what is measured stays; the front is the one of exact points."""
-    rng = np.random.default_rng(7)
-    for trial in range(6):
-        folder = tmp_path / str(trial)
-        folder.mkdir()
-        names = [f"setting {n}" for n in range(6)]
-        shares = rng.permutation(6) * 0.06 + 0.03
-        images = {
-            name: [changed(found.reference.mean, found.ready.counted, share)]
-            for name, share in zip(names, shares, strict=True)
-        }
-        seconds = {name: float(rng.integers(1, 5)) * 10.0 ** rng.integers(-6, 3) for name in names}
-        settings = judged(found, folder, images, seconds)
-        for name, share in zip(names, shares, strict=True):
-            is_beaten = any(
-                seconds[other] <= seconds[name] and more < share
-                for other, more in zip(names, shares, strict=True)
-            )
-            assert settings[name].front is not is_beaten
-            assert settings[name].ratio is None
-            assert settings[name].seconds.low == settings[name].seconds.high
-        alone = fronted(found.points)
-        for setting in settings.values():
-            assert not set(setting.ties) & {point.method for point in alone}
-    related = judged(found, tmp_path, {"a": [found.reference.mean]}, {"a": 0.0063}, "2.1ms")
+    """Whatever is given, what is measured stays."""
+    right = found.reference.mean
+    images = {
+        name: [changed(right, found.ready.counted, share)]
+        for name, share in (("fast", 0.3), ("slow", 0.1), ("beaten", 0.2))
+    }
+    seconds = {"fast": 1e-9, "slow": 100.0, "beaten": 1000.0}
+    settings = judged(found, tmp_path, images, seconds)
+    assert [settings[name].front for name in images] == [True, True, False]
+    measured = {point.method for point in fronted(found.points)}
+    for setting in settings.values():
+        assert setting.ratio is None
+        assert setting.seconds.low == setting.seconds.high
+        assert not set(setting.ties) & measured
+    related = judged(found, tmp_path, {"a": [right]}, {"a": 0.0063}, "2.1ms")
     assert related["a"].ratio == pytest.approx(3.0)
 
 
@@ -299,7 +256,6 @@ def test_the_command_puts_pictures_on_a_front_at_their_size(rgb, run, tmp_path, 
         ),
         (("--resolution", "24x24"), "it has 20x20 pixels, and --resolution 24x24 is requested"),
         (("--picture", "none @ 1ms=none_*.npy"), "none_*.npy: no file matches"),
-        (("--picture", "none=low_*.npy"), "has no time"),
     ):
         code, _, error = run(*words, *more)
         assert code == 2
@@ -319,9 +275,6 @@ def test_python_puts_arrays_on_a_front_beside_a_scene():
     assert high.picture.files == ("picture 2 1.npy",)
     with pytest.raises(InputError, match="`reference` is for pictures without a scene"):
         fotismos.cost("lambert-sphere", pictures=pictures, reference=grey)
-    clear = np.concatenate([grey, 0 * grey[..., :1]], axis=-1)
-    with pytest.raises(InputError, match="Give the colour behind"):
-        fotismos.cost("lambert-sphere", pictures={"clear @ 1ms": clear})
 
 
 def test_repeats_of_one_seed_are_refused_and_equal_ones_have_no_noise(found, tmp_path):

@@ -256,6 +256,7 @@ def test_the_standard_error_is_the_spread_of_fits_to_noisy_images(rgb):
 # --- Whole fits -----------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", LOSSES)
 def test_the_errors_are_those_of_the_loss_that_was_minimised(name, rgb):
     loss = LOSSES[name]
@@ -386,9 +387,6 @@ def test_what_cannot_be_fitted_is_refused(run, rgb, written, tmp_path):
         fit(builtin("fig-8-9").source(), forms=())
     for words, expected in (
         (("fig-6-10",), "--interpolation phong"),
-        (("fig-8-6a", "--loss", "L1"), "perceptual"),
-        (("no-such-scene",), "built-in"),
-        ((), "Missing argument"),
         (("fig-8-6a", "--variant", "llvm_ad_mono"), "--heuristic-variant llvm_ad_rgb"),
         (("fig-8-9", "--heuristic", plain), f"heuristic {plain} has no parameters to fit"),
         ((CORPUS / "bsdf-mask.xml",), "material of shape-.* needs opaque materials"),

@@ -5,17 +5,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from msgspec import structs
-from msgspec.structs import astuple
 
 from fotismos.comparisons import timing
 from fotismos.comparisons.comparison import MeanError
-from fotismos.comparisons.cost.cost_record import Method, Point
-from fotismos.comparisons.cost.front import at_size, beats, fronted, reach, sufficient
-from fotismos.comparisons.cost.measure import QUICK, Effort, timed, tried
-from fotismos.heuristic.errors import InputError
+from fotismos.comparisons.cost.cost_record import Point
+from fotismos.comparisons.cost.front import beats, fronted, reach, sufficient
+from fotismos.comparisons.cost.measure import timed, tried
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering.renderer import passes
-from tests.shared import cost_records
 
 PIXELS = 64 * 64
 KERNEL = 15e-9
@@ -60,14 +57,6 @@ def lines_of(per_sample, rng, rounds=7, taken=0.0, overhead=6e-3, **more):
 
 
 # -- Times -----------------------------------------------------------------------------------------
-
-
-def test_the_largest_rendering_takes_long_enough(rgb):
-    slow = {"kernel": KERNEL, "plan": 100 * KERNEL}
-    _, renderers = lines_of(slow, np.random.default_rng(0))
-    for name, counts in (("plan", [4, 16, 64]), ("kernel", [4, 16, 64, 256, 1024])):
-        assert [spp for own, spp in renderers if own == name] == counts
-        assert min(renderers[name, counts[-1]].times) >= timing.LEAST_S
 
 
 def test_overhead_and_time_per_sample_are_found_beside_bursts(rgb):
@@ -213,26 +202,3 @@ def test_bias_is_told_from_noise():
     assert (found.method, found.spp) == ("near", None)
     assert found.left == pytest.approx(4.0)
     assert reach(by_law("one", 0.0, 30.0, 1.0, (4,)), 2.0) is None
-
-
-def test_the_time_at_another_size_follows_from_overhead_and_time_per_sample():
-    record = cost_records.record()
-    larger = at_size(record.points, record.methods, (1280, 720))
-    for point, one in zip(record.points, larger, strict=True):
-        method, samples = record.method(point.method), 1280 * 720 * point.spp
-        overhead, per_sample = map(astuple, (method.overhead_s, method.per_sample_s))
-        expected = np.add(overhead, np.multiply(samples, per_sample))
-        assert astuple(one.seconds) == pytest.approx(expected)
-        assert one.error == point.error
-
-
-def test_errors_are_measured_at_powers_of_four():
-    random, sure = (
-        Method(name="any", family="physical", monte_carlo=each) for each in (True, False)
-    )
-    assert Effort(largest=100).counts(random) == (4, 16, 64)
-    assert Effort(largest=2).counts(random) == (2,)
-    assert Effort().counts(sure) == (4, 16)
-    assert QUICK.counts(sure) == QUICK.counts(random) == (4, 16)
-    with pytest.raises(InputError, match="rounds"):
-        Effort(rounds=1)

@@ -158,6 +158,36 @@ def test_a_window_of_too_many_pixels_is_refused(tmp_path, reference, capfd):
     assert "its display window has 200001x200001 pixels, and at most" in message
 
 
+def test_files_of_other_colours_or_windows_are_refused(tmp_path, reference, capfd):
+    """Also several parts, objects of Python, and pipes."""
+    colours = {"RGB": sound()}
+    far = (np.array([50, 50], np.int32), np.array([81, 73], np.int32))
+    exr(tmp_path / "primaries.exr", colours, chromaticities=(0.3,) * 8)
+    exr(tmp_path / "window.exr", colours, displayWindow=far)
+    header = {"type": OpenEXR.scanlineimage}
+    parts = [OpenEXR.Part(dict(header), dict(colours), name) for name in ("left", "right")]
+    with OpenEXR.File(parts) as file:
+        file.write(str(tmp_path / "parts.exr"))
+    np.save(tmp_path / "objects.npy", np.array([None]), allow_pickle=True)
+    Image.new("CMYK", (32, 24)).save(tmp_path / "inks.jpg")
+    Image.fromarray(np.full((*SIZE, 4), 128, np.uint8)).save(tmp_path / "clear.png")
+    os.mkfifo(tmp_path / "pipe.exr")
+    for name, message in {
+        "primaries.exr": "span no colours",
+        "window.exr": "lies outside its display window",
+        "parts.exr": "it has 2 parts, 'left', 'right'. Save the",
+        "parts.exr:right": "it has 2 parts, 'left', 'right'",
+        "objects.npy": "not a readable NPY file",
+        "inks.jpg": "its colours are CMYK. Save it as RGB",
+        "pipe.exr": "it is not a regular file",
+        "x.tga": "pictures are .exr or .png or .jpg",
+    }.items():
+        assert message in refusal(capfd, [tmp_path / name], reference)
+    for over in ("red", "1,2", "1,2,-3", "1,2,nan"):
+        said = refusal(capfd, [tmp_path / "clear.png"], reference, over=over)
+        assert f"over = {over} is not allowed" in said
+
+
 def test_layers_are_those_of_exr_files(tmp_path, reference, capfd):
     for suffix in (".png", ".npy"):
         WRITERS[suffix](tmp_path / f"x{suffix}", sound())
@@ -238,23 +268,15 @@ def with_alpha(alpha):
 
 REFUSED = (
     (one(np.nan), r"1 of 768 pixels, the first at (x, y) = (4, 3), are NaN or infinite"),
-    (one(np.inf), "(4, 3), are NaN or infinite"),
     (one(-np.inf), "(4, 3), are NaN or infinite"),
     (one(-1.0), "(4, 3), are negative"),
     (one(1.1e18), "(4, 3), are above 1e+18"),
-    (one(1e300), "(4, 3), are above 1e+18"),
     (np.full((*SIZE, 3), np.nan), "768 of 768 pixels"),
-    (np.full((*SIZE, 3), -1.0), "768 of 768 pixels"),
     (with_alpha(0.0), "the pictures are transparent, everywhere"),
-    (with_alpha(-1.0), "the pictures are transparent, everywhere"),
     (with_alpha(np.nan), "are NaN or infinite"),
-    (sound((12, 16)), "): the last is 2 times as wide and 2 times as high as"),
     (sound((25, 32)), "): the last is 1.04 times as high as the first"),
     (sound((32, 24)), "): the last is 1.33 times as wide and 0.75 times as high"),
     (sound() > 0.5, "type bool is not a picture"),
-    (sound() + 1j, "type complex64 is not a picture"),
-    (np.array([["a"]]), "is not a picture"),
-    (np.ones(3), "is not a picture"),
     (np.float64(3), "is not a picture"),
     (np.ones((2, 3, 4, 3)), "is not a picture"),
     (np.ones((*SIZE, 2)), "is not a picture"),
@@ -299,14 +321,14 @@ def test_large_and_small_values_are_compared(tmp_path):
             assert np.isfinite(record.agreement.ratio).all()
 
 
-SHAPES = ((1, 1), (1, 2), (2, 1), (1, 40), (40, 1), (2, 2), (3, 3), (5, 7), (8, 8), (2, 300))
+SHAPES = ((1, 1), (1, 2), (40, 1), (2, 2), (5, 7), (2, 300))
 
 
 def test_small_pictures_are_compared_and_not_said_to_be_moved(tmp_path):
     """Chance aligns the edges of few pixels, also of equal pictures."""
     for shape in SHAPES:
         assert of_arrays(tmp_path, sound(shape), sound(shape)).agreement.mistakes == ()
-        for seed in range(2, 6):
+        for seed in range(2, 5):
             record = of_arrays(tmp_path, sound(shape, seed))
             said = " ".join(record.agreement.mistakes)
             assert "shifted" not in said, (shape, seed)
@@ -316,11 +338,10 @@ def test_small_pictures_are_compared_and_not_said_to_be_moved(tmp_path):
         assert "Each picture is one colour" in record.caution
 
 
-@pytest.mark.parametrize("shape", [(1, 1), (1, 40), (3, 3)])
-def test_repeats_of_small_pictures_have_noise(shape, tmp_path):
+def test_repeats_of_a_single_pixel_have_noise(tmp_path):
     names = [f"{half}{number}.npy" for half in "ir" for number in range(4)]
     for seed, name in enumerate(names):
-        np.save(tmp_path / name, sound(shape, seed))
+        np.save(tmp_path / name, sound((1, 1), seed))
     record = compared([tmp_path / "i*.npy"], [tmp_path / "r*.npy"])
     assert record.metrics["dE2000"].noise_floor > 0
 

@@ -1,10 +1,10 @@
-"""The metrics against colour-science and FLIP's authors, at their limits, and summed up."""
+"""The metrics against colour-science, at their limits, and summed up; by Dr.Jit and by NumPy."""
 
 import colour
 import numpy as np
 import pytest
 
-from fotismos.comparisons.departure import definitions
+from fotismos.comparisons.departure import arrays, definitions
 from fotismos.comparisons.departure.colour import (
     Viewing,
     cam16ucs_unclipped,
@@ -178,23 +178,18 @@ def test_known_extremes():
     assert LEADING(two, four, Viewing(exposure=0.25)) > 10.0
 
 
-def declared(label, **more):
-    """A metric with a label and nothing of note."""
-    made = {"name": "mine", "unit": "1", "definition": "", "caution": "", "map_range": (0, 1)}
-    return Metric(label=label, **made, **more)
-
-
-def test_a_heading_says_mean_once():
-    assert declared("Contrast").heading == "Contrast, mean"
-    assert declared("Mean contrast").heading == "Mean contrast"
-
-
 def test_the_former_name_of_a_root_mean_square_still_works():
+    declared = {
+        "name": "mine",
+        "label": "Contrast",
+        "unit": "1",
+        "definition": "",
+        "caution": "",
+        "map_range": (0, 1),
+    }
     with pytest.warns(DeprecationWarning, match="averages_squares"):
-        former = declared("Contrast", linear=True)
-    for metric in (former, declared("Contrast", averages_squares=True)):
-        assert metric.mean(np.array([3.0, 4.0])) == pytest.approx(12.5**0.5)
-    assert declared("Contrast").mean(np.array([3.0, 4.0])) == 3.5
+        former = Metric(**declared, linear=True)
+    assert former.mean(np.array([3.0, 4.0])) == pytest.approx(12.5**0.5)
 
 
 def test_log2_ratio_is_signed_and_defined_at_black():
@@ -289,7 +284,7 @@ def test_errors_of_the_literature_are_as_defined():
 
 
 def test_a_pixel_that_is_not_finite_is_named_with_layer_count_and_place():
-    for wrong in (np.nan, np.inf, -np.inf):
+    for wrong in (np.nan, np.inf):
         bad = np.zeros((4, 5, 3))
         bad[2, 3, 1] = bad[3, 0, 0] = wrong
         with pytest.raises(NonFiniteError, match=r"test image: 2 of 20 .* \(x, y\) = \(3, 2\)"):
@@ -386,7 +381,22 @@ def test_noise_floor_is_what_noise_alone_gives(metric):
     assert noise_floor(metric, reference, 0 * first, mask) == 0.0
 
 
-# --- Metrics from outside, and the doctor ---------------------------------------------------------
+# --- Blocks, and the doctor -----------------------------------------------------------------------
+
+
+def test_single_precision_is_widened_first():
+    images = np.random.default_rng(0).random((2, 15, 3)).astype(np.float32)
+    found = METRICS["dE2000"](*images[:, None])
+    np.testing.assert_allclose(found, METRICS["dE2000"](*images[:, None].astype(float)), rtol=1e-9)
+
+
+def test_numpy_takes_blocks_of_any_number_of_pixels(monkeypatch):
+    images = np.random.default_rng(0).random((2, 15, 3))
+    whole = METRICS["dE2000"].difference(*images)
+    monkeypatch.setattr(arrays, "PIXELS", 7)
+    for count in (0, 1, 7, 15):
+        found = METRICS["dE2000"].difference(*images[:, :count])
+        np.testing.assert_allclose(found, whole[:count], rtol=1e-12)
 
 
 def test_the_doctor_finds_the_metrics_as_defined(monkeypatch):

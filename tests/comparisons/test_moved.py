@@ -1,13 +1,13 @@
-"""What a check calls moved: false alarms at the stated rate, power, and statistics gone wrong.
+"""What a check calls moved: false alarms at the stated rate, and values of the statistic.
 
-Passes are drawn here, by NumPy, so that thousands of checks take a second. Alarms are counted
-against bounds that a right statistic leaves once in a thousand runs; broken ones must leave them.
+Passes are drawn here, by NumPy, so that hundreds of checks take a second. Alarms are counted
+against bounds that a right statistic leaves once in a thousand runs.
 """
 
 import numpy as np
 import pytest
 from msgspec import structs
-from scipy import special, stats
+from scipy import stats
 
 from fotismos.comparisons.check import measurement as measuring
 from fotismos.comparisons.check import moved as moving
@@ -55,11 +55,11 @@ def skewed(rng):
     return rng.lognormal(sigma=1.0, size=(PASSES, 102))
 
 
-def alarms(draw, checks, level, differences=moving.differences):
+def alarms(draw, checks, level):
     """Count the checks that alarm though both sides are drawn alike."""
     rng = np.random.default_rng(11)
     return sum(
-        bool(moving.moved(differences(*(measured(draw(rng)) for _ in range(2))), level))
+        bool(moving.moved(moving.differences(measured(draw(rng)), measured(draw(rng))), level))
         for _ in range(checks)
     )
 
@@ -71,63 +71,16 @@ def bounds(checks, level):
 # --- False alarms ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("level", [0.01, 0.2])
-def test_normal_noise_alarms_at_the_stated_rate(level):
-    least, most = bounds(1000, level * 102 / (103 + len(METRICS)))
-    assert least <= alarms(normal, 1000, level) <= most
+def test_normal_noise_alarms_at_the_stated_rate():
+    level = 0.2
+    least, most = bounds(400, level * 102 / (103 + len(METRICS)))
+    assert least <= alarms(normal, 400, level) <= most
 
 
 @pytest.mark.guarantee("checks", "Heavy-tailed noise raises alarms no more often than stated.")
 @pytest.mark.parametrize("draw", [fireflies, skewed])
 def test_noise_of_heavy_tails_alarms_no_more_than_stated(draw):
     assert alarms(draw, 500, 0.05) <= bounds(500, 0.05)[1]
-
-
-def with_errors(side, factor):
-    """The same with all errors multiplied."""
-
-    def scaled(one):
-        return structs.replace(one, error=tuple(factor * error for error in one.error))
-
-    halves = {name: getattr(side, name) for name in measuring.HALVES}
-    return structs.replace(side, **{
-        name: structs.replace(scaled(one), blocks=tuple(tuple(map(scaled, row))
-                                                        for row in one.blocks))
-        for name, one in halves.items()
-    })  # fmt: skip
-
-
-def one_sided(before, after):
-    """The baseline's own doubt forgotten."""
-    return moving.differences(with_errors(before, 0), after)
-
-
-def normal_not_t(before, after):
-    """The normal distribution in place of Student's."""
-    moves = moving.differences(before, after)
-    return [
-        structs.replace(m, p=p, p_corrected=moving.sidak(p, len(moves)))
-        for m in moves
-        for p in [2 * special.ndtr(-abs(m.standard_errors or 0.0))]
-    ]
-
-
-def uncorrected(before, after):
-    """Each of all the tests at the level of the whole."""
-    return [structs.replace(m, p_corrected=m.p) for m in moving.differences(before, after)]
-
-
-def standard_deviations(before, after):
-    """The spread of passes taken for the error of their mean: nothing is ever seen."""
-    return moving.differences(with_errors(before, 4), with_errors(after, 4))
-
-
-@pytest.mark.parametrize(
-    "broken", [one_sided, normal_not_t, uncorrected, standard_deviations], ids=lambda f: f.__name__
-)
-def test_a_broken_statistic_leaves_the_bounds(broken):
-    least, most = bounds(400, 0.2 * 102 / (103 + len(METRICS)))
-    assert not least <= alarms(normal, 400, 0.2, broken) <= most
 
 
 def test_shared_significance_is_that_of_all_checks():

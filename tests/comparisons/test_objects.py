@@ -6,13 +6,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from fotismos.comparisons.attribution import BIAS, by_object, with_effects_named
+from fotismos.comparisons.attribution import with_effects_named
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure import regions
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.steps import steps
-from fotismos.reference.rendering import sums
 from fotismos.reference.rendering.gbuffer import ObjectIds, gbuffer
 from tests.shared import records
 from tests.shared.parts import CENTRE, RADIUS, moved, shadowed
@@ -54,28 +53,6 @@ def test_what_is_removed_on_shapes_averages_to_that_of_the_image(compared):
     for row in why.objects:
         total = sum(removes.value for removes in row.removes) + row.left
         assert total == pytest.approx(row.departure)
-
-
-def test_intervals_on_shapes_tell_the_spread_of_replicates():
-    """Noise of known size in the replicates of one shape, none in those of another."""
-    rng = np.random.default_rng(5)
-    counted = np.array([[True, True, True], [True, True, False]])
-    owners = ObjectIds(np.array([[0, 0, 1], [1, 1, 1]]), ("noisy", "still"))
-    spread = rng.normal(size=8)
-    left_out = [(spread.sum() - each) / 7 for each in spread]
-    means = np.array([spread.mean(), *left_out])
-    removed = np.stack([means, means, *[np.full(9, 2.0)] * 3], axis=1)
-    departure = np.where(counted, 3.0, 0)
-    by_both_rules = np.stack([removed, removed])
-    rows = by_object(departure, {"shadow": by_both_rules}, departure[counted], counted, owners)
-    found = {row.name: row for row in rows}
-    still, noisy = found["still"], found["noisy"]
-    assert (still.pixels, noisy.pixels) == (3, 2)
-    assert still.removes[0] == sums.Interval(value=2.0, low=2.0 - 3 * BIAS, high=2.0 + 3 * BIAS)
-    error = spread.std(ddof=1) / np.sqrt(len(spread))
-    expected = sums.student(spread.mean(), error, len(spread), 3 * BIAS)
-    assert noisy.removes[0].value == pytest.approx(expected.value)
-    assert noisy.removes[0].high == pytest.approx(expected.high)
 
 
 def test_pixels_belong_to_the_surface_that_their_ray_meets(compared):

@@ -11,18 +11,25 @@ from fotismos.comparisons.audit import diagnosis, probes
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic import heuristics
-from fotismos.reference.scene.source import Source
 from fotismos.reports import verdict
 from tests.shared.opengl import opengl
 from tests.shared.parts import camera, look_at, moved
 from tests.shared.planted_shaders import MESSAGES, SHADERS
 
-SUFFIXES = {".glsl": [pytest.mark.thorough, opengl], ".py": []}
-EACH = [pytest.param(s, id=s.name, marks=SUFFIXES[s.suffix]) for s in SHADERS]
+
+def each_shader(quick):
+    """Return parameters of all shaders, of which those of some names are quick."""
+    parameters = []
+    for shader in SHADERS:
+        marks = [] if shader.name in quick else [pytest.mark.thorough]
+        if shader.suffix == ".glsl":
+            marks.append(opengl)
+        parameters.append(pytest.param(shader, id=shader.name, marks=marks))
+    return parameters
+
 
 HEAD = """import fotismos  # isort: skip
 import drjit as dr
@@ -85,7 +92,7 @@ def written(folder, body):
 
 
 @pytest.mark.guarantee("runs", "Twelve kinds of mistakes are named in five shaders, 60 in all.")
-@pytest.mark.parametrize("shader", EACH)
+@pytest.mark.parametrize("shader", each_shader(quick={"Blinn"}))
 def test_planted_mistakes_are_named(rgb, tmp_path, shader):
     for number, (kind, message) in enumerate(MESSAGES.items()):
         path = tmp_path / f"wrong{number}{shader.suffix}"
@@ -96,13 +103,14 @@ def test_planted_mistakes_are_named(rgb, tmp_path, shader):
         assert re.search(is_number, said), (kind, said)
 
 
-@pytest.mark.parametrize("shader", EACH)
+@pytest.mark.parametrize("shader", each_shader(quick={"Lambert", "Blinn", "Cook-Torrance"}))
 def test_nothing_is_said_of_the_right_ones(rgb, tmp_path, shader):
     path = tmp_path / f"right{shader.suffix}"
     path.write_text(shader.text(), encoding="utf-8")
     assert diagnosis.describe(str(path)) == ()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("body", OTHERS.values(), ids=OTHERS)
 def test_nothing_is_said_of_what_is_meant(rgb, tmp_path, body):
     assert diagnosis.describe(written(tmp_path, body)) == ()
@@ -153,6 +161,7 @@ KEPT = {
 SHINING = "value += point.prepared * m.base_color + I * m.base_color * {}"
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     ("cosine", "message"),
     {
@@ -185,9 +194,8 @@ def test_a_shader_that_breaks_in_a_probe_is_compared_all_the_same(rgb, tmp_path,
     assert diagnosis.describe(path) == ()
 
 
-def compared(source, path):
-    options = Options(heuristic=path, resolution=(16, 12), spp=8)
-    case = open_case(source, options)
+def compared(source, path, **options):
+    case = open_case(source, Options(heuristic=path, resolution=(16, 12), spp=8, **options))
     return compare(case.source, case.options, then=steps(case.options, False)).record
 
 
@@ -205,7 +213,7 @@ def test_the_textbook_stands_beside_a_wrong_shader_and_no_advice_to_trace(rgb, t
 
 def test_the_textbooks_error_is_that_of_its_own_picture(rgb):
     path = Path(__file__).parents[2] / "docs/shaders/phong.py"
-    for scene in ("fig-8-9", "plastic-spheres", "fig-8-11-n9"):
+    for scene in ("plastic-spheres", "fig-8-11-n9"):
         record = compared(scene, str(path))
         assert record.textbook == pytest.approx(record.metrics[LEADING.name].mean, rel=1e-3)
         assert record.textbook > 0.1
@@ -251,6 +259,8 @@ OWN = {
 }  # fmt: skip
 """Scenes of Mitsuba's own parts."""
 
+BUILT_IN = ("fig-6-10", "fig-8-9", "plastic-spheres", "two-intensities", "narrow-band-lamp")
+
 
 @pytest.mark.thorough
 @opengl
@@ -258,27 +268,13 @@ OWN = {
     "runs", "Of five right shaders nothing is said, on built-in scenes and others."
 )
 def test_nothing_is_said_of_right_shaders_on_scenes(rgb, tmp_path):
-    paths = [tmp_path / f"right{number}{s.suffix}" for number, s in enumerate(SHADERS)]
-    for path, shader in zip(paths, SHADERS, strict=True):
+    """What is said depends on the shader alone: scenes take turns."""
+    for shader, parts, name in zip(SHADERS, OWN.values(), BUILT_IN, strict=True):
+        path = tmp_path / f"right{shader.suffix}"
         path.write_text(shader.text(), encoding="utf-8")
-    for name, parts in OWN.items():
-        scene = {"type": "scene", "view": VIEW, "floor": FLOOR} | (parts or {})
-        source = Source(name, scene if parts else mi.cornell_box())
-        for path in paths:
-            options = Options(heuristic=str(path), resolution=(16, 12), spp=8)
-            found = compare(source, options, then=steps(options, False))
-            assert found.record.mistakes == (), (name, path)
-            assert np.isfinite(found.record.textbook)
-    # What is said depends on the shader alone: built-in scenes take turns.
-    for number, name in enumerate(SCENES):
-        case = open_case(
-            name,
-            Options(
-                heuristic=str(paths[number % len(paths)]),
-                heuristic_variant="llvm_ad_rgb",
-                resolution=(16, 12),
-                spp=8,
-            ),
-        )
-        found = compare(case.source, case.options, then=steps(case.options, False))
-        assert found.record.mistakes == (), name
+        around = {"type": "scene", "view": VIEW, "floor": FLOOR}
+        made = around | parts if parts else mi.cornell_box()
+        for scene in (made, name):
+            record = compared(scene, str(path), heuristic_variant="llvm_ad_rgb")
+            assert record.mistakes == ()
+            assert np.isfinite(record.textbook)

@@ -4,39 +4,16 @@ from copy import copy
 
 import numpy as np
 import pytest
-from msgspec import structs
 
 from fotismos.comparisons import timing
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
 from fotismos.reference.records import plain
-from fotismos.reference.rendering.renderer import passes
 from fotismos.reference.scene.source import Source
-from fotismos.reports.run.scene import _stages
 from fotismos.reports.terminal import tables
 from fotismos.reports.terminal.words import number
 from tests.shared.misplanned import DIFFUSE, lamp, scene
 from tests.shared.parts import moved
-
-
-class Half:
-    """A renderer that notes when it was called."""
-
-    def __init__(self, calls, name):
-        self.calls = calls
-        self.name = name
-        self.variant = "llvm_ad_rgb"
-
-    def render(self, seed):
-        self.calls.append(self.name)
-
-
-def test_the_halves_of_a_pass_alternate(rgb):
-    calls = []
-    halves = (Half(calls, "textbook"), Half(calls, "physical"))
-    for _ in passes(halves, 0, 4):
-        pass
-    assert calls == ["textbook", "physical", "physical", "textbook"] * 2
 
 
 class Timed:
@@ -121,17 +98,6 @@ def test_the_record_has_the_ratio_that_is_shown(rgb):
     if price["ratio"]:
         assert f"x {number(price['ratio']['value'])}" in printed
         assert price["ratio"]["low"] <= price["ratio"]["value"] <= price["ratio"]["high"]
-
-
-def test_the_stages_of_a_run_hold_all_stages_of_a_comparison(rgb):
-    record = comparison()
-    stages = dict.fromkeys(record.time.stages, 1.0) | {"terms": 1.0, "causes": 1.0}
-    total = sum(stages.values()) + record.time.heuristic.total_s + record.time.reference.total_s
-    timed = structs.replace(record, time=structs.replace(record.time, stages=stages))
-    spent = _stages(timed, total)
-    assert spent["metrics"] == pytest.approx(stages["metrics"])
-    assert spent["scenes and plans"] == 3.0
-    assert sum(spent.values()) == pytest.approx(total)
 
 
 def test_a_table_without_a_ratio_says_why(rgb, monkeypatch):

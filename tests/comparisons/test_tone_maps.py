@@ -2,10 +2,10 @@
 
 import json
 import re
+from functools import cache
 from typing import get_args
 
 import colour
-import mitsuba as mi
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from fotismos.comparisons import alignment, picture_mistakes
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.departure import mapped_sums, tone_maps
+from fotismos.comparisons.departure import tone_maps
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
-from fotismos.comparisons.departure.mapped_sums import Light, reference_sums
-from fotismos.comparisons.departure.tone_maps import TONE_MAPS, aces, agx, neutral, reinhard
+from fotismos.comparisons.departure.mapped_sums import reference_sums
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light, aces, agx, neutral, reinhard
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options, ToneMapName
 from fotismos.comparisons.picture_mistakes import Names, NoisyImage
@@ -126,7 +126,7 @@ def test_neutral_is_that_of_khronos():
 
 @pytest.mark.parametrize("name", TONE_MAPS)
 def test_the_noise_is_that_of_means_shown_by_the_curve(rgb, name):
-    """Of 600 runs, whose pictures have noise of their own, the spread is what each run says.
+    """Of 300 runs, whose pictures have noise of their own, the spread is what each run says.
 
     The mean of a run is the curve of the mean, to the bit, whatever the number of passes.
     """
@@ -135,7 +135,7 @@ def test_the_noise_is_that_of_means_shown_by_the_curve(rgb, name):
     counted = np.ones(truth.shape[:2], bool)
     count = 16
     found: dict[str, list[np.ndarray]] = {}
-    for _ in range(600):
+    for _ in range(300):
         reference, difference = reference_sums(name, counted)
         # Of all channels alike in the first row, of each by itself in the second.
         paths = rng.gamma(4.0, 1 / 4.0, (count, *truth.shape))
@@ -166,32 +166,21 @@ def test_the_noise_is_that_of_means_shown_by_the_curve(rgb, name):
         assert_allclose(error, expected, rtol=0.15)
 
 
-def test_without_a_curve_the_sums_are_plain(rgb):
-    reference, difference = reference_sums(None, np.ones((4, 4), bool))
-    assert not isinstance(reference, mapped_sums.MappedReference)
-    assert not isinstance(difference, mapped_sums.MappedDifference)
-
-
 # --- In pictures ---------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def halves():
-    """By scene: the light of the reference, another run of it, the kernel, and what counts."""
-    mi.set_variant("llvm_ad_rgb")
-    found = {}
-    for name in SCENES:
-        ready = prepare(open_case(name, options := Options(resolution=(32, 32), spp=256)).source,
-                        options)  # fmt: skip
-        sums = Accumulator()
-        other = Accumulator()
-        for seed in range(ready.passes):
-            sums.add(ready.reference.render(seed))
-            other.add(ready.reference.render(1000 + seed))
-        light = Light(mean=sums.mean(), standard_error=sums.standard_error())
-        kernel = np.array(ready.heuristic.render(5), float)
-        found[name] = light, other.mean(), kernel, ready.counted
-    return found
+@cache
+def rendered(name):
+    """Return the light of a scene's reference, another run of it, and the pixels that count."""
+    options = Options(resolution=(32, 32), spp=256)
+    ready = prepare(open_case(name).source, options)
+    sums = Accumulator()
+    other = Accumulator()
+    for seed in range(ready.passes):
+        sums.add(ready.reference.render(seed))
+        other.add(ready.reference.render(1000 + seed))
+    light = Light(mean=sums.mean(), standard_error=sums.standard_error())
+    return light, other.mean(), ready.counted
 
 
 def said(picture, light, counted, tone_map=None):
@@ -216,12 +205,14 @@ def saved(image):
     return from_srgb(np.round(255 * to_srgb(image.clip(0, 1))) / 255)
 
 
+@pytest.mark.thorough
 @pytest.mark.guarantee("runs", "The tone map of a picture is named, and none of a linear one.")
-def test_the_curve_of_a_picture_is_named_at_any_exposure(halves):
+def test_the_curve_of_a_picture_is_named_at_any_exposure(rgb):
     """Unless light shown linearly is within a code value of it, or another curve within a tenth."""
     rng = np.random.default_rng(2)
     named = 0
-    for light, other, _, counted in halves.values():
+    for scene in SCENES:
+        light, other, counted = rendered(scene)
         for name, tone_map in TONE_MAPS.items():
             exposure = 2 ** rng.uniform(-3, 3)
             picture = saved(tone_map(exposure * other))
@@ -235,19 +226,21 @@ def test_the_curve_of_a_picture_is_named_at_any_exposure(halves):
             named += f"tone_map={name}`" in words
             # Nothing is said where the right curve is given.
             assert said(saved(tone_map(other)), light, counted, tone_map=name) == ""
-    assert named > 0.8 * len(halves) * len(TONE_MAPS)
+    assert named > 0.8 * len(SCENES) * len(TONE_MAPS)
 
 
-def test_no_curve_is_named_for_right_pictures(halves):
+@pytest.mark.thorough
+def test_no_curve_is_named_for_right_pictures(rgb):
     rng = np.random.default_rng(3)
-    for light, other, _, counted in halves.values():
+    for scene in SCENES:
+        light, other, counted = rendered(scene)
         for exposure in (1, *2 ** rng.uniform(-3, 3, 4)):
             for picture in (exposure * other, saved(exposure * other)):
                 assert "tone-mapped" not in said(picture, light, counted)
 
 
-def test_another_curve_than_the_given_one_is_named(halves):
-    light, other, _, counted = halves["cornell-box"]
+def test_another_curve_than_the_given_one_is_named(rgb):
+    light, other, counted = rendered("cornell-box")
     for name, tone_map in TONE_MAPS.items():
         for given in TONE_MAPS.keys() - {name}:
             assert f"tone_map={name}`" in said(saved(tone_map(2 * other)), light, counted, given)
@@ -258,11 +251,12 @@ def test_another_curve_than_the_given_one_is_named(halves):
     assert re.search(r"3\.1\d times as bright as the reference: a missing division by pi", words)
 
 
+@pytest.mark.thorough
 def test_a_picture_is_compared_under_its_curve(run, tmp_path, monkeypatch):
     """A tone-mapped picture of another run is as far as a linear one is: only by noise."""
     monkeypatch.chdir(tmp_path)
-    ready = prepare(open_case("plastic-spheres", options := Options(resolution=(64, 48))).source,
-                    options)  # fmt: skip
+    options = Options(resolution=(64, 48))
+    ready = prepare(open_case("plastic-spheres").source, options)
     light = np.mean([ready.reference.render(seed) for seed in range(100, 116)], axis=0)
     files = {}
     for name, image in (("linear", light.clip(0)), ("agx", agx(light))):

@@ -13,7 +13,6 @@ import fotismos
 from fotismos.comparisons import pictures, two_pictures
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure import marks
-from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.metrics import LEADING, METRICS
 from fotismos.comparisons.names import as_files
 from fotismos.comparisons.options import Options
@@ -119,24 +118,6 @@ def test_a_first_page_does_not_outlive_its_command(run, two, monkeypatch, fault,
     assert not Path("out").exists()
 
 
-def test_two_pictures_are_a_gate(run, tmp_path, monkeypatch):
-    """A tenth of the pixels changed fails at 5 %, and passes at 20 %."""
-    monkeypatch.chdir(tmp_path)
-    image = landscape()
-    changed = image.copy()
-    changed[:6] *= 3
-    np.save("a.npy", image)
-    np.save("b.npy", changed)
-    words = ("compare", "--reference", "a.npy", "--image", "b.npy", "--max-visible")
-    assert run(*words, 5)[0] == 1
-    assert run(*words, "20%")[0] == 0
-    assert run(*words, 0, "--within", 10)[0] == 1
-    np.save("b.npy", image)
-    code, said, _ = run(*words, 0)
-    assert code == 0
-    assert "a.npy are the same file, byte for byte" in said
-
-
 @pytest.mark.parametrize(("first", "second"), [(8, 8), (8, 6), (3, 2), (5, 1), (1, 4)])
 def test_repeats_of_any_number_give_the_noise(first, second):
     """The floor is that of the noise of both means; all repeats count in the mean."""
@@ -170,7 +151,7 @@ def test_single_pictures_tell_a_difference_from_noise():
     image = landscape()
     apart = record_of([1.3 * image], [image])
     assert apart.significant.certain
-    for seed in range(20):
+    for seed in range(5):
         first, second = noisy(image, 2, seed, 0.3)
         record = record_of([first], [second])
         assert record.metrics["dE2000"].mean > 3
@@ -205,21 +186,6 @@ def test_the_filtered_noise_of_single_pictures_is_no_certain_difference():
             found += marks._is_even(first * part - second, everywhere)
     assert false <= 6  # of 200: three times the stated rate
     assert found >= 180
-
-
-@pytest.mark.parametrize(("first", "second"), [(2, 2), (2, 7), (3, 3), (4, 8)])
-def test_few_repeats_do_not_make_a_share_from_noise(first, second):
-    """The interval holds the truth also where noise is larger than what is visible."""
-    image = landscape()
-    changed = image.copy()
-    changed[:, :8] *= 1.5
-    truth = float((LEADING(changed, image) > 2).mean())
-    for seed in range(2):
-        reference = noisy(image, second, seed, 0.3)
-        for expected, half in ((0.0, image), (truth, changed)):
-            record = record_of(noisy(half, first, 100 + seed, 0.3), reference)
-            share = share_above(record.metrics["dE2000"].visible, 2.0)
-            assert share.low <= expected <= share.high
 
 
 def test_a_mask_and_alpha_say_which_pixels_count(run, tmp_path, monkeypatch):
@@ -257,29 +223,12 @@ def test_a_mask_says_which_pixels_of_a_rendering_count(run, tmp_path, monkeypatc
     assert "the mask has 16x16 pixels, and the pictures 8x8" in error
 
 
-GREY = np.full((8, 8, 3), 0.5)
-BAD = (
-    (
-        {"image": [GREY], "reference": [np.full((8, 16, 3), 0.5)]},
-        {},
-        r"8x8 \(image 0.npy\), 16x8 \(reference 0.npy\): the last is 2 times as wide as",
-    ),
-    ({"image": [0 * GREY], "reference": [0 * GREY]}, {}, "both pictures are black"),
-    ({"image": [GREY], "reference": []}, {}, "two pictures are needed"),
-    ({"image": [GREY], "reference": [GREY]}, {"mask": "none.png"}, "none.png: there is no such"),
-    ({"image": [GREY], "reference": [GREY]}, {"spp": 4}, "`spp`: this needs a scene"),
-)
-
-
-@pytest.mark.parametrize(("given", "options", "message"), BAD)
-def test_what_cannot_be_compared_is_refused(given, options, message):
-    with pytest.raises(InputError, match=message):
-        record_of(**given, **options)
-
-
-def test_doubtful_pictures_are_cautioned():
-    assert "The picture is black" in record_of([0 * GREY], [GREY]).caution
-    assert "one colour" in record_of([GREY], [0.3 * GREY]).caution
+def test_what_cannot_be_compared_is_refused():
+    grey = np.full((8, 8, 3), 0.5)
+    with pytest.raises(InputError, match="two pictures are needed"):
+        record_of([grey], [])
+    with pytest.raises(InputError, match="`spp`: this needs a scene"):
+        record_of([grey], [grey], spp=4)
 
 
 def test_commands_without_a_scene_or_pictures_say_what_is_missing(run):
@@ -312,18 +261,6 @@ def test_a_picture_replaces_the_reference_of_a_scene(run, tmp_path, monkeypatch)
     assert max(map(abs, record["agreement"]["shift"])) < 0.3
 
 
-def test_a_picture_that_equals_the_textbook_half_is_said_to(run, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    words = ("compare", "fig-8-9", "--spp", 16, "--resolution", "64x64", "--no-why")
-    assert run(*words, "-o", "own")[0] == 0
-    file = "own/fig-8-9/comparison.exr:heuristic"
-    said = run(*words, "--image", file)[1]
-    assert "The picture equals the textbook half to ΔE2000 0.01, away from edges." in said
-    brighter = 1.05 * read_file(file).image
-    np.save("brighter.npy", brighter)
-    assert "equals the textbook" not in run(*words, "--image", "brighter.npy")[1]
-
-
 def test_a_notebook_compares_arrays():
     image = landscape()
     shown = fotismos.compare(image=1.5 * image, reference=noisy(image, 4, size=0.02))
@@ -335,6 +272,7 @@ def test_a_notebook_compares_arrays():
         fotismos.compare(image=image)
 
 
+@pytest.mark.thorough
 def test_parameters_are_fitted_to_a_picture_of_another_renderer(run, tmp_path, monkeypatch, rgb):
     """Of repeats of the scene's own reference they are those of a fit of the scene."""
     monkeypatch.chdir(tmp_path)

@@ -129,10 +129,10 @@ def power(pool, passes):
     return float((marked[clearly] == marks.MARKED).mean()) if clearly.any() else 0.0
 
 
-def render(name, samples, count, size=SIZE, make=None):
+def render(name, samples, count, size=SIZE):
     """Render a pool of passes of so many samples per pixel."""
     options = Options(resolution=(size, size), spp=16 * samples, everything=name == "lights")
-    ready = prepare(Source(name, make or CASES[name]), options)
+    ready = prepare(Source(name, CASES[name]), options)
     ready.reference.pass_spp = ready.heuristic.pass_spp = samples
     images = np.empty((count, size, size, 3), np.float32)
     for number in range(count):

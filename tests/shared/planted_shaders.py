@@ -3,7 +3,7 @@
 A shader is a text with named pieces; a kind of mistake replaces one of them.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from string import Template
 
 PYTHON = """import fotismos  # noqa: F401  isort: skip
@@ -118,7 +118,6 @@ class Planted:
     missing: str
     squared: str
     suffix: str = ".py"
-    other: dict[str, dict[str, str]] = field(default_factory=dict)
 
     def text(self, kind: str = "") -> str:
         """Return the text of the shader with a kind of mistake, or the right one."""
@@ -128,7 +127,7 @@ class Planted:
             "missing cosine": {"model": self.missing},
             "squared cosine": {"model": self.squared},
         }
-        changed = (kinds | self.other)[kind] if kind else {}
+        changed = kinds[kind] if kind else {}
         return Template(GLSL if is_glsl else PYTHON).substitute(pieces | changed)
 
 
