@@ -15,7 +15,6 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.plain_scene import material_of
 from fotismos.comparisons.prepared import prepare
 from fotismos.heuristic import DirectionalLight, Material, PointLight, shade
-from fotismos.heuristic.errors import InputError
 from fotismos.reference import Convention, Source
 from fotismos.reference.pairing import halves
 from fotismos.reference.planning.effects import INTERREFLECTION, SPECULAR
@@ -370,13 +369,8 @@ SCENE = """<scene version="3.0.0">
 """
 
 
-@pytest.mark.parametrize(
-    "variant",
-    ["llvm_ad_rgb", *(pytest.param(f"llvm_ad_{kind}", marks=pytest.mark.thorough)
-                      for kind in ("spectral", "mono"))],
-)  # fmt: skip
-def test_a_file_with_a_mirror_is_compared(run, written, tmp_path, variant):
-    words = ("--spp", 16, "--variant", variant, "-o", tmp_path / "out")
+def test_a_file_with_a_mirror_is_compared(run, written, tmp_path):
+    words = ("--spp", 4, "-o", tmp_path / "out")
     code, _, messages = run("compare", written(SCENE, "mirror.xml"), *words)
     assert code in (0, 1), messages
     (record,) = (tmp_path / "out").rglob("comparison.json")
@@ -394,9 +388,3 @@ def test_a_mirror_is_exported_without_k_s_and_not_fitted(run, rgb, written, tmp_
     code, _, messages = run("fit", written(SCENE, "mirror.xml"), "--spp", 16, "-o", tmp_path)
     assert code == 2
     assert "chrome: n is infinite" in messages
-
-
-def test_other_infinities_stay_refused(rgb):
-    for values in ({"n": -inf}, {"n": 1e39}, {"n": float("nan")}, {"k_s": inf}):
-        with pytest.raises(InputError, match=f"{next(iter(values))} = .* not allowed"):
-            pair_of(MIRROR | values).heuristic.instantiate()

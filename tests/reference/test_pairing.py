@@ -213,23 +213,6 @@ def test_a_pair_holds_its_misses_and_warns_of_what_reflects_more_than_it_receive
     assert "1.18" in warning  # 0.9 + 2 · 0.7 / 5
 
 
-def test_the_factor_from_physical_to_heuristic_lights_is_1_over_pi(rgb):
-    for given in (
-        {"type": "point", "position": (1, 2, 3), "intensity": 5.0},
-        {"type": "directional", "direction": (0, 0, -1), "irradiance": 5.0},
-    ):
-        pair = pair_of({"type": "diffuse", "reflectance": 0.5}, given)
-        props = only(pair.heuristic, EMITTER)
-        assert props.plugin_name() == f"heuristic_{given['type']}"
-        assert props["scale"] == pytest.approx(1 / pi)
-        (record,) = pair.pairing.emitters
-        assert record.factor == pytest.approx(1 / pi)
-        assert record.exact
-        if given["type"] == "point":
-            assert [props[name] for name in ("k0", "k1", "k2")] == [0, 0, 1]
-        assert only(pair.physical, EMITTER).plugin_name() == given["type"]
-
-
 def test_the_factor_from_heuristic_to_physical_lights_is_pi(rgb):
     bsdf = {"type": "phong", "k_d": 0.5}
     inverse_square = {"type": "heuristic_point", "position": (1, 2, 3), "k0": 0.0, "k2": 1.0}

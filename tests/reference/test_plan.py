@@ -14,7 +14,7 @@ from fotismos.reference.planning.facts import Facts
 from fotismos.reference.planning.plan import wants_spectra
 from fotismos.reference.scene.source import Source
 from tests.shared import misplanned
-from tests.shared.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron, prune_blindly
+from tests.shared.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron
 from tests.shared.parts import look_at, moved, rgb_of
 from tests.shared.verification import kernel_difference, verify
 
@@ -172,13 +172,6 @@ def test_a_plan_that_is_not_pruned_is_the_one_for_everything(rgb, name):
         for choice in (False, True)
     )
     assert pruned.unpruned() == whole != pruned
-
-
-def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
-    """The verification can fail: with shadows left out it marks the shadow."""
-    prune_blindly(monkeypatch)
-    parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
-    assert verify(Source("wrong", scene(**parts)), Options(spp=256)).significant > 0
 
 
 def test_the_table_of_the_environment_agrees_with_sampling(rgb):

@@ -1,6 +1,5 @@
 """The sampler: stratified as it says, and right in the mean however long paths are."""
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -77,15 +76,6 @@ def test_seeds_and_pixels_do_not_share_numbers(make):
     one, other = (np.array(make(16, 500, seed).next_1d()) for seed in (1, 2))
     assert len(np.unique(np.concatenate([one, other]))) > 0.99 * 16_000
     assert abs(np.corrcoef(one, other)[0, 1]) < 0.05
-
-
-def test_a_clone_goes_on_with_the_same_numbers_and_a_fork_begins_again(make):
-    sampler = make(16, 10)
-    sampler.next_1d()
-    clone, fork = sampler.clone(), sampler.fork()
-    assert dr.all(clone.next_1d() == sampler.next_1d())
-    fork.seed(1, 160)
-    assert dr.all(fork.next_1d() == make(16, 10).next_1d())
 
 
 @pytest.mark.guarantee(
