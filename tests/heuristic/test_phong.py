@@ -41,7 +41,7 @@ def test_samples_follow_the_density(rgb):
 def test_weight_is_value_over_density_which_integrates_to_the_share_of_samples(rgb):
     """At most 1; what is missing is the part of the lobe that is cut off by the surface."""
     rng, count = mi.PCG32(40_000), 40_000
-    wo, solid_angle = spherical_grid()
+    wo, solid_angle = spherical_grid(200)
     context = mi.BSDFContext()
     for values in MATERIALS.values():
         bsdf = mi.load_dict(phong(**values, twosided=True))

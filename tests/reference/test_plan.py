@@ -164,16 +164,6 @@ def test_a_plan_simulates_what_is_asked_for_and_nothing_else(rgb):
     assert plan.simulating(everything - {OCCLUSION}, max_depth=3).integrator == "direct_all"
 
 
-@pytest.mark.parametrize("name", ["fig-8-9", "cornell-box"])
-def test_a_plan_that_is_not_pruned_is_the_one_for_everything(rgb, name):
-    source, size = SCENES[name].source(), (8, 8)
-    pruned, whole = (
-        prepare(source, Options(resolution=size, everything=choice)).plan
-        for choice in (False, True)
-    )
-    assert pruned.unpruned() == whole != pruned
-
-
 def test_the_table_of_the_environment_agrees_with_sampling(rgb):
     """The albedo over view angles against plain Monte Carlo of another size and generator."""
     bsdf = mi.load_dict({"type": "roughplastic", "alpha": 0.3, "int_ior": 2.0})

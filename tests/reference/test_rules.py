@@ -6,7 +6,7 @@ import pytest
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.reference.planning.facts import Facts, Form
+from fotismos.reference.planning.facts import Facts
 from fotismos.reference.planning.rules import (
     CONVEX,
     FEW,
@@ -31,7 +31,6 @@ from tests.shared.misplanned import (
     sphere,
     tube,
 )
-from tests.shared.parts import moved
 from tests.shared.verification import planned, stock
 
 SPP = 256
@@ -108,27 +107,6 @@ def test_a_premise_that_fails_is_named(rgb):
             result = rule.check(facts)
             assert (result.premise, result.applies) == (premise.sentence, False), parts
             assert result.evidence
-
-
-def test_a_mirrored_transform_turns_the_sides_round(rgb):
-    """Mitsuba's sphere then has its normals inside, as with ``flip_normals``."""
-    mirrored = moved(0, (-1, 1, 1))
-    shapes = {
-        "ball": sphere(),
-        "flipped": sphere(flip_normals=True),
-        "mirrored": {"type": "sphere", "to_world": mirrored, "bsdf": DIFFUSE},
-        "both": {"type": "sphere", "to_world": mirrored, "flip_normals": True, "bsdf": DIFFUSE},
-        "box": {"type": "cube", "bsdf": DIFFUSE},
-        "hollow": {"type": "cube", "flip_normals": True, "bsdf": DIFFUSE},
-    }
-    found = {s.name: s for s in facts_of(scene(**shapes, light=lamp((9, 9, 9)))).shapes}
-    sides = {name: (shape.outer, shape.inner) for name, shape in found.items()}
-    out, inside = (True, False), (False, True)
-    assert sides == {
-        "ball": out, "flipped": inside, "mirrored": inside, "both": out, "box": out,
-        "hollow": inside,
-    }  # fmt: skip
-    assert found["ball"].form is Form.CLOSED
 
 
 def test_a_table_over_cosines_is_for_one_isotropic_material(rgb):
