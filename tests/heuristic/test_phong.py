@@ -45,7 +45,7 @@ def test_weight_is_value_over_density_which_integrates_to_the_share_of_samples(r
     context = mi.BSDFContext()
     for values in MATERIALS.values():
         bsdf = mi.load_dict(phong(**values, twosided=True))
-        for degrees in (0, 35, 80, 89, 120):
+        for degrees in (0, 80, 89, 120):
             si = interaction(direction(degrees), count)
             sample2 = mi.Point2f(rng.next_float32(), rng.next_float32())
             bs, weight = bsdf.sample(context, si, rng.next_float32(), sample2)

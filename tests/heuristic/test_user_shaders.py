@@ -168,6 +168,7 @@ def test_a_light_has_the_size_of_its_lamp(rgb, written):
     ))  # fmt: skip
 
 
+@pytest.mark.thorough
 def test_a_representative_point_is_nearer_to_a_lamps_highlight():
     file, found = SHADERS / "representative_point.py", []
     for name in (f"{file}", f"{file}:center"):
@@ -280,7 +281,10 @@ READING = {
 
 
 @pytest.mark.guarantee("runs", "No result of a Python shader is reused, whatever it reads.")
-@pytest.mark.parametrize("way", READING)
+@pytest.mark.parametrize(
+    "way",
+    [pytest.param(way, marks=() if way == "a file" else pytest.mark.thorough) for way in READING],
+)
 def test_a_shader_that_reads_something_is_rendered_again(way, rgb, run, written, monkeypatch):
     level = "level_of()" if way == "late" else "level"
     name = written(f"{READING[way]}\ndef shade(point): return point.ambient * 0 + {level}\n")
@@ -297,7 +301,9 @@ def test_a_shader_that_reads_something_is_rendered_again(way, rgb, run, written,
     assert means[0] != means[1]
 
 
-@pytest.mark.parametrize("variant", ["llvm_ad_spectral", "scalar_rgb"])
+@pytest.mark.parametrize(
+    "variant", ["llvm_ad_spectral", pytest.param("scalar_rgb", marks=pytest.mark.thorough)]
+)
 def test_a_shader_does_not_change_the_variant(rgb, run, written, variant):
     switch = f"import mitsuba as mi\nmi.set_variant('{variant}')\n"
     words = ("compare", "lambert-sphere", "--resolution", "8x8", "--spp", 4, "-o", "out")
@@ -313,6 +319,7 @@ def test_a_shader_does_not_change_the_variant(rgb, run, written, variant):
     assert mi.variant() == "llvm_ad_rgb"
 
 
+@pytest.mark.thorough
 def test_a_shader_does_not_change_how_numpy_handles_errors(rgb, run, written):
     before = np.geterr()
     raising = "import numpy as np\nnp.seterr(all='raise')\n"
