@@ -45,21 +45,6 @@ def test_one_that_only_passes_is_not_there(rgb):
     np.testing.assert_array_equal(passing, nothing)
 
 
-def test_it_is_the_mask_of_an_opaque_one(rgb):
-    opaque = {"type": "phong", "k_d": 0.5, "k_s": 0.3, "n": 9, "twosided": True}
-    mask = {"type": "mask", "opacity": 0.4, "bsdf": opaque}
-    clear = opaque | {"k_d": 0.2, "k_s": 0.12, "transmittance": 0.6}
-    masked, cleared, closed = (ball(bsdf) for bsdf in (mask, clear, opaque))
-    error = np.hypot(masked.std(ddof=1), cleared.std(ddof=1)) / 4
-    assert abs(masked.mean() - cleared.mean()) < 4 * error
-    assert abs(closed.mean() - masked.mean()) > 10 * error
-
-
-def ball(bsdf):
-    """Return the mean of an image of the ball alone, for each of 16 seeds."""
-    return np.array([image.mean() for image in images(bsdf, 16, size=8, fov=10.0)])
-
-
 def images(bsdf, count=1, **film):
     """Render a ball of the material over a floor, between a sky and a lamp."""
     scene = {

@@ -276,31 +276,6 @@ def test_flat_and_gouraud_shading_are_refused_by_wavelength(spectral):
         mi.load_dict(two_balls(twosided=False))
 
 
-@pytest.mark.parametrize("interpolation", [FLAT, GOURAUD])
-def test_an_orthographic_camera_sees_a_plane_evenly(rgb, interpolation):
-    """Then N, L and V are the same everywhere, which is the premise of flat shading."""
-    phong = {"type": "phong", "k_d": 0.3, "k_s": 0.6, "n": 12.0}
-    square = mi.load_dict({"type": "rectangle", "id": "square", "bsdf": phong})
-    pictures = {}
-    for plugin in ("orthographic", "perspective"):
-        scene = {
-            "type": "scene",
-            "integrator": {"type": "heuristic", "interpolation": interpolation.value},
-            "sensor": camera((0.4, -1, 2), size=8, type=plugin)
-            | ({"fov": 30.0} if plugin == "perspective" else {}),
-            "sun": {"type": "heuristic_directional", "direction": (0.5, -0.8, -2)},
-            "square": tessellation.to_mesh(square, 2),
-        }
-        image = np.array(mi.render(mi.load_dict(scene, optimize=False), spp=1))
-        pictures[plugin] = image[2:6, 2:6]
-    material = oracle.Material(k_d=0.3, k_s=0.6, n=12)
-    sun = oracle.Light("directional", 1.0, direction=(0.5, -0.8, -2))
-    view = np.array([(0.4, -1.0, 2.0)])
-    expected = oracle.shade(np.zeros((1, 3)), np.array([(0, 0, 1.0)]), view, material, [sun])
-    np.testing.assert_allclose(pictures["orthographic"], expected.ravel()[0], atol=1e-5)
-    assert np.ptp(pictures["perspective"]) > 0.02
-
-
 # --- A scene's shapes become meshes ---------------------------------------------------------------
 
 TETRAHEDRON = np.array([(1, 1, 1), (-1, -1, 1), (-1, 1, -1), (1, -1, -1)], float)

@@ -120,44 +120,6 @@ def test_what_has_no_direction_has_the_zero_normal(vector_type):
     require_units(parallel, (0, 0, 0), 0)
 
 
-def cube_corner(cuts):
-    """Three square sides at the origin, seen from (1, 1, 1); that in z = 0 is cut into slices.
-
-    The corner touches ``cuts`` triangles of the side in the xy plane (a fan from the origin) and
-    one or two of each other side.
-    """
-    rim = [(1.0, t, 0.0) for t in np.linspace(0, 1, cuts)[:-1]] + [(1.0, 1.0, 0.0), (0, 1.0, 0.0)]
-    points = [(0.0, 0.0, 0.0), *rim, (0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (0.0, 1.0, 1.0)]
-    last = len(rim)
-    x, y, z, xz, yz = 1, last, last + 1, last + 2, last + 3
-    faces = [(0, i, i + 1) for i in range(1, last)]
-    faces += [(0, z, xz), (0, xz, x), (0, y, yz), (0, yz, z)]
-    return DOUBLE(np.array(points).T), Array3u(np.array(faces, np.uint32).T)
-
-
-def test_only_angles_are_indifferent_to_how_a_side_is_cut():
-    """All areas are equal, however many slices there are; the mean counts the slices."""
-    for cuts in (2, 3, 9):
-        points, faces = cube_corner(cuts)
-        for weighting in WEIGHTINGS:
-            x, y, z = rows(vertex_normals(points, faces, weighting))[0]
-            assert y == pytest.approx(x)
-            share = cuts / 2 if weighting == "mean" else 1
-            assert z / x == pytest.approx(share, rel=1e-14), (weighting, cuts)
-
-
-def test_areas_count_what_does_not_touch_the_vertex():
-    """A cut off the corner takes area from the faces around it, and leaves their angles alone."""
-    points = DOUBLE([0, 1, 0, 0, 0.25, 0], [0, 0, 1, 0, 0, 0.25], [0, 0, 0, 1, 0, 0])
-    whole = Array3u([0, 0, 0], [1, 2, 3], [2, 3, 1])
-    cut = Array3u([0, 4, 4, 0, 5, 0, 3], [4, 1, 2, 5, 2, 3, 1], [5, 2, 5, 3, 3, 4, 4])
-    for weighting, share in {"area": 1 / 4, "angle": 1}.items():
-        x, y, z = rows(vertex_normals(points, whole, weighting))[0]
-        assert (y / x, z / x) == pytest.approx((1, 1))
-        x, y, z = rows(vertex_normals(points, cut, weighting))[0]
-        assert (y / x, z / x) == pytest.approx((1, share))
-
-
 @EVERY_WEIGHTING
 def test_faces_without_area_count_nothing(weighting):
     points = SINGLE([0, 1, 0, 2, 0.5], [0, 0, 1, 0, 0], [0, 0, 0, 0, 0])

@@ -212,14 +212,14 @@ def errors(n, form, count, vector_type):
 @pytest.mark.guarantee(
     "kernel", "Highlights are right to 1e-4 for any exponent, light and view; Blinn's to 3e-4."
 )
-@pytest.mark.parametrize("count", [40_000, pytest.param(400_000, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("count", [40_000, pytest.param(400_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("form", "bound"), [("phong", 1e-4), ("blinn", 3e-4)])
 def test_the_lobe_is_right_between_the_tested_points(form, bound, count):
     for n in EXPONENTS:
         assert errors(n, form, count, Array3f)[1].max() < bound, n
 
 
-@pytest.mark.parametrize("count", [20_000, pytest.param(400_000, marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("count", [20_000, pytest.param(400_000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("form", ["phong", "blinn"])
 def test_in_double_precision_the_lobe_is_right_to_its_last_digits(form, count):
     """By 50 digits, where it is farthest from extended precision, which loses more than it."""

@@ -7,12 +7,10 @@ import pytest
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.heuristic import indirect_light, shadow_maps, tessellation
 from fotismos.heuristic.errors import InputError
-from fotismos.heuristic.heuristics import named
 from fotismos.reference.pairing.halves import PairOptions, pair
 from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.scene.source import Source
 from tests.shared.parts import camera, moved
-from tests.shared.random_scenes import is_sound, random_scene
 from tests.shared.sky import sky_above, two_colours
 
 AMBIENT = "hemisphere-ambient"
@@ -211,29 +209,6 @@ def test_a_scene_without_lamps_or_with_too_many_is_refused_with_the_reason(rgb):
             InputError, match=f"heuristic shadow-map cannot shade this scene: {reason}"
         ):
             image(scene, "shadow-map")
-
-
-@pytest.mark.parametrize(
-    ("variant", "seeds"),
-    [
-        ("llvm_ad_rgb", (3, 8)),
-        pytest.param("llvm_ad_mono", (12,), marks=pytest.mark.thorough),
-        pytest.param("llvm_ad_spectral", (28,), marks=pytest.mark.thorough),
-    ],
-    indirect=["variant"],
-)
-def test_random_scenes_are_finite_and_not_negative(variant, seeds, tmp_path):
-    for seed in seeds:
-        graph = pair(Source(f"seed {seed}", random_scene(seed, tmp_path))).heuristic
-        scene = graph.instantiate()
-        for model in (AMBIENT, "shadow-map"):
-            refuse = named(model).refuse
-            if refuse is None or not refuse(scene):
-                other = graph.copy()
-                (integrator,) = other.nodes(mi.ObjectType.Integrator)
-                other.props(integrator)["model"] = model
-                renderer = Renderer(scene, other.instantiate().integrator(), 4, model)
-                assert is_sound(np.array(renderer.render(seed))), (seed, model)
 
 
 def test_vertices_and_faces_are_shaded_too_and_later_passes_replay_the_first(rgb):

@@ -23,8 +23,6 @@ BALLS = {
     "smooth plastic": {"type": "plastic", "diffuse_reflectance": 0.5},
     "null": {"type": "null"},
     "mask": {"type": "mask", "opacity": 0.4, "bsdf": {"type": "diffuse", "reflectance": 0.5}},
-    "diffuse": {"type": "diffuse", "reflectance": 0.5},
-    "rough metal": {"type": "roughconductor", "material": "none", "alpha": 0.2},
 }
 
 

@@ -133,16 +133,6 @@ def test_a_shape_seen_through_both_sides_of_a_hidden_lamp_is_warned_of(rgb):
         assert is_override is (record.plan.integrator == "volpath")
 
 
-def test_what_the_warning_names_is_wrong_in_mitsuba_alone(rgb):
-    """The ball shines inwards, so it lights nothing outside."""
-    described = seen_through_a_ball(body="sphere")
-    made, _ = planned(described)
-    assert np.array(made.reference.render(0)).max() > 5
-    without = {name: part for name, part in described.items() if name != "ball"}
-    made, _ = planned(without)
-    assert np.array(made.reference.render(0)).max() < 1
-
-
 # --- Settings of the scene's own integrator --------------------------------------------------
 
 

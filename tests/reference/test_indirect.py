@@ -43,7 +43,7 @@ def estimate(max_depth, rr_depth=1000, **transport):
     return float(values.mean(dtype=float)), float(values.std(dtype=float)) / COUNT**0.5
 
 
-@pytest.mark.parametrize("max_depth", [2, 3, 4, 6, -1])
+@pytest.mark.parametrize("max_depth", [2, 4, -1])
 def test_each_further_reflection_adds_a_power_of_the_albedo(rgb, max_depth):
     """Light of depth d has been reflected d - 1 times; depth 2 is direct."""
     powers = range(2, max_depth if max_depth > 0 else 200)

@@ -1,10 +1,7 @@
 """What each kind of light declares agrees with what Mitsuba makes of its plugins."""
 
-import pkgutil
-
 import mitsuba as mi
 import numpy as np
-import pytest
 
 from fotismos.heuristic.lights import PLUGINS
 from fotismos.reference import Source
@@ -48,37 +45,3 @@ def test_every_light_of_the_heuristic_has_a_physical_form(rgb):
         (record,) = replaced.emitters
         assert record.given == plugin
         assert record.derived in kind.plugins
-
-
-def test_two_kinds_of_light_with_one_plugin_are_refused():
-    twin = lights.LightKind(plugins=("area",))
-    with pytest.raises(ValueError, match="plugin area"):
-        lights.by_plugin([*lights.KINDS, twin])
-
-
-def test_a_heuristic_light_without_a_physical_form_is_refused(monkeypatch, rgb):
-    """It was once paired as a spot."""
-    without = lights.LightKind(plugins=(), model=PLUGINS["heuristic_point"])
-    monkeypatch.setitem(lights.BY_PLUGIN, "heuristic_point", without)
-    with pytest.raises(NotImplementedError, match="heuristic_point has no physical form"):
-        emitters.to_physical(graph_of("heuristic_point"), None, Replacements())
-
-
-def test_every_rule_of_pairing_exists():
-    rules = {rule for kind in lights.KINDS for rule in (kind.to_heuristic, kind.to_physical)}
-    for rule in rules - {""}:
-        assert callable(pkgutil.resolve_name(f"fotismos.reference.pairing.{rule}"))
-
-
-def test_a_physical_light_is_paired_by_the_rule_of_its_kind(monkeypatch, rgb):
-    """A light without a rule is left out, and so is a shape's light of a kind without shapes."""
-    for rule, derived in (("", "none"), ("emitters:point_to_heuristic", "heuristic_point")):
-        kind = lights.LightKind(plugins=("projector",), to_heuristic=rule)
-        monkeypatch.setitem(lights.BY_PLUGIN, "projector", kind)
-        replaced = Replacements()
-        emitters.to_heuristic(graph_of("projector"), None, False, replaced)
-        assert [record.derived for record in replaced.emitters] == [derived]
-    monkeypatch.setitem(lights.BY_PLUGIN, "area", kind)
-    replaced = Replacements()
-    emitters.to_heuristic(graph_of("area"), None, False, replaced)
-    assert [record.derived for record in replaced.emitters] == ["none"]

@@ -14,7 +14,7 @@ from fotismos.reference.planning.facts import Facts
 from fotismos.reference.planning.plan import wants_spectra
 from fotismos.reference.scene.source import Source
 from tests.shared import misplanned
-from tests.shared.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron, prune_blindly
+from tests.shared.misplanned import BLACK, DIFFUSE, TWO_SIDED, octahedron
 from tests.shared.parts import look_at, moved, rgb_of
 from tests.shared.verification import kernel_difference, verify
 
@@ -162,23 +162,6 @@ def test_a_plan_simulates_what_is_asked_for_and_nothing_else(rgb):
     shallow = plan.simulating(everything, max_depth=3)
     assert (shallow.integrator, shallow.max_depth) == ("path", 3)
     assert plan.simulating(everything - {OCCLUSION}, max_depth=3).integrator == "direct_all"
-
-
-@pytest.mark.parametrize("name", ["fig-8-9", "cornell-box"])
-def test_a_plan_that_is_not_pruned_is_the_one_for_everything(rgb, name):
-    source, size = SCENES[name].source(), (8, 8)
-    pruned, whole = (
-        prepare(source, Options(resolution=size, everything=choice)).plan
-        for choice in (False, True)
-    )
-    assert pruned.unpruned() == whole != pruned
-
-
-def test_a_wrong_rule_would_be_seen(rgb, monkeypatch):
-    """The verification can fail: with shadows left out it marks the shadow."""
-    prune_blindly(monkeypatch)
-    parts = {"ball": ball((0, 0, 0.5), 0.5), "floor": floor(-0.5), "light": lamp((-2, -1, 4))}
-    assert verify(Source("wrong", scene(**parts)), Options(spp=256)).significant > 0
 
 
 def test_the_table_of_the_environment_agrees_with_sampling(rgb):

@@ -1,6 +1,5 @@
 """The sampler: stratified as it says, and right in the mean however long paths are."""
 
-import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -79,15 +78,6 @@ def test_seeds_and_pixels_do_not_share_numbers(make):
     assert abs(np.corrcoef(one, other)[0, 1]) < 0.05
 
 
-def test_a_clone_goes_on_with_the_same_numbers_and_a_fork_begins_again(make):
-    sampler = make(16, 10)
-    sampler.next_1d()
-    clone, fork = sampler.clone(), sampler.fork()
-    assert dr.all(clone.next_1d() == sampler.next_1d())
-    fork.seed(1, 160)
-    assert dr.all(fork.next_1d() == make(16, 10).next_1d())
-
-
 @pytest.mark.guarantee(
     "reference", "Inside a bright sphere the reference is within 0.3 % of the closed form."
 )
@@ -95,7 +85,7 @@ def test_a_clone_goes_on_with_the_same_numbers_and_a_fork_begins_again(make):
     ("reflectance", "spp"),
     [
         pytest.param(reflectance, spp, marks=() if reflectance == 0.8 else pytest.mark.thorough)
-        for reflectance, spp in ((0.5, None), (0.8, None), (0.9, None), (0.95, None), (0.9, 64))
+        for reflectance, spp in ((0.8, None), (0.95, None), (0.9, 64))
     ],
 )
 def test_the_reference_is_right_inside_a_bright_sphere(rgb, reflectance, spp):

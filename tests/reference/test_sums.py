@@ -75,18 +75,3 @@ def test_the_sums_of_halves_are_those_of_their_difference(rgb, scale, kind):
         assert found.noise.any() == is_noisy
         groups = found.grouped.means.reshape(-1, *SIZE, 3)
         np.testing.assert_allclose(groups[0], difference[::8].mean(axis=0))
-
-
-def test_passes_are_left_as_they_are_and_may_be_of_both_kinds(rgb):
-    images = np.random.default_rng(2).exponential(size=(2, 4, *SIZE, 3))
-    before = images.copy()
-    found = []
-    for kinds in (("ndarray", "ndarray"), ("ndarray", "TensorXd"), ("TensorXd", "ndarray")):
-        sums = Accumulator(MEAN), Accumulator(DEVIATION), DifferenceSums(np.eye(*SIZE) > 0)
-        for pair in zip(*images, strict=True):
-            add_difference(sums, [passed(*each) for each in zip(kinds, pair, strict=True)])
-        found.append(sums[2].estimate())
-    np.testing.assert_array_equal(images, before)
-    for other in found[1:]:
-        np.testing.assert_allclose(other.third, found[0].third, rtol=1e-9, atol=1e-15)
-        np.testing.assert_allclose(other.grouped.means, found[0].grouped.means, rtol=1e-12)

@@ -1,7 +1,5 @@
 """Values of parameters, combined: plain ones as in NumPy, others by nodes of the same value."""
 
-from itertools import product
-
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -11,35 +9,10 @@ from fotismos.reference.scene import values
 from fotismos.reference.scene.source import Source
 from tests.shared.parts import camera
 
-NUMBERS = (0.0, 0.25, 1.0, 1.5)
-COLOURS = ((0.0, 0.0, 0.0), (0.2, 0.4, 0.8))
-FORMULAS = {
-    values.product: lambda a, b: a * b,
-    values.total: lambda a, b: a + b,
-    values.share: lambda a, b: a * np.clip(b, 0, 1),
-    values.rest: lambda a, b: a * (1 - np.clip(b, 0, 1)),
-}
-
 
 def graph(**bsdf):
     shape = {"type": "sphere", "bsdf": {"type": "diffuse"} | bsdf}
     return Source("a test", {"type": "scene", "shape": shape, "camera": camera((0, -4, 0))}).parse()
-
-
-@pytest.mark.parametrize("function", FORMULAS, ids=lambda function: function.__name__)
-def test_plain_values_combine_as_in_numpy(rgb, function):
-    weights = NUMBERS if function in (values.share, values.rest) else (*NUMBERS, *COLOURS)
-    for a, b in product((*NUMBERS, *COLOURS), weights):
-        found = function(graph(), a, b)
-        expected = FORMULAS[function](np.asarray(a), np.asarray(b))
-        np.testing.assert_allclose(np.broadcast_to(found, np.shape(expected)), expected)
-
-
-def test_a_blend_of_plain_values_is_linear_and_clipped(rgb):
-    for a, b, weight in product(NUMBERS, COLOURS, (-1.0, 0.0, 0.3, 2.0)):
-        w = np.clip(weight, 0, 1)
-        found = values.blend(graph(), a, b, weight)
-        np.testing.assert_allclose(found, np.asarray(a) * (1 - w) + np.asarray(b) * w)
 
 
 def test_a_texture_combines_in_a_node_that_has_the_value_at_each_point(rgb):

@@ -5,17 +5,10 @@ seeds give intervals: of the mean ΔE2000, of the share of visible pixels, of wh
 and of the closure, whose true value is 0. The true mean and share come from Mitsuba's own
 integrator, which shares no plan with the reference, and the true effects from hybrids, each with
 :data:`FINER` times the samples.
-
-``python -m tests.witnesses.noise FOLDER [SCENE …]`` measures scenes, and keeps what it measured in
-a folder, one JSON file per scene.
 """
 
-import json
-import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
-from time import perf_counter
+from dataclasses import dataclass
 from unittest import mock
 
 import fotismos  # noqa: F401  isort: skip  it finds LLVM before Mitsuba is imported
@@ -32,8 +25,6 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.steps import steps
-from fotismos.reports.terminal import tables
-from tests.shared.noisy_scenes import SCENES
 
 SEEDS = 8
 FINER = 100
@@ -79,7 +70,6 @@ class SceneMeasured:
     scene: str
     departure: float
     numbers: list[Measured]
-    seconds: float
 
     def held(self, *numbers: str) -> tuple[int, int]:
         """Return how many intervals of some numbers hold their truth, and how many there are."""
@@ -95,7 +85,6 @@ class SceneMeasured:
 
 def measured(make) -> SceneMeasured:
     """Compare a scene with different seeds, and find its true values."""
-    begin = perf_counter()
     intervals: dict[str, list[list[float]]] = {}
     kernels = []
     for seed in range(SEEDS):
@@ -121,7 +110,6 @@ def measured(make) -> SceneMeasured:
         numbers=[
             Measured(number, true.get(number, 0.0), found) for number, found in intervals.items()
         ],
-        seconds=perf_counter() - begin,
     )
 
 
@@ -177,31 +165,3 @@ def table(results: Sequence[SceneMeasured]) -> Iterator[tuple[str, ...]]:
         )
         cells = (f"{held} of {count}" if count else "–" for held, count in counts)
         yield result.scene, f"{result.departure:.2f}", *cells
-
-
-def load(folder: Path) -> list[SceneMeasured]:
-    """Return what a folder keeps, in the scenes' order."""
-    results = []
-    for make in SCENES:
-        file = folder / f"{make.__name__}.json"
-        if file.exists():
-            content = json.loads(file.read_bytes())
-            numbers = [Measured(**number) for number in content.pop("numbers")]
-            results.append(SceneMeasured(**content, numbers=numbers))
-    return results
-
-
-def main(arguments: Sequence[str]) -> None:
-    """Measure scenes that a folder does not keep yet, and print the table of all that it keeps."""
-    folder = Path(arguments[0])
-    folder.mkdir(parents=True, exist_ok=True)
-    for make in SCENES:
-        file = folder / f"{make.__name__}.json"
-        if not file.exists() and (make.__name__ in arguments[1:] or not arguments[1:]):
-            file.write_text(json.dumps(asdict(measured(make)), indent=1))
-            print(make.__name__, flush=True)
-    print(*tables.markdown(list(table(load(folder)))), sep="\n")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
