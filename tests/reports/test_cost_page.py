@@ -82,18 +82,9 @@ def test_page_and_terminal_say_which_sample_count_would_pass(study):
         f"No measured method looks right at {size}. About {ceil(spp)} samples per pixel with full"
         " plan would pass;"
     )
-    right = structs.replace(record.points[2], tolerance=MeanError(value=1.0, low=0.9, high=1.1))
-    time = seconds(right.seconds.value)
-    kernel = seconds(record.points[0].seconds.value)
-    cheapest = (
-        f"Cheapest that looks right at {size}: {right.method} with {right.spp} samples, {time}; the"
-        f" textbook kernel takes {kernel} and fails."
-    )
-    for points, expected in ((record.points, more), ((*record.points[:2], right), cheapest)):
-        changed = structs.replace(record, points=points)
-        first, *_ = cost_tables.lines(changed)
-        assert expected in first
-        assert expected in Page(shown(replace(study, record=changed))).text
+    first, *_ = cost_tables.lines(record)
+    assert more in first
+    assert more in Page(shown(study)).text
 
 
 def test_the_page_has_what_is_predicted_and_the_table_marks_the_cheapest(study):

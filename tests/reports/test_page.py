@@ -168,18 +168,6 @@ def test_values_have_three_digits_and_their_unit():
         assert {value: form(value) for value in texts} == texts
 
 
-def test_the_page_has_each_of_its_parts_once_and_no_name_twice():
-    """Scripts are joined into one module, where a second declaration is a syntax error."""
-    folder = templating.TEMPLATES
-    assert {path.stem for path in (folder / "viewer").iterdir()} == set(page.SCRIPTS)
-    assert {path.stem for path in (folder / "styles").iterdir()} == set(templating.STYLES)
-    declared = re.compile(r"^(?:async )?(?:function|class|const|let) (\w+)", re.MULTILINE)
-    sources = ((folder / "viewer" / f"{name}.js").read_text() for name in page.SCRIPTS)
-    found = Counter(name for source in sources for name in declared.findall(source))
-    assert len(found) > 50
-    assert [name for name, count in found.items() if count > 1] == []
-
-
 def test_details_have_what_was_checked_and_every_metric():
     machine = Machine(processor=HOSTILE, cores=2, system="Linux")
     run = RunRecord(command="", stages={"page": 1.5}, failures=(), machine=machine, versions={})
