@@ -24,8 +24,7 @@ from tests.shared.spheres import centres, prepared
 
 SCENE = f"#scene={NOISY_ID}"
 SCENES = (
-    "fig-8-5b", "fig-8-6b", "fig-8-9", "fig-8-11-n9", "fig-6-5-m40", "fig-6-10", "lambert-sphere",
-    "plastic-spheres", "cornell-box", "two-intensities",
+    "fig-8-11-n9", "fig-6-5-m40", "fig-6-10", "plastic-spheres", "cornell-box", "two-intensities",
 )  # fmt: skip
 SCRIPTS = ("page", "images", "terms", "shading", "numbers")
 

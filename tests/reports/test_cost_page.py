@@ -183,16 +183,6 @@ def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_c
         assert text not in bare
 
 
-def test_the_map_of_effects_tells_halves_none_and_what_does_not_count():
-    found = scene_files.view_of(cost_records.explained(noisy())).why.effects
-    assert found.names == cost_records.EFFECTS
-    assert len(set(found.colours)) == 3
-    rows = [found.map[start : start + 12] for start in range(0, 96, 12)]
-    assert rows[0] == "-" * 12
-    assert set(rows[1:-1]) == {"000000222222"}
-    assert rows[-1] == "." * 12
-
-
 def test_a_comparison_with_its_study_replaces_an_earlier_one_as_a_whole(tmp_path, study):
     comparison = noisy()
     scene_files.write(tmp_path, "scene", comparison, study)

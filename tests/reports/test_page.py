@@ -99,19 +99,6 @@ def test_texts_hold_from_the_threshold_at_which_they_begin(record):
     assert len(data["headlines"]) > 1
 
 
-def test_scenes_stand_worst_first_and_have_their_own_anchors(record, pictures):
-    other = copy.deepcopy(record) | {"scene": "second"}
-    for share in other["metrics"]["dE2000"]["visible"]:
-        share |= {"value": 0.9, "high": 1.0}
-    shown = Page(page.render([records.view(record, embedded=pictures), records.view(other)]))
-    ids = [attrs["id"] for _, attrs in shown.tags if "id" in attrs]
-    assert len(ids) == len(set(ids))
-    targets = [attrs["href"][1:] for _, attrs in shown.tags if "href" in attrs]
-    scenes = [target for target in dict.fromkeys(targets) if "=" in target and "&" not in target]
-    assert scenes == ["scene=second", "scene=fig-8-9"]
-    assert set(scenes) < set(ids)
-
-
 def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
     record |= {"scene": HOSTILE, "variant": HOSTILE, "warnings": [HOSTILE]}
     record["command"] = f"fotismos compare '{HOSTILE.replace(chr(39), '')}'"

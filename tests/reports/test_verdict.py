@@ -149,12 +149,6 @@ RULES = {
         scene(price=structs.replace(price(64), ratio=None, reference_s=None)), None, 2.0,
         "64 samples per pixel pass.",
     ),
-    "undecided, with samples": (
-        scene(0.03, 0.08, price=price(64)), None, 2.0,
-        "Too close to call: between 3.00 % and 8.00 % of the pixels differ, and at most 5 % may."
-        " More samples (--spp) decide. 64 samples per pixel pass: 128 times the textbook's time,"
-        " 640 ms.",
-    ),
     "without a price": (scene(), None, 2.0, "The map shows where the pictures differ."),
     "caution": (scene(caution="No pixel sees light."), None, 2.0, "No pixel sees light."),
 }  # fmt: skip
