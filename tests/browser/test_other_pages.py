@@ -23,8 +23,7 @@ light_angle = [0, 60]
 """
 
 PICTURES = "() => [...document.images].map((e) => e.complete && e.naturalWidth)"
-BEYOND = """all => all.map((e) => Math.max(
-  e.getBoundingClientRect().right - innerWidth, e.scrollWidth - e.clientWidth))"""
+BEYOND = "all => all.map((e) => e.getBoundingClientRect().right - innerWidth)"
 
 
 def audited(folder):
@@ -54,7 +53,7 @@ def studied(folder):
     ("make", "whole", "count"),
     [
         (audited, "figure svg", 1),
-        (fitted, ".scroll", 2),
+        (fitted, ".scroll table", 2),
         (studied, ".scroll, .chart svg, .sheet", 5),
     ],
 )

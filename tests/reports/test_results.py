@@ -46,8 +46,6 @@ def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
     record.write_text(content.replace(mean, mean[::-1]))
     assert rendered(run, scene_file, out)
     assert mean[::-1] not in record.read_text()
-    record.unlink()
-    assert rendered(run, scene_file, out)
     with monkeypatch.context() as patched:
         patched.setattr(
             fotismos.heuristic.program, "source_digest", lambda: "terms.diffuse, halved"
@@ -61,7 +59,12 @@ def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
 
 def test_a_scene_in_python_is_never_reused(run, tmp_path):
     path = tmp_path / "my scene.py"
-    path.write_text("import mitsuba as mi\nscene = mi.cornell_box()")
+    parts = {
+        "sensor": {"type": "perspective"},
+        "lamp": {"type": "point", "position": (0, 0, 0)},
+        "ball": {"type": "sphere", "center": (0, 0, 4)},
+    }
+    path.write_text(f"scene = {{'type': 'scene'}} | {parts}")
     out = tmp_path / "out"
     assert [rendered(run, path, out) for _ in range(2)] == [True, True]
 
