@@ -2,6 +2,8 @@
 
 import sys
 
+import pytest
+
 from tests.shared.programs import ROOT, python
 
 PROGRAM = """
@@ -43,6 +45,7 @@ main()
 """
 
 
+@pytest.mark.thorough
 def test_every_module_is_imported_and_a_scene_compared(tmp_path):
     words = ("fig-8-9", "--resolution", "16x16", "--spp", 4, "--workers", 0, "--figures")
     done = python("-c", PROGRAM, "compare", *words, "-o", tmp_path)

@@ -15,21 +15,13 @@ from fotismos.comparisons.names import file_of
 from tests.shared.outputs import results
 from tests.shared.programs import ROOT
 from tests.shared.schemas import schema
-from tests.shared.small_scene import SCENE
+from tests.shared.small_scene import IN_PYTHON, SCENE
 
 ABORTS = """
 import os, signal
 
 def scene():
     os.kill(os.getpid(), signal.SIGABRT)
-"""
-
-
-GOOD = """
-import mitsuba as mi
-
-def scene():
-    return mi.cornell_box()
 """
 
 
@@ -51,7 +43,7 @@ def scenes_in(folder):
 @pytest.mark.thorough
 def test_a_scene_that_kills_its_process_takes_no_other_along(run, apart, folder, tmp_path):
     (folder / "aa.py").write_text(ABORTS)
-    (folder / "c.py").write_text(GOOD)
+    (folder / "c.py").write_text(IN_PYTHON)
     out = tmp_path / "out"
     words = ("compare", *scenes_in(folder), "-o", out, "--spp", 2, "--resolution", "16x16")
     code, _, messages = run(*words)
@@ -68,7 +60,7 @@ def test_a_scene_that_kills_its_process_takes_no_other_along(run, apart, folder,
     record = json.loads((out / "c/comparison.json").read_text(encoding="utf-8"))
     assert str(folder / "c.py") in record["command"]
     before = {path: path.stat().st_mtime_ns for path in out.glob("[ab]/*")}
-    (folder / "aa.py").write_text(GOOD)
+    (folder / "aa.py").write_text(IN_PYTHON)
     assert run(*words)[0] == 0
     assert {path: path.stat().st_mtime_ns for path in out.glob("[ab]/*")} == before
     assert (out / "aa/comparison.json").is_file()

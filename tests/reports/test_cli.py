@@ -155,6 +155,7 @@ SURROUNDINGS = {
 """As in a cell of Jupyter, whose kernel passes its backend on, and as packagers set them."""
 
 
+@pytest.mark.thorough
 def test_a_comparison_ignores_its_surroundings_and_imports_what_it_needs(tmp_path):
     options = ("--no-why", "--resolution", "16x16", "--spp", 4, "--workers", 0, "--figures", "-q")
     words = ("compare", "fig-8-9", *options, "-o", tmp_path)

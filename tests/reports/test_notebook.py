@@ -17,7 +17,7 @@ import fotismos
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.steps import steps
+from fotismos.comparisons.steps import with_terms
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Missing
 from fotismos.reports.notebook import Shown
@@ -68,7 +68,7 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
 def shown():
     """A sphere in front of nothing, wider than high so that no column passes for a row."""
     case = open_case("fig-8-9", Options(spp=4, resolution=(24, 16)))
-    return Shown(compare(case.source, case.options, then=steps(case.options, True)), page="")
+    return Shown(compare(case.source, case.options, then=[with_terms]), page="")
 
 
 @pytest.mark.parametrize("place", [(12, 8), (9, 5)])
@@ -104,6 +104,7 @@ def test_the_users_variant_is_given_back_after_success_and_error(spectral):
     assert scene.ray_intersect(mi.Ray3f((0, 0, -3), (0, 0, 1))).is_valid()
 
 
+@pytest.mark.thorough
 def test_comparisons_in_threads_are_those_of_one_thread(rgb):
     alone = small().comparison.images.reference
     with ThreadPoolExecutor(2) as threads:
