@@ -34,8 +34,11 @@ def commands():
 def clone(tmp_path_factory):
     """A folder with what a clone holds and README's commands name, and a user's files."""
     folder = tmp_path_factory.mktemp("clone")
-    for name in ("docs", "tests", "studies"):
+    for name in ("docs", "studies"):
         (folder / name).symlink_to(ROOT / name)
+    # One of many: tests/test_baselines.py checks all.
+    (folder / "tests/baselines").mkdir(parents=True)
+    shutil.copy(ROOT / "tests/baselines/fig-8-9-llvm_ad_rgb.json", folder / "tests/baselines")
     shutil.copy(ROOT / "run", folder)
     sensor = re.search(r"<sensor.*?</sensor>", SCENE, re.DOTALL)[0]
     rough = SCENE.replace('name="alpha" value="0.2"', 'name="alpha" value="$roughness"')

@@ -19,7 +19,7 @@ from tests.shared.small_scene import SCENE
 
 pytestmark = pytest.mark.thorough
 
-SMALL = ("--spp", "8", "--resolution", "16x16", "-o", "out")
+SMALL = ("--spp", "8", "--resolution", "16x16", "--no-why", "-o", "out")
 COMPARE = ("compare", "a.xml", *SMALL)
 STUDY = """[[part]]
 scene = "lobe"
