@@ -76,7 +76,7 @@ def orphans(mark):
 def folder(tmp_path):
     boxed = SCENE.replace("</film>", '<rfilter type="box"/></film>')
     scripts = {"exit": "import sys\nsys.exit(3)", "kill": "import os\nos.kill(os.getpid(), 9)"}
-    files = {"a.xml": boxed, "text.xml": "no scene", "text.json": "{", "mine.txt": "mine"}
+    files = {"a.xml": boxed, "text.xml": "no scene", "mine.txt": "mine"}
     files |= {"s.toml": STUDY} | {f"{name}.py": text for name, text in scripts.items()}
     for name, text in files.items():
         (tmp_path / name).write_text(text, encoding="utf-8")
