@@ -60,11 +60,15 @@ def test_no_term_is_without_help(visitor):
         assert found - PLAIN == set(), fragment
 
 
-@pytest.mark.parametrize("visitor", [{}, PHONE], indirect=True)
+@pytest.mark.parametrize(
+    "visitor", [{}, PHONE, {"viewport": {"width": 320, "height": 640}}], indirect=True
+)
 def test_targets_are_large_enough_and_nothing_is_clipped(visitor):
     for fragment in VIEWS:
         page = visitor.open(fragment)
         visitor.unfold()
+        width = page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
+        assert width <= 0, fragment
         assert page.evaluate(SMALL) == [], fragment
         assert page.evaluate(CLIPPED) == [], fragment
 

@@ -1,19 +1,8 @@
-"""What holds for the whole page: offline, without scripts, narrow, on paper, for everybody."""
+"""What holds for the whole page: its policy, without scripts, on paper, for everybody."""
 
 import pytest
 
-from tests.browser.conftest import NOISY_ID, PHONE, VIEWS, violations
-
-
-def test_it_opens_from_disk_and_asks_for_nothing_else(visitor):
-    page = visitor.open()
-    assert page.url.startswith("file:")
-    page.get_by_role("link", name="exact").first.click()
-    visitor.wait_for_viewer("exact")
-    visitor.unfold()
-    assert [url for url in visitor.requests if not url.startswith(("data:", "about:"))] == [
-        visitor.report.url
-    ]
+from tests.browser.conftest import NOISY_ID, VIEWS, violations
 
 
 def test_the_policy_stops_what_is_not_the_pages_own(visitor):
@@ -42,25 +31,10 @@ def test_axe_finds_no_violation(visitor):
         if "scene=" in fragment:
             visitor.unfold()
         assert not violations(page), fragment
-
-
-def test_axe_finds_no_violation_in_help_and_details(visitor):
-    page = visitor.open(f"#scene={NOISY_ID}")
     page.keyboard.press("?")
     assert not violations(page)
     page.goto(visitor.report.url.replace("index", "details"))
     assert not violations(page)
-
-
-@pytest.mark.parametrize(
-    "visitor", [PHONE, {"viewport": {"width": 320, "height": 640}}], indirect=True
-)
-def test_a_narrow_screen_scrolls_in_one_direction_only(visitor):
-    for fragment in VIEWS:
-        page = visitor.open(fragment)
-        page.wait_for_timeout(100)
-        width = page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
-        assert width <= 0, fragment
 
 
 @pytest.mark.parametrize("visitor", [{"java_script_enabled": False}], indirect=True)

@@ -195,6 +195,7 @@ for none.
 """
 
 
+@pytest.mark.thorough
 def test_a_kind_of_light_is_found_by_its_declaration_alone():
     """Registered, shaded, paired, planned, exported, checked and named: in a process of its own."""
     ended = python("-m", "tests.shared.trial_light_program")

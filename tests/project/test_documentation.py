@@ -10,10 +10,9 @@ import pytest
 from markdown_it import MarkdownIt
 from matplotlib.collections import PathCollection
 from nbclient import NotebookClient
-from PIL import Image
 from pyarrow import csv, parquet
 
-from docs.figures import accuracy, charts, engines, hero
+from docs.figures import accuracy, charts, engines
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.options import Options
 from fotismos.reports import cli
@@ -80,15 +79,6 @@ def test_the_readmes_example_runs(tmp_path):
     expected = [0.3 + k_d * 0.8 + 0.7 * 0.8**9 for k_d in (0.5, 0.4, 0.3)]
     found = [float(number) for number in re.findall(r"[\d.]+", done.stdout)]
     assert all(abs(a - b) < 1e-5 for a, b in zip(found, expected, strict=True))
-
-
-def test_the_readme_shows_a_picture_with_the_command_that_makes_its_numbers():
-    text = (ROOT / "README.md").read_text()
-    (caption,) = re.findall(r"made by ./run docs -->\n\n(\*`.*)\n", text)
-    assert f"`./run compare {hero.SCENE}`" in caption
-    with Image.open(ROOT / "docs/hero.webp") as picture:
-        assert picture.width >= 900
-    assert (ROOT / "docs/hero.webp").stat().st_size < 150_000
 
 
 def test_the_scenes_of_studies_open_without_values():

@@ -2,7 +2,6 @@
 
 import io
 import json
-import runpy
 import struct
 
 import drjit as dr
@@ -237,27 +236,14 @@ def test_a_normal_map_tilts_to_the_images_right_and_top(rgb, tmp_path, normal):
     )  # Mitsuba softens terminators
 
 
-def test_parts_of_one_name_are_all_there_and_integers_may_stand_for_fractions(rgb, tmp_path):
-    nodes = [{"name": name, "mesh": 0, "translation": [0, 0, z]}
-             for z, name in enumerate(("a", "camera", "a", "a.b", "type", "a 4"))]  # fmt: skip
-    path = glb(tmp_path / "a.glb", nodes, [{}])
+def test_parts_of_one_name_are_all_there(rgb, tmp_path):
+    names = ("a", "camera", "a", "a.b", "type", "a 4")
+    path = glb(tmp_path / "a.glb", [{"name": name, "mesh": 0} for name in names], [{}])
     kinds = [part["type"] for part in made(path).values() if isinstance(part, dict)]
-    assert kinds.count("ply") == len(nodes)
-    assert kinds.count("perspective") == 1
-    byte = np.array([-128, -127, 0, 127], np.int8).tobytes()
-    (tmp_path / "a.bin").write_bytes(bytes(2) + byte)
-    content = {
-        "buffers": [{"uri": "a.bin"}],
-        "bufferViews": [{"buffer": 0, "byteOffset": 2, "byteLength": 4}],
-        "accessors": [{"bufferView": 0, "componentType": 5120, "count": 4, "type": "SCALAR",
-                       "normalized": True}],
-    }  # fmt: skip
-    (tmp_path / "a.gltf").write_text(json.dumps(content))
-    file = runpy.run_path(str(SCRIPT.with_name("gltf_file.py")))["File"](tmp_path / "a.gltf")
-    np.testing.assert_allclose(file.array(0).ravel(), [-1, -1, 0, 1])
+    assert (kinds.count("ply"), kinds.count("perspective")) == (len(names), 1)
 
 
-@pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1), (1, -1, 1)])
+@pytest.mark.parametrize("scale", [(1, 1, 1), (-1, 1, 1)])
 def test_a_mirrored_mesh_without_normals_still_shows_its_front(rgb, tmp_path, scale):
     eye = {"name": "eye", "camera": 0, "translation": [0, 0, 6]}
     material = {"pbrMetallicRoughness": {"metallicFactor": 0.0}}
@@ -301,7 +287,7 @@ def test_what_is_left_out_is_named_once_and_what_cannot_be_read_refused(rgb, tmp
         made(glb(tmp_path / "c.glb", [{"mesh": 0}], [opaque], **packed))
 
 
-@pytest.mark.parametrize("name", ["cornell-box", "fig-6-5-m40", "plastic-spheres"])
+@pytest.mark.parametrize("name", ["cornell-box", "fig-6-5-m40"])
 def test_pixels_see_an_exports_surfaces_where_they_were(rgb, tmp_path, name):
     size = (48, 32)
     case = open_case(name, Options(resolution=size))

@@ -1,8 +1,6 @@
-"""What the package states of itself, and what works with another Mitsuba or without an extra."""
+"""What the package states of itself, and what works with another Mitsuba."""
 
 import re
-import subprocess
-import sys
 import tomllib
 from importlib import metadata
 
@@ -18,39 +16,6 @@ from tests.shared.programs import ROOT, command_line
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
-WITHOUT = """
-import sys
-
-class Hook:
-    def find_spec(self, name, path=None, target=None):
-        if name.partition(".")[0] == "pyarrow":
-            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
-
-sys.meta_path.insert(0, Hook())
-"""
-
-IMPORT = """
-import pkgutil
-from importlib import import_module
-
-names = [name for room in ("heuristic", "reference", "comparisons", "reports") for _, name, _ in
-         pkgutil.walk_packages(import_module(f"fotismos.{room}").__path__, f"fotismos.{room}.")]
-for name in names:
-    if not name.endswith("__main__"):
-        import_module(name)
-"""
-
-RUN = """
-from fotismos.reports.__main__ import main
-sys.argv[0] = "fotismos"
-main()
-"""
-
-
-def without_pyarrow(text, *words):
-    command = [sys.executable, "-P", "-c", WITHOUT + text, *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=ROOT, timeout=300)
-
 
 @pytest.fixture
 def installed(monkeypatch):
@@ -62,9 +27,6 @@ def installed(monkeypatch):
         monkeypatch.setattr(metadata, "version", lambda name: known.get(name) or real(name))
 
     return of
-
-
-# --- Versions --------------------------------------------------------------------------------
 
 
 def test_the_citation_has_the_version_and_its_date():
@@ -113,24 +75,3 @@ def test_a_check_says_once_that_mitsuba_is_another():
     said = "\n".join(summary.lines(made, 0.01))
     assert said.count("Mitsuba 3.9.2 renders here, and 3.9.1 made the baselines") == 1
     assert "renders here" not in "\n".join(summary.lines(made[2:], 0.01))
-
-
-# --- Without pyarrow -------------------------------------------------------------------------
-
-
-def test_every_module_can_be_imported_without_pyarrow():
-    done = without_pyarrow(IMPORT)
-    assert done.returncode == 0, done.stderr
-
-
-def test_a_study_without_pyarrow_names_what_to_install_and_a_comparison_works(tmp_path):
-    study = without_pyarrow(RUN, "study", "studies/phong-roughplastic.toml", "-o", tmp_path)
-    assert study.returncode == 2
-    assert "pyarrow is not installed" in study.stderr
-    assert "pip install pyarrow" in study.stderr
-    assert "Traceback" not in study.stderr
-    assert not list(tmp_path.iterdir())
-    words = ("fig-8-9", "--resolution", "16x16", "--spp", 4, "--workers", 0, "--figures")
-    compared = without_pyarrow(RUN, "compare", *words, "-o", tmp_path)
-    assert compared.returncode == 0, compared.stderr
-    assert (tmp_path / "index.html").exists()

@@ -1,14 +1,16 @@
-"""What Windows lacks is not needed to import the package, or to compare a scene in one process."""
+"""What Windows lacks, and extras, are not needed to import the package or to compare a scene."""
 
-import subprocess
 import sys
 
-from tests.shared.programs import ROOT
+import pytest
 
-WITHOUT = """
-import os, signal, sys
+from tests.shared.programs import ROOT, python
+
+PROGRAM = """
+import os, pkgutil, signal, sys
 import multiprocessing.resource_tracker, multiprocessing.popen_spawn_posix, random, threading
 import filelock  # which has locks of its own on Windows
+from importlib import import_module
 
 for module in ("fcntl", "resource", "termios", "pwd", "grp"):
     sys.modules[module] = None
@@ -19,53 +21,42 @@ for name in ("SIGALRM", "SIGKILL", "setitimer", "ITIMER_REAL", "pthread_sigmask"
 members = {name: value for name, value in signal.Signals.__members__.items()
            if name in ("SIGINT", "SIGTERM", "SIGABRT")}
 signal.Signals = type("Signals", (), {"__members__": members, "__class_getitem__": members.get})
-"""
 
-IMPORT = """
-import pkgutil
-from importlib import import_module
+class Hook:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in ("pyarrow", "moderngl", "dask", "distributed", "nbformat"):
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+sys.meta_path.insert(0, Hook())
 
 import fotismos
-rooms = [__import__(f"fotismos.{room}", fromlist=["x"]) for room in
-         ("heuristic", "reference", "comparisons", "reports")]
-names = [name for room in rooms for _, name, _ in
-         pkgutil.walk_packages(room.__path__, f"{room.__name__}.") if not name.endswith("__main__")]
-optional = ("moderngl", "dask", "distributed")
+names = []
+for room in ("heuristic", "reference", "comparisons", "reports"):
+    package = import_module(f"fotismos.{room}")
+    names += [one.name for one in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
 for name in names:
-    try:
+    if not name.endswith("__main__"):
         import_module(name)
-    except ImportError as error:
-        if error.name not in optional:
-            raise
 print(len(names))
-"""
 
-COMPARE = """
 from fotismos.reports.__main__ import main
-sys.argv = ["fotismos", "compare", "fig-8-9", "--resolution", "16x16", "--spp", "4",
-            "--workers", "0", "-o", sys.argv[1]]
+sys.argv = ["fotismos", *sys.argv[1:]]
 main()
 """
 
 
-def program(*parts, folder):
-    text = "\n".join((WITHOUT, *parts))
-    return subprocess.run(
-        [sys.executable, "-P", "-c", text, str(folder)],
-        capture_output=True,
-        text=True,
-        cwd=ROOT,
-        timeout=300,
-    )
-
-
-def test_every_module_can_be_imported_without_what_windows_lacks(tmp_path):
-    done = program(IMPORT, folder=tmp_path)
+@pytest.mark.thorough
+def test_every_module_is_imported_and_a_scene_compared(tmp_path):
+    words = ("fig-8-9", "--resolution", "16x16", "--spp", 4, "--workers", 0, "--figures")
+    done = python("-c", PROGRAM, "compare", *words, "-o", tmp_path)
     assert done.returncode == 0, done.stderr
-    assert int(done.stdout) > 150
-
-
-def test_a_scene_is_compared_in_one_process(tmp_path):
-    done = program(COMPARE, folder=tmp_path)
-    assert done.returncode == 0, done.stderr
+    assert int(done.stdout.splitlines()[0]) > 150
     assert (tmp_path / "fig-8-9/comparison.json").exists()
+
+
+def test_a_study_without_its_extra_names_what_to_install(run, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    study = ROOT / "studies/phong-roughplastic.toml"
+    code, _, messages = run("study", study, "-o", tmp_path)
+    assert (code, "pip install pyarrow" in messages) == (2, True)
+    assert not list(tmp_path.iterdir())

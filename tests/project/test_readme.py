@@ -3,7 +3,6 @@
 import re
 import shlex
 import shutil
-import subprocess
 from glob import glob
 
 import click
@@ -35,8 +34,11 @@ def commands():
 def clone(tmp_path_factory):
     """A folder with what a clone holds and README's commands name, and a user's files."""
     folder = tmp_path_factory.mktemp("clone")
-    for name in ("docs", "tests", "studies"):
+    for name in ("docs", "studies"):
         (folder / name).symlink_to(ROOT / name)
+    # One of many: tests/test_baselines.py checks all.
+    (folder / "tests/baselines").mkdir(parents=True)
+    shutil.copy(ROOT / "tests/baselines/fig-8-9-llvm_ad_rgb.json", folder / "tests/baselines")
     shutil.copy(ROOT / "run", folder)
     sensor = re.search(r"<sensor.*?</sensor>", SCENE, re.DOTALL)[0]
     rough = SCENE.replace('name="alpha" value="0.2"', 'name="alpha" value="$roughness"')
@@ -84,6 +86,3 @@ def test_the_readme_names_the_commands_that_run_the_report_and_the_tests():
     assert [line.split()[1] for line in first.splitlines()] == ["report", "test"]
     assert "test --all" in commands()
     assert '"./run test --all"' in (ROOT / ".ci/run").read_text()
-    words = [ROOT / "run", "test", "--collect-only", "tests/project/test_fotismos.py"]
-    ended = subprocess.run(words, capture_output=True, text=True, timeout=300)
-    assert (ended.returncode, ended.stderr) == (0, "")

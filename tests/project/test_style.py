@@ -3,8 +3,6 @@
 import ast
 from collections.abc import Iterator
 
-import pytest
-
 from tests.shared.programs import ROOT
 
 ROOMS = ("heuristic", "reference", "comparisons", "reports")
@@ -56,18 +54,16 @@ def faults(node: ast.AST, lines: list[str]) -> Iterator[str]:
                     yield f"an import in {node.name} without its reason"
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_code_is_written_plainly(path):
-    lines = path.read_text().splitlines()
-    found = [
-        f"line {getattr(node, 'lineno', 0)}: {fault}"
-        for node in ast.walk(TREES[path])
-        for fault in faults(node, lines)
-    ]
+def test_code_is_written_plainly():
+    found = []
+    for path, tree in TREES.items():
+        lines = path.read_text().splitlines()
+        for node in ast.walk(tree):
+            place = f"{path.relative_to(ROOT)}, line {getattr(node, 'lineno', 0)}"
+            found += [f"{place}: {fault}" for fault in faults(node, lines)]
     assert found == []
 
 
-@pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.name)
-def test_lines_of_scripts_fit_a_window(path):
-    lines = enumerate(path.read_text().splitlines(), start=1)
-    assert [number for number, line in lines if len(line) > 100] == []
+def test_lines_of_scripts_fit_a_window():
+    lines = [(path.name, line) for path in SCRIPTS for line in path.read_text().splitlines()]
+    assert [(name, line) for name, line in lines if len(line) > 100] == []

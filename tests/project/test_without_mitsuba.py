@@ -9,57 +9,13 @@ from tests.shared import records
 from tests.shared.programs import python
 from tests.shared.two_pictures import measured
 
-MODULES = (
-    "fotismos",
-    "fotismos.comparisons.comparison",
-    "fotismos.comparisons.cost.engine",
-    "fotismos.comparisons.cost.engine_record",
-    "fotismos.comparisons.cost.front",
-    "fotismos.comparisons.cost.timed_pictures",
-    "fotismos.comparisons.departure.arrays",
-    "fotismos.comparisons.departure.blocks",
-    "fotismos.comparisons.departure.colour",
-    "fotismos.comparisons.departure.criterion",
+ROOTS = (
     "fotismos.comparisons.departure.definitions",
-    "fotismos.comparisons.departure.flip",
-    "fotismos.comparisons.departure.marks",
-    "fotismos.comparisons.departure.metrics",
-    "fotismos.comparisons.departure.noise",
-    "fotismos.comparisons.departure.regions",
-    "fotismos.comparisons.departure.statistics",
-    "fotismos.comparisons.names",
-    "fotismos.comparisons.options",
-    "fotismos.comparisons.picture_files",
-    "fotismos.comparisons.picture_formats",
-    "fotismos.comparisons.two_pictures",
-    "fotismos.comparisons.price_record",
-    "fotismos.reference",
-    "fotismos.reference.pairing.pairing_record",
-    "fotismos.reference.planning.decisions",
-    "fotismos.reference.planning.effects",
-    "fotismos.reference.planning.plan_record",
-    "fotismos.reference.records",
-    "fotismos.reference.rendering.finite",
-    "fotismos.reference.rendering.integrators",
-    "fotismos.reference.rendering.sums",
-    "fotismos.reports.charts.cost_charts",
-    "fotismos.reports.charts.theme",
     "fotismos.reports.cli",
-    "fotismos.reports.files.images",
-    "fotismos.reports.files.results",
-    "fotismos.reports.glossary",
-    "fotismos.reports.jobs",
-    "fotismos.reports.page.embedding",
-    "fotismos.reports.page.page",
-    "fotismos.reports.page.scene_view",
-    "fotismos.reports.run.batch",
-    "fotismos.reports.run.cost_files",
-    "fotismos.reports.terminal.cost_tables",
     "fotismos.reports.run.pictures",
-    "fotismos.reports.terminal.tables",
-    "fotismos.reports.verdict",
     "fotismos.reports.work.cost",
 )
+"""They import the others."""
 
 WITHOUT = """
 import sys
@@ -131,7 +87,7 @@ print(json.dumps(plain(found)))
 
 
 def test_modules_for_two_pictures_are_imported_without_mitsuba():
-    done = python("-c", IMPORTED, *MODULES)
+    done = python("-c", IMPORTED, *ROOTS)
     assert done.stdout == "0\n", done.stderr
 
 
@@ -156,13 +112,6 @@ def test_two_pictures_are_measured_recorded_and_shown_without_mitsuba(rgb, tmp_p
         )
     assert found["read"] < 1e-3  # the file has half precision
     assert found["loaded"] == ["drjit", "mitsuba"]  # which are None
-    assert found["versions"] == [
-        "OpenEXR",
-        "colour-science",
-        "fotismos",
-        "numpy",
-        "pillow",
-        "python",
-    ]
+    assert {"OpenEXR", "colour-science", "numpy"} < set(found["versions"])
     assert records.record().scene in found["said"][0]
     assert found["said"][-1] > 0

@@ -15,21 +15,13 @@ from fotismos.comparisons.names import file_of
 from tests.shared.outputs import results
 from tests.shared.programs import ROOT
 from tests.shared.schemas import schema
-from tests.shared.small_scene import SCENE
+from tests.shared.small_scene import IN_PYTHON, SCENE
 
 ABORTS = """
 import os, signal
 
 def scene():
     os.kill(os.getpid(), signal.SIGABRT)
-"""
-
-
-GOOD = """
-import mitsuba as mi
-
-def scene():
-    return mi.cornell_box()
 """
 
 
@@ -51,7 +43,7 @@ def scenes_in(folder):
 @pytest.mark.thorough
 def test_a_scene_that_kills_its_process_takes_no_other_along(run, apart, folder, tmp_path):
     (folder / "aa.py").write_text(ABORTS)
-    (folder / "c.py").write_text(GOOD)
+    (folder / "c.py").write_text(IN_PYTHON)
     out = tmp_path / "out"
     words = ("compare", *scenes_in(folder), "-o", out, "--spp", 2, "--resolution", "16x16")
     code, _, messages = run(*words)
@@ -68,7 +60,7 @@ def test_a_scene_that_kills_its_process_takes_no_other_along(run, apart, folder,
     record = json.loads((out / "c/comparison.json").read_text(encoding="utf-8"))
     assert str(folder / "c.py") in record["command"]
     before = {path: path.stat().st_mtime_ns for path in out.glob("[ab]/*")}
-    (folder / "aa.py").write_text(GOOD)
+    (folder / "aa.py").write_text(IN_PYTHON)
     assert run(*words)[0] == 0
     assert {path: path.stat().st_mtime_ns for path in out.glob("[ab]/*")} == before
     assert (out / "aa/comparison.json").is_file()
@@ -124,13 +116,10 @@ def test_a_hostile_scene_is_refused_in_one_message(run, tmp_path):
 
 @pytest.mark.thorough
 def test_a_script_that_ends_its_process_is_the_users_mistake(run, apart, tmp_path):
-    """And one that crashes it is a scene's process lost."""
     out = ("-o", tmp_path / "out", "--spp", 2, "--resolution", "16x16")
     (tmp_path / "leaving.py").write_text("import os\nos._exit(0)\n")
     code, _, messages = run("compare", tmp_path / "leaving.py", *out)
     assert (code, "Remove os._exit from it" in messages) == (2, True)
-    (tmp_path / "aborting.py").write_text(ABORTS)
-    assert run("compare", tmp_path / "aborting.py", *out)[0] == 1
 
 
 def test_a_pipe_and_a_folder_are_no_scenes(run, tmp_path, monkeypatch):
@@ -193,7 +182,6 @@ def test_values_for_placeholders_go_to_the_scenes_that_have_them(run, folder, tm
     (folder / "b.xml").write_text(with_one, encoding="utf-8")
     size = ("--spp", 4, "--resolution", "8x8")
     words = ("compare", *scenes_in(folder), "-o", tmp_path / "out", *size)
-    assert run(*words)[0] == 2
     assert run(*words, "-D", "roughness=0.3")[0] == 0
     commands = {
         name: json.loads((tmp_path / f"out/{name}/comparison.json").read_text())["command"]

@@ -14,8 +14,10 @@ from io import StringIO
 import jsonschema
 import pytest
 
+from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost import measure
 from fotismos.comparisons.fit import fit as fitting
+from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import InputError
 from fotismos.reports import cli
@@ -104,38 +106,6 @@ def test_causes_that_cannot_be_found_leave_the_comparison_and_a_warning(
     assert "The causes are unknown: the effects are unknown" in page
 
 
-@pytest.mark.parametrize(
-    ("level", "code", "message"), [("1", 0, ""), ("2", 2, "docstrings .* Unset PYTHONOPTIMIZE")]
-)
-def test_python_without_docstrings_is_refused_before_any_work(level, code, message, tmp_path):
-    words = ("audit", "--heuristic", "phong", "-o", tmp_path / "out")
-    done = python("-m", "fotismos.reports", *words, PYTHONOPTIMIZE=level)
-    assert (done.returncode, done.stderr.count("\n")) == (code, len(message) > 0)
-    assert re.search(message, done.stderr)
-    assert (tmp_path / "out").exists() == (code == 0)
-
-
-def test_any_date_of_building_is_ignored(scene_file, tmp_path):
-    for date in ("x", "", "9" * 30):
-        words = ("compare", scene_file, "-o", tmp_path / f"out{date}", "--figures", *SMALL)
-        done = python("-m", "fotismos.reports", *words, "--no-why", SOURCE_DATE_EPOCH=date)
-        assert (done.returncode, done.stderr) == (0, "")
-
-
-def test_a_scene_that_fails_is_named_and_the_others_are_compared(run, scene_file, tmp_path):
-    broken = tmp_path / "broken.xml"
-    broken.write_text(_changed('type="diffuse"', 'type="nonesuch"'))
-    out = tmp_path / "out"
-    code, printed, messages = run("compare", broken, scene_file, "-o", out, "--spp", 4)
-    assert code == 2
-    assert "1 of 2 scenes failed" in messages
-    assert "my scene" in printed
-    page = (out / "index.html").read_text()
-    assert "<b>Failed:</b>" in page
-    assert (out / "my-scene/comparison.json").is_file()
-    assert not (out / "broken").exists()
-
-
 def test_plan_prints_a_table_and_json(run):
     code, printed, _ = run("plan", "cornell-box")
     assert code == 0
@@ -154,30 +124,42 @@ def test_plan_prints_a_table_and_json(run):
     assert all(effect["called_for"] for effect in data["effects"])
 
 
-def test_a_file_with_tabulated_spectra_is_compared_spectrally(run, tmp_path):
+def test_a_file_with_tabulated_spectra_is_compared_spectrally(tmp_path):
     spectrum = '<spectrum name="radiance" value="400:0.1, 700:0.3"/>'
     path = tmp_path / "scene.xml"
     path.write_text(_changed('<rgb name="radiance" value="0.2"/>', spectrum))
-    asked = ("-m", "llvm_ad_rgb")
-    for options, variant in (((), "llvm_ad_spectral"), (asked, "llvm_ad_rgb")):
-        run("compare", path, "-o", tmp_path / "out", "--spp", 4, *options)
-        assert read(tmp_path / "out/scene/comparison.json")["variant"] == variant
+    assert open_case(path, Options()).variant == "llvm_ad_spectral"
+    assert open_case(path, Options(variant="llvm_ad_rgb")).variant == "llvm_ad_rgb"
 
 
-COMPARE = """
+def test_python_without_docstrings_is_refused_before_any_work(tmp_path):
+    words = ("audit", "--heuristic", "phong", "-o", tmp_path / "out")
+    done = python("-m", "fotismos.reports", *words, PYTHONOPTIMIZE="2")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "Unset PYTHONOPTIMIZE" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+STARTED = """
 import sys
-from fotismos.comparisons.processes.pool import Pool
-from fotismos.reports import cli, jobs
-jobs.Pool = lambda count, *others: Pool(0, *others)
-words = "compare fig-8-9 --no-why --resolution 16x16 -q -o".split()
-sys.argv = ["fotismos", *words, sys.argv[1]]
-cli.main()
-print(*sorted(sys.modules))
+from fotismos.reports.__main__ import main
+sys.argv = ["fotismos", *sys.argv[1:]]
+main()
+print(*sys.modules)
 """
+SURROUNDINGS = {
+    "MPLBACKEND": "module://not_installed.backend",
+    "SOURCE_DATE_EPOCH": "9" * 30,
+    "PYTHONOPTIMIZE": "1",
+}
+"""As in a cell of Jupyter, whose kernel passes its backend on, and as packagers set them."""
 
 
-def test_a_comparison_of_a_built_in_scene_imports_what_it_needs(tmp_path):
-    done = python("-c", COMPARE, tmp_path / "out")
+@pytest.mark.thorough
+def test_a_comparison_ignores_its_surroundings_and_imports_what_it_needs(tmp_path):
+    options = ("--no-why", "--resolution", "16x16", "--spp", 4, "--workers", 0, "--figures", "-q")
+    words = ("compare", "fig-8-9", *options, "-o", tmp_path)
+    done = python("-c", STARTED, *words, **SURROUNDINGS)
     assert (done.returncode, done.stderr) == (0, "")
     modules = done.stdout.split()
     assert "fotismos.comparisons.compare" in modules
@@ -204,10 +186,10 @@ def test_help_only_helps(command, tmp_path):
 
 
 @pytest.mark.parametrize("name", sorted(cli.cli.list_commands(None)))
-def test_help_shows_examples_that_are_commands(name, run):
+def test_help_shows_examples_that_are_commands_and_options_that_there_are(name, run):
     code, printed, _ = run(name, "--help")
     assert code == 0
-    _, _, examples = printed.partition("Examples")
+    before, _, examples = printed.partition("Examples")
     command = cli.cli.get_command(None, name)
     found = 0
     for line in examples.partition("\nOptions")[0].splitlines():
@@ -217,6 +199,9 @@ def test_help_shows_examples_that_are_commands(name, run):
             assert words[1] == name
             found += 1
     assert found or "fotismos " + name in examples
+    text = re.sub(r"`[^`]*`", "", f"{before} {examples.partition('Options:')[2]}")
+    has = {option for one in command.params for option in (*one.opts, *one.secondary_opts)}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", text)) <= has | {"--help"}
 
 
 def test_help_is_in_groups_with_whole_summaries_and_the_words_of_the_user(run, monkeypatch):
@@ -235,12 +220,10 @@ def test_help_is_in_groups_with_whole_summaries_and_the_words_of_the_user(run, m
 SMALL = ("--resolution", "16x16", "--spp", 4)
 
 
-def test_a_quiet_run_prints_the_page_alone_and_a_verbose_one_says_more(run, tmp_path):
+def test_a_quiet_run_prints_the_page_alone_and_a_verbose_one_says_more(run, tmp_path, two_scenes):
     quiet = run("compare", "fig-8-9", "-q", "-o", tmp_path, *SMALL)
     assert quiet == (0, f"{tmp_path / 'index.html'}\n", "")
-    code, usual, messages = run("compare", "fig-8-9", "-o", tmp_path, *SMALL)
-    assert (code, messages) == (0, "")
-    assert "mean ΔE2000" in usual
+    assert "mean ΔE2000" in two_scenes.printed
     words = ("-v", "--figures", "-o", tmp_path, *SMALL)
     code, printed, messages = run("compare", "fig-8-8a", *words)
     assert (code, "mean ΔE2000" in printed) == (0, True)
@@ -304,35 +287,6 @@ def test_a_pipe_gets_ten_lines_on_the_points_of_a_study(capsys):
             update("points", done, 400)
     lines = capsys.readouterr().err.splitlines()
     assert lines == [f"gloss: {done} of 400 points" for done in range(40, 401, 40)]
-
-
-def test_a_backend_of_jupyter_that_is_not_installed_does_not_matter(tmp_path):
-    """As in a cell ``!fotismos doctor``: the kernel passes its backend on."""
-    surroundings = os.environ | {"PYTHONPATH": str(ROOT)}
-    surroundings["MPLBACKEND"] = "module://not_installed.backend"
-    words = [
-        sys.executable,
-        "-P",
-        "-m",
-        "fotismos.reports",
-        "compare",
-        "lambert-sphere",
-        "--no-why",
-    ]
-    sizes = ["--resolution", "8x8", "--spp", "4", "-o", str(tmp_path / "out")]
-    ended = subprocess.run([*words, *sizes], env=surroundings, capture_output=True, text=True)
-    assert (ended.returncode, ended.stderr) == (0, "")
-
-
-@pytest.mark.parametrize("name", sorted(cli.cli.list_commands(None)))
-def test_help_names_only_options_that_the_command_has(name, run):
-    _, printed, _ = run(name, "--help")
-    without_examples, *_ = printed.partition("Examples:")
-    after_examples = printed[len(without_examples) :].partition("Options:")[2]
-    text = re.sub(r"`[^`]*`", "", f"{without_examples} {after_examples}")
-    parameters = cli.cli.get_command(None, name).params
-    has = {option for one in parameters for option in (*one.opts, *one.secondary_opts)}
-    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", text)) <= has | {"--help"}
 
 
 def test_help_of_costs_and_fits_states_their_own_defaults(run):

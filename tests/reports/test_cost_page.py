@@ -82,18 +82,9 @@ def test_page_and_terminal_say_which_sample_count_would_pass(study):
         f"No measured method looks right at {size}. About {ceil(spp)} samples per pixel with full"
         " plan would pass;"
     )
-    right = structs.replace(record.points[2], tolerance=MeanError(value=1.0, low=0.9, high=1.1))
-    time = seconds(right.seconds.value)
-    kernel = seconds(record.points[0].seconds.value)
-    cheapest = (
-        f"Cheapest that looks right at {size}: {right.method} with {right.spp} samples, {time}; the"
-        f" textbook kernel takes {kernel} and fails."
-    )
-    for points, expected in ((record.points, more), ((*record.points[:2], right), cheapest)):
-        changed = structs.replace(record, points=points)
-        first, *_ = cost_tables.lines(changed)
-        assert expected in first
-        assert expected in Page(shown(replace(study, record=changed))).text
+    first, *_ = cost_tables.lines(record)
+    assert more in first
+    assert more in Page(shown(study)).text
 
 
 def test_the_page_has_what_is_predicted_and_the_table_marks_the_cheapest(study):
@@ -175,31 +166,13 @@ def test_a_setting_that_is_beaten_names_the_better_one(study):
         assert first.endswith(expected)
 
 
-def test_names_from_files_stay_text_and_a_page_without_a_study_says_nothing_of_cost(study):
+def test_names_from_files_stay_text(study):
     machine = structs.replace(study.record.machine, processor=HOSTILE)
-    hostile = replace(study, record=structs.replace(study.record, machine=machine))
-    html = shown(hostile, records.record(scene=HOSTILE))
-    assert HOSTILE not in html
-    assert HOSTILE in Page(html).text
     given = cost_records.with_engine(study, machine=HOSTILE, names=(HOSTILE, "b"))
-    html = shown(given)
-    assert HOSTILE not in html
-    assert Page(html).text.count(HOSTILE) > 3
+    hostile = replace(given, record=structs.replace(given.record, machine=machine))
     html = shown(hostile, records.record(scene=HOSTILE))
-    bare = page.render([SceneView(record=records.record())])
-    for text in ("What accuracy costs", "What each effect", "Ladder"):
-        assert text in html
-        assert text not in bare
-
-
-def test_the_map_of_effects_tells_halves_none_and_what_does_not_count():
-    found = scene_files.view_of(cost_records.explained(noisy())).why.effects
-    assert found.names == cost_records.EFFECTS
-    assert len(set(found.colours)) == 3
-    rows = [found.map[start : start + 12] for start in range(0, 96, 12)]
-    assert rows[0] == "-" * 12
-    assert set(rows[1:-1]) == {"000000222222"}
-    assert rows[-1] == "." * 12
+    assert HOSTILE not in html
+    assert Page(html).text.count(HOSTILE) > 5
 
 
 def test_a_comparison_with_its_study_replaces_an_earlier_one_as_a_whole(tmp_path, study):

@@ -19,7 +19,7 @@ from tests.shared.small_scene import SCENE
 
 pytestmark = pytest.mark.thorough
 
-SMALL = ("--spp", "8", "--resolution", "16x16", "-o", "out")
+SMALL = ("--spp", "8", "--resolution", "16x16", "--no-why", "-o", "out")
 COMPARE = ("compare", "a.xml", *SMALL)
 STUDY = """[[part]]
 scene = "lobe"
@@ -34,14 +34,8 @@ FAULTS = (
     ("no scene, and a script that is killed", ("compare", "text.xml", "kill.py", *SMALL), "", 2,
      "2 of 2 scenes failed, among them: text"),
     ("no time", (*COMPARE, "--timeout", "1e-9"), "", 1, "made no progress"),
-    ("no scheduler", (*COMPARE, "--scheduler", "x"), "", 2, "scheduler"),
-    ("a file in the way", ("compare", "a.xml", "-o", "mine.txt"), "", 2, "mine.txt"),
-    ("another's folder", ("compare", "a.xml", *SMALL), "mkdir out; cp mine.txt out/index.html;", 2,
-     "not made by fotismos"),
     ("no rights", COMPARE, f"mkdir out; chmod 555 out; {RIGHTS}", 2, "denied"),
     ("a full disk", COMPARE, "ulimit -f 4;", 2, "File too large"),
-    ("a study of nothing", ("study", "text.xml", "-o", "out"), "", 2, "not TOML"),
-    ("a baseline of nothing", ("check", "text.json", "-o", "out"), "", 2, "not JSON"),
 )  # fmt: skip
 """Name, words, what a shell does before, exit code, and what the message has."""
 
@@ -82,7 +76,7 @@ def orphans(mark):
 def folder(tmp_path):
     boxed = SCENE.replace("</film>", '<rfilter type="box"/></film>')
     scripts = {"exit": "import sys\nsys.exit(3)", "kill": "import os\nos.kill(os.getpid(), 9)"}
-    files = {"a.xml": boxed, "text.xml": "no scene", "text.json": "{", "mine.txt": "mine"}
+    files = {"a.xml": boxed, "text.xml": "no scene", "mine.txt": "mine"}
     files |= {"s.toml": STUDY} | {f"{name}.py": text for name, text in scripts.items()}
     for name, text in files.items():
         (tmp_path / name).write_text(text, encoding="utf-8")

@@ -99,19 +99,6 @@ def test_texts_hold_from_the_threshold_at_which_they_begin(record):
     assert len(data["headlines"]) > 1
 
 
-def test_scenes_stand_worst_first_and_have_their_own_anchors(record, pictures):
-    other = copy.deepcopy(record) | {"scene": "second"}
-    for share in other["metrics"]["dE2000"]["visible"]:
-        share |= {"value": 0.9, "high": 1.0}
-    shown = Page(page.render([records.view(record, embedded=pictures), records.view(other)]))
-    ids = [attrs["id"] for _, attrs in shown.tags if "id" in attrs]
-    assert len(ids) == len(set(ids))
-    targets = [attrs["href"][1:] for _, attrs in shown.tags if "href" in attrs]
-    scenes = [target for target in dict.fromkeys(targets) if "=" in target and "&" not in target]
-    assert scenes == ["scene=second", "scene=fig-8-9"]
-    assert set(scenes) < set(ids)
-
-
 def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
     record |= {"scene": HOSTILE, "variant": HOSTILE, "warnings": [HOSTILE]}
     record["command"] = f"fotismos compare '{HOSTILE.replace(chr(39), '')}'"
@@ -166,18 +153,6 @@ WORDS = (
 def test_values_have_three_digits_and_their_unit():
     for form, texts in WORDS:
         assert {value: form(value) for value in texts} == texts
-
-
-def test_the_page_has_each_of_its_parts_once_and_no_name_twice():
-    """Scripts are joined into one module, where a second declaration is a syntax error."""
-    folder = templating.TEMPLATES
-    assert {path.stem for path in (folder / "viewer").iterdir()} == set(page.SCRIPTS)
-    assert {path.stem for path in (folder / "styles").iterdir()} == set(templating.STYLES)
-    declared = re.compile(r"^(?:async )?(?:function|class|const|let) (\w+)", re.MULTILINE)
-    sources = ((folder / "viewer" / f"{name}.js").read_text() for name in page.SCRIPTS)
-    found = Counter(name for source in sources for name in declared.findall(source))
-    assert len(found) > 50
-    assert [name for name, count in found.items() if count > 1] == []
 
 
 def test_details_have_what_was_checked_and_every_metric():

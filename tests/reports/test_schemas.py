@@ -35,12 +35,6 @@ def test_a_docstring_describes_the_attributes_in_the_schema():
     assert described == {"colour": words, "sheen": words, "record_version": None}
 
 
-def test_what_was_written_is_read():
-    assert records.read(Toy, records.to_json(Toy(colour="red", sheen=0.5)), "toy.json") == Toy(
-        colour="red", sheen=0.5
-    )
-
-
 @pytest.mark.parametrize(
     ("text", "expected"),
     [

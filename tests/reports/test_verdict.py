@@ -5,15 +5,11 @@ from types import SimpleNamespace
 import pytest
 from msgspec import structs
 
-from fotismos.comparisons.case import open_case
-from fotismos.comparisons.compare import compare
 from fotismos.comparisons.comparison import MeanError
 from fotismos.comparisons.cost import cost_record
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
-from fotismos.comparisons.options import Options
 from fotismos.comparisons.price_record import EffectsThatPass, Price, SamplesThatPass, Saving
-from fotismos.comparisons.steps import steps
 from fotismos.heuristic.heuristics import HEURISTICS, Interpolation, Point
 from fotismos.reference.records import Interval
 from fotismos.reports import verdict
@@ -149,12 +145,6 @@ RULES = {
         scene(price=structs.replace(price(64), ratio=None, reference_s=None)), None, 2.0,
         "64 samples per pixel pass.",
     ),
-    "undecided, with samples": (
-        scene(0.03, 0.08, price=price(64)), None, 2.0,
-        "Too close to call: between 3.00 % and 8.00 % of the pixels differ, and at most 5 % may."
-        " More samples (--spp) decide. 64 samples per pixel pass: 128 times the textbook's time,"
-        " 640 ms.",
-    ),
     "without a price": (scene(), None, 2.0, "The map shows where the pictures differ."),
     "caution": (scene(caution="No pixel sees light."), None, 2.0, "No pixel sees light."),
 }  # fmt: skip
@@ -263,16 +253,26 @@ def test_a_run_counts_scenes_and_names_what_those_that_fail_lack_by_pixels():
     assert lines[0].startswith("a: Mostly missing: interreflection. None of the ")
 
 
-def test_a_run_ends_with_its_verdict_and_finds_causes_unless_told_not_to(
-    run, causes, scene_file, tmp_path
+def test_a_run_ends_with_its_verdict_and_finds_causes(
+    run, causes, scene_file, tmp_path, two_scenes
 ):
-    scene_file.write_text(PLAIN)
-    for words, has_causes in (((), True), (("--no-why",), False)):
-        small = ("--spp", 4, "--resolution", "12x8", "-o", tmp_path / f"{has_causes}")
-        code, printed, _ = run("compare", scene_file, *small, *words)
-        assert code == 0
-        assert "Textbook shading " in printed
-        assert ("Mostly missing: " in printed) is has_causes
+    """Such as a material that reflects more than it receives."""
+    bright = (
+        '<bsdf type="phong"><float name="k_d" value="2.5"/><float name="k_s" value="0.4"/></bsdf>'
+    )
+    text = PLAIN.replace('<bsdf type="diffuse"/>', bright, 1)
+    assert bright in text
+    scene_file.write_text(text)
+    small = ("--spp", 16, "--resolution", "12x8", "-o", tmp_path / "out")
+    code, printed, _ = run("compare", scene_file, *small)
+    assert code == 0
+    said = " ".join(printed.split())
+    assert "Textbook shading " in said
+    assert "Mostly missing: " in said
+    assert "A material reflects 2.50 times the light that it receives" in said
+    assert "microfacets" not in said
+    assert "Textbook shading " in two_scenes.printed
+    assert "Mostly missing: " not in two_scenes.printed
 
 
 def test_the_heuristics_called_textbook_are_those_of_the_package_that_shade_as_the_chapters_do():
@@ -293,23 +293,6 @@ def test_a_chosen_threshold_decides_on_the_terminal_and_where_the_page_begins(ru
     assert "Textbook shading looks right in fig-8-9." in printed
     assert 'value="10.0"' in (tmp_path / "index.html").read_text()
     assert run(*words, "--within", 2.1)[0] == 2
-
-
-def test_a_material_that_reflects_more_than_it_receives_is_the_cause(rgb, tmp_path):
-    bright = (
-        '<bsdf type="phong"><float name="k_d" value="2.5"/><float name="k_s" value="0.4"/></bsdf>'
-    )
-    text = PLAIN.replace('<bsdf type="diffuse"/>', bright, 1)
-    assert bright in text
-    path = tmp_path / "bright.xml"
-    path.write_text(text)
-    case = open_case(path, Options(resolution=(12, 8), spp=16))
-    then = steps(case.options, True)
-    record = compare(case.source, case.options, command=case.command(), then=then).record
-    assert verdict.missing(record)
-    said = f"{verdict.about(record)} {verdict.most_missing([record])}"
-    assert "A material reflects 2.50 times the light that it receives" in said
-    assert "microfacets" not in said
 
 
 def test_a_warning_stands_once_in_what_is_said_about_a_scene():

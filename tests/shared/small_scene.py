@@ -35,3 +35,12 @@ PLAIN = PLAIN.replace('"max_depth" value="3"', '"max_depth" value="2"')
 """Diffuse, under the point alone, light reflected once: shadows are its one effect. So its study of
 cost has few methods and effects, for tests that are not about effects.
 """
+
+IN_PYTHON = """scene = {
+    "type": "scene",
+    "sensor": {"type": "perspective"},
+    "lamp": {"type": "point", "position": (0, 0, 0)},
+    "ball": {"type": "sphere", "center": (0, 0, 4)},
+}
+"""
+"""A sphere, in a file of Python."""
