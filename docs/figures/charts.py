@@ -3,21 +3,16 @@
 A measurement writes its table; ``./run docs`` draws it, so a chart never waits for a measurement.
 """
 
-import csv
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from io import StringIO
-
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
+from collections.abc import Callable, Iterator, Sequence
 
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from docs.figures.from_tests import ROOT
+from docs.figures.documents import draw, replace
+from docs.figures.documents import read_table as read
 from docs.figures.model_figures import FAINT, GROUND, STYLE
-from fotismos.comparisons import atomic
 
-FOLDER = ROOT / "docs/data"
 WIDTH = 7.0
 ROW = 0.24
 """Inches: the width of a chart, and the height of a row."""
@@ -28,10 +23,8 @@ GATES = {"fotismos": "#1a56a0", "RMSE": "#b97b00", "z-test": "#00795a", "FLIP": 
 THRESHOLDS = {"5": ("#00795a", "o"), "2": ("#1a56a0", "s"), "1": ("#b0426f", "D")}
 """Colour and mark of each threshold, in ΔE2000."""
 
-
 TIME = "time over the kernel's"
 """A column of methods.csv; empty where nothing passes."""
-
 
 INTERVALS = {
     "mean": "the means",
@@ -42,17 +35,11 @@ INTERVALS = {
 """Columns of noise.csv, in words."""
 
 
-def write(name: str, rows: Iterable[Sequence[object]]) -> None:
-    """Write a table, whose first row has the names of its columns."""
-    text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows(rows)
-    atomic.write(FOLDER / f"{name}.csv", text.getvalue())
-
-
-def read(name: str) -> list[dict[str, str]]:
-    """Return the rows of a table by the names of its columns."""
-    with (FOLDER / f"{name}.csv").open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+def write() -> None:
+    """Draw the charts, and write the sentence on intervals in noise."""
+    for name, chart in CHARTS.items():
+        draw(f"{name}.svg", chart())
+    replace("witnesses.md", "noise", intervals())
 
 
 def gates() -> Figure:

@@ -6,7 +6,7 @@ from pathlib import Path, PurePosixPath
 from posixpath import dirname, normpath, relpath
 
 from docs.figures import guarantees, lessons
-from docs.figures.from_tests import ROOT
+from docs.figures.documents import ROOT
 from docs.website import api_pages, file_pages, notebook_page
 
 LINK = re.compile(r"\[(?P<text>[^][]*)\]\((?P<target>[^)\s#]+)(?P<anchor>#[^)\s]*)?\)")
