@@ -4,6 +4,7 @@ import runpy
 from collections.abc import Iterator
 from functools import partial
 from textwrap import wrap
+from typing import Any
 
 from docs.figures.documents import DOCS, compared, draw, fact, panels, replace
 from docs.figures.model_figures import pictures, sheet
@@ -115,5 +116,5 @@ def _write_spheres() -> None:
     draw("shaders-spheres.webp", sheet(titles, shown, labels, size=(2.88, 1.16)))
 
 
-def _shaded(scene: object, shader: str, name: str | None = None, **options: object) -> Comparison:
+def _shaded(scene: object, shader: str, name: str | None = None, **options: Any) -> Comparison:
     return compared(scene, name, heuristic=str(SHADERS / f"{shader}.py"), **options)
