@@ -26,8 +26,8 @@ SPHERES = {
     ("map", "phong"): "phong",
     ("map", "harmonics"): "harmonics",
     ("map", "split_sum"): "split sum",
-    ("lamps", "cook_torrance"): "lamps as points",
-    ("lamps", "ltc"): "lamps by ltc",
+    ("lamps", "cook_torrance"): "points",
+    ("lamps", "ltc"): "ltc",
 }
 """Shaders of docs/scenes/spheres.py, by its light and their files."""
 
@@ -113,7 +113,8 @@ def _write_spheres() -> None:
     replace("shaders.md", "spheres", markdown([head, *rows], right=2))
     titles = "shader", "reference", LEADING.label
     labels = [*SPHERES.values()]
-    draw("shaders-spheres.webp", sheet(titles, shown, labels, size=(2.88, 1.16)))
+    drawn = sheet(titles, shown, labels, size=(2.88, 1.16), maps=len(shown))
+    draw("shaders-spheres.webp", drawn)
 
 
 def _shaded(scene: object, shader: str, name: str | None = None, **options: Any) -> Comparison:

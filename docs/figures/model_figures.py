@@ -134,10 +134,11 @@ def sheet(
     rows: Sequence[Sequence[Image.Image]],
     labels: Sequence[str] = (),
     size: tuple[float, float] = (INCH, INCH),
+    maps: int = 1,
 ) -> Figure:
     """Draw rows of pictures, each of a size in inches: columns have titles, rows may have labels.
 
-    With labels, a column or the last row is a map of errors, and has its legend.
+    With labels, the last ``maps`` rows end with a map of errors, and have its legend.
     """
     left, right = (0.3, 0.62) if labels else (0.0, 0.0)
     width = len(titles) * size[0] + left + right
@@ -158,7 +159,7 @@ def sheet(
             axes.text(-0.03, 0.5, label, rotation=90, ha="right", va="center",
                       transform=axes.transAxes)  # fmt: skip
         if labels:
-            box = (width - 0.56) / width, 0.02, 0.1 / width, INCH / height - 0.04
+            box = (width - 0.56) / width, 0.02, 0.1 / width, maps * size[1] / height - 0.04
             figures.legend(figure, figure.add_axes(box))
     return figure
 
