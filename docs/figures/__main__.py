@@ -30,7 +30,7 @@ from docs.figures import (
     two_pictures,
 )
 from docs.figures.documents import DOCS, ROOT, fact, replace, run, write_table
-from docs.website import build
+from docs.website import sources
 from fotismos.comparisons import atomic
 from fotismos.reference.planning.rules import RULES
 from fotismos.reference.scene.graph import set_variant
@@ -77,7 +77,7 @@ def rules() -> Iterator[str]:
 def _site() -> None:
     """Build the site from what is there, in out/site, with a page for the lessons' scenes."""
     folder = ROOT / "out/site"
-    if build.build(folder):
+    if sources.build(folder):
         raise SystemExit(f"The site in {folder} is not whole: mend the faults above.")
     # The lessons' scenes, with live shading: nothing has to be installed to move the sliders.
     size = f"{lessons.SIDE}x{lessons.SIDE}"
