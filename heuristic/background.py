@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 
 from fotismos.heuristic import vectors
-from fotismos.heuristic.convention import Colour, Doubles, Floats, Interaction, Mask, Scene, Vector
+from fotismos.heuristic.convention import Colour, Doubles, Floats, Interaction, Scene, Vector
 from fotismos.heuristic.errors import InputError
 
 ROWS = 512
@@ -72,9 +72,7 @@ def without_sun(scene: Scene) -> Iterator[None]:
         parameters.update()
 
 
-def radiance(
-    emitter: Any, direction: Vector, at: Interaction | None = None, active: Mask = True
-) -> Colour:
+def radiance(emitter: Any, direction: Vector, at: Interaction | None = None) -> Colour:
     """Return an environment emitter's radiance at the time and wavelengths of an interaction."""
     there = dr.zeros(mi.SurfaceInteraction3f)
     if at is not None:
@@ -84,7 +82,7 @@ def radiance(
     # A unit vector stays as it is: Mitsuba's angles lose half of the digits near the poles.
     is_unit = dr.abs(dr.squared_norm(vector) - 1) < UNIT
     there.wi = -dr.select(is_unit, vector, vectors.normalise(vector))
-    return emitter.eval(there, active)
+    return emitter.eval(there)
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,3 @@
-"""The generated parts of the documentation, one module for each page or picture."""
+"""The pictures, tables and sentences of the documents, made by ``./run docs``."""
+
+import fotismos  # noqa: F401  it finds LLVM before a module here imports Dr.Jit

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from statistics import median
 from typing import Any
 
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
-
-from docs.figures.from_tests import ROOT, fact
+from docs.figures import charts
+from docs.figures.documents import DOCS, fact, replace, write_table
+from fotismos.comparisons import atomic
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.cost.cost_record import Cost, Point
@@ -18,12 +18,14 @@ from fotismos.comparisons.cost.front import at_size, fronted, sufficient
 from fotismos.comparisons.cost.methods import FULL_PLAN, STAND_INS
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
+from fotismos.reports.charts import vega
+from fotismos.reports.charts.cost_charts import titled
 from fotismos.reports.terminal.cost_tables import busy
 from fotismos.reports.terminal.tables import markdown
 from fotismos.reports.terminal.words import number, parameter
 
 LARGER = tuple(
-    ROOT / "docs/scenes" / f"{name}.py"
+    DOCS / "scenes" / f"{name}.py"
     for name in ("glass", "glossy_floor", "outdoors", "textured_room")
 )
 SIZE = 512, 384
@@ -36,10 +38,29 @@ NONE, KERNEL = "none", "kernel"
 AT_FULL_SIZE = "cornell-box", "plastic-spheres"
 
 
-def measured(names: Sequence[str] = (*SCENES, *map(str, LARGER))) -> list[Cost]:
+def write() -> None:
+    """Measure, and write the page with its tables and charts."""
+    records = measured()
+    replace("accuracy.md", "setting", setting(records))
+    replace("accuracy.md", "findings", findings(records))
+    replace("accuracy.md", "attribution", attribution(records))
+    write_table("methods", methods(records))
+    write_table("fronts", fronts(records))
+    charts.write()
+    names = [path.stem for path in LARGER]
+    pictures = []
+    for record in (each for each in records if each.scene in names):
+        file = f"cost-{record.scene.replace('_', '-')}.svg"
+        atomic.write(DOCS / file, vega.paper(titled(record)))
+        pictures.append(f"![Error against time: {record.scene.replace('_', ' ')}]({file})")
+    replace("accuracy.md", "pictures", pictures)
+    replace("accuracy.md", "predictions", predictions())
+
+
+def measured() -> list[Cost]:
     """Study what accuracy costs on each scene, in turn."""
     found = []
-    for name in names:
+    for name in (*SCENES, *map(str, LARGER)):
         case = open_case(name, Options(resolution=(SIZE[0] // 4, SIZE[1] // 4)))
         found.append(cost(case.source, case.options).record)
         print(name, flush=True)
@@ -80,18 +101,6 @@ def predictions() -> Iterator[str]:
     width, height = found["size"]
     yield f"At {width} by {height} pixels, from studies of 128 pixels."
     yield " ".join(found["summary"])
-
-
-def pictures(records: Sequence[Cost]) -> Iterator[str]:
-    """Yield the charts of the larger scenes, for the page."""
-    for record, file in charts(records):
-        yield f"![Error against time: {record.scene.replace('_', ' ')}]({file})"
-
-
-def charts(records: Sequence[Cost]) -> Iterator[tuple[Cost, str]]:
-    """Yield the studies of the larger scenes, and the file of each chart."""
-    names = {file.stem: f"cost-{file.stem.replace('_', '-')}.svg" for file in LARGER}
-    yield from ((record, names[record.scene]) for record in records if record.scene in names)
 
 
 def methods(records: Sequence[Cost]) -> Iterator[tuple[str, ...]]:

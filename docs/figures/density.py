@@ -7,12 +7,11 @@ meshes, and the sphere itself, are rendered in turn, with the same samples.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
-
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from docs.figures import documents
 from docs.figures.model_figures import COLOURS, GROUND, STYLE, quiet
 from fotismos.comparisons.cost import measure
 from fotismos.comparisons.gallery import scenes
@@ -56,7 +55,14 @@ def near_sphere() -> dict:
     return scene
 
 
-def measured(fineness: Sequence[int] = FINENESS, rounds: int = ROUNDS) -> list[Density]:
+def write() -> None:
+    """Measure, and write the chart and its sentences."""
+    found = measured()
+    documents.draw("models-density.svg", chart(found))
+    documents.replace("models.md", "density", sentences(found))
+
+
+def measured() -> list[Density]:
     """Render all meshes and the sphere itself in turn."""
     source, options = Source(EXACT, near_sphere), Options(resolution=(SIDE, SIDE))
     ready = prepare(source, options)
@@ -65,7 +71,7 @@ def measured(fineness: Sequence[int] = FINENESS, rounds: int = ROUNDS) -> list[D
     judge = measure.judge_by(reference, ready.counted, options.viewing)
     firsts = {EXACT: ready.heuristic.sampled(SPP)}
     meshes: dict[str, tuple[Interpolation, int]] = {}
-    for n in fineness:
+    for n in FINENESS:
         for shading in MARKS:
             changed = options.changed(interpolation=shading.value, tessellation=n)
             renderer: Renderer = prepare(source, changed).heuristic
@@ -74,8 +80,8 @@ def measured(fineness: Sequence[int] = FINENESS, rounds: int = ROUNDS) -> list[D
             meshes[name] = shading, renderer.scene.shapes()[0].face_count()
     renderers = measure.tried(firsts, dict.fromkeys(firsts, (SPP,)), SIDE**2)
     judged = {(name, SPP) for name in meshes}
-    errors, _ = measure.rendered(renderers, judge, judged, rounds, options.seed, None, "")
-    lines = measure.timed(renderers, rounds, SIDE**2)
+    errors, _ = measure.rendered(renderers, judge, judged, ROUNDS, options.seed, None, "")
+    lines = measure.timed(renderers, ROUNDS, SIDE**2)
     return [
         Density(*mesh, errors[name, SPP][0].value, ratio(lines[name], lines[EXACT]))
         for name, mesh in meshes.items()

@@ -6,12 +6,9 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import log2
-from pathlib import Path
 from statistics import median
 from textwrap import wrap
 from typing import Any
-
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 import numpy as np
 import pyarrow as pa
@@ -20,7 +17,7 @@ from matplotlib.figure import Figure
 from msgspec import structs
 from pyarrow import csv, parquet
 
-from docs.figures.from_tests import ROOT
+from docs.figures.documents import DOCS, draw, replace
 from docs.figures.model_figures import GROUND, STYLE
 from fotismos.comparisons import timing
 from fotismos.comparisons.case import Case, open_case
@@ -42,7 +39,6 @@ from fotismos.reports.files import images
 from fotismos.reports.terminal.tables import markdown
 from fotismos.reports.terminal.words import number, percent, seconds
 
-DOCS = ROOT / "docs"
 WIDTH = 192
 ROUNDS = measure.MEASURED_ROUNDS
 DAYLIGHT = {"type": "sunsky", "sun_direction": (-0.5, -0.6, 0.6), "turbidity": 4.0}
@@ -115,9 +111,17 @@ class Measured(Rendered):
     stops_direct: float
 
 
-def measured() -> list[Measured]:
-    """Measure all approximations on each scene, in turn."""
-    return [row for scene in SCENES for row in on_scene(scene)]
+def write() -> None:
+    """Measure all approximations on each scene, in turn, and write the page and its tables."""
+    rows = [row for scene in SCENES for row in on_scene(scene)]
+    plain = [{key: value for key, value in vars(one).items() if key != "picture"} for one in rows]
+    found = pa.Table.from_pylist(plain)
+    csv.write_csv(found, DOCS / "engines.csv")
+    parquet.write_table(found, DOCS / "engines.parquet")
+    replace("engines.md", "lead", lead(rows))
+    replace("engines.md", "table", table(rows))
+    replace("engines.md", "bias", bias(rows))
+    draw("engines.webp", chart(rows))
 
 
 def on_scene(name: str) -> Iterator[Measured]:
@@ -253,11 +257,3 @@ def bias(rows: Sequence[Measured]) -> Iterator[str]:
 def _stops_of(one: Measured | None) -> str:
     """Return the bias of direct light, and of all light."""
     return "–" if one is None else f"{one.stops_direct:+.2f}/{one.stops:+.2f}"
-
-
-def write(rows: Sequence[Measured], folder: Path) -> None:
-    """Write all numbers as ``engines.csv`` and ``engines.parquet``."""
-    plain = [{key: value for key, value in vars(one).items() if key != "picture"} for one in rows]
-    found = pa.Table.from_pylist(plain)
-    csv.write_csv(found, folder / "engines.csv")
-    parquet.write_table(found, folder / "engines.parquet")

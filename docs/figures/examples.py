@@ -1,29 +1,22 @@
-"""The tables and the picture of docs/shaders.md, from the shaders in docs/shaders."""
+"""The tables and the pictures of docs/shaders.md, from the shaders in docs/shaders."""
 
 import runpy
 from collections.abc import Iterator
 from functools import partial
 from textwrap import wrap
+from typing import Any
 
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
-
-import numpy as np
-from matplotlib import rc_context
-from matplotlib.figure import Figure
-
-from docs.figures import model_figures
-from docs.figures.from_tests import ROOT, fact
+from docs.figures.documents import DOCS, compared, draw, fact, panels, replace
+from docs.figures.model_figures import pictures, sheet
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.reference.scene.source import Source
-from fotismos.reports.charts import figures
-from fotismos.reports.files import images
 from fotismos.reports.terminal.tables import markdown
 
-SHADERS = ROOT / "docs/shaders"
+SHADERS = DOCS / "shaders"
 NAMES = ("phong", "wrapped", "oren_nayar", "toon", "cook_torrance")
 SCENES = ("lambert-sphere", "fig-8-9", "plastic-spheres")
 PICTURED = SCENES[-1]
@@ -33,30 +26,44 @@ SPHERES = {
     ("map", "phong"): "phong",
     ("map", "harmonics"): "harmonics",
     ("map", "split_sum"): "split sum",
-    ("lamps", "cook_torrance"): "lamps as points",
-    ("lamps", "ltc"): "lamps by ltc",
+    ("lamps", "cook_torrance"): "points",
+    ("lamps", "ltc"): "ltc",
 }
 """Shaders of docs/scenes/spheres.py, by its light and their files."""
 
 
-def comparisons() -> dict[tuple[str, str], Comparison]:
-    """Compare each shader on each scene; keys are the names of both."""
-    return {(name, scene): _compared(name, scene) for name in NAMES for scene in SCENES}
+def link(name: str) -> str:
+    """Return a link to a shader of docs/shaders."""
+    return f"[{name.replace('_', ' ')}](shaders/{name}.py)"
 
 
-def table(found: dict[tuple[str, str], Comparison]) -> Iterator[str]:
-    """Yield the table of departures: the mean, its noise, and the mean after the best exposure."""
-    rows = [(_link(name), *(_cell(found[name, scene]) for scene in SCENES)) for name in NAMES]
-    yield from markdown([("Shader", *SCENES), *rows], right=1)
+def write() -> None:
+    """Compare the shaders, and write their tables and pictures."""
+    _write_comparisons()
+    replace("shaders.md", "lamp", _lamp())
+    replace("shaders.md", "mistakes", [f"{'; '.join(fact('mistakes'))}."])
+    _write_spheres()
 
 
-def pictures(found: dict[tuple[str, str], Comparison]) -> dict[str, np.ndarray]:
-    """Return the images of one scene, by shader."""
-    shown = {name: found[name, PICTURED].images.heuristic for name in NAMES}
-    return shown | {"reference": found[NAMES[0], PICTURED].images.reference}
+def _write_comparisons() -> None:
+    """Compare each shader on each scene: the mean departure, and after the best exposure."""
+    shown = []
+    rows = []
+    for name in NAMES:
+        row = [link(name)]
+        for scene in SCENES:
+            comparison = _shaded(scene, name, resolution=(SIDE, SIDE), spp=SAMPLES)
+            metric = comparison.record.metrics[LEADING.name]
+            row.append(f"{metric.mean:.2f} ({metric.after_exposure.mean:.2f})")
+            if scene == PICTURED:
+                shown.append(comparison.images)
+        rows.append(row)
+    replace("shaders.md", "shaders", markdown([("Shader", *SCENES), *rows]))
+    row_of_pictures = [*(one.heuristic for one in shown), shown[0].reference]
+    draw("shaders.png", pictures([*NAMES, "reference"], [row_of_pictures]))
 
 
-def lamp() -> Iterator[str]:
+def _lamp() -> Iterator[str]:
     """Yield what a representative point changes under a spherical lamp, on plastic and on metal."""
     file = SHADERS / "representative_point.py"
     bare = dict(runpy.run_path(str(file))["scene"])
@@ -86,21 +93,14 @@ def lamp() -> Iterator[str]:
     )
 
 
-def spheres() -> dict[tuple[str, str], Comparison]:
-    """Compare shaders of environments and of lamps on spheres; keys are those of `SPHERES`."""
-    scene = runpy.run_path(str(ROOT / "docs/scenes/spheres.py"))["scene"]
-    found = {}
-    for light, name in SPHERES:
-        asked = Options(heuristic=str(SHADERS / f"{name}.py"), spp=2 * SAMPLES)
-        case = open_case(partial(scene, light), asked, name=light)
-        found[light, name] = compare(case.source, case.options)
-    return found
-
-
-def table_of_spheres(found: dict[tuple[str, str], Comparison]) -> Iterator[str]:
-    """Yield the departures on the spheres: over all, over the plastic ones, and over the gold."""
+def _write_spheres() -> None:
+    """Compare shaders of environments and of lamps: on all spheres, the plastic and the gold."""
+    scene = runpy.run_path(str(DOCS / "scenes/spheres.py"))["scene"]
+    shown = []
     rows = []
-    for (light, name), comparison in found.items():
+    for light, name in SPHERES:
+        comparison = _shaded(partial(scene, light), name, light, spp=2 * SAMPLES)
+        shown.append(panels(comparison.images))
         record = comparison.record
         means = [record.metrics[LEADING.name].mean]
         for kind in ("plastic", "gold"):
@@ -108,47 +108,14 @@ def table_of_spheres(found: dict[tuple[str, str], Comparison]) -> Iterator[str]:
             total = sum(region.mean_dE2000 * region.pixels for region in one)
             means.append(total / sum(region.pixels for region in one))
         rmse = record.metrics["rmse"].mean
-        rows.append((_link(name), light, *(f"{mean:.2f}" for mean in means), f"{rmse:.3f}"))
-    yield from markdown([("Shader", "Light", "all", "plastic", "gold", "RMSE"), *rows], right=2)
-
-
-def picture_of_spheres(found: dict[tuple[str, str], Comparison]) -> Figure:
-    """Draw each shader beside the reference, and the error beside both."""
+        rows.append((link(name), light, *(f"{mean:.2f}" for mean in means), f"{rmse:.3f}"))
+    head = "Shader", "Light", "all", "plastic", "gold", "RMSE"
+    replace("shaders.md", "spheres", markdown([head, *rows], right=2))
     titles = "shader", "reference", LEADING.label
-    with rc_context(model_figures.STYLE):
-        figure = Figure(figsize=(9.6, 1.22 * len(found) + 0.3), facecolor=model_figures.GROUND)
-        grid = figure.subplots(len(found), 3)
-        figure.subplots_adjust(0.03, 0, 0.93, 0.955, wspace=0.02, hspace=0.03)
-        for line, (key, comparison) in zip(grid, found.items(), strict=True):
-            shown = comparison.images
-            error = images.error_map(shown.maps[LEADING.name], LEADING.map_range[1])
-            pictures = images.tonemap(shown.heuristic), images.tonemap(shown.reference), error
-            for axes, picture in zip(line, pictures, strict=True):
-                axes.imshow(picture.convert("RGB"), interpolation="none", aspect="auto")
-                axes.axis("off")
-            line[0].text(-0.02, 0.5, SPHERES[key], rotation=90, ha="right", va="center",
-                         fontsize=9, transform=line[0].transAxes)  # fmt: skip
-        for axes, title in zip(grid[0], titles, strict=True):
-            axes.set_title(title, pad=4)
-        figures.legend(figure, figure.add_axes((0.94, 0.02, 0.012, 0.93)))
-    return figure
+    labels = [*SPHERES.values()]
+    drawn = sheet(titles, shown, labels, size=(2.88, 1.16), maps=len(shown))
+    draw("shaders-spheres.webp", drawn)
 
 
-def mistakes() -> Iterator[str]:
-    """Yield the names of the mistakes that tests make on purpose."""
-    yield f"{'; '.join(fact('mistakes'))}."
-
-
-def _compared(name: str, scene: str) -> Comparison:
-    asked = Options(heuristic=str(SHADERS / f"{name}.py"), resolution=(SIDE, SIDE), spp=SAMPLES)
-    case = open_case(scene, asked)
-    return compare(case.source, case.options)
-
-
-def _link(name: str) -> str:
-    return f"[{name.replace('_', ' ')}](shaders/{name}.py)"
-
-
-def _cell(comparison: Comparison) -> str:
-    metric = comparison.record.metrics[LEADING.name]
-    return f"{metric.mean:.2f} ({metric.after_exposure.mean:.2f})"
+def _shaded(scene: object, shader: str, name: str | None = None, **options: Any) -> Comparison:
+    return compared(scene, name, heuristic=str(SHADERS / f"{shader}.py"), **options)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from docs.figures.from_tests import ROOT
+from docs.figures.documents import ROOT, replace, write_table
 
 AREAS = {
     "kernel": "Kernel and plugins",
@@ -55,19 +55,18 @@ def guarantees() -> list[Guarantee]:
     return sorted(found, key=lambda each: places.index(each.area))
 
 
-def rows() -> Iterator[tuple[str, str, str, str, str]]:
-    """Yield the rows of docs/data/guarantees.csv."""
-    yield "area", "guarantee", "test", "file", "slow"
-    for each in guarantees():
-        slow = "slow" if each.is_slow else ""
-        yield AREAS[each.area], each.text, each.test, each.path, slow
-
-
-def summary() -> Iterator[str]:
-    """Yield how many guarantees there are of each area."""
-    counts = Counter(AREAS[each.area] for each in guarantees())
+def write() -> None:
+    """Write the list as a table, and how many guarantees there are of each area."""
+    found = guarantees()
+    head = "area", "guarantee", "test", "file", "slow"
+    rows = [
+        (AREAS[each.area], each.text, each.test, each.path, "slow" if each.is_slow else "")
+        for each in found
+    ]
+    write_table("guarantees", [head, *rows])
+    counts = Counter(AREAS[each.area] for each in found)
     areas = ", ".join(f"{area[0].lower()}{area[1:]} ({count})" for area, count in counts.items())
-    yield f"{counts.total()} guarantees: {areas}."
+    replace("guarantees.md", "guarantees", [f"{counts.total()} guarantees: {areas}."])
 
 
 def lines() -> Iterator[str]:
@@ -85,7 +84,10 @@ def _of_file(path: Path) -> Iterator[Guarantee]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if not isinstance(node, ast.FunctionDef | ast.ClassDef):
             continue
-        marks = {_name(mark): mark for mark in node.decorator_list}
+        marks = {
+            ast.unparse(mark.func if isinstance(mark, ast.Call) else mark): mark
+            for mark in node.decorator_list
+        }
         if "pytest.mark.guarantee" in marks:
             mark: Any = marks["pytest.mark.guarantee"]
             area, text = (ast.literal_eval(argument) for argument in mark.args)
@@ -96,8 +98,3 @@ def _of_file(path: Path) -> Iterator[Guarantee]:
             is_slow = "pytest.mark.slow" in marks
             where = path.relative_to(ROOT).as_posix()
             yield Guarantee(area, text, where, node.name, is_slow)
-
-
-def _name(decorator: ast.expr) -> str:
-    called = decorator.func if isinstance(decorator, ast.Call) else decorator
-    return ast.unparse(called)

@@ -3,32 +3,27 @@
 It is drawn from the files and the record of `./run compare SCENE`, so its numbers are the page's.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
 
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 from PIL import Image
 
+from docs.figures.documents import draw, replace
 from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.reports import verdict
 from fotismos.reports.charts import figures
 from fotismos.reports.charts.theme import EFFECT_COLOURS
-from fotismos.reports.files.images import webp
 from fotismos.reports.files.results import TABLES
 from fotismos.reports.jobs import Job
 from fotismos.reports.run import scene
 from fotismos.reports.terminal.words import number, percent
 
 SCENE = "cornell-box"
-GROUND, INK, QUIET = "#fcfcfb", "#1c1e21", "#585f67"
+GROUND, INK = "#fcfcfb", "#1c1e21"
 """Colours of the page in light."""
 
 PANELS = {"heuristic": "Textbook shading", "reference": "Physical", LEADING.name: ""}
@@ -40,78 +35,56 @@ WIDTH, HEIGHT = 9.1, 4.3
 BAR = 8.21
 """Inches: the bar of effects is as wide as the panels."""
 
-DENSITY = 160
-"""Dots per inch, for screens of high density."""
 
-
-@dataclass(frozen=True)
-class Hero:
-    """A scene's pictures by file name, its numbers, and the parts of its mean by effect."""
-
-    pictures: dict[str, Image.Image]
-    mean: float
-    visible: float
-    parts: dict[str, float]
-    command: str
-
-
-def made(request: Options | None = None) -> Hero:
-    """Compare the scene as the command does."""
-    job = Job(request or Options(), with_causes=True)
+def write() -> None:
+    """Compare the scene as the command does, and write the picture and its caption."""
+    job = Job(Options(), with_causes=True)
     with TemporaryDirectory() as folder:
         Path(folder, TABLES).mkdir()  # where processes of a command wait for their turn
         view, _ = scene.compare(SCENE, Path(folder), SCENE, job, lambda *_: None)
         files = {name: Path(folder, SCENE, f"{name}.png") for name in PANELS}
         pictures = {name: Image.open(file).convert("RGB") for name, file in files.items()}
     record = view.record
-    mean, share = record.metrics[LEADING.name].mean, verdict.share(record).value
-    parts = {name: mean * part for name, part in verdict.missing(record).items()}
-    return Hero(pictures, mean, share, parts, f"./run compare {SCENE}")
-
-
-def caption(hero: Hero) -> Iterator[str]:
-    """Yield the sentences below the picture, which hold its numbers."""
-    parts = ", ".join(f"{effect} {number(part)}" for effect, part in hero.parts.items())
-    yield (
-        f"*`{hero.command}`: {percent(hero.visible)} of the pixels differ visibly, by more than"
-        f" {LEADING.label} {TOLERANCE:g}; the mean is {number(hero.mean)}. Missing effects"
-        f" make up the mean: {parts}.*"
+    mean = record.metrics[LEADING.name].mean
+    missing = verdict.missing(record)
+    parts = {effect: mean * share for effect, share in missing.items()}
+    draw("hero.webp", _picture(pictures, mean, parts))
+    listed = ", ".join(f"{effect} {number(part)}" for effect, part in parts.items())
+    caption = (
+        f"*`./run compare {SCENE}`: {percent(verdict.share(record).value)} of the pixels differ"
+        f" visibly, by more than {LEADING.label} {TOLERANCE:g}; the mean is {number(mean)}. Missing"
+        f" effects make up the mean: {listed}.*"
     )
+    replace("../README.md", "hero", [caption])
 
 
-def picture(hero: Hero) -> Figure:
+def _picture(pictures: dict[str, Image.Image], mean: float, parts: dict[str, float]) -> Figure:
     """Return the labelled panels, the legend of the map, and the bar of effects."""
-    titles = {**PANELS, LEADING.name: f"{LEADING.label}, mean {number(hero.mean)}"}
+    titles = {**PANELS, LEADING.name: f"{LEADING.label}, mean {number(mean)}"}
     with rc_context({"font.size": 12, "text.color": INK, "font.family": "sans-serif"}):
         figure = Figure(figsize=(WIDTH, HEIGHT), facecolor=GROUND)
         for column, (name, title) in enumerate(titles.items()):
             axes = figure.add_axes(_box(0.1 + 2.77 * column, 1.2, 2.67, 2.67))
-            axes.imshow(hero.pictures[name], interpolation="none", aspect="auto")
+            axes.imshow(pictures[name], interpolation="none", aspect="auto")
             axes.set_title(title, loc="left", pad=6, fontsize=14)
             axes.axis("off")
         figures.legend(figure, figure.add_axes(_box(8.39, 1.2, 0.12, 2.67)))
-        _effects(figure, hero)
+        _draw_effects(figure, mean, parts)
     return figure
 
 
-def encoded(figure: Figure) -> bytes:
-    """Return the WebP file of the picture, a sixth of its PNG."""
-    drawn = figures.drawn(figure, "png", DENSITY)
-    return webp(Image.open(BytesIO(drawn)).convert("RGB"))
-
-
-def _effects(figure: Figure, hero: Hero) -> None:
+def _draw_effects(figure: Figure, mean: float, parts: dict[str, float]) -> None:
     """Draw the bar on the scale of the mean, and a label for each effect below it."""
     axes = figure.add_axes(_box(0.1, 0.16, BAR, 0.92), xlim=(0, BAR), ylim=(0, 0.92))
     axes.axis("off")
     axes.text(0, 0.74, "What is missing", fontsize=14)
     left = 0.0
-    for effect, part in hero.parts.items():
-        wide, colour = BAR * part / hero.mean, EFFECT_COLOURS[effect]
+    for effect, part in parts.items():
+        wide, colour = BAR * part / mean, EFFECT_COLOURS[effect]
         axes.barh(0.47, wide, 0.24, left, color=colour, edgecolor=GROUND, linewidth=0.6)
         left += wide
     place = 0.0
-    for effect, part in hero.parts.items():
+    for effect, part in parts.items():
         axes.barh(0.12, 0.15, 0.15, place, color=EFFECT_COLOURS[effect])
         words = axes.text(place + 0.23, 0.12, f"{effect} {number(part)}", va="center")
         box = words.get_window_extent()

@@ -6,21 +6,17 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
-
 import numpy as np
 from PIL import Image, ImageDraw
 
-from fotismos.comparisons.case import open_case
-from fotismos.comparisons.compare import compare
+from docs.figures.documents import DOCS, compared, panels, read_table, replace
+from fotismos.comparisons import atomic
 from fotismos.comparisons.comparison import Comparison, Images
-from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.options import Options
 from fotismos.comparisons.pixel_terms import LightTerms, PixelTerms
 from fotismos.comparisons.steps import with_terms
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Missing
-from fotismos.reports.files import images as files
+from fotismos.reports.files.images import webp
 
 SIDE, SAMPLES = 64, 1024
 """Size of the pictures whose pixels a lesson names, and samples per pixel."""
@@ -44,62 +40,16 @@ class Pixel:
     row: int
 
 
-LESSONS: dict[str, tuple[Pixel, ...]] = {
-    "emission": (Pixel("emission", 16, 31), Pixel("emission", 16, 51)),
-    "sky": (Pixel("fig-8-5a", 32, 32), Pixel("fig-8-5a", 50, 32)),
-    "distance": (
-        Pixel("fig-8-6a", 15, 32),
-        Pixel("fig-8-6a", 42, 32),
-        Pixel("lambert-sphere", 42, 32),
-    ),
-    "fall-offs": (
-        Pixel("fall-offs", 2, 45),
-        Pixel("fall-offs", 9, 20),
-        Pixel("fall-offs", 41, 45),
-        Pixel("fall-offs", 38, 20),
-    ),
-    "far": (
-        Pixel("far-lamp", 15, 32),
-        Pixel("far-lamp", 42, 32),
-        Pixel("fig-8-6b", 15, 32),
-        Pixel("fig-8-6b", 42, 32),
-    ),
-    "rim": (Pixel("fig-8-7a", 14, 32), Pixel("fig-8-7a", 31, 32)),
-    "mirror": (Pixel("mirror", 16, 30), Pixel("mirror", 27, 26)),
-    "shadow": (Pixel("fig-8-8a", 49, 32),),
-    "sum": (Pixel("fig-8-8c", 32, 38),),
-    "exponent": (
-        Pixel("fig-8-8c", 32, 38),
-        Pixel("fig-8-9", 32, 38),
-        Pixel("fig-8-8c", 32, 50),
-        Pixel("fig-8-9", 32, 50),
-    ),
-    "half vector": (Pixel("fig-8-9", 45, 32), Pixel("fig-8-9 --heuristic blinn", 45, 32)),
-    "channels": (Pixel("fig-8-11-n9", 48, 32), Pixel("fig-8-9", 48, 32)),
-    "beam": (
-        Pixel("fig-6-5-m1", 44, 32),
-        Pixel("fig-6-5-m40", 32, 32),
-        Pixel("fig-6-5-m40", 44, 32),
-    ),
-    "weights": (
-        Pixel("vertex-normals", 26, 31),
-        Pixel("vertex-normals --vertex-weights angle", 26, 31),
-    ),
-    "edges": (
-        Pixel("fig-6-10", 31, 32),
-        Pixel("fig-6-10", 32, 32),
-        Pixel("fig-6-10 --interpolation phong", 31, 32),
-        Pixel("fig-6-10 --interpolation phong", 32, 32),
-    ),
-    "vertices": (Pixel("fig-6-14", 42, 37), Pixel("fig-6-14 --interpolation phong", 42, 37)),
-    "surfaces": (
-        Pixel("cornell-box", 20, 6),
-        Pixel("cornell-box", 36, 50),
-        Pixel("cornell-box", 48, 58),
-    ),
-}
-"""The pixels of each lesson; its picture shows the scene of the first."""
+def _listed() -> dict[str, list[Pixel]]:
+    found: dict[str, list[Pixel]] = {}
+    for row in read_table("lessons"):
+        pixel = Pixel(command=row["command"], column=int(row["column"]), row=int(row["row"]))
+        found.setdefault(row["lesson"], []).append(pixel)
+    return found
 
+
+LESSONS = _listed()
+"""The pixels of each lesson; its picture shows the scene of the first."""
 
 MOVED = {
     "sky": "k_a:0:0.9",
@@ -111,25 +61,31 @@ MOVED = {
 
 
 @cache
-def compared(command: str, side: int = SIDE, spp: int = SAMPLES) -> Comparison:
+def rendered(command: str, side: int = SIDE, spp: int = SAMPLES) -> Comparison:
     """Compare as a command does whose words are a scene and options."""
     scene, *words = command.split(" --")
     given: dict[str, Any] = dict(word.replace("-", "_").split() for word in words)
-    case = open_case(scene, Options(resolution=(side, side), spp=spp, **given))
-    return compare(case.source, case.options, then=[with_terms])
+    return compared(scene, then=[with_terms], resolution=(side, side), spp=spp, **given)
 
 
 def values(lesson: str) -> Floats:
     """Return the linear RGB of textbook and reference at each pixel, (pixels, 2, 3)."""
     found = []
     for pixel in LESSONS[lesson]:
-        shown: Images = compared(pixel.command).images
+        shown: Images = rendered(pixel.command).images
         halves = (shown.heuristic, shown.reference)
         found.append([half[pixel.row, pixel.column] for half in halves])
     return np.array(found)
 
 
-def lines(lesson: str) -> Iterator[str]:
+def write() -> None:
+    """Write the picture and the pixels of each lesson."""
+    for lesson in LESSONS:
+        atomic.write(DOCS / file(lesson), _picture(lesson))
+        replace("lessons.md", lesson, _lines(lesson))
+
+
+def _lines(lesson: str) -> Iterator[str]:
     """Yield the picture of a lesson, and its pixels: both halves, and 8.10 with numbers put in."""
     yield f"![{LESSONS[lesson][0].command}: textbook, physical, error]({file(lesson)})"
     yield ""
@@ -149,28 +105,20 @@ def file(lesson: str) -> str:
     return f"lessons/{lesson.replace(' ', '-')}.webp"
 
 
-def picture(lesson: str) -> bytes:
+def _picture(lesson: str) -> bytes:
     """Return a lesson's picture: both halves and the map of the error, with its pixels marked."""
     command = LESSONS[lesson][0].command
-    shown = compared(command, PANEL, PANEL_SAMPLES).images
-    panels = [
-        panel.convert("RGB")
-        for panel in (
-            files.tonemap(shown.heuristic),
-            files.tonemap(shown.reference),
-            files.error_map(shown.maps[LEADING.name], LEADING.map_range[1]),
-        )
-    ]
-    width = len(panels) * (PANEL + GAP) - GAP
+    pictures = panels(rendered(command, PANEL, PANEL_SAMPLES).images)
+    width = len(pictures) * (PANEL + GAP) - GAP
     strip = Image.new("RGB", (width, PANEL), "white")
-    for number, panel in enumerate(panels):
-        drawing = ImageDraw.Draw(panel)
+    for number, picture in enumerate(pictures):
+        drawing = ImageDraw.Draw(picture)
         for pixel in LESSONS[lesson]:
             if pixel.command == command:
                 x, y = ((place + 0.5) * PANEL / SIDE for place in (pixel.column, pixel.row))
                 drawing.ellipse((x - 5, y - 5, x + 5, y + 5), outline=RING, width=2)
-        strip.paste(panel, (number * (PANEL + GAP), 0))
-    return files.webp(strip)
+        strip.paste(picture, (number * (PANEL + GAP), 0))
+    return webp(strip)
 
 
 def scenes() -> list[str]:
@@ -199,7 +147,7 @@ def _with_page(section: str, folder: str) -> str:
 
 def _equation(pixel: Pixel) -> str:
     """Return 8.10 with a pixel's numbers, in red; empty if its intensities are interpolated."""
-    grid = compared(pixel.command).terms
+    grid = rendered(pixel.command).terms
     terms = None if grid is None or isinstance(grid, Missing) else grid.at(pixel.column, pixel.row)
     if terms is None or terms.pixel != (pixel.column, pixel.row):
         return ""

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
-
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from docs.figures.density import MARKS, near_sphere
+from docs.figures.documents import draw, replace
 from docs.figures.model_figures import GROUND, STYLE, quiet
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
@@ -63,28 +62,28 @@ def lit(count: int) -> dict[str, Any]:
     return scene
 
 
-def measured(
-    counts: Sequence[int] = COUNTS, fineness: Sequence[int] = tuple(FINENESS), rounds: int = ROUNDS
-) -> list[ShadingCost]:
-    """Render all meshes with all numbers of lights, in turns."""
-    return [cost for count in counts for cost in _of_count(count, fineness, rounds)]
+def write() -> None:
+    """Render all meshes with all numbers of lights, in turns, and write the chart and sentences."""
+    found = [cost for count in COUNTS for cost in _of_count(count)]
+    draw("models-light-counts.svg", chart(found))
+    replace("models.md", "light counts", sentences(found))
 
 
-def _of_count(count: int, fineness: Sequence[int], rounds: int) -> Iterator[ShadingCost]:
+def _of_count(count: int) -> Iterator[ShadingCost]:
     source = Source(f"{count} lights", partial(lit, count))
     options = Options(resolution=(SIDE, SIDE))
     sphere = prepare(source, options)
     renderers: list[Renderer] = [sphere.heuristic.sampled(SPP)]
     meshes = []
     for shading in MARKS:
-        for n in fineness:
+        for n in FINENESS:
             changed = options.changed(interpolation=shading.value, tessellation=n)
             renderer: Renderer = prepare(source, changed).heuristic
             renderers.append(renderer.sampled(SPP))
             meshes.append((shading, n, renderer.scene.shapes()[0].face_count()))
     for renderer in renderers:
         warm(renderer)
-    *_, last = passes(renderers, options.seed, rounds)
+    *_, last = passes(renderers, options.seed, ROUNDS)
     exact, *images = map(np.array, last.images)
     distances = LEADING.against(exact, sphere.counted, options.viewing)
     for (shading, n, faces), renderer, image in zip(meshes, renderers[1:], images, strict=True):
@@ -93,7 +92,7 @@ def _of_count(count: int, fineness: Sequence[int], rounds: int) -> Iterator[Shad
             fineness=n,
             faces=faces,
             lights=count,
-            seconds=min(renderer.processor_times[-rounds:]),
+            seconds=min(renderer.processor_times[-ROUNDS:]),
             error=LEADING.mean(distances(image)),
         )
 

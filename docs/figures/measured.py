@@ -9,13 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
-
 import msgspec
 import numpy as np
 
+from docs.figures import density, light_counts
 from docs.figures import findings as findings_page
-from docs.figures.from_tests import ROOT, fact
+from docs.figures.documents import DOCS, ROOT, fact, replace, run, write_table
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost.cost import cost
@@ -27,7 +26,6 @@ from fotismos.reports.charts import vega
 from fotismos.reports.charts.cost_charts import titled
 from fotismos.reports.terminal.words import number
 
-DOCS = ROOT / "docs"
 COST_SCENE = "cornell-box"
 ROUNDS = 30
 VERIFIED = ("fig-8-9", "fig-6-10", "cornell-box", "plastic-spheres", "narrow-band-lamp")
@@ -39,11 +37,25 @@ CHAPTER_8 = (
 )
 
 
+def write() -> None:
+    """Measure all errors and times in the documents again."""
+    density.write()
+    light_counts.write()
+    baselines()
+    findings()
+    write_table("noise", fact("intervals_in_noise"))
+    write_table("fits", fits())
+    replace("../README.md", "cost", attribution())
+    replace("plans.md", "gains", gains())
+    replace("speed.md", "speed", speed())
+
+
 def baselines() -> None:
     """Measure all baselines of the tests again, not only those that moved."""
     for file in (ROOT / "tests" / "baselines").glob("*.json"):
         file.unlink()
-    _run("pytest", "-q", "-m", "", "tests/test_baselines.py", "--fotismos-update")
+    words = ("-q", "-m", "", "tests/test_baselines.py", "--fotismos-update")
+    subprocess.run([sys.executable, "-P", "-m", "pytest", *words], cwd=ROOT, check=True)
 
 
 def fits() -> Iterator[tuple[str, ...]]:
@@ -63,7 +75,7 @@ def findings() -> None:
     """Study Phong against roughplastic, and write its dataset, its figures and their page."""
     file = ROOT / "studies/phong-roughplastic.toml"
     with TemporaryDirectory() as folder:
-        _run("fotismos.reports", "study", str(file), "-o", folder)
+        run("study", str(file), "-o", folder)
         made = Path(folder, "study", file.stem)
         table = dataset.read(made / f"{file.stem}.parquet")
         atomic.write(file.with_suffix(".parquet"), dataset.file_of(table))
@@ -119,7 +131,3 @@ def speed() -> Iterator[str]:
         f" point; eight unrolled lights take {unrolled:.2f} ns. Compile time stays under"
         f" {max(row['compile_s'] for row in many):.1g} s."
     )
-
-
-def _run(module: str, *words: str) -> None:
-    subprocess.run([sys.executable, "-P", "-m", module, *words], cwd=ROOT, check=True)

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-import fotismos  # isort: skip  it finds LLVM before Dr.Jit is imported
-
 import numpy as np
 from drjit.auto import Array3f
 from matplotlib import rc_context
@@ -14,6 +12,8 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 from PIL import Image
 
+import fotismos
+from docs.figures.documents import compared, draw, panels
 from fotismos.comparisons.comparison import Images
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.reports.charts import figures
@@ -43,6 +43,42 @@ INCIDENCE = 50.0
 ROWS = ("textbook", "physical", LEADING.label)
 STYLE = {"font.size": 11, "axes.titlesize": 11, "mathtext.fontset": "dejavuserif"}
 INCH = 1.92
+
+
+SHEETS = {
+    "ambient": ("fig-8-5a", "fig-8-5b", "fig-8-5c"),
+    "diffuse": ("fig-8-6a", "fig-8-6b", "fig-8-6c"),
+    "specular": ("fig-8-7a", "fig-8-7b", "fig-8-7c"),
+    "sum": ("fig-8-8a", "fig-8-8c", "fig-8-9", "fig-8-11-n9"),
+    "spots": ("fig-6-5-m1", "fig-6-5-m40"),
+}
+"""Scenes in docs/models.md: heuristic, reference and difference below each other."""
+
+POLYGONS = (
+    ("fig-6-10", "flat"),
+    ("fig-6-10", "gouraud"),
+    ("fig-6-10", "phong"),
+    ("fig-6-14", "gouraud"),
+    ("fig-6-14", "phong"),
+)
+"""Scenes and their interpolation, beside each other."""
+
+SIDE, SAMPLES = 192, 64
+
+
+def write() -> None:
+    """Draw the lobes, and render the sheets."""
+    draw("models-lobes.svg", lobes())
+    for name, scenes in SHEETS.items():
+        draw(f"models-{name}.png", halves(scenes, [_images(scene) for scene in scenes]))
+    titles = [f"{scene}, {kind}" for scene, kind in POLYGONS]
+    shaded = [_images(scene, kind).heuristic for scene, kind in POLYGONS]
+    draw("models-polygons.png", pictures(titles, [shaded]))
+
+
+def _images(scene: str, interpolation: str | None = None) -> Images:
+    size = (SIDE, SIDE)
+    return compared(scene, interpolation=interpolation, resolution=size, spp=SAMPLES).images
 
 
 def lobes() -> Figure:
@@ -83,26 +119,30 @@ def seen(incidence: float, **material: Any) -> NDArray[np.float64]:
     return np.broadcast_to(np.array(value, np.float64), VIEWS.shape)
 
 
-def compared(titles: Sequence[str], found: Sequence[Images]) -> Figure:
+def halves(titles: Sequence[str], found: Sequence[Images]) -> Figure:
     """Draw three rows of pictures: heuristic, reference, and their difference with its legend."""
-    top = LEADING.map_range[1]
-    rows = [
-        [images.tonemap(one.heuristic) for one in found],
-        [images.tonemap(one.reference) for one in found],
-        [images.error_map(one.maps[LEADING.name], top).convert("RGB") for one in found],
-    ]
-    return sheet(titles, rows, ROWS)
+    return sheet(titles, [*zip(*map(panels, found), strict=True)], ROWS)
+
+
+def pictures(titles: Sequence[str], rows: Sequence[Sequence[NDArray]]) -> Figure:
+    """Draw rows of linear pictures (H, W, 3), with a title above each column."""
+    return sheet(titles, [[images.tonemap(picture) for picture in row] for row in rows])
 
 
 def sheet(
-    titles: Sequence[str], rows: Sequence[Sequence[Image.Image]], labels: Sequence[str] = ()
+    titles: Sequence[str],
+    rows: Sequence[Sequence[Image.Image]],
+    labels: Sequence[str] = (),
+    size: tuple[float, float] = (INCH, INCH),
+    maps: int = 1,
 ) -> Figure:
-    """Draw rows of pictures, a title above each column and a label before each row.
+    """Draw rows of pictures, each of a size in inches: columns have titles, rows may have labels.
 
-    With labels, the last row is a map of errors, and has its legend.
+    With labels, the last ``maps`` rows end with a map of errors, and have its legend.
     """
     left, right = (0.3, 0.62) if labels else (0.0, 0.0)
-    width, height = len(titles) * INCH + left + right, len(rows) * INCH + 0.3
+    width = len(titles) * size[0] + left + right
+    height = len(rows) * size[1] + 0.3
     with rc_context(STYLE):
         figure = Figure(figsize=(width, height), facecolor=GROUND)
         grid = figure.subplots(len(rows), len(titles), squeeze=False)
@@ -119,13 +159,9 @@ def sheet(
             axes.text(-0.03, 0.5, label, rotation=90, ha="right", va="center",
                       transform=axes.transAxes)  # fmt: skip
         if labels:
-            _legend(figure, width, height)
+            box = (width - 0.56) / width, 0.02, 0.1 / width, maps * size[1] / height - 0.04
+            figures.legend(figure, figure.add_axes(box))
     return figure
-
-
-def _legend(figure: Figure, width: float, height: float) -> None:
-    axes = figure.add_axes(((width - 0.56) / width, 0.02, 0.1 / width, INCH / height - 0.04))
-    figures.legend(figure, axes)
 
 
 def quiet(axes: Axes) -> None:

@@ -6,13 +6,12 @@
 from collections.abc import Iterator, Sequence
 from math import log10
 
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
-
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from docs.figures.accuracy import LARGER
+from docs.figures.documents import draw, replace, write_table
 from docs.figures.model_figures import GROUND, STYLE, quiet
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
@@ -45,6 +44,16 @@ own."""
 
 NAMED_ABOVE = 1.6
 """Times of the textbook's time above which the chart names a scene."""
+
+
+def write() -> None:
+    """Compare the scenes, and write their table, chart and sentences."""
+    records = measured()
+    draw("prices.svg", chart(records))
+    for page in ("accuracy.md", "../README.md"):
+        replace(page, "prices", sentences(records))
+    write_table("prices", [HEAD, *map(_row, records)])
+    replace("models.md", "complexity", complexity(records))
 
 
 def measured() -> list[ComparisonRecord]:
@@ -81,12 +90,6 @@ def complexity(records: Sequence[ComparisonRecord]) -> Iterator[str]:
         f" {number(max(ratios))} times as long as a textbook one; in the Cornell box it takes"
         " longer ([what accuracy costs](accuracy.md))."
     )
-
-
-def table(records: Sequence[ComparisonRecord]) -> Iterator[tuple[str, ...]]:
-    """Yield a row for each scene: what differs, what is needed, and what that takes."""
-    yield HEAD
-    yield from map(_row, records)
 
 
 def _row(record: ComparisonRecord) -> tuple[str, ...]:

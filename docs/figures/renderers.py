@@ -1,14 +1,10 @@
 """The content of docs/renderers.md: scenes by the kernel, POV-Ray, three.js and Mitsuba."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
-
-import fotismos  # noqa: F401  isort: skip  it finds LLVM before Dr.Jit is imported
-
 import numpy as np
 
 from docs.engines import three_js
-from docs.figures.from_tests import fact
+from docs.figures.documents import draw, fact, replace
+from docs.figures.model_figures import pictures
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import leading_distance
@@ -21,37 +17,25 @@ SIDE, SAMPLES = 192, 256
 KERNEL, POVRAY, THREE, MITSUBA = "kernel", "POV-Ray", "three.js", "Mitsuba"
 
 
-@dataclass(frozen=True)
-class Rendered:
-    """The images (H, W, 3) of a scene by renderer, and mean departures of all but the last."""
-
-    images: dict[str, np.ndarray]
-    departures: dict[str, float]
-    from_kernel: dict[str, float]
-
-
-def rendered() -> dict[str, Rendered]:
-    """Render all scenes; keys are their names."""
-    return {name: _rendered(name) for name in SCENES}
-
-
-def table(found: dict[str, Rendered]) -> Iterator[str]:
-    """Yield the table: the mean departure from Mitsuba; in brackets, from the kernel."""
-    rows = [
-        (name, *(_cell(one, renderer) for renderer in (KERNEL, POVRAY, THREE)))
-        for name, one in found.items()
-    ]
-    yield from markdown([("Scene", KERNEL, POVRAY, THREE), *rows], right=1)
+def write() -> None:
+    """Render all scenes with each program, and write their pictures and the table."""
+    found = {}
+    rows = []
+    for scene in SCENES:
+        found[scene], cells = _rendered(scene)
+        rows.append((scene, *cells))
+    replace("renderers.md", "renderers", markdown([("Scene", KERNEL, POVRAY, THREE), *rows]))
+    programs = (KERNEL, POVRAY, THREE, MITSUBA)
+    shown = [[found[scene][program] for scene in SCENES] for program in programs]
+    draw("renderers.png", pictures(SCENES, shown))
 
 
-def _cell(one: Rendered, renderer: str) -> str:
-    shown = f"{one.departures[renderer]:.2f}"
-    return shown if renderer == KERNEL else f"{shown} ({one.from_kernel[renderer]:.2f})"
+def _rendered(name: str) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Return the images (H, W, 3) of a scene by program, and the mean departures from Mitsuba.
 
-
-def _rendered(name: str) -> Rendered:
-    asked = Options(resolution=(SIDE, SIDE), spp=SAMPLES)
-    case = open_case(name, asked)
+    In brackets are those from the kernel.
+    """
+    case = open_case(name, Options(resolution=(SIDE, SIDE), spp=SAMPLES))
     kernel = compare(case.source, case.options).images
     fine = case.changed(tessellation=three_js.TESSELLATION)
     images = {
@@ -62,13 +46,11 @@ def _rendered(name: str) -> Rendered:
     }
     departure = leading_distance(case.options.viewing)
 
-    def mean(renderer: str, other: str) -> float:
+    def mean(renderer: str, other: str) -> str:
         one, two = (images[each][kernel.counted].astype(float) for each in (renderer, other))
-        return float(departure(one, two).mean())
+        return f"{float(departure(one, two).mean()):.2f}"
 
-    drawn = (KERNEL, POVRAY, THREE)
-    return Rendered(
-        images,
-        {each: mean(each, MITSUBA) for each in drawn},
-        {each: mean(each, KERNEL) for each in drawn},
-    )
+    cells = [mean(KERNEL, MITSUBA)]
+    for renderer in (POVRAY, THREE):
+        cells.append(f"{mean(renderer, MITSUBA)} ({mean(renderer, KERNEL)})")
+    return images, cells

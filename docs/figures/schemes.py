@@ -8,8 +8,6 @@ squares, as in chapter 8.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import fotismos  # isort: skip  it finds LLVM before Dr.Jit is imported
-
 import numpy as np
 from drjit.auto import Array3f
 from matplotlib import rc_context
@@ -18,6 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon
 from numpy.typing import ArrayLike, NDArray
 
+import fotismos
+from docs.figures.documents import draw
 from docs.figures.model_figures import (
     COLOURS,
     FAINT,
@@ -41,6 +41,12 @@ N, L, R, V = (rf"\mathbf{{{letter}}}" for letter in "nlrv")
 
 WIDE, TALL = 3.0, 2.0
 """Inches of a panel, with its title."""
+
+
+def write() -> None:
+    """Draw all sheets."""
+    for name, panels in SHEETS.items():
+        draw(f"models-{name}.svg", sheet(panels))
 
 
 def sheet(panels: Mapping[str, Callable[[Axes], None]]) -> Figure:

@@ -5,7 +5,7 @@ from importlib import import_module
 from pathlib import Path
 from pydoc import locate
 
-from docs.figures.from_tests import ROOT
+from docs.figures.documents import ROOT
 
 ROOMS = ("heuristic", "reference", "comparisons", "reports")
 

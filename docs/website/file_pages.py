@@ -5,7 +5,7 @@ from functools import cache
 from pathlib import PurePosixPath
 from textwrap import indent
 
-from docs.figures.from_tests import ROOT
+from docs.figures.documents import ROOT
 from docs.figures.guarantees import Guarantee, guarantees
 
 LANGUAGES = {

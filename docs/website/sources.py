@@ -1,13 +1,18 @@
-"""Gathers the sources of the site: our pages, those of the API, and those of linked files."""
+"""Builds the site, offline: from our pages, those of the API, and those of linked files."""
 
 import re
+from base64 import b64decode
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 from posixpath import dirname, normpath, relpath
+from tempfile import TemporaryDirectory
+
+import nbformat
+from sphinx.cmd.build import build_main
 
 from docs.figures import guarantees, lessons
-from docs.figures.from_tests import ROOT
-from docs.website import api_pages, file_pages, notebook_page
+from docs.figures.documents import ROOT
+from docs.website import api_pages, file_pages
 
 LINK = re.compile(r"\[(?P<text>[^][]*)\]\((?P<target>[^)\s#]+)(?P<anchor>#[^)\s]*)?\)")
 """A link in Markdown."""
@@ -24,6 +29,15 @@ GUARANTEES = "docs/guarantees.md"
 """The page to which the site adds each guarantee, with a link to its test."""
 
 PROJECT = ("CONTRIBUTING.md", "CHANGELOG.md")
+
+
+def build(folder: Path) -> int:
+    """Write the site into a folder; return 0 only if no link or docstring has a fault."""
+    with TemporaryDirectory() as temporary:
+        gather(Path(temporary, "sources"))
+        words = ["-b", "html", "-W", "--keep-going", "-q", "-c", str(Path(__file__).parent)]
+        trees = ["-d", f"{temporary}/trees"]
+        return build_main([*words, *trees, f"{temporary}/sources", str(folder)])
 
 
 def gather(folder: Path) -> None:
@@ -43,7 +57,7 @@ def gather(folder: Path) -> None:
     for path in (ROOT / "docs").rglob("*"):
         if path.suffix in PICTURES:
             write(folder / path.relative_to(ROOT), path.read_bytes())
-    text, pictures = notebook_page.page(ROOT / "docs/tutorial.ipynb")
+    text, pictures = notebook(ROOT / "docs/tutorial.ipynb")
     write(folder / "docs/tutorial.md", with_links(text, "docs/tutorial.ipynb", linked))
     for name, picture in pictures.items():
         write(folder / "docs" / name, picture)
@@ -62,6 +76,31 @@ def write(path: Path, content: str | bytes) -> None:
 def place(path: str) -> str:
     """Return a page's place in the site: a folder's own page is its index."""
     return path.replace("README.md", "index.md").replace(".ipynb", ".md")
+
+
+def notebook(path: Path) -> tuple[str, dict[str, bytes]]:
+    """Return a notebook in Markdown, and its pictures by file name."""
+    parts = []
+    pictures: dict[str, bytes] = {}
+    for cell in nbformat.read(path, as_version=4).cells:
+        is_code = cell.cell_type == "code"
+        parts.append(fenced("python", cell.source) if is_code else cell.source)
+        for output in cell.get("outputs", ()):
+            data = output.get("data", {"text/plain": output.get("text")})
+            kind = next(k for k in ("image/png", "image/svg+xml", "text/plain") if k in data)
+            if kind == "text/plain":
+                parts.append(fenced("text", data[kind].rstrip()))
+                continue
+            is_svg = kind == "image/svg+xml"
+            name = f"{path.stem}-{len(pictures) + 1}.{'svg' if is_svg else 'png'}"
+            pictures[name] = data[kind].encode() if is_svg else b64decode(data[kind])
+            parts.append(f"![The picture that the cell draws]({name})")
+    return "\n\n".join(parts), pictures
+
+
+def fenced(language: str, text: str) -> str:
+    """Return a block of code."""
+    return f"```{language}\n{text}\n```"
 
 
 def with_links(text: str, page: str, linked: set[str]) -> str:

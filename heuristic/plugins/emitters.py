@@ -59,14 +59,7 @@ import mitsuba as mi
 
 from fotismos.heuristic import convention, terms
 from fotismos.heuristic.convention import Colour, Interaction, Mask, Number, Properties, Sample
-from fotismos.heuristic.lights import (
-    FAR,
-    INTENSITIES,
-    PLUGINS,
-    UNATTENUATED,
-    Extent,
-    Light,
-)
+from fotismos.heuristic.lights import FAR, INTENSITIES, PLUGINS, UNATTENUATED, Extent, Light
 from fotismos.heuristic.plugins.coefficients import coefficient, emitted
 
 

@@ -246,9 +246,8 @@ def define() -> dict[str, Any]:
             raise unknown("interpolation", name, names)
         if name == "phong":
             return HeuristicIntegrator(props)
-        from fotismos.heuristic.plugins import (
-            interpolated,  # loaded late: most scenes have no meshes
-        )
+        # Loaded late: most scenes have no meshes.
+        from fotismos.heuristic.plugins import interpolated
 
         return interpolated.derived(HeuristicIntegrator)(props)
 

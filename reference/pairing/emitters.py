@@ -1,8 +1,6 @@
 """Replacing the lights of a scene by their counterparts, by ``reference.pairing.factors``.
 
-Lights without a row in the table get the nearest light: an environment or a sky becomes ``I_a``,
-its mean radiance over the sphere, and the sun a directional light of its irradiance and mean
-direction; a textured ``area`` light has its mean radiance. Any other light is left out.
+Lights without a row in the table get the nearest light (:mod:`fotismos.reference.pairing.lamps`).
 
 **Level.** A light without an exact pair differs from its form in the other half by shape. Its level
 follows one rule, so only the shape differs: *equal flux if the light's parameters determine it;

@@ -40,12 +40,7 @@ import numpy as np
 
 from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
 from fotismos.heuristic.terms import normalisation
-from fotismos.reference.pairing.pairing_record import (
-    BsdfPair,
-    EmitterPair,
-    Miss,
-    Unrepresentable,
-)
+from fotismos.reference.pairing.pairing_record import BsdfPair, EmitterPair, Miss, Unrepresentable
 
 INTENSITY_FACTOR = 1 / IRRADIANCE_PER_INTENSITY
 """``I_p / E`` and ``I_p0 / I``: the factor of all rows above."""

@@ -16,11 +16,7 @@ from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named
 from fotismos.heuristic.plugins import register
 from fotismos.reference.pairing import bsdfs, emitters
-from fotismos.reference.pairing.factors import (
-    Convention,
-    Replacements,
-    specular_albedo,
-)
+from fotismos.reference.pairing.factors import Convention, Replacements, specular_albedo
 from fotismos.reference.pairing.pairing_record import Override, Pairing, Unrepresentable
 from fotismos.reference.pairing.settings import Settings, complete
 from fotismos.reference.rendering.gbuffer import gbuffer
@@ -118,9 +114,8 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
     for_users = options.with_partners or not model.is_builtin
     context = bsdfs.Context(half, options.convention, for_users=for_users)
     if any(half.plugin(index) not in bsdfs.RULES for index in half.nodes(BSDF)):
-        from fotismos.reference.pairing import (
-            nearest,  # loaded late: only for lobes and transmission
-        )
+        # Loaded late: only for lobes and transmission.
+        from fotismos.reference.pairing import nearest
 
         context.rule_of = nearest.rule_of
     bsdfs.to_heuristic(context, replaced)
@@ -141,9 +136,8 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
     props.set_id("integrator")  # identifies its parameters
     half.attach(0, "integrator", half.add(INTEGRATOR, props))
     if options.has_meshes:
-        from fotismos.reference.pairing import (
-            polygons,  # loaded late: few scenes are made into triangles
-        )
+        # Loaded late: few scenes are made into triangles.
+        from fotismos.reference.pairing import polygons
 
         polygons.replace_shapes(
             half,

@@ -1,9 +1,10 @@
 """Spots, lights with an extent, and those that must be measured, to their nearest forms.
 
-``area``: in the far field a point or an even spot, nearby a glow ``k_i``. ``constant``, ``envmap``
-and any other plugin whose light surrounds the scene: ``I_a``, the mean radiance; the sun of
-``sunsky`` and ``timed_sunsky`` is a directional light. Any other light, such as ``projector`` or a
-textured ``spot``, is left out: it has no nearest form.
+``area``: in the far field a point or an even spot, nearby a glow ``k_i``; of a texture the mean
+radiance. ``constant``, ``envmap`` and any other plugin whose light surrounds the scene: ``I_a``,
+the mean radiance over the sphere; the sun of ``sunsky`` and ``timed_sunsky`` is a directional light
+of its irradiance and mean direction. Any other light, such as ``projector`` or a textured ``spot``,
+is left out: it has no nearest form.
 
 Spots differ. Mitsuba's is even up to its beam width and falls linearly in the angle to 0 at its
 cutoff; the chapters' (6.4) falls as ``cos^m`` and is cut off. Neither can reproduce the other. The

@@ -272,16 +272,11 @@ NEAREST = "seen through without refraction, by the transmittance at normal incid
 
 
 def dielectric(context: Context, index: int) -> NearestPhong:
-    """``dielectric``, ``roughdielectric``: the interface is lit only from outside."""
-    return _clear(context, index, "refraction", twosided=False)
+    """``dielectric``, ``roughdielectric``: lit only from outside; ``thindielectric``: both sides.
 
-
-def sheet(context: Context, index: int) -> NearestPhong:
-    """``thindielectric``: both sides reflect, without refraction."""
-    return _clear(context, index, "mirror image", twosided=True)
-
-
-def _clear(context: Context, index: int, lost: str, twosided: bool) -> NearestPhong:
+    Only the thin one has no refraction.
+    """
+    is_thin = context.plugin(index) == "thindielectric"
     white = probe.measured(
         context.graph, index, specular_reflectance=1.0, specular_transmittance=1.0
     )
@@ -290,8 +285,8 @@ def _clear(context: Context, index: int, lost: str, twosided: bool) -> NearestPh
         k_a=reflected,
         **lobe(context, reflected, context.value(index, "alpha", white.alpha)),
         transmittance=_tinted(context, index, reflected=white.passed, key="specular_transmittance"),
-        twosided=twosided,
-        lost=((lost, NEAREST),),
+        twosided=is_thin,
+        lost=(("mirror image" if is_thin else "refraction", NEAREST),),
         physical=context.physical(0.0, _alpha(context, index), _ior(context.graph, index, "bk7")),
     )
 
@@ -476,8 +471,7 @@ RULES: dict[str, Rule] = {
     "plastic": plastic,
     **dict.fromkeys(("conductor", "roughconductor"), conductor),
     "principled": principled,
-    **dict.fromkeys(("dielectric", "roughdielectric"), dielectric),
-    "thindielectric": sheet,
+    **dict.fromkeys(("dielectric", "roughdielectric", "thindielectric"), dielectric),
     "null": null,
     "twosided": twosided,
     "mask": mask,

@@ -186,17 +186,10 @@ def _parts(bsdf: mi.BSDF, wavelengths: np.ndarray | None) -> tuple[tuple[Any, ..
     beside = mi.Vector3f(sin(OFF_LOBE) * cos_phi, sin(OFF_LOBE) * sin_phi, cos(OFF_LOBE))
     level = bsdf.eval(mi.BSDFContext(), si, beside, True) * (pi / cos(OFF_LOBE))
     dr.eval(bs, weight, up, straight, level)  # one kernel for all values read below
-    reflected = np.array(
-        [np.mean(np.array(channel, float)) for channel in dr.select(up, weight, 0)]
-    )
-    passed = np.array(
-        [np.mean(np.array(channel, float)) for channel in dr.select(~up & straight, weight, 0)]
-    )
-    scattered = np.array(
-        [np.mean(np.array(channel, float)) for channel in dr.select(~up & ~straight, weight, 0)]
-    )
-    diffuse = np.array([np.mean(np.array(channel, float)) for channel in level])
-    diffuse = np.clip(diffuse, 0, reflected)
+    reflected = _channel_means(dr.select(up, weight, 0))
+    passed = _channel_means(dr.select(~up & straight, weight, 0))
+    scattered = _channel_means(dr.select(~up & ~straight, weight, 0))
+    diffuse = np.clip(_channel_means(level), 0, reflected)
     return (reflected, diffuse, passed, scattered), _width(bs, weight, up=up, diffuse=diffuse)
 
 
@@ -244,7 +237,7 @@ def surface_mean(graph: Graph, shape: mi.Shape) -> Any:
     si.uv = sample.uv
     si.wi = mi.Vector3f(0, 0, 1)
     means = [_channel_means(emitter.eval(_at(si, wavelengths))) for wavelengths in _wavelengths()]
-    return as_value(graph, np.concatenate(means), emitted=True)
+    return as_value(graph, np.maximum(np.concatenate(means), 0), emitted=True)
 
 
 def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:
@@ -258,16 +251,17 @@ def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:
         weight = dr.select(dr.isfinite(weight) & (ds.pdf > 0), weight, 0)
         means.append(_channel_means(weight))
         toward += np.array(ds.d, float) @ np.mean(np.array(weight, float), axis=0)
-    return np.concatenate(means), toward / max(float(np.linalg.norm(toward)), 1e-30)
+    # At least 0: sky models dip slightly below.
+    arriving = np.maximum(np.concatenate(means), 0)
+    return arriving, toward / max(float(np.linalg.norm(toward)), 1e-30)
 
 
 def _lattice() -> tuple[mi.Float, ...]:
     return tuple(mi.Float(row) for row in lattice(SAMPLES_OF_LIGHTS, LATTICE_OF_LIGHTS))
 
 
-def _channel_means(spectrum: Any) -> Any:
-    """Return the mean of each channel, at least 0: sky models dip slightly below."""
-    return np.array([max(np.mean(np.array(channel, float)), 0.0) for channel in spectrum])
+def _channel_means(spectrum: Any) -> np.ndarray:
+    return np.array([np.mean(np.array(channel, float)) for channel in spectrum])
 
 
 class AlbedoTable:

@@ -318,7 +318,8 @@ class CameraFacts:
         middle = origins.mean(axis=0)
         axis = np.ravel(np.array(sensor.world_transform().matrix, float)[:3, 2])
         wide = middle + MARGIN * (origins - middle)
-        return cls(plugin, wide, axis / np.linalg.norm(axis), is_still)
+        unit = axis / np.linalg.norm(axis)
+        return cls(plugin=plugin, origins=wide, axis=unit, is_still=is_still)
 
     def is_outside(self, shape: ShapeFacts) -> bool:
         """Return whether all rays certainly begin outside a shape's box.

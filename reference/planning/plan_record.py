@@ -7,13 +7,7 @@ from msgspec import Meta
 from msgspec.structs import replace
 
 from fotismos.reference.planning.decisions import Decision, RuleResult
-from fotismos.reference.planning.effects import (
-    EFFECTS,
-    INTERREFLECTION,
-    OCCLUSION,
-    PRUNED,
-    Effect,
-)
+from fotismos.reference.planning.effects import EFFECTS, INTERREFLECTION, OCCLUSION, PRUNED, Effect
 from fotismos.reference.records import Amount, Count, Record, Size
 from fotismos.reference.rendering.integrators import (
     PATHS,
