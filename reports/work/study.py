@@ -16,12 +16,10 @@ from fotismos.comparisons.study.design import StudyFile
 from fotismos.comparisons.study.running import StudyPoint
 from fotismos.comparisons.study.sheet import sheet_of
 from fotismos.reports.charts import study_charts, vega
-from fotismos.reports.charts.contact_sheet import contact_sheet
 from fotismos.reports.files import results
 from fotismos.reports.files.results import PAGE, hold_results, own
 from fotismos.reports.jobs import command_line
-from fotismos.reports.page.head import head
-from fotismos.reports.page.templating import rendered
+from fotismos.reports.page.templating import head, rendered
 from fotismos.reports.terminal import progress, tables
 from fotismos.reports.terminal.words import tell
 
@@ -72,7 +70,7 @@ def write(
         layout = sheet_of(part)
         pictures = running.kept_pictures([p for p in points if p.part.name == part.name], folder)
         if layout and pictures:
-            sheets[part.name] = contact_sheet(part, layout, pictures)
+            sheets[part.name] = study_charts.contact_sheet(part, layout, pictures)
             results.write(folder / FIGURES / f"sheet-{part.name}.webp", sheets[part.name])
     html = rendered(
         "study.html.j2",

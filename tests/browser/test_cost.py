@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.hybrids.attribution import dominating
-from fotismos.reports.charts import theme
+from fotismos.reports.page import scene_view
 from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
 from tests.shared.cost_records import HEIGHT as ROWS
 from tests.shared.cost_records import WIDTH as COLUMNS
@@ -28,7 +28,7 @@ def test_map_and_inspector_name_the_effect_that_dominates(visitor, pixel):
     found = causes()
     known = dominating(found.maps, found.counted)[place(*pixel)]
     names = [*found.maps, "unknown", "none"]
-    colours = [*map(theme.EFFECT_COLOURS.get, found.maps), "#82888f", theme.NO_EFFECT]
+    colours = [*map(scene_view.EFFECT_COLOURS.get, found.maps), "#82888f", scene_view.NO_EFFECT]
     assert visitor.inspected()["cause"] == names[known]
     x, y = pixel[0] + (2 if pixel[0] != 23 else -2), pixel[1]  # beside the mark
     np.testing.assert_allclose(visitor.colour_of(x, y), bytes_of(colours[known]), atol=1)

@@ -44,7 +44,6 @@ MODULES = (
     "fotismos.reference.rendering.integrators",
     "fotismos.reference.rendering.sums",
     "fotismos.reports.charts.cost_charts",
-    "fotismos.reports.charts.theme",
     "fotismos.reports.cli",
     "fotismos.reports.files.images",
     "fotismos.reports.files.results",

@@ -2,7 +2,7 @@
 
 import re
 
-from fotismos.reports.charts import theme, vega
+from fotismos.reports.charts import vega
 
 
 def bars(effect="shadow", **extra):
@@ -30,8 +30,8 @@ def test_paper_is_white_with_black_text_and_otherwise_as_the_page():
     assert 'fill="white"' in svg
     assert "currentColor" not in svg
     for part in ("axis", "legend", "title"):
-        inked = {**theme.PAPER[part]}
-        differing = {key for key, value in theme.PAGE[part].items() if inked[key] != value}
+        inked = {**vega.PAPER[part]}
+        differing = {key for key, value in vega.PAGE[part].items() if inked[key] != value}
         assert all("olor" in key for key in differing), differing
 
 
