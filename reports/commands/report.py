@@ -73,6 +73,9 @@ def report(
         scenes=tuple(SCENES),
         output=output,
         job=job,
+        max_visible=None,
+        junit=None,
+        summary_file=None,
         is_opened=is_opened,
         with_hard_cases=True,
     )

@@ -26,10 +26,10 @@ def run(
     scenes: Sequence[str],
     output: Path,
     job: Job,
+    max_visible: float | None,
+    junit: Path | None,
+    summary_file: Path | None,
     is_opened: bool,
-    max_visible: float | None = None,
-    junit: Path | None = None,
-    summary_file: Path | None = None,
     with_hard_cases: bool = False,
 ) -> int:
     """Compare scenes or pictures, print the gates, write files for CI, return the exit code."""
