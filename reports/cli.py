@@ -31,6 +31,9 @@ COMMANDS = {
 }
 """The commands by groups of the help; most are a module of `fotismos.reports.commands`."""
 
+DOCTOR_TIMEOUT_S = 300
+"""Seconds for a test rendering, which takes about ten if no kernel is compiled yet."""
+
 COMPLETION = "_FOTISMOS_COMPLETE"
 """Environment variable with which a shell requests completions."""
 
@@ -67,6 +70,17 @@ def completion(context: click.Context, shell: str) -> None:
     script = completer(context.find_root().command, {}, "fotismos", COMPLETION)
     # Not .source(), which starts a bash to look at its version.
     click.echo(script.source_template % script.source_vars())
+
+
+@jobs.command()
+def doctor() -> None:
+    """Check the installation: versions, LLVM, OpenGL, a rendering in each variant, metrics.
+
+    \b
+    Examples:
+      fotismos doctor
+    """  # noqa: D301 click reads the \b as: keep these lines
+    jobs.work("doctor", jobs.pool(DOCTOR_TIMEOUT_S))
 
 
 class Group(jobs.Helped, click.Group):
@@ -107,7 +121,7 @@ class Group(jobs.Helped, click.Group):
 
 @click.group(
     cls=Group,
-    commands=[scenes, completion],
+    commands=[scenes, completion, doctor],
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(__version__, prog_name="fotismos")

@@ -228,6 +228,11 @@ def _kind(kind: Any) -> dict[str, Any]:
     return {}
 
 
+def options(*names: str) -> Decorator:
+    """Return the command line's forms of several fields; see :func:`option`."""
+    return with_options(*map(option, names))
+
+
 RENDERING = (
     "variant", "heuristic_variant", "seed", "spp", "resolution", "heuristic", "interpolation",
     "tessellation", "vertex_weights", "everything", "pairing", "pixels_per_degree", "allow_empty",
@@ -240,7 +245,6 @@ def options_of_scenes(without: Sequence[str] = (), **defaults: str) -> Decorator
     return with_options(*(option(name, defaults.get(name, "")) for name in names))
 
 
-rendering_options = with_options(*map(option, RENDERING))
 scene_options = options_of_scenes()
 
 timeout_option = click.option(

@@ -99,10 +99,12 @@ def share(record: ComparisonRecord, threshold: float = TOLERANCE) -> VisibleShar
     return share_above(record.metrics[LEADING.name].visible, threshold)
 
 
-def decision(record: ComparisonRecord, threshold: float = TOLERANCE) -> Verdict:
-    """Return whether a scene passes at a tolerance, fails, or is undecided."""
+def decision(
+    record: ComparisonRecord, threshold: float = TOLERANCE, bound: float = LIMIT
+) -> Verdict:
+    """Return whether a scene passes, fails, or is undecided: at most ``bound`` may differ."""
     visible = record.metrics[LEADING.name].visible
-    return decide(visible, threshold, is_certain=record.significant.certain)
+    return decide(visible, threshold, bound, is_certain=record.significant.certain)
 
 
 def missing(record: ComparisonRecord) -> dict[str, float]:

@@ -16,9 +16,9 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.reports import verdict
 from fotismos.reports.charts import figures
-from fotismos.reports.charts.theme import EFFECT_COLOURS
 from fotismos.reports.files.results import TABLES
 from fotismos.reports.jobs import Job
+from fotismos.reports.page.scene_view import EFFECT_COLOURS
 from fotismos.reports.run import scene
 from fotismos.reports.terminal.words import number, percent
 

@@ -12,8 +12,7 @@ from scipy.optimize import isotonic_regression
 
 from fotismos.comparisons.cost.engine_record import Engine, EngineCost
 from fotismos.comparisons.departure.criterion import TOLERANCE
-from fotismos.reports.charts.theme import FAINT, Spec
-from fotismos.reports.charts.vega import specification
+from fotismos.reports.charts.vega import FAINT, Spec, specification
 from fotismos.reports.terminal.cost_tables import OWN_FRONT, stated
 from fotismos.reports.terminal.words import number
 

@@ -1,11 +1,11 @@
-"""Baselines as files: finding them, reading and writing them, and the scenes that they name."""
+"""Baselines as files, of scenes and of pictures: finding, reading and writing them."""
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from msgspec import structs
@@ -14,13 +14,17 @@ from numpy.typing import NDArray
 from fotismos.comparisons import atomic
 from fotismos.comparisons.atomic import content, require_regular
 from fotismos.comparisons.case import Case, open_case
-from fotismos.comparisons.check.measurement import HALVES, Baseline, read_baseline
+from fotismos.comparisons.check.measurement import HALVES, Baseline, laid_out, read_baseline
+from fotismos.comparisons.check.pictures import PictureBaseline, Repeats, colour, means
+from fotismos.comparisons.comparison import PictureFiles
 from fotismos.comparisons.departure.blocks import averaged, shrunk
-from fotismos.comparisons.names import SUFFIXES, file_of, is_script
+from fotismos.comparisons.names import SUFFIXES, file_of, is_script, matching
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.picture_files import read_file
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import in_file
+from fotismos.reference import records
 from fotismos.reports.files import images
 
 Kept = Mapping[str, NDArray[np.floating]]
@@ -67,6 +71,11 @@ LARGEST = 2**24
 
 LONGEST_KEPT = 128
 """Pixels of the longer side of the pictures that a baseline keeps."""
+
+LONGEST_PICTURE = 2**15
+"""Pixels of the longer side of a baseline of pictures that is read, at most."""
+
+PICTURE_LAYERS = ("mean", "variance")
 
 _HOW = (
     f"Make one with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`, or"
@@ -218,3 +227,82 @@ def read_layers(
             f"{path}: the baseline's pictures cannot be read: {error}. Write them again with"
             f" `{how}`."
         ) from error
+
+
+# --- Pictures ----------------------------------------------------------------------------------
+
+
+def read_repeats(
+    pattern: str, transfer: str | None, over: str | None = None
+) -> tuple[Repeats, PictureFiles]:
+    """Read the repeats that match a pattern, ``render_*.exr`` or ``render_*.exr:LAYER``.
+
+    Also return the record of their files.
+    """
+    names = matching([pattern])
+    digests = []
+    notes: dict[str, None] = {}
+
+    def shots() -> Iterator[np.ndarray]:
+        # One at a time: only their sums are kept.
+        for name in names:
+            file = read_file(name, transfer, over)
+            digests.append(file.digest)
+            notes.update(dict.fromkeys(file.notes))
+            yield file.image
+
+    repeats = Repeats.of(shots())
+    files = PictureFiles(
+        files=names,
+        digests=tuple(digests),
+        transfer=transfer,
+        notes=tuple(notes),
+        repeats=len(names),
+    )
+    return repeats, files
+
+
+def write_pictures(
+    path: Path,
+    repeats: Repeats,
+    transfer: Literal["linear", "srgb"] | None,
+    over: str | None = None,
+) -> None:
+    """Write a baseline, and its EXR with the mean and variance of each pixel."""
+    if repeats.count < 2:
+        raise InputError(f"{path}: one picture does not show its noise. Give two repeats or more.")
+    # Compared with itself: the difference of two such means has an error √2 times that of one.
+    whole, _ = means(repeats, repeats)
+    height, width = repeats.mean.shape[:2]
+    baseline = PictureBaseline(
+        repeats=repeats.count,
+        resolution=(width, height),
+        transfer=transfer,
+        over=over,
+        mean=colour(whole.before[0, 0]),
+        error=colour(whole.error[0, 0] / np.sqrt(2.0)),
+        correlation=float(repeats.correlation),
+        images=path.with_suffix(".exr").name,
+    )
+    layers = {f"baseline.{name}": getattr(repeats, name) for name in PICTURE_LAYERS}
+    put(path, laid_out(records.plain(baseline)) + "\n", layers, path.stem)
+
+
+def picture_record(path: Path) -> PictureBaseline:
+    """Read the record of a baseline."""
+    return records.read(PictureBaseline, read_text(path, of_pictures=True), str(path))
+
+
+def read_pictures(path: Path) -> tuple[PictureBaseline, Repeats]:
+    """Read a baseline, and the statistics of its repeats from the EXR beside it."""
+    baseline = picture_record(path)
+    # Only the name counts: a baseline must not lead to files elsewhere.
+    kept = path.parent / Path(baseline.images).name
+    how = program.command("check", path, "--update", "--picture", f"{path.stem}=PATTERN")
+    found = read_layers(kept, PICTURE_LAYERS, longest=LONGEST_PICTURE, how=how)
+    repeats = Repeats(baseline.repeats, **found, correlation=np.array(baseline.correlation))
+    # The two files may come from different runs, or one was edited.
+    is_same = np.allclose(repeats.mean.mean(axis=(0, 1)), baseline.mean, rtol=1e-5, atol=1e-9)
+    if not (is_same and (repeats.variance >= 0).all() and baseline.correlation < np.inf):
+        raise InputError(f"{kept}: this is not of {path.name}. Write both again: `{how}`.")
+    return baseline, repeats

@@ -9,9 +9,15 @@ from typing import Annotated, Any, Literal
 from msgspec import Meta, field, structs
 
 from fotismos.comparisons.case import Case, open_case
-from fotismos.comparisons.check.measurement import baseline_of, made_small, measure_scene
+from fotismos.comparisons.check.measurement import (
+    LINEAR_ROUNDING,
+    baseline_of,
+    made_small,
+    measure_scene,
+)
 from fotismos.comparisons.check.moved import LEVEL, READERS, Check, Move, check, level_of_each
 from fotismos.comparisons.check.pictures import (
+    SIDE,
     PictureCheck,
     PictureGate,
     Repeats,
@@ -31,7 +37,7 @@ from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.records import VERSION, Amount, Count, Record, Share, to_json
 from fotismos.reference.rendering.renderer import Progress
 from fotismos.reference.scene.graph import set_variant
-from fotismos.reports.ci import baselines, pictures
+from fotismos.reports.ci import baselines
 from fotismos.reports.ci.baselines import BaselineFile
 from fotismos.reports.files import images, results
 from fotismos.reports.page import page
@@ -321,8 +327,8 @@ def examine_pictures(
 ) -> tuple[CheckRecord, Before | None]:
     """Check pictures that match a pattern against their baseline, for drift or by a tolerance."""
     begin = perf_counter()
-    baseline, before = pictures.read(path)
-    after, files = pictures.read_repeats(pattern, baseline.transfer, baseline.over)
+    baseline, before = baselines.read_pictures(path)
+    after, files = baselines.read_repeats(pattern, baseline.transfer, baseline.over)
     found = check_pictures(before, after, level)
     gate = None
     has_failed = bool(found.moved)
@@ -360,11 +366,11 @@ def update_pictures(
     begin = perf_counter()
     status = "updated" if path.exists() else "created"
     if path.exists():
-        known = pictures.record_of(path)
+        known = baselines.picture_record(path)
         transfer = transfer or known.transfer
         over = over or known.over
-    repeats, files = pictures.read_repeats(pattern, transfer, over)
-    pictures.write(path, repeats, transfer, over)
+    repeats, files = baselines.read_repeats(pattern, transfer, over)
+    baselines.write_pictures(path, repeats, transfer, over)
     found = check_pictures(repeats, repeats, level)
     made = of_pictures(path, pattern, status=status, found=found, begin=begin, files=files)
     return made, None
@@ -385,12 +391,26 @@ def of_pictures(
         scene=pattern,
         status=status,
         seconds=round(perf_counter() - begin, 3),
-        message=pictures.sentence(changes, found.before),
+        message=_caught(changes, found.before),
         tested=found.picture.before.size + found.blocks.before.size,
         significance=found.level,
         moved=found.moved,
         smallest_changes=changes,
         picture=files,
+    )
+
+
+def _caught(changes: SmallestChanges, before: Repeats) -> str:
+    """Return the sentence on what could not be seen, relative to the mean of the picture."""
+    whole = max(before.mean.mean(), LINEAR_ROUNDING)
+    picture = f"{100 * max(changes.mean) / whole:.2g} %"
+    block = f"{100 * max(changes.block) / whole:.2g} %"
+    noisiest = f"{100 * max(changes.noisiest) / whole:.2g} %"
+    equal = " The repeats are equal: if their renderer is random, give each its own seed."
+    return (
+        f"caught in {100 * changes.power:g} % of cases: a change of the mean by {picture}, of a"
+        f" block of {SIDE} x {SIDE} pixels by {block} of it, of the noisiest block by {noisiest};"
+        f" smaller ones may be missed.{'' if before.variance.any() else equal}"
     )
 
 

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fotismos.comparisons import atomic
 from fotismos.comparisons.comparison import ComparisonRecord
-from fotismos.comparisons.departure.criterion import TOLERANCE, Verdict, decide
+from fotismos.comparisons.departure.criterion import TOLERANCE, Verdict
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.heuristic.errors import FotismosError, InputError, OutputError
@@ -75,12 +75,7 @@ def gates(
             scene=record.scene,
             bound=bound,
             found=verdict.share(record, threshold),
-            state=decide(
-                record.metrics[LEADING.name].visible,
-                threshold,
-                bound,
-                is_certain=record.significant.certain,
-            ),
+            state=verdict.decision(record, threshold, bound),
         )
         for record in records
     ]

@@ -32,7 +32,7 @@ from fotismos.reference import records
 from fotismos.reference.rendering.finite import require_finite
 from fotismos.reference.rendering.sums import student
 from fotismos.reference.scene.graph import set_variant
-from fotismos.reports.ci import baselines, checks, pictures, summary
+from fotismos.reports.ci import baselines, checks, summary
 from fotismos.reports.files import images, results
 from fotismos.reports.jobs import share_of
 from fotismos.reports.page.scene_view import Before, SceneView
@@ -215,9 +215,9 @@ class Fotismos:
                 raise AssertionError(
                     f"{path}: there is no such baseline. `pytest --fotismos-update` writes it."
                 )
-            pictures.write(path, _noiseless(after), None)
+            baselines.write_pictures(path, _noiseless(after), None)
             return True
-        _, before = pictures.read(path)
+        _, before = baselines.read_pictures(path)
         begin = perf_counter()
         level = self.significance if significance is None else significance
         found = None
@@ -227,7 +227,7 @@ class Fotismos:
         else:
             fault = _visible(before, after, within, _share(max_visible))
         if fault and self.update:
-            pictures.write(path, _noiseless(after), None)
+            baselines.write_pictures(path, _noiseless(after), None)
         elif fault:
             folder = self._shown(name, before, after)
             found = found or check_pictures(before, after, level)
@@ -257,7 +257,7 @@ class Fotismos:
         """Return pictures as repeats."""
         if isinstance(image, (str, Path)):
             beside = self.beside / image
-            repeats, _ = pictures.read_repeats(str(beside), None)
+            repeats, _ = baselines.read_repeats(str(beside), None)
             return repeats
         arrays = [image] if isinstance(image, np.ndarray) else list(image)
         for array in arrays:

@@ -17,15 +17,9 @@ from fotismos.reports import jobs
 @jobs.fresh_option
 @jobs.process_options
 @jobs.scene_options
-@jobs.option("image")
-@jobs.option("reference")
-@jobs.option("mask")
-@jobs.option("transfer")
-@jobs.option("over")
-@jobs.option("tone_map")
+@jobs.options("image", "reference", "mask", "transfer", "over", "tone_map")
 @jobs.verbosity_options
-@jobs.option("noise")
-@jobs.option("colour_science")
+@jobs.options("noise", "colour_science")
 @click.option(
     "--why/--no-why",
     "with_causes",

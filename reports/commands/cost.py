@@ -33,11 +33,7 @@ from fotismos.reports import jobs
 @click.option(
     "--kernel-time", metavar="TIME", help="What the textbook kernel takes there, for ratios."
 )
-@jobs.option("reference")
-@jobs.option("mask")
-@jobs.option("transfer")
-@jobs.option("over")
-@jobs.option("tone_map")
+@jobs.options("reference", "mask", "transfer", "over", "tone_map")
 @jobs.within_option
 @jobs.json_option
 def cost(

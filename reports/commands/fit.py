@@ -29,10 +29,7 @@ from fotismos.reports import jobs
 @jobs.json_option
 @jobs.timeout_option
 @jobs.options_of_scenes(resolution="96x96", spp="64")
-@jobs.option("reference")
-@jobs.option("mask")
-@jobs.option("transfer")
-@jobs.option("over")
+@jobs.options("reference", "mask", "transfer", "over")
 @jobs.verbosity_options
 def fit(
     scenes: tuple[str, ...],

@@ -17,8 +17,7 @@ QUICK = {"resolution": (64, 64), "spp": 16}
 @jobs.figures_option
 @jobs.fresh_option
 @jobs.process_options
-@jobs.rendering_options
-@jobs.option("colour_science")
+@jobs.options(*jobs.RENDERING, "colour_science")
 @jobs.verbosity_options
 @click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
 @click.option(
@@ -68,4 +67,15 @@ def report(
         ladders=frozenset(ladders),
     )
     processes = jobs.pool(timeout, len(SCENES), workers=workers, scheduler=scheduler)
-    jobs.work("report", processes, output=output, job=job, is_opened=is_opened)
+    jobs.work(
+        "compare",
+        processes,
+        scenes=tuple(SCENES),
+        output=output,
+        job=job,
+        max_visible=None,
+        junit=None,
+        summary_file=None,
+        is_opened=is_opened,
+        with_hard_cases=True,
+    )

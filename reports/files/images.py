@@ -68,11 +68,6 @@ def difference_map(values: ArrayLike, threshold: float, top: float) -> Image.Ima
     return Image.fromarray(np.where((values > threshold)[..., None], table[above], grey[..., None]))
 
 
-def signed_map(values: ArrayLike, limit: float) -> Image.Image:
-    """A signed map (H, W): −`limit` (blue) over 0 (near white) to `limit` (red)."""
-    return _coloured(0.5 + 0.5 * np.asarray(values, np.float64) / limit, SIGNED_COLOURS)
-
-
 def mask_map(marked: ArrayLike, counted: ArrayLike) -> Image.Image:
     """A map (H, W) of marks, 1, 0.5 or 0: orange if marked, pale if undetermined, else grey.
 
@@ -100,12 +95,16 @@ def png(picture: Image.Image) -> bytes:
 
 
 def pictures(shown: Images, exposure: float = 1.0) -> dict[str, bytes]:
-    """The named PNG files of a comparison, each map over the fixed range of its metric."""
+    """The named PNG files of a comparison, each map over the fixed range of its metric.
+
+    The ratio's is signed: from its limit below 0 (blue) over 0 (near white) to that above (red).
+    """
+    ratio = 0.5 + 0.5 * np.asarray(shown.maps[RATIO.name], np.float64) / RATIO.limit
     panels = {
         "heuristic": tonemap(shown.heuristic, exposure),
         "reference": tonemap(shown.reference, exposure),
         "significant": mask_map(shown.significant, shown.counted),
-        RATIO.name: signed_map(shown.maps[RATIO.name], RATIO.limit),
+        RATIO.name: _coloured(ratio, SIGNED_COLOURS),
     }
     for name, metric in drawn().items():
         panels[name] = error_map(shown.maps[name], metric.map_range[1])

@@ -34,11 +34,17 @@ from fotismos.comparisons.departure.metrics import (
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.reference.records import plain
 from fotismos.reports import glossary, verdict
-from fotismos.reports.charts.theme import EFFECT_COLOURS, EFFECTS_TITLE, NO_EFFECT
 from fotismos.reports.files import images
 from fotismos.reports.files.results import DETAILS, Failure, RunRecord
-from fotismos.reports.page.scene_view import Before, SceneView, WhyView
-from fotismos.reports.page.templating import HELP, rendered
+from fotismos.reports.page.scene_view import (
+    EFFECT_COLOURS,
+    EFFECTS_TITLE,
+    NO_EFFECT,
+    Before,
+    SceneView,
+    WhyView,
+)
+from fotismos.reports.page.templating import HELP, identifier, rendered
 from fotismos.reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
@@ -336,15 +342,3 @@ def _drawing() -> dict[str, Any]:
         "xyz": rgb_to_xyz(BT709).tolist(),
         "epsilon": LOG2_EPSILON,
     }
-
-
-def identifier(name: str, taken: set[str]) -> str:
-    """Return a name for a scene in the page's address: plain characters; added to `taken`."""
-    word = "".join(c if (c.isascii() and c.isalnum()) or c in "-_." else "-" for c in name)
-    chosen = word or "scene"
-    count = 1
-    while chosen in taken:
-        count += 1
-        chosen = f"{word or 'scene'}-{count}"
-    taken.add(chosen)
-    return chosen

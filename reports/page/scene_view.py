@@ -1,15 +1,35 @@
-"""The page's data of one scene."""
+"""The page's data of one scene, and the colours of effects."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from msgspec import field
 
 from fotismos.comparisons.comparison import ComparisonRecord
+from fotismos.reference.planning.effects import EFFECTS
 from fotismos.reference.records import Record, plain
-from fotismos.reports.charts.theme import Figure
 from fotismos.reports.page.embedding import Embedded
+
+EFFECT_COLOURS = {effect.label: effect.colour for effect in EFFECTS if effect.colour}
+"""Colours of effects in attributions: Okabe and Ito's seven for those that often come together, and
+four of Tol's muted scheme. Both suit the common colour deficiencies."""
+
+EFFECTS_TITLE = "Effects"
+"""Title of the map of dominant effects."""
+
+NO_EFFECT = "#dee2e6"
+"""Colour where no effect removes enough to be seen."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A chart for the page: its title, a sentence, and its picture."""
+
+    title: str
+    note: str
+    svg: str
 
 
 class EffectMap(Record):

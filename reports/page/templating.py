@@ -1,4 +1,4 @@
-"""Templates of pages: how values are printed, and the style and scripts that a page holds."""
+"""What all pages share: how values are printed, style and scripts, and how a page begins."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import base64
 import hashlib
 import math
 from collections.abc import Sequence
+from datetime import date
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,11 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from fotismos.comparisons.departure.regions import Region
+from fotismos.heuristic.program import __version__
 from fotismos.reference.records import plain
 from fotismos.reports import verdict
 from fotismos.reports.files import images
+from fotismos.reports.files.results import PAGE
 from fotismos.reports.terminal.words import (
     difference,
     given_time,
@@ -32,6 +35,9 @@ STYLES = ("base", "page", "live", "print")
 
 HELP = ("page", "help")
 """The parts of a script that explains terms; those of the whole page follow."""
+
+KINDS = ("cost", "fit")
+"""Commands whose pages of one scene link each other."""
 
 REGION_SIZE = 420
 """Approximate screen pixels of a region that is opened from its link."""
@@ -124,3 +130,40 @@ def rendered(template: str, parts: Sequence[str] = (), **content: Any) -> str:
     style = Markup("".join(_source(f"styles/{part}.css") for part in STYLES))
     content |= {"style": style, "scripts": scripts(parts) if parts else []}
     return environment().get_template(template).render(**content)
+
+
+def head(command: str, folder: Path | None, scene: str = "") -> dict[str, Any]:
+    """Return the head of a page in ``OUTPUT/command/NAME``, with links to what exists.
+
+    They lead to the comparisons in OUTPUT, to that of the same ``scene``, and to its other pages.
+    Without a folder there are no links.
+    """
+    links = {}
+    home = ""
+    if folder is not None:
+        output = folder.absolute().parent.parent
+        home = f"../../{PAGE}" if (output / PAGE).exists() else ""
+        if scene and home and (output / folder.name / "comparison.json").exists():
+            links["Comparison"] = f"{home}#scene={identifier(scene, set())}"
+        for kind in KINDS:
+            if scene and kind != command and (output / kind / folder.name / PAGE).exists():
+                links[kind.capitalize()] = f"../../{kind}/{folder.name}/{PAGE}"
+    return {
+        "command": command,
+        "home": home,
+        "links": links,
+        "version": __version__,
+        "date": date.today().isoformat(),
+    }
+
+
+def identifier(name: str, taken: set[str]) -> str:
+    """Return a name for a scene in the page's address: plain characters; added to `taken`."""
+    word = "".join(c if (c.isascii() and c.isalnum()) or c in "-_." else "-" for c in name)
+    chosen = word or "scene"
+    count = 1
+    while chosen in taken:
+        count += 1
+        chosen = f"{word or 'scene'}-{count}"
+    taken.add(chosen)
+    return chosen

@@ -9,9 +9,14 @@ from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
 from fotismos.reference.records import Missing
-from fotismos.reports.charts.theme import EFFECT_COLOURS
 from fotismos.reports.page.embedding import COUNTED, encode, packed
-from fotismos.reports.page.scene_view import EffectMap, LiveView, TermsView, WhyView
+from fotismos.reports.page.scene_view import (
+    EFFECT_COLOURS,
+    EffectMap,
+    LiveView,
+    TermsView,
+    WhyView,
+)
 
 LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789a"))
 """Codes of the map: no effect, a pixel that does not count, and the effects' places."""

@@ -12,11 +12,10 @@ from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.heuristics import in_file
 from fotismos.reference import records
 from fotismos.reports.charts import vega
-from fotismos.reports.charts.theme import FAINT, Spec
+from fotismos.reports.charts.vega import FAINT, Spec
 from fotismos.reports.files import results
 from fotismos.reports.files.images import tonemap, webp
-from fotismos.reports.page.head import head
-from fotismos.reports.page.templating import rendered
+from fotismos.reports.page.templating import head, rendered
 from fotismos.reports.terminal import tables
 from fotismos.reports.terminal.words import number
 

@@ -14,11 +14,10 @@ from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
 from fotismos.heuristic.convention import Floats
 from fotismos.reference import records
 from fotismos.reports import glossary
-from fotismos.reports.charts import cost_charts, theme, vega
+from fotismos.reports.charts import cost_charts, vega
 from fotismos.reports.files import images, results
-from fotismos.reports.page.head import head
-from fotismos.reports.page.scene_view import CostView, EngineView
-from fotismos.reports.page.templating import HELP, rendered
+from fotismos.reports.page.scene_view import EFFECT_COLOURS, CostView, EngineView, Figure
+from fotismos.reports.page.templating import HELP, head, rendered
 from fotismos.reports.terminal.cost_tables import (
     OWN_FRONT,
     answer,
@@ -88,7 +87,7 @@ def write(folder: Path, study: AnyStudy, shown: CostView) -> None:
         results.write(folder / name, content)
 
 
-def figure(record: Cost | EngineCost) -> theme.Figure:
+def figure(record: Cost | EngineCost) -> Figure:
     """Return the chart of a study: error against time."""
     families = [] if isinstance(record, EngineCost) else [FAMILIES]
     note = "; ".join([*families, *cost_charts.reading(record)]) + "."
@@ -149,5 +148,5 @@ def view(study: Study[Cost]) -> CostView:
         answer=as_typed(answer(record)),
         left_out=tuple(map(as_typed, left_out(record))),
         reference=_small(study.reference, record.viewing.exposure),
-        colours=tuple(theme.EFFECT_COLOURS[effect.effect] for effect in effects),
+        colours=tuple(EFFECT_COLOURS[effect.effect] for effect in effects),
     )

@@ -11,8 +11,7 @@ from fotismos.comparisons.fit.fit_record import FitRecord, FittedParameter, Form
 from fotismos.reference.pairing.factors import alpha_of, exponent_of
 from fotismos.reference.records import to_json
 from fotismos.reports.files import images, results
-from fotismos.reports.page.head import head
-from fotismos.reports.page.templating import rendered
+from fotismos.reports.page.templating import head, rendered
 from fotismos.reports.terminal import tables
 from fotismos.reports.terminal.words import difference, percent
 from fotismos.reports.verdict import EXACT

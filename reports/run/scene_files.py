@@ -56,10 +56,6 @@ def load(folder: Path, key: str | None) -> SceneView | None:
         return None
 
 
-def _digest(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
-
-
 # --- Files -----------------------------------------------------------------------------------
 
 
@@ -101,7 +97,7 @@ def write(
         results.write(target / file, content)
     images.write_exr(target / PICTURE, _layers(comparison.images), _header(record))
     made[RECORD] = atomic.encoded(to_json(record))
-    digests = {file: _digest(content) for file, content in made.items()}
+    digests = {file: hashlib.sha256(content).hexdigest() for file, content in made.items()}
     # The library writes this file, so its bytes are only on the disk.
     digests[PICTURE] = results.digest_of(target / PICTURE)
     results.clear(target, earlier - digests.keys())

@@ -1,17 +1,23 @@
-"""The work of ``fotismos compare``."""
+"""The work of ``fotismos compare`` and ``fotismos report``."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
 
 from fotismos.comparisons.names import picture_parts, with_files
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.processes.pool import Pool
+from fotismos.comparisons.processes.pool import Pool, Task, Turn
 from fotismos.heuristic.errors import FotismosError
+from fotismos.reports.files import results
 from fotismos.reports.jobs import Job, open_page
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import batch
 from fotismos.reports.terminal.words import echo, is_quiet
+
+if TYPE_CHECKING:  # only a report has hard cases
+    from fotismos.comparisons.hard_cases import HardCases
 
 
 def run(
@@ -23,6 +29,7 @@ def run(
     junit: Path | None,
     summary_file: Path | None,
     is_opened: bool,
+    with_hard_cases: bool = False,
 ) -> int:
     """Compare scenes or pictures, print the gates, write files for CI, return the exit code."""
     on_page = open_page if is_opened else None
@@ -30,7 +37,8 @@ def run(
     job = replace(job, options=options)
     subjects = _subjects(scenes, options)
     if max_visible is None and junit is None and summary_file is None:
-        batch.run(pool, subjects, output, job, on_page=on_page)
+        cases = Task("hard cases", hard_cases, (output,)) if with_hard_cases else None
+        batch.run(pool, subjects, output, job, cases, on_page)
         return 0
     from fotismos.reports.ci import summary  # loaded late: most comparisons need no CI
 
@@ -72,3 +80,12 @@ def _subjects(scenes: Sequence[str], options: Options) -> batch.Subjects:
     from fotismos.reports.run import pictures  # loaded late: most comparisons are of scenes
 
     return pictures.subjects(options)
+
+
+def hard_cases(folder: Path) -> "tuple[HardCases, float]":
+    """Evaluate the hard cases; return them, and the seconds that it took in its turn."""
+    from fotismos.comparisons.hard_cases import collect  # loaded late: only for a report
+
+    with Turn(folder, folder / results.TABLES):
+        begin = perf_counter()
+        return collect(), perf_counter() - begin

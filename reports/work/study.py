@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,12 +16,10 @@ from fotismos.comparisons.study.design import StudyFile
 from fotismos.comparisons.study.running import StudyPoint
 from fotismos.comparisons.study.sheet import sheet_of
 from fotismos.reports.charts import study_charts, vega
-from fotismos.reports.charts.contact_sheet import contact_sheet
 from fotismos.reports.files import results
 from fotismos.reports.files.results import PAGE, hold_results, own
 from fotismos.reports.jobs import command_line
-from fotismos.reports.page.head import head
-from fotismos.reports.page.templating import rendered
+from fotismos.reports.page.templating import head, rendered
 from fotismos.reports.terminal import progress, tables
 from fotismos.reports.terminal.words import tell
 
@@ -73,7 +71,7 @@ def write(
         layout = sheet_of(part)
         pictures = running.kept_pictures([p for p in points if p.part.name == part.name], folder)
         if layout and pictures:
-            sheets[part.name] = contact_sheet(part, layout, pictures)
+            sheets[part.name] = study_charts.contact_sheet(part, layout, pictures)
             results.write(folder / FIGURES / f"sheet-{part.name}.webp", sheets[part.name])
     html = rendered(
         "study.html.j2",
@@ -88,17 +86,14 @@ def write(
     return data, folder / FIGURES, folder / PAGE
 
 
-def _range(part: str, rows: Sequence[Row]) -> dict[str, Any]:
-    """Return how many points a part has, how many failed, and its least, median and most error."""
+def _range(part: str, rows: Sequence[Row]) -> tuple[str, ...]:
+    """Return the row of a part: name, points, failed ones, least, median and most error."""
     of_part = [row for row in rows if row["part"] == part]
     good = sorted(row["dE2000"] for row in of_part if row["error"] is None)
-    errors = (good[0], good[len(good) // 2], good[-1]) if good else ()
-    return {
-        "name": part,
-        "points": len(of_part),
-        "failed": len(of_part) - len(good),
-        "errors": [f"{error:.2f}" for error in errors],
-    }
+    errors = ["–", "–", "–"]
+    if good:
+        errors = [f"{error:.2f}" for error in (good[0], good[len(good) // 2], good[-1])]
+    return part, f"{len(of_part)}", f"{len(of_part) - len(good)}", *errors
 
 
 def summary(study: StudyFile, table: pa.Table, done: int) -> Iterator[str]:
@@ -106,11 +101,7 @@ def summary(study: StudyFile, table: pa.Table, done: int) -> Iterator[str]:
     rows = table.to_pylist()
     headings = "part", "points", "failed", "mean ΔE2000: least", "median", "most"
     parts = [_range(part.name, rows) for part in study.parts]
-    lines = [
-        (part["name"], str(part["points"]), str(part["failed"]), *(part["errors"] or 3 * ["–"]))
-        for part in parts
-    ]
-    yield from tables.printed([headings, *lines], right=1)
+    yield from tables.printed([headings, *parts], right=1)
     if done < len(rows):
         yield f"{len(rows) - done} points were kept from an earlier run, or are shared."
     for row in [row for row in rows if row["error"] is not None][:3]:

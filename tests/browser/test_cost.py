@@ -3,7 +3,7 @@
 import numpy as np
 
 from fotismos.comparisons.attribution import dominating
-from fotismos.reports.charts import theme
+from fotismos.reports.page import scene_view
 from tests.browser.conftest import EXACT, HEIGHT, NOISY_ID, WIDTH
 from tests.shared.cost_records import HEIGHT as ROWS
 from tests.shared.cost_records import WIDTH as COLUMNS
@@ -25,7 +25,7 @@ def test_map_and_inspector_name_the_effect_that_dominates(visitor):
     found = causes()
     known = dominating(found.maps, found.counted)
     names = [*found.maps, "unknown", "none"]
-    colours = [*map(theme.EFFECT_COLOURS.get, found.maps), "#82888f", theme.NO_EFFECT]
+    colours = [*map(scene_view.EFFECT_COLOURS.get, found.maps), "#82888f", scene_view.NO_EFFECT]
     for x, y in ((5, 12), (40, 12), (23, 16), (24, 16), (30, 31), (30, 1)):
         visitor.open(f"{SCENE}&map=effects&pixel={x},{y}")
         visitor.settle()

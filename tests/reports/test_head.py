@@ -3,7 +3,7 @@
 import re
 
 from fotismos.heuristic.program import __version__
-from fotismos.reports.page.head import head
+from fotismos.reports.page.templating import head
 
 
 def test_a_page_links_the_comparison_and_the_other_page_of_its_scene_if_they_exist(tmp_path):

@@ -25,7 +25,7 @@ const meanings = new Map(
  */
 function explainTerms(section) {
   const known = new Set();
-  for (const element of /** @type {NodeListOf<HTMLElement>} */ (section.querySelectorAll(NAMING))) {
+  for (const element of elementsIn(NAMING, section)) {
     if (element.closest("[data-plain]")) continue; // the glossary itself, and other meanings
     const texts = [
       element.getAttribute("aria-label"),

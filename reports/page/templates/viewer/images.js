@@ -75,15 +75,16 @@ function srgb(linear) {
 }
 
 /**
- * A canvas that a function has painted.
+ * A canvas that is painted place by place, row after row.
  * @param {number} width
  * @param {number} height
- * @param {(pixels: Uint32Array) => void} paint
+ * @param {(place: number) => number} pixelAt
  */
-function painted(width, height, paint) {
+function painted(width, height, pixelAt) {
   const canvas = Object.assign(document.createElement("canvas"), { width, height });
   const data = new ImageData(width, height);
-  paint(new Uint32Array(data.data.buffer));
+  const pixels = new Uint32Array(data.data.buffer);
+  for (let place = 0; place < pixels.length; place++) pixels[place] = pixelAt(place);
   canvas.getContext("2d")?.putImageData(data, 0, 0);
   return canvas;
 }
@@ -169,9 +170,7 @@ class Painter {
   picture(slot, key, pixelAt, { width, height } = this.images) {
     const kept = this.kept.get(slot);
     if (kept?.key === key) return kept.canvas;
-    const canvas = painted(width, height, pixels => {
-      for (let place = 0; place < pixels.length; place++) pixels[place] = pixelAt(place);
-    });
+    const canvas = painted(width, height, pixelAt);
     this.kept.set(slot, { key, canvas });
     return canvas;
   }

@@ -247,15 +247,7 @@ class LiveShading {
     for (const [name, pixelAt] of Object.entries(pictures)) {
       const canvas = /** @type {HTMLCanvasElement} */ (this.part(name));
       Object.assign(canvas, { width, height });
-      canvas.getContext("2d")?.drawImage(
-        painted(width, height, pixels =>
-          pixels.forEach((_, cell) => {
-            pixels[cell] = pixelAt(cell);
-          }),
-        ),
-        0,
-        0,
-      );
+      canvas.getContext("2d")?.drawImage(painted(width, height, pixelAt), 0, 0);
     }
     const texts = { mean: session.mean, first: session.first, best: session.best };
     for (const [name, value] of Object.entries(texts))

@@ -5,6 +5,7 @@ const viewer = new Viewer(byId("viewer"), change);
 const terms = new TermsPanel(byId("terms"));
 const live = new LiveShading(byId("live"), change);
 let view = DEFAULT_VIEW;
+const sliders = /** @type {HTMLInputElement[]} */ (elementsIn("[data-threshold]"));
 /** How far the overview was scrolled when it was left. */
 let left = 0;
 
@@ -46,9 +47,7 @@ function show() {
   const place = placeOf(view.t);
   const scene = page.scenes.find(one => one.id === view.scene);
   document.documentElement.dataset.view = scene ? "scene" : "overview";
-  for (const slider of /** @type {NodeListOf<HTMLInputElement>} */ (
-    document.querySelectorAll("[data-threshold]")
-  )) {
+  for (const slider of sliders) {
     slider.value = String(view.t);
     if (slider.nextElementSibling) slider.nextElementSibling.textContent = String(view.t);
   }
@@ -94,14 +93,9 @@ function turn(step) {
   );
 }
 
-for (const slider of /** @type {NodeListOf<HTMLInputElement>} */ (
-  document.querySelectorAll("[data-threshold]")
-)) {
+for (const slider of sliders)
   slider.addEventListener("input", () => change({ t: Number(slider.value) }));
-}
-for (const link of /** @type {NodeListOf<HTMLElement>} */ (
-  document.querySelectorAll("[data-jump]")
-)) {
+for (const link of elementsIn("[data-jump]")) {
   link.addEventListener("click", event => {
     event.preventDefault(); // the fragment is the view's
     event.stopPropagation();

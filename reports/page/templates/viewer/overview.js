@@ -13,8 +13,7 @@ function showOverview(t) {
   const list = document.querySelector(".bars");
   const items = /** @type {HTMLElement[]} */ ([...(list?.children ?? [])]);
   list?.append(...items.sort((a, b) => sizeOf(b) - sizeOf(a)));
-  for (const item of document.querySelectorAll("#overview [data-scene]")) {
-    const row = /** @type {HTMLElement} */ (item);
+  for (const row of elementsIn("#overview [data-scene]")) {
     const scene = known.get(row.dataset.scene ?? "");
     if (scene && !scene.failed) showScene(row, scene, place);
   }
@@ -27,7 +26,7 @@ function showPrices(place) {
   if (!sentence) return;
   sentence.textContent = textAt(page.costs, place);
   const {low, high} = page.axis;
-  const points = /** @type {HTMLElement[]} */ ([...document.querySelectorAll("[data-price]")]);
+  const points = elementsIn("[data-price]");
   const labelled = /** @type {{from: number, to: number, y: number}[]} */ ([]);
   const plot = points[0]?.parentElement?.clientWidth || 1;
   const scenes = /** @type {Scene[]} */ (page.scenes.filter(scene => !scene.failed));

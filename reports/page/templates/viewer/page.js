@@ -71,6 +71,10 @@ const page = JSON.parse(document.getElementById("page-data")?.textContent ?? "{}
 /** @param {string} id @returns {HTMLElement} */
 const byId = id => /** @type {HTMLElement} */ (document.getElementById(id));
 
+/** @param {string} selector @param {ParentNode} part of the page */
+const elementsIn = (selector, part = document) =>
+  /** @type {HTMLElement[]} */ ([...part.querySelectorAll(selector)]);
+
 /** @param {number} value @param {number} low @param {number} high */
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 

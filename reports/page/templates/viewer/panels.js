@@ -28,9 +28,8 @@ class Panels {
     this.inspect();
     const { shown: painter, added, view, scene } = this.viewer;
     const hasCauses = Boolean(scene.effects) || scene.regions.some(region => region.effect);
-    for (const part of this.elements)
-      for (const row of /** @type {NodeListOf<HTMLElement>} */ (part.querySelectorAll("tr.cause")))
-        row.hidden = !hasCauses && scene.arePictures;
+    for (const row of this.elements.flatMap(part => elementsIn("tr.cause", part)))
+      row.hidden = !hasCauses && scene.arePictures;
     const box = this.viewer.box();
     const key = JSON.stringify([scene.id, view.t, box, view.on]);
     if (!painter || this.key === key) return;
@@ -123,9 +122,7 @@ class Panels {
           : "not known",
       significant: !(flags & COUNTED) ? "not counted" : added ? UNKNOWN : marked,
     };
-    for (const cell of /** @type {NodeListOf<HTMLElement>} */ (
-      this.inspector.querySelectorAll("[data-value]")
-    )) {
+    for (const cell of elementsIn("[data-value]", this.inspector)) {
       const [name, index] = cell.dataset.value?.split(".") ?? [];
       cell.textContent = index ? texts[name][Number(index)] : String(texts[name]);
       if (name.endsWith("_hex")) cell.style.borderColor = String(texts[name]);

@@ -82,11 +82,8 @@ class Viewer {
   show(view) {
     const without = !this.scene.effects && view.map === "effects";
     this.view = without ? { ...view, map: DEFAULT_VIEW.map } : view;
-    for (const button of /** @type {NodeListOf<HTMLElement>} */ (
-      this.element.querySelectorAll("button[data-mode]")
-    )) {
+    for (const button of elementsIn("button[data-mode]", this.element))
       button.setAttribute("aria-pressed", String(button.dataset.mode === view.mode));
-    }
     this.part("[data-action=select]").setAttribute("aria-pressed", String(this.selecting));
     const option = /** @type {HTMLOptionElement} */ (this.part("option[value=effects]"));
     option.hidden = option.disabled = !this.scene.effects;
@@ -277,11 +274,8 @@ function showLegend(legend, { painter, view, scene }) {
   if (hasBar) {
     const table = pixelsOf(is === "ratio" ? page.colours.signed : page.colours.error);
     const differences = differenceColours(view.t);
-    const strip = painted(256, 1, pixels =>
-      pixels.forEach((_, place) => {
-        pixels[place] =
-          is === "difference" ? differences((place / 256) * TOP) : table[place];
-      }),
+    const strip = painted(256, 1, place =>
+      is === "difference" ? differences((place / 256) * TOP) : table[place],
     );
     /** @type {HTMLCanvasElement} */ (bar).getContext("2d")?.drawImage(strip, 0, 0);
     const texts =
