@@ -208,7 +208,7 @@ def _stand_ins(records: Sequence[Any]) -> str:
     never = [name for name in names if not on_front[name]]
     said = "; ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
     left = f" Never: {'; '.join(never)}." if never else ""
-    return f"Stand-ins on the front, by the number of scenes: {said}.{left}"
+    return f"Approximations of engines on the front, by the number of scenes: {said}.{left}"
 
 
 def _named(point: Point | None, kernel: str) -> str:

@@ -158,10 +158,10 @@ def intervals() -> Iterator[str]:
         for row in rows:
             some, _, every = row[number].partition(" of ")
             if every and int(some) < 0.8 * int(every):
-                least.append(f"{words} of the scene *{row['scene']}*: {row[number]}")
-    yield f"Intervals hold the true value in {', '.join(shares)}."
+                least.append(f"{words} of *{row['scene']}*: {row[number]}")
+    yield f"The intervals hold the true value for {', '.join(shares)}."
     if least:
-        yield f"Fewer than four fifths hold it only for {'; '.join(least)}."
+        yield f"Fewer than four fifths of the intervals hold it for {'; '.join(least)}."
 
 
 CHARTS: dict[str, Callable[[], Figure]] = {

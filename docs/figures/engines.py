@@ -194,11 +194,11 @@ def lead(rows: Sequence[Measured]) -> Iterator[str]:
     )
     look = "looks" if right == 1 else "look"
     yield from wrap(
-        f"**{right} of {len(shaded)} pictures {look} right**, with at most {100 * LIMIT:g} % of"
-        f" their pixels visibly off, by more than {LEADING.label} {TOLERANCE:g}. The nearest is"
+        f"**{right} of {len(shaded)} pictures {look} right**: at most {100 * LIMIT:g} % of the"
+        f" pixels differ visibly, by more than {LEADING.label} {TOLERANCE:g}. The nearest is"
         f" {best.approximation} on *{best.scene}*: {percent(best.visible)}. Under lamps, most of"
-        " what is missing is light from other surfaces. These shares of ltc's pixels differ from"
-        f" the physical picture, and from one without that light: {ltc}.",
+        " what is missing is light from other surfaces. With ltc, these shares of the pixels differ"
+        f" from the physical picture, and from a physical picture without that light: {ltc}.",
         width=110,
     )
 

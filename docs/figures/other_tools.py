@@ -124,8 +124,8 @@ def _lines(found: Sequence[Answers]) -> Iterator[str]:
     yield (
         f"FLIP and RMS give a number only. fotismos passes {len(passed)} pairs, in which at most"
         f" {percent(LIMIT)} of the pixels differ visibly, and names the mistake in {len(named)} of"
-        f" the {len(found) - len(passed)} others; not named is {', '.join(unnamed)}, which varies"
-        f" over the picture. By RMS, *{worst.pair}* is worse than {better} of those that fail."
+        f" the {len(found) - len(passed)} others. It names none in {', '.join(unnamed)}, where the"
+        f" error varies over the picture. By RMS, *{worst.pair}* is worse than {better} of those that fail."
     )
 
 

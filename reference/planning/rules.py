@@ -153,8 +153,8 @@ def _seen_inside_a_lamp(facts: Facts) -> str | None:
 
 SAMPLED_AS_HIT = Premise(
     "Every lamp's shape is a mesh, a rectangle or a disk whose shading normals are those of its"
-    " surface, a sphere, or a cylinder that is round and not mirrored: Mitsuba's samples of others"
-    " are not what rays hit.",
+    " surface, a sphere, or a cylinder that is round and not mirrored: on other shapes, Mitsuba"
+    " samples points that rays do not hit.",
     _sampled_elsewhere,
 )
 
