@@ -125,6 +125,7 @@ def sentences(found: Sequence[Density]) -> Iterator[str]:
         )
     times = [one.ratio.value / other.ratio.value for one, other in zip(gouraud, phong, strict=True)]
     yield (
-        f"On the same mesh a sample of Gouraud shading takes {min(times):.2g} to {max(times):.2g}"
-        " times as long: with one light, interpolating stored intensities is no cheaper than shading."
+        f"On the same mesh a sample of Gouraud shading takes {min(times):.2g} to"
+        f" {max(times):.2g} times as long: with one light, interpolating stored intensities is no"
+        " cheaper than shading."
     )

@@ -125,7 +125,8 @@ def _lines(found: Sequence[Answers]) -> Iterator[str]:
         f"FLIP and RMS give a number only. fotismos passes {len(passed)} pairs, in which at most"
         f" {percent(LIMIT)} of the pixels differ visibly, and names the mistake in {len(named)} of"
         f" the {len(found) - len(passed)} others. It names none in {', '.join(unnamed)}, where the"
-        f" error varies over the picture. By RMS, *{worst.pair}* is worse than {better} of those that fail."
+        f" error varies over the picture. By RMS, *{worst.pair}* is worse than {better} of those"
+        " that fail."
     )
 
 

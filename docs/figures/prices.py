@@ -50,8 +50,7 @@ def write() -> None:
     """Compare the scenes, and write their table, chart and sentences."""
     records = measured()
     draw("prices.svg", chart(records))
-    for page in ("accuracy.md", "../README.md"):
-        replace(page, "prices", sentences(records))
+    replace("../README.md", "prices", sentences(records))
     write_table("prices", [HEAD, *map(_row, records)])
     replace("models.md", "complexity", complexity(records))
 

@@ -51,7 +51,9 @@ def summary(found):
     time = sum(median(abs(row["time"]) for row in own) <= TIME for own in scenes)
     yield f"Times are within {100 * TIME:.0f} % in {time} of {len(scenes)} scenes."
     error = max(abs(row["error"]) for own in scenes for row in own)
-    yield f"Errors change by up to {100 * error:.0f} % from size to size, so they are not predicted."
+    yield (
+        f"Errors change by up to {100 * error:.0f} % from size to size, so they are not predicted."
+    )
 
 
 def _deviations(name, rounds):
