@@ -56,6 +56,18 @@ def test_the_files_hold_all_that_the_textbooks_picture_is_made_of(rgb):
         assert edge.mean() < 0.005
 
 
+def test_the_projection_puts_each_point_into_its_pixel(rgb):
+    _, found = exported_of("cornell-box")
+    both = np.array(found.camera["projection"]) @ np.array(found.camera["view"])
+    is_seen = found.layers["shape"] > 0
+    clip = np.insert(found.layers["P"][is_seen].astype(float), 3, 1, axis=1) @ both.T
+    ndc = clip[:, :3] / clip[:, 3:]
+    y, x = np.nonzero(is_seen)
+    pixels = (1 + ndc[:, :2] * (1, -1)) / 2 * SIZE - 0.5
+    np.testing.assert_allclose(pixels, np.stack([x, y], axis=1), atol=2e-3)
+    assert (np.abs(ndc[:, 2]) <= 1).all()
+
+
 def matrix_of(node):
     return np.array(node["matrix"]).reshape(4, 4).T
 

@@ -211,6 +211,7 @@ def test_the_textbook_stands_beside_a_wrong_shader_and_no_advice_to_trace(rgb, t
     assert verdict.price_at(record) is None
 
 
+@pytest.mark.thorough
 def test_the_textbooks_error_is_that_of_its_own_picture(rgb):
     path = Path(__file__).parents[2] / "docs/shaders/phong.py"
     for scene in ("plastic-spheres", "fig-8-11-n9"):
@@ -220,6 +221,7 @@ def test_the_textbooks_error_is_that_of_its_own_picture(rgb):
     assert compared("fig-8-9", "blinn").textbook is None
 
 
+@pytest.mark.thorough
 def test_commands_tell_both(run, tmp_path):
     path, out = tmp_path / "mine.py", tmp_path / "out"
     path.write_text(SHADERS[1].text("reversed light"), encoding="utf-8")
