@@ -20,7 +20,9 @@ from tests.shared.parts import camera, moved, rgb_of
 
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
 CHECKS = {"type": "checkerboard", "color0": rgb_of(0.9, 0.6, 0.3), "color1": rgb_of(0.1, 0.2, 0.4)}
-GREY_CHECKS = {"type": "checkerboard", "color0": 0.2, "color1": 0.8}
+GREY_CHECKS = {"type": "checkerboard", "color0": 0.2, "color1": 1.5}
+"""Weights, of which one is clipped to 1."""
+
 SUN = {"type": "directional", "direction": [0.4, 0.2, -1.0], "irradiance": 2.0}
 
 
