@@ -44,7 +44,11 @@ def with_occluders(light, occlusion=True, **sphere):
     }
 
 
-@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
+@pytest.mark.parametrize(
+    "variant",
+    ["llvm_ad_rgb", pytest.param("llvm_ad_spectral", marks=pytest.mark.thorough)],
+    indirect=True,
+)
 def test_kernel_and_plugins_agree_on_every_pixel_with_occluders(variant):
     lobes = [{"form": "blinn"}, {"form": "blinn", "normalised": True}, {"normalised": True}]
     cases = [(light, {}) for light in LIGHTS] + [("point", lobe) for lobe in lobes]

@@ -5,6 +5,7 @@ import pytest
 
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
 from fotismos.reference.planning.facts import Facts
 from fotismos.reference.planning.rules import LIGHT_BY_LIGHT
 from fotismos.reference.rendering.integrators import RR_DEPTH
@@ -116,21 +117,22 @@ def seen_through_a_ball(max_depth=-1, flip_normals=True, body="cylinder", aside=
 def test_a_shape_seen_through_both_sides_of_a_hidden_lamp_is_warned_of(rgb):
     """Mitsuba's volpath lights it as if it were inside."""
     for flip_normals in (True, False):
-        described = seen_through_a_ball(flip_normals=flip_normals, body="sphere")
-        record = compare(Source("a test", described), Options(spp=16)).record
-        assert record.plan.integrator == "volpath"
-        assert "through both sides of a hidden lamp" in record.caution
-        assert verdict.headline([record]).startswith("a test: The reference is wrong at")
-        assert "integrator" in {entry.what for entry in record.overridden}
+        source = Source("a test", seen_through_a_ball(flip_normals=flip_normals, body="sphere"))
+        ready = prepare(source)
+        assert ready.plan.integrator == "volpath"
+        assert "through both sides of a hidden lamp" in ready.caution()
+        assert "integrator" in {entry.what for entry in ready.overridden}
+    record = compare(source, Options(spp=4, resolution=(16, 16))).record
+    assert verdict.headline([record]).startswith("a test: The reference is wrong at")
     for described in (
         seen_through_a_ball(max_depth=2, body="sphere", flip_normals=False),
         seen_through_a_ball(body="cube"),
         seen_through_a_ball(body="sphere", aside=9.0),
     ):
-        record = compare(Source("a test", described), Options(spp=16)).record
-        assert record.caution == ""
-        is_override = "integrator" in {entry.what for entry in record.overridden}
-        assert is_override is (record.plan.integrator == "volpath")
+        ready = prepare(Source("a test", described))
+        assert ready.caution() == ""
+        is_override = "integrator" in {entry.what for entry in ready.overridden}
+        assert is_override is (ready.plan.integrator == "volpath")
 
 
 # --- Settings of the scene's own integrator --------------------------------------------------
@@ -150,8 +152,8 @@ def mirrored(integrator, sampling_weight=1.0):
 
 
 def overridden(description):
-    record = compare(Source("a test", description), Options(spp=16)).record
-    return {entry.what: (entry.given, entry.used) for entry in record.overridden}
+    ready = prepare(Source("a test", description))
+    return {entry.what: (entry.given, entry.used) for entry in ready.overridden}
 
 
 @pytest.mark.guarantee("plans", "Integrator settings that a plan does not use are named.")
@@ -173,10 +175,9 @@ def test_the_depth_of_russian_roulette_is_the_one_used(rgb):
     for given, entry in ((5, ("5", str(RR_DEPTH))), (RR_DEPTH, None)):
         integrator = {"type": "path", "rr_depth": given}
         described = scene(integrator=integrator, floor=floor, wall=wall, **lamps)
-        record = compare(Source("a test", described), Options(spp=16)).record
-        assert (record.plan.integrator, record.plan.rr_depth) == ("direct_all", RR_DEPTH)
-        overridden = {one.what: (one.given, one.used) for one in record.overridden}
-        assert overridden.get("rr_depth") == entry
+        plan = prepare(Source("a test", described)).plan
+        assert (plan.integrator, plan.rr_depth) == ("direct_all", RR_DEPTH)
+        assert overridden(described).get("rr_depth") == entry
 
 
 @pytest.mark.parametrize("integrator", ["path", "direct"])

@@ -20,7 +20,9 @@ from tests.shared.parts import camera, moved, rgb_of
 
 BSDF, EMITTER = mi.ObjectType.BSDF, mi.ObjectType.Emitter
 CHECKS = {"type": "checkerboard", "color0": rgb_of(0.9, 0.6, 0.3), "color1": rgb_of(0.1, 0.2, 0.4)}
-GREY_CHECKS = {"type": "checkerboard", "color0": 0.2, "color1": 0.8}
+GREY_CHECKS = {"type": "checkerboard", "color0": 0.2, "color1": 1.5}
+"""Weights, of which one is clipped to 1."""
+
 SUN = {"type": "directional", "direction": [0.4, 0.2, -1.0], "irradiance": 2.0}
 
 
@@ -177,8 +179,8 @@ TEXTURED_LOBE = {"type": "roughconductor", "alpha": {"type": "checkerboard", "co
 
 
 def test_a_blend_of_lobes_of_two_scales_is_at_its_ends_each_of_them(rgb):
-    """A textured roughness makes a normalised lobe; the other one's is not. Weights are clipped."""
-    for weight, alone in ((0.0, PHONG), (1.0, TEXTURED_LOBE), (2.0, TEXTURED_LOBE)):
+    """A textured roughness makes a normalised lobe; the other one's is not."""
+    for weight, alone in ((0.0, PHONG), (1.0, TEXTURED_LOBE)):
         blend = {"type": "blendbsdf", "weight": weight, "a": PHONG, "b": TEXTURED_LOBE}
         shown, expected = (
             images(scene({"s": {"type": "rectangle", "b": each}}))[0] for each in (blend, alone)

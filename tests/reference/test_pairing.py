@@ -99,7 +99,13 @@ def drawn(seed, number):
 
 
 @pytest.mark.parametrize(
-    ("variant", "number"), [("llvm_ad_rgb", 32), ("llvm_ad_spectral", 4)], indirect=["variant"]
+    ("variant", "number"),
+    [
+        ("llvm_ad_rgb", 12),
+        pytest.param("llvm_ad_rgb", 32, marks=pytest.mark.thorough),
+        pytest.param("llvm_ad_spectral", 4, marks=pytest.mark.thorough),
+    ],
+    indirect=["variant"],
 )
 def test_the_albedos_of_a_roughplastic_are_what_its_plugin_reflects(variant, number):
     """The plugin's own sums, in single precision, are off by up to 1e-5.

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.reference.planning.facts import Facts
@@ -144,11 +143,11 @@ def test_a_cylinder_that_shines_is_sampled_where_rays_hit_it_if_the_plan_says_so
 
 
 def test_a_lamp_whose_samples_are_not_its_hits_is_warned_of(rgb):
-    source, few = Source("tube", SCENES["a mirrored cylinder that shines"]()), Options(spp=16)
-    (said,) = (line for line in compare(source, few).record.warnings if "weights" in line)
+    ready = prepare(Source("tube", SCENES["a mirrored cylinder that shines"]()))
+    (said,) = (line for line in ready.warnings() if "weights" in line)
     assert said.startswith("tube: samples of it may not be what rays hit")
-    again = compare(Source("sky", SCENES["an anisotropic sphere"]()), few)
-    assert not any("weights" in line for line in again.record.warnings)
+    again = prepare(Source("sky", SCENES["an anisotropic sphere"]()))
+    assert not any("weights" in line for line in again.warnings())
 
 
 @pytest.mark.parametrize(
