@@ -154,7 +154,7 @@ class Within(click.FloatRange):
         return number
 
 
-def with_options(*options: Decorator) -> Decorator:
+def with_options(options: Sequence[Decorator]) -> Decorator:
     """Return a decorator that adds options to a command."""
 
     def add(command: Any) -> Any:
@@ -228,11 +228,6 @@ def _kind(kind: Any) -> dict[str, Any]:
     return {}
 
 
-def options(*names: str) -> Decorator:
-    """Return the command line's forms of several fields; see :func:`option`."""
-    return with_options(*map(option, names))
-
-
 RENDERING = (
     "variant", "heuristic_variant", "seed", "spp", "resolution", "heuristic", "interpolation",
     "tessellation", "vertex_weights", "everything", "pairing", "pixels_per_degree", "allow_empty",
@@ -242,10 +237,12 @@ RENDERING = (
 def options_of_scenes(without: Sequence[str] = (), **defaults: str) -> Decorator:
     """Return the options of a scene, some left out, with a command's own defaults."""
     names = [name for name in (*RENDERING, "define", "sensor") if name not in without]
-    return with_options(*(option(name, defaults.get(name, "")) for name in names))
+    return with_options([option(name, defaults.get(name, "")) for name in names])
 
 
+rendering_options = with_options([option(name) for name in RENDERING])
 scene_options = options_of_scenes()
+picture_options = with_options([option(name) for name in ("reference", "mask", "transfer", "over")])
 
 timeout_option = click.option(
     "--timeout",
@@ -268,8 +265,8 @@ scheduler_option = click.option(
     metavar="ADDRESS",
     help="Use the Dask cluster with this scheduler, such as tcp://host:8786.",
 )
-process_options = with_options(timeout_option, workers_option, scheduler_option)
-verbosity_options = with_options(quiet_option, verbose_option)
+process_options = with_options([timeout_option, workers_option, scheduler_option])
+verbosity_options = with_options([quiet_option, verbose_option])
 
 
 def share_of(text: str) -> float:
@@ -301,15 +298,14 @@ within_option = click.option(
     help="Pixels differ visibly if ΔE2000 is above this: 1 to 10 in steps of 0.25.",
 )
 _file = click.Path(path_type=Path, dir_okay=False)
-ci_options = with_options(
-    click.option("--junit", type=_file, metavar="FILE", help="Write a JUnit XML file."),
-    click.option(
-        "--summary",
-        type=_file,
-        metavar="FILE",
-        help="Append a summary in Markdown, such as for a comment on a pull request.",
-    ),
+junit_option = click.option("--junit", type=_file, metavar="FILE", help="Write a JUnit XML file.")
+summary_option = click.option(
+    "--summary",
+    type=_file,
+    metavar="FILE",
+    help="Append a summary in Markdown, such as for a comment on a pull request.",
 )
+ci_options = with_options([junit_option, summary_option])
 
 open_option = click.option(
     "--open", "is_opened", is_flag=True, help="Open the page in a browser as soon as it exists."

@@ -150,7 +150,8 @@ class Configured(jobs.Helped):
 @jobs.output_option("out", "check")
 @jobs.process_options
 @jobs.options_of_scenes(resolution="the film's, reduced to 64 pixels at most")
-@jobs.options("transfer", "over")
+@jobs.option("transfer")
+@jobs.option("over")
 @jobs.verbosity_options
 @click.pass_context
 def check(

@@ -17,9 +17,12 @@ from fotismos.reports import jobs
 @jobs.fresh_option
 @jobs.process_options
 @jobs.scene_options
-@jobs.options("image", "reference", "mask", "transfer", "over", "tone_map")
+@jobs.option("image")
+@jobs.picture_options
+@jobs.option("tone_map")
 @jobs.verbosity_options
-@jobs.options("noise", "colour_science")
+@jobs.option("noise")
+@jobs.option("colour_science")
 @click.option(
     "--why/--no-why",
     "with_causes",

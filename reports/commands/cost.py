@@ -33,7 +33,8 @@ from fotismos.reports import jobs
 @click.option(
     "--kernel-time", metavar="TIME", help="What the textbook kernel takes there, for ratios."
 )
-@jobs.options("reference", "mask", "transfer", "over", "tone_map")
+@jobs.picture_options
+@jobs.option("tone_map")
 @jobs.within_option
 @jobs.json_option
 def cost(

@@ -29,7 +29,7 @@ from fotismos.reports import jobs
 @jobs.json_option
 @jobs.timeout_option
 @jobs.options_of_scenes(resolution="96x96", spp="64")
-@jobs.options("reference", "mask", "transfer", "over")
+@jobs.picture_options
 @jobs.verbosity_options
 def fit(
     scenes: tuple[str, ...],

@@ -17,7 +17,8 @@ QUICK = {"resolution": (64, 64), "spp": 16}
 @jobs.figures_option
 @jobs.fresh_option
 @jobs.process_options
-@jobs.options(*jobs.RENDERING, "colour_science")
+@jobs.rendering_options
+@jobs.option("colour_science")
 @jobs.verbosity_options
 @click.option("--quick", is_flag=True, help="Everything at a small size, in about a minute.")
 @click.option(

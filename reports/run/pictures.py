@@ -9,7 +9,6 @@ from fotismos.comparisons.comparison import PICTURE_LIBRARIES
 from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.two_pictures import finish, look
-from fotismos.reports.files import results
 from fotismos.reports.jobs import Job
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files
@@ -49,9 +48,5 @@ def compare(
     comparison = finish(first)
     seconds["pictures"] += perf_counter() - begin
     begin = perf_counter()
-    if job.figures:
-        from fotismos.reports.charts import figures  # loaded late: few pages have any
-
-        figures.write_scene(folder / results.FIGURES, target, comparison)
-    view = scene_files.write(folder, target, comparison, view=view)
+    view = scene_files.write(folder, target, comparison, view=view, with_figures=job.figures)
     return view, seconds | {"files": perf_counter() - begin}

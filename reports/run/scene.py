@@ -84,11 +84,9 @@ def compare(
             )
             spent["methods"] = perf_counter() - begin
         begin = perf_counter()
-        if job.figures:  # first, since the record marks the scene as finished
-            from fotismos.reports.charts import figures
-
-            figures.write_scene(folder / results.FIGURES, target, comparison)
-        view = scene_files.write(folder, target, comparison, costs, key)
+        view = scene_files.write(
+            folder, target, comparison, costs=costs, key=key, with_figures=job.figures
+        )
         return view, spent | {"files": perf_counter() - begin}
 
 

@@ -66,15 +66,20 @@ def write(
     costs: "Study[Cost] | None" = None,
     key: str | None = None,
     view: SceneView | None = None,
+    with_figures: bool = False,
 ) -> SceneView:
     """Write the files of one comparison to ``folder/name``, and return its part of the page.
 
     The record is removed first and written last. Files of an earlier result that this one does not
     have are deleted. With a key, :func:`load` finds the result. ``view`` is that of the same images
-    with an earlier record.
+    with an earlier record. Figures for print go to a folder of their own.
     """
     target = folder / name
     record = comparison.record
+    if with_figures:  # first, since the record marks the scene as finished
+        from fotismos.reports.charts import figures  # loaded late: few runs have any
+
+        figures.write_scene(folder / results.FIGURES, name, comparison)
     results.own(target)
     # The view names the earlier files, and is about to go.
     earlier = _files(target)

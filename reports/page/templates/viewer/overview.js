@@ -1,21 +1,22 @@
 // The first screen at a threshold: headline, order, pictures, prices, bars and what is needed.
 
+const comparedScenes = /** @type {Scene[]} */ (page.scenes.filter(scene => !scene.failed));
+/** The scenes whose comparison did not fail, by their ids. */
+const compared = new Map(comparedScenes.map(scene => [scene.id, scene]));
+
 /** Show all scenes at a threshold; Python made the sentences for each. @param {number} t */
 function showOverview(t) {
   const place = placeOf(t);
   byId("headline").textContent = textAt(page.headlines, place);
   byId("missing").textContent = textAt(page.missing, place);
-  const known = new Map(page.scenes.map(scene => [scene.id, scene]));
-  const sizeOf = (/** @type {HTMLElement} */ item) => {
-    const scene = known.get(item.dataset.scene ?? "");
-    return scene && !scene.failed ? scene.shares[place] : -1;
-  };
+  const sizeOf = (/** @type {HTMLElement} */ item) =>
+    compared.get(item.dataset.scene ?? "")?.shares[place] ?? -1;
   const list = document.querySelector(".bars");
   const items = /** @type {HTMLElement[]} */ ([...(list?.children ?? [])]);
   list?.append(...items.sort((a, b) => sizeOf(b) - sizeOf(a)));
   for (const row of elementsIn("#overview [data-scene]")) {
-    const scene = known.get(row.dataset.scene ?? "");
-    if (scene && !scene.failed) showScene(row, scene, place);
+    const scene = compared.get(row.dataset.scene ?? "");
+    if (scene) showScene(row, scene, place);
   }
   showPrices(place);
 }
@@ -29,10 +30,8 @@ function showPrices(place) {
   const points = elementsIn("[data-price]");
   const labelled = /** @type {{from: number, to: number, y: number}[]} */ ([]);
   const plot = points[0]?.parentElement?.clientWidth || 1;
-  const scenes = /** @type {Scene[]} */ (page.scenes.filter(scene => !scene.failed));
-  const known = new Map(scenes.map(scene => [scene.id, scene]));
   const spots = points.map(point => {
-    const scene = /** @type {Scene} */ (known.get(point.dataset.price ?? ""));
+    const scene = /** @type {Scene} */ (compared.get(point.dataset.price ?? ""));
     const price = scene.prices[place];
     // The last part of the axis holds what has no price.
     const steps = price ? clamp(Math.log10(price) - low, 0, high - low) : high - low + 1;
