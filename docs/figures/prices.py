@@ -3,7 +3,8 @@
 ``./run docs --prices`` measures for some six minutes on an idle machine.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import log10
 
 from matplotlib import rc_context
@@ -11,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from docs.figures.accuracy import LARGER
-from docs.figures.documents import draw, replace, write_table
+from docs.figures.documents import draw, read_table, replace, write_table
 from docs.figures.model_figures import GROUND, STYLE, quiet
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
@@ -26,19 +27,16 @@ from fotismos.reports.terminal.words import number, percent, seconds
 SIZE = 256, 192
 THRESHOLD = 2.0
 
-HEAD = (
-    "scene",
-    "needs",
-    "share that differs",
-    "time of a sample over the textbook's",
-    "samples",
-    "time over the textbook's",
-    "time",
-)
+SHARE = "share that differs"
+PRICE = "time over the textbook's"
+HEAD = "scene", "needs", SHARE, "time of a sample over the textbook's", "samples", PRICE, "time"
 """Columns of the table: the last three are those of the physical picture that passes."""
 
+UNKNOWN = "–"
+"""Stands in the table where nothing passes, or no time is known."""
+
 NEAR = 7.0
-NEAR_DECADES = 0.13
+NEAR_DECADES = 0.2
 """Percent of pixels, and decades of time, by which points differ at least, to have labels of their
 own."""
 
@@ -46,12 +44,21 @@ NAMED_ABOVE = 1.6
 """Times of the textbook's time above which the chart names a scene."""
 
 
+@dataclass(frozen=True)
+class Point:
+    """A scene of the chart: its price, and the percentage of pixels that differ."""
+
+    scene: str
+    price: float
+    share: float
+
+
 def write() -> None:
     """Compare the scenes, and write their table, chart and sentences."""
     records = measured()
-    draw("prices.svg", chart(records))
-    replace("../README.md", "prices", sentences(records))
     write_table("prices", [HEAD, *map(_row, records)])
+    draw("prices.svg", chart(read_table("prices")))
+    replace("../README.md", "prices", sentences(records))
     replace("models.md", "complexity", complexity(records))
 
 
@@ -98,7 +105,7 @@ def _row(record: ComparisonRecord) -> tuple[str, ...]:
     needed = price.needed_at(THRESHOLD)
     assert needed is not None
     effects = ", ".join(needed.effects) or "nothing"
-    count = "–"
+    count = UNKNOWN
     if samples is not None:
         count = "more than 65,536" if samples.value is None else f"{samples.value:,}"
         if samples.value is not None and samples.high is None:
@@ -110,7 +117,7 @@ def _row(record: ComparisonRecord) -> tuple[str, ...]:
         percent(verdict.share(record).value),
         "?" if price.ratio is None else number(price.ratio.value),
         count,
-        "–" if over_textbook is None else number(over_textbook),
+        UNKNOWN if over_textbook is None else number(over_textbook),
         _seconds(record, price),
     )
 
@@ -119,25 +126,32 @@ def _seconds(record: ComparisonRecord, price: Price) -> str:
     """Return the time of the physical picture that passes."""
     samples = price.samples_at(THRESHOLD)
     if samples is None or samples.value is None:
-        return "–"
+        return UNKNOWN
     taken = price.seconds(samples.value)
-    return "–" if taken is None else seconds(taken)
+    return UNKNOWN if taken is None else seconds(taken)
 
 
-def chart(records: Sequence[ComparisonRecord]) -> Figure:
-    """Draw the share of pixels that differ over the price, logarithmic."""
+def chart(rows: Sequence[Mapping[str, str]]) -> Figure:
+    """Draw the share of pixels that differ over the price, logarithmic, out of the table's rows."""
+    points = [
+        Point(
+            scene=row["scene"].replace("_", " "),
+            price=float(row[PRICE].replace(",", "")),
+            share=float(row[SHARE].removesuffix(" %")),
+        )
+        for row in rows
+        if row[PRICE] != UNKNOWN
+    ]
     with rc_context(STYLE):
         figure = Figure(figsize=(7, 3.6), facecolor=GROUND, layout="constrained")
         axes = figure.subplots()
-        known = [(record, verdict.price_at(record, THRESHOLD)) for record in records]
-        points = [(record, price) for record, price in known if price is not None]
         axes.scatter(
-            [price for _, price in points],
-            [100 * verdict.share(record).value for record, _ in points],
+            [point.price for point in points],
+            [point.share for point in points],
             color="#1a56a0",
             zorder=2,
         )
-        _name(axes, [point for point in points if point[1] > NAMED_ABOVE])
+        _name(axes, [point for point in points if point.price > NAMED_ABOVE])
         axes.set_xscale("log")
         axes.xaxis.set_major_formatter("{x:g}")
         axes.set(
@@ -149,26 +163,27 @@ def chart(records: Sequence[ComparisonRecord]) -> Figure:
     return figure
 
 
-def _name(axes: Axes, points: Sequence[tuple[ComparisonRecord, float]]) -> None:
+def _name(axes: Axes, points: Sequence[Point]) -> None:
     """Write the names of scenes beside their points, those of near points together."""
-    groups: list[tuple[float, float, list[str]]] = []
-    for record, price in sorted(points, key=lambda point: -verdict.share(point[0]).value):
-        height = 100 * verdict.share(record).value
-        name = record.scene.replace("_", " ")
-        for x, y, names in groups:
-            if abs(y - height) < NEAR and abs(log10(x / price)) < NEAR_DECADES:
-                names.append(name)
+    groups: list[list[Point]] = []
+    for point in sorted(points, key=lambda point: -point.share):
+        for group in groups:
+            is_level = abs(group[0].share - point.share) < NEAR
+            if is_level and abs(log10(group[0].price / point.price)) < NEAR_DECADES:
+                group.append(point)
                 break
         else:
-            groups.append((price, height, [name]))
-    right = max(x for x, _, _ in groups)
-    for x, y, names in groups:
-        is_right = x > right / 30
+            groups.append([point])
+    dearest = max(point.price for point in points)
+    for group in groups:
+        ordered = sorted(group, key=lambda point: point.price)
+        is_left = ordered[0].price > dearest / 30
+        beside = ordered[0 if is_left else -1]
         axes.annotate(
-            ", ".join(names),
-            (x, y),
-            xytext=(-6 if is_right else 6, -3),
+            ", ".join(point.scene for point in ordered),
+            (beside.price, beside.share),
+            xytext=(-6 if is_left else 6, -3),
             textcoords="offset points",
-            ha="right" if is_right else "left",
+            ha="right" if is_left else "left",
             fontsize=8,
         )
