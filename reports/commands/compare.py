@@ -27,7 +27,7 @@ from fotismos.reports import jobs
     "--why/--no-why",
     "with_causes",
     default=True,
-    help="Find which effects are missing, at a small size; not of a picture. [default: why]",
+    help="Find which effects are missing, at a small size; not for pictures. [default: why]",
 )
 @jobs.open_option
 @jobs.within_option
