@@ -143,13 +143,13 @@ def measure(
     options: Options,
     surface: "GBuffer | None" = None,
     exact: bool = False,
-    is_random: bool = True,
+    noise_shown: marks.NoiseShown = "all",
     names: Iterable[str] = METRICS,
 ) -> tuple[dict[str, Any], Images]:
     """Return fields of the record, and maps over the pixels that count, (H, W).
 
     ``surface`` is what they see; two pictures have none. ``exact`` says that the difference has no
-    noise, and not ``is_random`` that passes do not show it
+    noise, and ``noise_shown`` whose noise the passes show
     (:func:`fotismos.comparisons.departure.marks.find`). ``names`` are those of the metrics, among
     them the leading one.
     """
@@ -161,7 +161,7 @@ def measure(
     ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(test, reference, counted)
     distance = leading_distance(viewing, metrics)
     found = marks.find(
-        estimates.difference, test, counted, distance, exact=exact, is_random=is_random
+        estimates.difference, test, counted, distance, exact=exact, noise_shown=noise_shown
     )
     error = maps[LEADING.name]
     images = Images(

@@ -412,18 +412,23 @@ def _zoom(picture: Array, other: Array) -> float | None:
         # The smaller one is enlarged, since nothing is known beyond its edges.
         shown = small if zoom > 1 else _zoomed(small, 1 / zoom)
         expected = _zoomed(small_other, zoom) if zoom > 1 else small_other
-        edges = alignment.picture_edges(shown)
-        agreement.append(_best_correlation(edges, alignment.picture_edges(expected)))
+        agreement.append(_agreement(shown, expected))
     best = int(np.argmax(agreement))
-    unchanged = agreement[len(ZOOMS) // 2]
-    is_other = best not in (0, len(ZOOMS) - 1) and abs(ZOOMS[best] - 1) > OTHER_SIZE
+    zoom = float(ZOOMS[best])
+    # Resampling takes noise away, so edges agree better; half a pixel takes as much.
+    shown = small if zoom > 1 else _shifted(small, right=0.5, down=0.5)
+    expected = _shifted(small_other, right=0.5, down=0.5) if zoom > 1 else small_other
+    unchanged = max(agreement[len(ZOOMS) // 2], _agreement(shown, expected))
+    is_other = best not in (0, len(ZOOMS) - 1) and abs(zoom - 1) > OTHER_SIZE
     if not is_other or agreement[best] < unchanged + ZOOMED:
         return None
-    return float(ZOOMS[best])
+    return zoom
 
 
-def _best_correlation(seen: Array, expected: Array) -> float:
-    """Return the highest correlation of two maps (H, W) over all cyclic shifts."""
+def _agreement(picture: Array, other: Array) -> float:
+    """Return the highest correlation of the edges of two pictures over all cyclic shifts."""
+    seen = alignment.picture_edges(picture)
+    expected = alignment.picture_edges(other)
     a = seen - seen.mean()
     b = expected - expected.mean()
     size = np.sqrt((a * a).sum() * (b * b).sum())

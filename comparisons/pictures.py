@@ -21,6 +21,7 @@ from fotismos.comparisons import alignment, picture_mistakes
 from fotismos.comparisons.comparison import Agreement, Comparison, Images, PictureFiles
 from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.mapped_sums import MappedReference, reference_sums
+from fotismos.comparisons.departure.marks import NoiseShown
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.tone_maps import Light
 from fotismos.comparisons.estimates import Estimates, PassSums
@@ -73,6 +74,11 @@ class Pictures:
         """The most passes that they give, an even number; None for one, which shows no noise."""
         count = len(self.files)
         return None if count == 1 else count - count % 2
+
+    @property
+    def shows_noise(self) -> bool:
+        """Whether they show their noise: they are repeats, and not copies of one picture."""
+        return len({file.digest for file in self.files}) > 1
 
     @cached_property
     def mean(self) -> Array:
@@ -179,6 +185,14 @@ class GivenPictures:
         halves = (self.image, self.reference)
         counts = [half.passes for half in halves if half is not None and half.passes is not None]
         return min(counts, default=None)
+
+    @property
+    def noise_shown(self) -> NoiseShown:
+        """Whether the repeats show the noise of all pictures, of a part of them, or of none."""
+        shown = [half.shows_noise for half in self.halves]
+        if all(shown):
+            return "all"
+        return "part" if any(shown) else "none"
 
     def pass_sums(self, counted: NDArray[np.bool_]) -> PassSums:
         """Return sums of passes, in which the reference is shown as the pictures show light."""

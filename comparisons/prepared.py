@@ -240,7 +240,7 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
             " `image`, or omit it."
         )
     given = None
-    if options.has_pictures or options.mask:
+    if options.has_pictures or options.mask is not None:
         from fotismos.comparisons import pictures  # loaded late: few comparisons have any
 
         given = pictures.read_all(options)

@@ -66,7 +66,7 @@ def look(options: Options, name: str, command: str = "") -> FirstLook:
         estimates,
         counted,
         options,
-        is_random=given.passes is not None,
+        noise_shown=given.noise_shown,
         names=(LEADING.name, *declared()),
     )
     stages["metrics"] = perf_counter() - begin

@@ -419,6 +419,13 @@ def command_line() -> str:
     return program.command(*sys.argv[1:])
 
 
+def refuse_reading(given: Mapping[str, Any], option: str) -> None:
+    """Refuse options that say how pictures are read: none are given, which ``option`` would do."""
+    for name in ("transfer", "over"):
+        if given[name] is not None:
+            raise InputError(f"--{name}: it says how pictures are read. Give {option}.")
+
+
 def chosen_options(given: Mapping[str, Any]) -> Options:
     """Return the options of a comparison among those of a command."""
     return Options.of({**given, "define": dict(given.get("define") or ())})

@@ -39,6 +39,7 @@ pixels that differ by more than rounding differ.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,6 +71,9 @@ _NORMAL = 1e6
 
 Distance = Callable[[Array, Array], Array]
 
+NoiseShown = Literal["all", "part", "none"]
+"""Whether the passes show the noise of both images, of one alone, or of none."""
+
 
 @dataclass(frozen=True)
 class Marks:
@@ -86,7 +90,7 @@ def find(
     distance: Distance,
     *,
     exact: bool = False,
-    is_random: bool = True,
+    noise_shown: NoiseShown = "all",
     level: float = LEVEL,
 ) -> Marks:
     """Return marks (H, W): 1 where a difference is shown, 0.5 if undetermined, 0 elsewhere.
@@ -96,9 +100,10 @@ def find(
     ``difference`` is the test image (H, W, 3) less the reference, pass by pass. Pixels that are not
     ``counted`` (H, W) are 0. ``distance(test, reference) -> (N,)`` takes linear colours (N, 3), and
     is in the unit of `VISIBLE`. ``exact`` says that only the positions of camera rays are random,
-    and both images share them. ``is_random`` is false for two single pictures, whose passes show no
-    noise; it is then taken to be independent in cells of a few pixels. ``level`` replaces
-    `LEVEL`; blocks take the same share of it.
+    and both images share them. ``noise_shown`` says whose noise the passes show: of two single
+    pictures none. Noise that they do not show is taken to be independent in cells of a few pixels,
+    so a difference is certain only where it is alike over a tile. ``level`` replaces `LEVEL`;
+    blocks take the same share of it.
     """
     test = np.asarray(test)
     counted = np.asarray(counted, bool)
@@ -115,9 +120,12 @@ def find(
     if exact:
         marks[beyond] = MARKED
         return Marks(image=marks, is_certain=bool(beyond.any()))
-    if not is_random:
+    if noise_shown != "all" and not _is_even(difference.mean, counted):
         marks[beyond] = UNDETERMINED
-        return Marks(image=marks, is_certain=_is_even(difference.mean, counted))
+        return Marks(image=marks, is_certain=False)
+    if noise_shown == "none":
+        marks[beyond] = UNDETERMINED
+        return Marks(image=marks, is_certain=True)
     if difference.passes < FEWEST:
         marks[counted] = UNDETERMINED
         return Marks(image=marks, is_certain=False)

@@ -82,6 +82,8 @@ def compare(
       fotismos compare --reference 'theirs_*.exr' --image 'mine_*.exr' --max-visible 5%
       fotismos compare my_scenes/*.xml --max-visible 5% --summary summary.md
     """  # noqa: D301 click reads the \b as: keep these lines
+    if not (rendering["image"] or rendering["reference"]):
+        jobs.refuse_reading(rendering, "--image or --reference")
     are_pictures = bool(rendering["image"] and rendering["reference"])
     if not scenes and not are_pictures:
         raise click.UsageError(

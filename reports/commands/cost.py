@@ -73,9 +73,8 @@ def cost(
     if is_measured and at is None:
         raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
     engine = EngineTimes.of(pictures, machine, kernel_time)
-    for name in ("transfer", "over"):
-        if engine is None and rendering[name] is not None:
-            raise InputError(f"--{name}: it says how pictures are read. Give --picture.")
+    if engine is None:
+        jobs.refuse_reading(rendering, "--picture")
     if scene is None and not (rendering["reference"] and engine):
         raise click.UsageError(
             "Missing argument 'SCENE': give a scene, or pictures, --reference and --picture."

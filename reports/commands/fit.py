@@ -53,6 +53,8 @@ def fit(
       fotismos fit my_scene.xml --loss linear --form phong
       fotismos fit my_scene.xml --reference 'theirs_*.exr'
     """  # noqa: D301 click reads the \b as: keep these lines
+    if not rendering["reference"]:
+        jobs.refuse_reading(rendering, "--reference")
     jobs.work(
         "fit",
         jobs.pool(timeout),

@@ -159,6 +159,42 @@ def test_single_pictures_tell_a_difference_from_noise():
     assert any("noise is unknown" in words for words in record.warnings)
 
 
+@pytest.mark.parametrize("copies", [1, 4])
+def test_the_noise_of_one_picture_beside_repeats_is_no_certain_difference(copies):
+    """Copies of one file show no noise either."""
+    image = landscape()
+    apart = record_of([1.3 * image] * copies, noisy(image, 4, size=0.3))
+    assert apart.significant.certain
+    for seed in range(10):
+        record = record_of(noisy(image, 1, seed, 0.3) * copies, noisy(image, 4, 100 + seed, 0.3))
+        assert record.metrics["dE2000"].mean > 3
+        assert not record.significant.certain
+        assert record.significant.fraction == 0
+        assert verdict.decision(record) == "undecided"
+
+
+def discs(seed, width=32, height=24):
+    """Return discs of low contrast."""
+    random = np.random.default_rng(seed)
+    y, x = np.mgrid[:height, :width]
+    image = np.full((height, width, 3), 0.1)
+    for _ in range(8):
+        centre = random.uniform(0, (width, height))
+        radius = random.uniform(2, 9)
+        inside = np.hypot(x - centre[0], y - centre[1]) < radius
+        image[inside] = random.uniform(0.1, 0.25, 3)
+    return image
+
+
+def test_noise_that_resampling_takes_away_is_no_other_size():
+    for seed in range(9, 13):
+        random = np.random.default_rng(seed)
+        image = discs(seed)
+        repeats = [image * random.gamma(25, 1 / 25, (24, 32, 1)) for _ in range(5)]
+        record = record_of(repeats[:1], repeats[1:])
+        assert "times as large" not in " ".join(record.agreement.mistakes)
+
+
 def test_what_is_certain_is_said_though_noise_hides_its_share():
     image = landscape(side=128)
     changed = image.copy()
@@ -221,6 +257,12 @@ def test_a_mask_says_which_pixels_of_a_rendering_count(run, tmp_path, monkeypatc
     code, _, error = run(*words, "8x8")
     assert code == 2
     assert "the mask has 16x16 pixels, and the pictures 8x8" in error
+    # An empty variable of a shell names no mask, nor does a link that goes round.
+    Path("round.png").symlink_to("round.png")
+    for word, message in (("", "pictures are .exr or"), ("round.png", "there is no such file")):
+        code, _, error = run("compare", "fig-8-9", "--mask", word, "--resolution", "16x16")
+        assert code == 2
+        assert message in error
 
 
 def test_what_cannot_be_compared_is_refused():
@@ -236,6 +278,14 @@ def test_commands_without_a_scene_or_pictures_say_what_is_missing(run):
         code, _, error = run(*words)
         assert code == 2
         assert "give a scene, or two pictures, --reference and --image" in " ".join(error.split())
+
+
+def test_how_pictures_are_read_is_not_said_without_any(run):
+    for command, cure in (("compare", "--image or --reference"), ("fit", "--reference")):
+        for option, value in (("--transfer", "srgb"), ("--over", "black")):
+            code, _, error = run(command, "fig-8-9", option, value)
+            assert code == 2
+            assert f"{option}: it says how pictures are read. Give {cure}." in error
 
 
 # --- A picture in place of the reference ---------------------------------------------------------
