@@ -163,6 +163,8 @@ class HybridScenes:
         integrator.transports = tuple(
             Transport(plan.shadows, plan.bsdf_samples, plan.max_depth) for plan in plans
         )
+        # Without interreflection, as the kernel: clear surfaces are looked through.
+        integrator.looks_through = True
         return Renderer(scene, integrator, pass_spp=spp, label="image of some effects")
 
     def emission(self, simulated: Set[Effect], spp: int) -> Renderer | None:
@@ -194,7 +196,9 @@ class HybridScenes:
         scene = with_sampler(graph, self.plan.sampler).instantiate()
         # Hiding emitters would hide the emission; a hidden environment was detached above.
         direct.register()
-        integrator = mi.load_dict({"type": "direct_all", "max_depth": 1, "hide_emitters": False})
+        integrator = mi.load_dict(
+            {"type": "direct_all", "max_depth": 1, "hide_emitters": False, "looks_through": True}
+        )
         return Renderer(
             scene, integrator, pass_spp=spp, label="image of emission and ambient light"
         )

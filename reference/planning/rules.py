@@ -160,7 +160,7 @@ SAMPLED_AS_HIT = Premise(
 
 LIGHT_BY_LIGHT = PruningRule(
     name="light by light",
-    omits="picking one light at random",
+    omits="the random choice of one light",
     absent="all lights are summed: the sum is the mean of one light divided by its probability",
     proof="The mean is the sum over all lights, which `direct_all` takes at each sample, if each"
     " estimate of a light has the right mean, however samples of the BSDF are weighted against it.",

@@ -22,6 +22,9 @@ Parameter           Type (default)      Meaning
 ``max_depth``       integer (2)         as in Mitsuba's ``path``: 1 is only what shines by itself;
                                         more than 2, or -1 for no limit, adds indirect light
                                         (:mod:`fotismos.reference.rendering.indirect`)
+``looks_through``   boolean (false)     at a ``max_depth`` of 1 and 2, add the light of what lies
+                                        straight behind surfaces with a null component, such as
+                                        masks: they are no bounce, as in the textbook half
 ==================  ==================  ===========================================================
 
 One rendering can make several images, which share camera rays, paths and kernel: those of
@@ -37,6 +40,7 @@ import mitsuba as mi
 
 from fotismos.heuristic import numerics
 from fotismos.heuristic.convention import Colour, Mask, Scene
+from fotismos.heuristic.plugins.integrator import LAYERS
 from fotismos.reference.rendering.integrators import RR_DEPTH
 from fotismos.reference.rendering.transport import (
     Transport,
@@ -65,6 +69,7 @@ def _define(_variant: str) -> None:
             defaults = Transport()._asdict()
             given = {name: props.get(name, value) for name, value in defaults.items()}
             self.transports = (Transport(**given),)
+            self.looks_through = props.get("looks_through", False)
             self.environment_albedo = None
             """An `AlbedoTable` (:mod:`fotismos.reference.pairing.probe`) in place of samples of the
             environment, for one BSDF and nothing that hides it; set after construction."""
@@ -86,6 +91,7 @@ def _define(_variant: str) -> None:
                 si = _beyond_lamps(scene, mi.Ray3f(ray), mi.Bool(active))
             else:
                 si = scene.ray_intersect(ray, mi.RayFlags.All, True, active)
+            looks_through = self.looks_through and _has(mi.BSDFFlags.Null, scene)
             colour = mi.Spectrum(0)
             if others or len(delta) <= UNROLLED:  # rays never hit points or directions
                 is_shown = active & (si.is_valid() | (not self.hide_emitters))
@@ -95,6 +101,13 @@ def _define(_variant: str) -> None:
             environment = scene.environment() is not None and not self.hide_emitters
             valid = active if environment else hit
             if self.transports[0].max_depth == 1:
+                if looks_through:
+
+                    def shining(si: Any, active: Mask) -> list[Colour]:
+                        return [dr.select(active, si.emitter(scene).eval(si, active), 0)]
+
+                    (behind,) = _behind(scene, mi.Ray3f(ray), si, hit, light=shining, images=1)
+                    colour += behind
                 return colour, valid, []
             bsdf = si.bsdf(ray)
             seen = {
@@ -137,8 +150,25 @@ def _define(_variant: str) -> None:
             # Lights with an extent: a sample of each, and one of the BSDF for all together.
             colours = sums(colours, _of_all(extended, False, **seen))
             looks = any(transport.bsdf_samples for transport in self.transports)
-            if extended and (looks or _has_delta(scene)):
+            takes_samples = extended and (looks or _has(mi.BSDFFlags.Delta, scene))
+            if takes_samples:
                 colours = sums(colours, _from_bsdf(**seen))
+            shallow = [transport for transport in self.transports if transport.max_depth == 2]
+            if looks_through and shallow:
+
+                def direct(si: Any, active: Mask) -> list[Colour]:
+                    there = seen | {
+                        "si": si,
+                        "bsdf": si.bsdf(),
+                        "active": active & si.is_valid(),
+                        "transports": shallow,
+                    }
+                    light = sums(_of_all(delta, True, **there), _of_all(extended, False, **there))
+                    return sums(light, _from_bsdf(**there)) if takes_samples else light
+
+                behind = _behind(scene, mi.Ray3f(ray), si, hit, light=direct, images=len(shallow))
+                added = dict(zip(shallow, behind, strict=True))
+                colours = sums(colours, [added.get(transport, 0) for transport in self.transports])
             return colours[0], valid, [channel for image in colours[1:] for channel in image]
 
         def aov_names(self) -> list[str]:
@@ -183,9 +213,40 @@ def is_behind_two_lamps(scene: Any, ray: Any) -> Any:
     return si.is_valid() & (count > 1) & ~si.shape.is_mesh()
 
 
-def _has_delta(scene: Any) -> bool:
+@dr.syntax
+def _behind(
+    scene: Any,
+    ray: Any,
+    si: Any,
+    active: Any,
+    light: Callable[[Any, Mask], list[Colour]],
+    images: int,
+) -> list[Colour]:
+    """Return the light of what lies straight behind what a ray hits, for each image.
+
+    ``sum_(j > 1) L_j prod_(i < j) T_i`` over the surfaces 1, 2, … along the ray, ``T`` their null
+    transmittances, as the textbook half adds them. ``light(si, active)`` gives ``L`` of all images;
+    light that a surface's own samples find behind it is in its ``L``.
+    """
+    total = [mi.Spectrum(0) for _ in range(images)]
+    throughput = mi.Spectrum(1)
+    layer = mi.UInt32(1)
+    while active & (layer < LAYERS):
+        throughput *= si.bsdf().eval_null_transmission(si, active)
+        active &= dr.max(throughput) > 0
+        ray = si.spawn_ray(ray.d)
+        si = scene.ray_intersect(ray, active)
+        # Beyond the last surface, the background shines.
+        seen = light(si, active)
+        total = sums(total, [throughput * one for one in seen])
+        active &= si.is_valid()
+        layer += 1
+    return total
+
+
+def _has(flag: Any, scene: Any) -> bool:
     bsdfs = (shape.bsdf() for shape in scene.shapes())
-    return any(bsdf and mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta) for bsdf in bsdfs)
+    return any(bsdf and mi.has_flag(bsdf.flags(), flag) for bsdf in bsdfs)
 
 
 def _of_all(

@@ -1,6 +1,7 @@
 """Checking scenes against baselines, and writing baselines: one, or all of a command."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -362,16 +363,38 @@ def update_pictures(
     level: float,
     progress: Progress | None = None,
 ) -> tuple[CheckRecord, None]:
-    """Write or replace the baseline of the pictures that match a pattern."""
+    """Write the baseline of the pictures that match a pattern, unless nothing moved from it."""
     begin = perf_counter()
-    status = "updated" if path.exists() else "created"
+    status = "created"
+    before = None
     if path.exists():
+        status = "updated"
         known = baselines.picture_record(path)
+        with suppress(InputError):  # what cannot be read is replaced
+            _, before = baselines.read_pictures(path)
+        is_read_alike = (transfer or known.transfer, over or known.over) == (
+            known.transfer,
+            known.over,
+        )
         transfer = transfer or known.transfer
         over = over or known.over
     repeats, files = baselines.read_repeats(pattern, transfer, over)
-    baselines.write_pictures(path, repeats, transfer, over)
-    found = check_pictures(repeats, repeats, level)
+    # Pictures of another size or number, or read in another way, replace what is there.
+    if before is not None and (
+        before.mean.shape != repeats.mean.shape
+        or before.count != repeats.count
+        or not is_read_alike
+    ):
+        before = None
+    if before is None:
+        baselines.write_pictures(path, repeats, transfer, over)
+        found = check_pictures(repeats, repeats, level)
+    else:
+        found = check_pictures(before, repeats, level)
+        if found.moved:
+            baselines.write_pictures(path, repeats, transfer, over)
+        else:
+            status = "unchanged"
     made = of_pictures(path, pattern, status=status, found=found, begin=begin, files=files)
     return made, None
 

@@ -184,9 +184,9 @@ def check(
     The table [tool.fotismos] of the nearest pyproject.toml may set baselines, in place of BASELINE,
     report, in place of --output, significance, within and max_visible.
 
-    With --picture nothing is rendered: repeats of pictures are compared with earlier ones. Repeats
-    of a renderer without noise are equal, and any change is a drift; --within and --max-visible
-    allow what nobody sees, such as another GPU's rounding.
+    With --picture, repeats of a picture are compared with earlier ones and not rendered; the scenes
+    of a folder are checked, too. Repeats of a renderer without noise are equal, and any change is a
+    drift; --within and --max-visible allow what nobody sees, such as another GPU's rounding.
 
     A scene or shader in Python is code, and so is a baseline that names one: it is executed.
 

@@ -92,8 +92,9 @@ def compare(
     for option in ("image", "reference"):
         if rendering[option] and len(scenes) > 1:
             are_files = any(Path(word).suffix.lower() in PICTURES for word in scenes)
-            cure = f" Put a pattern in quotes: --{option} 'name_*.exr'." if are_files else ""
-            raise click.UsageError(f"--{option} goes with one scene.{cure}")
+            if are_files:
+                raise click.UsageError(f"Put a pattern in quotes: --{option} 'name_*.exr'.")
+            raise click.UsageError(f"--{option} goes with one scene.")
     if scenes:
         processes = jobs.pool(timeout, len(scenes), workers=workers, scheduler=scheduler)
     else:

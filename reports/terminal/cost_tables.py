@@ -241,7 +241,7 @@ def choice_lines(choice: Choice) -> Iterator[str]:
     measured = f"measured at {sized(choice.measured)}, " if is_smaller else ""
     if chosen is None:
         yield (
-            f"At {size} no measured method passes at {within}. The nearest is"
+            f"At {size} no method passes at {within} with the samples measured here. The nearest is"
             f" {_offer(choice.best, measured)}. {beyond(choice.reach)}"
         )
     elif chosen.method == full.method:

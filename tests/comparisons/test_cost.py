@@ -278,7 +278,7 @@ def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does
     monkeypatch.setattr(studies, "measure_ladder", lambda *_, **__: replace(found, points=points))
     code, said, _ = run(*words, "--within", 10)
     assert code == 1
-    assert "\nAt 12x12 no measured method passes at ΔE2000 10" in said
+    assert "\nAt 12x12 no method passes at ΔE2000 10 with the samples measured here" in said
     assert "More samples (--spp) decide" in said
     code, _, said = run(*words, "--within", 1.1)
     assert (code, "in steps of 0.25" in said) == (2, True)

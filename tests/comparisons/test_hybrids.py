@@ -188,6 +188,35 @@ def test_without_effects_the_plugins_give_the_kernels_image(rgb):
         np.testing.assert_allclose(found, expected, atol=2e-5)
 
 
+def test_without_effects_clear_surfaces_are_looked_through_as_by_the_kernel(rgb):
+    """Without interreflection, too: glass and masks are no bounce of the light behind them."""
+    glass = {"type": "sphere", "center": (0, 0, 1), "radius": 0.6, "bsdf": {"type": "dielectric"}}
+    mask = {
+        "type": "rectangle",
+        "to_world": mi.ScalarTransform4f().translate((0.5, 0.5, 2)),
+        "bsdf": {"type": "mask", "opacity": 0.4, "nested": DIFFUSE},
+    }
+    wall = {
+        "type": "rectangle",
+        "to_world": mi.ScalarTransform4f().translate((0, 0, -1)).scale(4),
+        "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": (0.8, 0.3, 0.1)}},
+    }
+    scene = {
+        "type": "scene",
+        "sensor": camera((0, 0, 6), up=(0, 1, 0)),
+        "sky": {"type": "constant", "radiance": 0.3},
+        "lamp": {"type": "point", "position": (1, 2, 4), "intensity": 20.0},
+        "glass": glass,
+        "mask": mask,
+        "wall": wall,
+    }
+    case = open_case(scene, Options(resolution=(24, 24), spp=16))
+    ready = guarded(case.source, case.options)
+    record = attribution.find(ready, case.source, case.options).record
+    assert {"interreflection", "transmission"} <= {one.effect for one in record.effects}
+    assert record.implementation < 1e-3
+
+
 @pytest.mark.thorough
 def test_images_of_one_rendering_are_those_of_a_rendering_each(rgb):
     """Alone, only the image with all effects draws the same random numbers: paths come first."""

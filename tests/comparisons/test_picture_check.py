@@ -255,3 +255,23 @@ def test_a_tolerance_that_judges_nothing_is_refused(run, tmp_path, monkeypatch):
     ):
         code, printed, messages = run("check", "b", *words)
         assert (code, expected in printed + messages) == (2, True), messages
+
+
+def test_an_update_writes_only_pictures_that_moved_and_says_what_did(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(0)
+    light = rng.uniform(0.2, 0.8, (32, 32, 3))
+    for name, factor in (("old", 1.0), ("new", 1.0), ("bright", 1.1)):
+        for number in range(4):
+            noisy = factor * light * rng.normal(1, 0.01, light.shape)
+            write(Path(f"{name}{number}.exr"), noisy.astype(np.float32))
+    picture = "check", "b", "--update", "--picture"
+    assert run(*picture, "hall=old?.exr")[0] == 0
+    kept = Path("b/hall.exr").read_bytes()
+    code, said, _ = run(*picture, "hall=new?.exr")
+    assert (code, Path("b/hall.exr").read_bytes()) == (0, kept)
+    assert "0 of 1 baselines written" in said
+    code, said, _ = run(*picture, "hall=bright?.exr")
+    assert "1 of 1 baselines written" in said
+    assert "what moved" in said
+    assert Path("b/hall.exr").read_bytes() != kept

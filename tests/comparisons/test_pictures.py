@@ -238,7 +238,7 @@ ODD = {
     "pi twice": (lambda image: image / np.pi, "a division by pi too many"),
     "exposure": (lambda image: image * 5, "times as bright as the reference: another exposure"),
     "white": (lambda image: image * [1, 0.9, 0.8], "another white"),
-    "gamma": (to_srgb, "sRGB-encoded: give `transfer=srgb`"),
+    "gamma": (to_srgb, "sRGB-encoded: write linear values"),
     "gamma twice": (lambda image: from_srgb(image.clip(0, 1)), "decoded twice"),
     "power": (lambda image: image.clip(0) ** 1.7, r"raised to the power 1\.[67]\d?"),
     "offset": (lambda image: image + 0.04, r"values are all 0\.0[34]\d* too high"),

@@ -160,7 +160,8 @@ def test_the_effects_needed_pass_with_another_seed(rgb):
 def test_what_a_plan_leaves_out_is_named_and_saves(rgb):
     found = priced("fig-8-9", resolution=(24, 24))
     assert found.left_out == (
-        "picking one light at random", "shadow rays", "interreflection", "the sampled environment",
+        "the random choice of one light", "shadow rays", "interreflection",
+        "the sampled environment",
     )  # fmt: skip
     assert found.saved.noise > 1.5
     assert priced("fig-8-9", resolution=(24, 24), everything=True).saved is None

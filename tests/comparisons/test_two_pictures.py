@@ -346,3 +346,21 @@ def test_parameters_are_fitted_to_a_picture_of_another_renderer(run, tmp_path, m
         values[name] = [parameter["fitted"] for parameter in material["parameters"]]
     assert values["pictures"] == pytest.approx(values["scene"], rel=0.02)
     assert run("fit", "fig-8-9", "--reference", "none.npy")[0] == 2
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_blurred_picture_is_not_called_shifted(count):
+    for seed in range(4):
+        image = landscape(seed)
+        blurred = gaussian_filter(image, (1.5, 1.5, 0))
+        noise = 0.03 if count > 1 else 0.0
+        record = record_of(noisy(blurred, count, 1, noise), noisy(image, count, 2, noise))
+        assert "shifted" not in " ".join(record.agreement.mistakes)
+
+
+@pytest.mark.parametrize("moved", [(0, 1), (-2, 0)])
+def test_a_blurred_picture_that_is_shifted_is_said_to_be(moved):
+    image = landscape(3)
+    blurred = gaussian_filter(np.roll(image, moved, axis=(0, 1)), (1, 1, 0))
+    record = record_of([blurred], [image])
+    assert "shifted by" in " ".join(record.agreement.mistakes)

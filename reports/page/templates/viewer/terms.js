@@ -26,7 +26,7 @@ class TermsPanel {
     if (!terms) return;
     section.querySelector(".terms-slot")?.append(this.panel);
     this.part("missing").hidden = !terms.missing;
-    this.part("missing").textContent = `No terms. ${terms.missing}`;
+    this.part("missing").textContent = `No numbers at a pixel. ${terms.missing}`;
     this.part("whole").hidden = !terms.grid;
     if (!terms.grid) return;
     const grid = await imagesIn(`data-terms-${scene.id}`, terms.grid);
