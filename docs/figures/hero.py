@@ -53,7 +53,7 @@ def write() -> None:
     caption = (
         f"*`./run compare {SCENE}`: {percent(verdict.share(record).value)} of the pixels differ"
         f" visibly, by more than {LEADING.label} {TOLERANCE:g}; the mean is {number(mean)}. Missing"
-        f" effects make up the mean: {listed}.*"
+        f" effects make up the mean: {listed}. The box has no ambient light.*"
     )
     replace("../README.md", "hero", [caption])
 
