@@ -24,6 +24,7 @@ from fotismos.heuristic.lights import DirectionalLight, PointLight
 from fotismos.heuristic.materials import PairedMaterial
 from fotismos.heuristic.user_code import contained
 from fotismos.reference.pairing import albedo, factors
+from fotismos.reference.scene import checks
 
 ALPHAS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
 """Roughness of the materials; the quadrature resolves their lobes at every angle."""
@@ -354,6 +355,10 @@ class ScatteringSubject(Subject):
         super().__init__()
         self.plugin = plugin = registered(word)
         self.parameters = dict(parameters)
+        for name, given in self.parameters.items():
+            for allowed in checks.objections(plugin, name, given):
+                wrong = f"{name} = {checks.shown(given)}"
+                raise InputError(f"BSDF {plugin!r}: {wrong} is not allowed: give {allowed}.")
         # Values whose lobes quadrature or χ² could not resolve are refused.
         for name, (least, most) in RESOLVED.items():
             value = self.parameters.get(name)

@@ -82,8 +82,8 @@ def check_node(graph: Graph, index: int) -> None:
     for key, value in props.items():
         if isinstance(value, str) and (path := find_file(graph.resolver, value)):
             require_regular_file(f"{graph.name}: {graph.label(index)}", value, path)
-        for allowed in _objections(plugin, key, value):
-            raise _refusal(graph, index, f"{key} = {_shown(value)} is not allowed: give {allowed}.")
+        for allowed in objections(plugin, key, value):
+            raise _refusal(graph, index, f"{key} = {shown(value)} is not allowed: give {allowed}.")
     for objection in _missing(graph, index):
         raise _refusal(graph, index, objection)
 
@@ -92,7 +92,8 @@ def _refusal(graph: Graph, index: int, objection: str) -> InputError:
     return InputError(f"{graph.name}: {graph.label(index)}: {objection}")
 
 
-def _objections(plugin: str, key: str, value: Any) -> Iterator[str]:
+def objections(plugin: str, key: str, value: Any) -> Iterator[str]:
+    """Yield what is allowed in place of a value that makes no sense."""
     if isinstance(value, bool):
         return
     if _is_transform(value):
@@ -164,7 +165,8 @@ def _missing(graph: Graph, index: int) -> Iterator[str]:
             yield "p0 and p1 are the same point: give the two ends of the axis."
 
 
-def _shown(value: Any) -> str:
+def shown(value: Any) -> str:
+    """Return a value as a message gives it."""
     if _is_transform(value):
         rows = np.array(value.matrix, float)
         return "[" + "; ".join(" ".join(f"{number:g}" for number in row) for row in rows) + "]"

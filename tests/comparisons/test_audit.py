@@ -364,6 +364,7 @@ def test_mistakes_in_words_are_refused(run, tmp_path, rgb, written):
         ("bsdf", "sphere", {}, "'sphere' is a plugin of Mitsuba, but no BSDF"),
         ("bsdf", scalar, {}, "in variant llvm_ad_rgb"),
         ("bsdf", "roughplastic", {"alpha": 0.01}, "too narrow"),
+        ("bsdf", "plastic", {"int_ior": 0.0}, "int_ior = 0 is not allowed: give an index of"),
         ("bsdf", "phong", {"n": 1000.0}, "too narrow"),
         ("bsdf", "roughplastic", {"alhpa": 1.0}, "alhpa"),
     ):
