@@ -186,7 +186,8 @@ def check(
 
     With --picture, repeats of a picture are compared with earlier ones and not rendered; the scenes
     of a folder are checked, too. Repeats of a renderer without noise are equal, and any change is a
-    drift; --within and --max-visible allow what nobody sees, such as another GPU's rounding.
+    drift. A tolerance, --within or --max-visible, allows what nobody sees, such as another GPU's
+    rounding.
 
     A scene or shader in Python is code, and so is a baseline that names one: it is executed.
 
