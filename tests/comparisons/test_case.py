@@ -43,6 +43,7 @@ def spectral_scene():
     }
 
 
+@pytest.mark.thorough
 def test_a_script_runs_once_in_a_command(run, tmp_path):
     script, runs = tmp_path / "s.py", tmp_path / "s.runs"
     script.write_text(SCRIPT)

@@ -12,6 +12,7 @@ from fotismos.comparisons.prepared import LIMIT_SPP
 SMALL = (24, 24)
 
 
+@pytest.mark.thorough
 def test_the_run_ends_once_the_noise_is_under_the_target(rgb):
     options = Options(resolution=SMALL, noise=6.0)
     result = compare(SCENES["cornell-box"].source(), options)

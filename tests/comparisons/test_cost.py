@@ -216,6 +216,7 @@ def test_the_size_is_of_the_chosen_sensor(rgb):
 # -- Commands --------------------------------------------------------------------------------------
 
 
+@pytest.mark.thorough
 @pytest.mark.guarantee("attribution", "`cost --at` predicts and measures at a size of any shape.")
 def test_the_command_predicts_and_measures_at_another_shape_than_the_films(rgb, run, tmp_path):
     words = ("--spp", 4, "--rounds", 2, "--at", "160x100", "--measure", "-o", tmp_path)

@@ -35,6 +35,7 @@ def broken(monkeypatch):
     monkeypatch.setitem(vars(LEADING), "difference", lambda a, b: 1.01 * ciede2000(a, b))
 
 
+@pytest.mark.thorough
 @pytest.mark.guarantee("means", "Every comparison computes 4,096 pixels with colour-science, too.")
 def test_the_record_says_how_far_its_colour_differences_are_and_at_how_many_pixels(
     usual, monkeypatch
@@ -60,6 +61,7 @@ def test_a_formula_that_is_off_by_a_hundredth_is_found_and_named(broken):
     assert f"at {record.pixels.counted} pixels: dE2000 {largest['dE2000']:.1e}" in line
 
 
+@pytest.mark.thorough
 def test_with_the_option_colour_science_computes_everything(broken, usual):
     found = compared(colour_science=True).record
     assert not found.warnings
@@ -115,6 +117,7 @@ def test_details_give_the_largest_deviation_of_all_scenes():
     assert "Colours against" not in page.details(records=[records.record()])
 
 
+@pytest.mark.thorough
 def test_a_view_of_nothing_has_nothing_to_compute():
     away = scene(viewer=(0, -4, 0), target=(0, -9, 0), size=8, ball=sphere(), sky=SKY)
     case = open_case(lambda: away, Options(spp=4, allow_empty=True))

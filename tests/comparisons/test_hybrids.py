@@ -242,6 +242,7 @@ def test_with_all_effects_they_give_the_reference(rgb):
         require_equal(found, whole(ready.reference, seed=90), name)
 
 
+@pytest.mark.thorough
 def test_light_without_shadows_passes_through_what_is_in_its_way(rgb):
     """A lamp behind a board: black with shadows, and without them what the lamp gives alone."""
 
@@ -311,6 +312,7 @@ def test_a_clean_reference_takes_noise_out_of_previews(rgb):
         assert np.mean(quiet) == pytest.approx(np.mean(plain), rel=0.02)
 
 
+@pytest.mark.thorough
 def test_a_crop_keeps_its_place_in_finer_pixels(rgb):
     parts = shadowed(64)
     crop = {"crop_width": 24, "crop_height": 32, "crop_offset_x": 21, "crop_offset_y": 17}

@@ -90,6 +90,7 @@ def comparison(spp=64):
     return compare(Source("a test", described), Options(spp=spp)).record
 
 
+@pytest.mark.thorough
 def test_the_record_has_the_ratio_that_is_shown(rgb):
     record = comparison()
     price = plain(record)["price"]

@@ -181,6 +181,7 @@ def shade(point):
 """
 
 
+@pytest.mark.thorough
 def test_a_preparation_is_a_stage_of_its_own(rgb, written):
     """Its 0.5 s stand in the record, and in no pass."""
     name = written(SLOW)

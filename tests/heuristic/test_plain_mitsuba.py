@@ -104,7 +104,13 @@ def lit_ball(kind):
 @pytest.mark.guarantee(
     "kernel", "Every gradient that `mitsuba.traverse` offers of a light is that of small steps."
 )
-@pytest.mark.parametrize("integrator", INTEGRATORS)
+@pytest.mark.parametrize(
+    "integrator",
+    [
+        pytest.param(name, marks=() if name == "direct" else pytest.mark.thorough)
+        for name in INTEGRATORS
+    ],
+)
 @pytest.mark.parametrize("kind", LAMPS)
 def test_offered_gradients_are_those_of_small_steps(rgb, kind, integrator):
     """And by positions and directions those of all integrators but `prb`, which has none."""

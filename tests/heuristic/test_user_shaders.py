@@ -349,6 +349,7 @@ def test_an_object_in_a_file_keeps_its_declaration(rgb, written):
     assert image("fig-8-9", f"{name}:mine").max() == pytest.approx(0.5)
 
 
+@pytest.mark.thorough
 def test_the_plan_and_the_record_say_what_is_read(run, written, tmp_path):
     name = written("def shade(point): return point.material.k_d * point.ambient\n")
     words = ("fig-8-9", "--heuristic", name, "--resolution", "8x8")
@@ -363,6 +364,7 @@ def test_the_plan_and_the_record_say_what_is_read(run, written, tmp_path):
     assert "phong, which reads ambient, lights, material, normal, position, view" in said
 
 
+@pytest.mark.thorough
 def test_a_program_gives_a_function_or_an_object(undeclared):
     from fotismos.reports.notebook import compare
 

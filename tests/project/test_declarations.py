@@ -96,6 +96,7 @@ def test_the_packages_metric_of_the_documentation_is_found(tmp_path, monkeypatch
     assert metrics["absolute"](image + 0.25, image).mean() == 0.25
 
 
+@pytest.mark.thorough
 def test_a_metric_from_outside_is_in_every_output(results):
     record = json.loads((results / "my-scene/comparison.json").read_text(encoding="utf-8"))
     jsonschema.validate(record, schema("comparison"))

@@ -309,6 +309,7 @@ def test_pixels_see_an_exports_surfaces_where_they_were(rgb, tmp_path, name):
     assert np.percentile(off, 90) < 0.01
 
 
+@pytest.mark.thorough
 def test_the_command_compares_a_file(run, tmp_path):
     """An exact pair comes back as one: the export's light, camera and diffuse sphere."""
     assert run("export", "lambert-sphere", "--resolution", "32x24", "-o", tmp_path)[0] == 0

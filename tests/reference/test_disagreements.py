@@ -111,6 +111,7 @@ def seen_through_a_ball(max_depth=-1, flip_normals=True, body="cylinder", aside=
     )
 
 
+@pytest.mark.thorough
 @pytest.mark.guarantee(
     "plans", "What is seen through both sides of a hidden lamp is warned of first."
 )
@@ -180,6 +181,7 @@ def test_the_depth_of_russian_roulette_is_the_one_used(rgb):
         assert overridden(described).get("rr_depth") == entry
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("integrator", ["path", "direct"])
 def test_a_light_without_a_weight_shines_like_any_other(rgb, integrator):
     _, found = planned(mirrored({"type": integrator}, sampling_weight=0.0))

@@ -41,6 +41,7 @@ def test_the_right_plan_of_such_a_scene_is_kept(rgb, name):
     assert ready.plan.sampler != "independent"
 
 
+@pytest.mark.thorough
 def test_the_record_says_what_was_found_and_done(rgb, monkeypatch):
     source = Source("wrong", SCENES["a two-sided rectangle seen from behind"]())
     options = Options(resolution=(8, 8), spp=64)

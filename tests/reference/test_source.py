@@ -39,6 +39,7 @@ def test_what_a_scene_does_not_have_is_refused_by_name(run, scene, tmp_path):
         assert message in messages.replace("grey.xml", "")
 
 
+@pytest.mark.thorough
 def test_a_value_and_a_sensor_are_used_and_recorded(run, scene, tmp_path):
     records = {}
     for value, sensor in (("0.2", 0), ("0.6", 0), ("0.6", 1)):

@@ -177,6 +177,7 @@ def box_filtered(folder):
     return folder
 
 
+@pytest.mark.thorough
 def test_values_for_placeholders_go_to_the_scenes_that_have_them(run, folder, tmp_path):
     with_one = SCENE.replace('name="alpha" value="0.2"', 'name="alpha" value="$roughness"')
     (folder / "b.xml").write_text(with_one, encoding="utf-8")
@@ -194,6 +195,7 @@ def test_values_for_placeholders_go_to_the_scenes_that_have_them(run, folder, tm
     assert "-D rougness: no scene has such a placeholder" in messages
 
 
+@pytest.mark.thorough
 def test_printed_commands_begin_as_the_program_was_started(run, folder, tmp_path, monkeypatch):
     monkeypatch.setenv("FOTISMOS_PROGRAM", "'./my run'")
     words = ("compare", folder / "a.xml", "-o", tmp_path / "out", "--spp", 4)

@@ -141,6 +141,7 @@ def frame(size):
     return {"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(size)}
 
 
+@pytest.mark.thorough
 @pytest.mark.guarantee(
     "runs", "A finished scene is rendered again once a file that Mitsuba read changes."
 )

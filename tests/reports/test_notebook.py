@@ -94,6 +94,7 @@ def small(name="box"):
     return fotismos.compare(mi.cornell_box(), name, why=False, spp=4, resolution=(16, 16))
 
 
+@pytest.mark.thorough
 def test_the_users_variant_is_given_back_after_success_and_error(spectral):
     scene = mi.load_dict({"type": "scene", "ball": {"type": "sphere"}})
     small()

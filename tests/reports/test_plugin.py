@@ -188,6 +188,7 @@ def test_options_other_than_the_baselines_fail_until_it_is_written_again(fixture
     assert json.loads(path.read_bytes())["options"]["spp"] == 48
 
 
+@pytest.mark.thorough
 def test_a_baseline_can_be_named_by_its_path(fixtures, tmp_path):
     checked, updated = fixtures
     updated.unchanged("scenes/scene.xml", **SMALL)
