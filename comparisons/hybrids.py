@@ -163,7 +163,7 @@ class HybridScenes:
         integrator.transports = tuple(
             Transport(plan.shadows, plan.bsdf_samples, plan.max_depth) for plan in plans
         )
-        # Without interreflection, as the kernel: clear surfaces are looked through.
+        # Without interreflection, clear surfaces are looked through, as by the kernel.
         integrator.looks_through = True
         return Renderer(scene, integrator, pass_spp=spp, label="image of some effects")
 

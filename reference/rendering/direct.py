@@ -24,7 +24,7 @@ Parameter           Type (default)      Meaning
                                         (:mod:`fotismos.reference.rendering.indirect`)
 ``looks_through``   boolean (false)     at a ``max_depth`` of 1 and 2, add the light of what lies
                                         straight behind surfaces with a null component, such as
-                                        masks: they are no bounce, as in the textbook half
+                                        masks: as in the textbook half, no bounce is counted there
 ==================  ==================  ===========================================================
 
 One rendering can make several images, which share camera rays, paths and kernel: those of
@@ -103,10 +103,18 @@ def _define(_variant: str) -> None:
             if self.transports[0].max_depth == 1:
                 if looks_through:
 
-                    def shining(si: Any, active: Mask) -> list[Colour]:
+                    def shining(si: Any, sampler: Any, active: Mask) -> list[Colour]:
                         return [dr.select(active, si.emitter(scene).eval(si, active), 0)]
 
-                    (behind,) = _behind(scene, mi.Ray3f(ray), si, hit, light=shining, images=1)
+                    (behind,) = _behind(
+                        scene,
+                        mi.Ray3f(ray),
+                        si,
+                        sampler=sampler,
+                        active=hit,
+                        light=shining,
+                        nothing=[mi.Spectrum(0)],
+                    )
                     colour += behind
                 return colour, valid, []
             bsdf = si.bsdf(ray)
@@ -145,31 +153,46 @@ def _define(_variant: str) -> None:
                     active=hit,
                     transports=deep,
                 )
-                added = dict(zip(deep, indirect, strict=True))
-                colours = sums(colours, [added.get(transport, 0) for transport in self.transports])
-            # Lights with an extent: a sample of each, and one of the BSDF for all together.
-            colours = sums(colours, _of_all(extended, False, **seen))
+                colours = sums(colours, self.spread(deep, indirect))
             looks = any(transport.bsdf_samples for transport in self.transports)
             takes_samples = extended and (looks or _has(mi.BSDFFlags.Delta, scene))
-            if takes_samples:
-                colours = sums(colours, _from_bsdf(**seen))
+
+            def with_lamps(colours: list[Colour], **there: Any) -> list[Colour]:
+                """Add lights with an extent: a sample of each, and one of the BSDF for all."""
+                colours = sums(colours, _of_all(extended, False, **there))
+                return sums(colours, _from_bsdf(**there)) if takes_samples else colours
+
+            colours = with_lamps(colours, **seen)
             shallow = [transport for transport in self.transports if transport.max_depth == 2]
             if looks_through and shallow:
 
-                def direct(si: Any, active: Mask) -> list[Colour]:
-                    there = seen | {
+                def direct(si: Any, sampler: Any, active: Mask) -> list[Colour]:
+                    there = {
+                        "scene": scene,
                         "si": si,
                         "bsdf": si.bsdf(),
+                        "sampler": sampler,
                         "active": active & si.is_valid(),
                         "transports": shallow,
                     }
-                    light = sums(_of_all(delta, True, **there), _of_all(extended, False, **there))
-                    return sums(light, _from_bsdf(**there)) if takes_samples else light
+                    return with_lamps(_of_all(delta, True, **there), **there)
 
-                behind = _behind(scene, mi.Ray3f(ray), si, hit, light=direct, images=len(shallow))
-                added = dict(zip(shallow, behind, strict=True))
-                colours = sums(colours, [added.get(transport, 0) for transport in self.transports])
+                behind = _behind(
+                    scene,
+                    mi.Ray3f(ray),
+                    si,
+                    sampler=sampler,
+                    active=hit,
+                    light=direct,
+                    nothing=[mi.Spectrum(0)] * len(shallow),
+                )
+                colours = sums(colours, self.spread(shallow, behind))
             return colours[0], valid, [channel for image in colours[1:] for channel in image]
+
+        def spread(self, transports: Sequence[Transport], light: Sequence[Colour]) -> list[Colour]:
+            """Return the light of some images among those of all; 0 in the others."""
+            known = dict(zip(transports, light, strict=True))
+            return [known.get(transport, 0) for transport in self.transports]
 
         def aov_names(self) -> list[str]:
             channels = range(len(mi.Spectrum(0)))
@@ -218,17 +241,19 @@ def _behind(
     scene: Any,
     ray: Any,
     si: Any,
+    sampler: Any,
     active: Any,
-    light: Callable[[Any, Mask], list[Colour]],
-    images: int,
+    light: Callable[[Any, Any, Mask], list[Colour]],
+    nothing: list[Colour],
 ) -> list[Colour]:
     """Return the light of what lies straight behind what a ray hits, for each image.
 
     ``sum_(j > 1) L_j prod_(i < j) T_i`` over the surfaces 1, 2, … along the ray, ``T`` their null
-    transmittances, as the textbook half adds them. ``light(si, active)`` gives ``L`` of all images;
-    light that a surface's own samples find behind it is in its ``L``.
+    transmittances, as the textbook half adds them. ``light(si, sampler, active)`` gives ``L`` of
+    all images; light that a surface's own samples find behind it is in its ``L``. The sampler is an
+    argument since it changes in the loop.
     """
-    total = [mi.Spectrum(0) for _ in range(images)]
+    total = nothing
     throughput = mi.Spectrum(1)
     layer = mi.UInt32(1)
     while active & (layer < LAYERS):
@@ -237,7 +262,7 @@ def _behind(
         ray = si.spawn_ray(ray.d)
         si = scene.ray_intersect(ray, active)
         # Beyond the last surface, the background shines.
-        seen = light(si, active)
+        seen = light(si, sampler, active)
         total = sums(total, [throughput * one for one in seen])
         active &= si.is_valid()
         layer += 1

@@ -189,7 +189,7 @@ def test_without_effects_the_plugins_give_the_kernels_image(rgb):
 
 
 def test_without_effects_clear_surfaces_are_looked_through_as_by_the_kernel(rgb):
-    """Without interreflection, too: glass and masks are no bounce of the light behind them."""
+    """Without interreflection, too: light from behind passes glass and masks without a bounce."""
     glass = {"type": "sphere", "center": (0, 0, 1), "radius": 0.6, "bsdf": {"type": "dielectric"}}
     mask = {
         "type": "rectangle",

@@ -77,6 +77,34 @@ def test_a_surface_without_a_density_is_black(rgb):
             assert not image.any(), name
 
 
+def test_what_lies_behind_masks_adds_its_light_if_it_is_asked_for(rgb):
+    """``L1 + T1 L2 + T1 T2 L3``, each of a surface alone, with a lamp that is sampled."""
+    layers = {}
+    for name, height, opacity, reflectance in (
+        ("first", 1.0, 0.4, 0.8), ("second", 0.5, 0.7, 0.5), ("wall", 0.0, 1.0, 0.3)
+    ):  # fmt: skip
+        diffuse = {"type": "diffuse", "reflectance": reflectance}
+        mask = {"type": "mask", "opacity": opacity, "nested": diffuse}
+        layers[name] = {"type": "rectangle", "to_world": moved((0, 0, height), 4), "bsdf": mask}
+    lamp = {
+        "type": "rectangle",
+        "to_world": moved((3, 0, 4)).rotate((0, 1, 0), 180),
+        "emitter": {"type": "area", "radiance": 20.0},
+    }
+    view = {"type": "scene", "sensor": camera((0, 0, 6), up=(0, 1, 0), size=8), "lamp": lamp}
+    direct_all = {"type": "direct_all", "shadows": False, "bsdf_samples": 0}
+
+    def light(integrator, *names):
+        scene = view | {name: layers[name] for name in names}
+        return checks.render(scene, 1024, 3, integrator).mean()
+
+    first, second, wall = (light(direct_all, name) for name in layers)
+    assert min(first, second, wall) > 0.1
+    expected = first + 0.6 * second + 0.6 * 0.3 * wall
+    assert light(direct_all | {"looks_through": True}, *layers) == pytest.approx(expected, rel=0.01)
+    assert light(direct_all, *layers) == pytest.approx(first, rel=0.01)
+
+
 def many(count, seed=1):
     """Point, spot and directional lights in no order, of intensities that differ a thousandfold."""
     rng = np.random.default_rng(seed)
