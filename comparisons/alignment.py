@@ -54,14 +54,16 @@ class Place:
     gain: float
 
 
-def geometry_edges(surface: "GBuffer", width: int, height: int) -> np.ndarray:
+def geometry_edges(surface: "GBuffer") -> np.ndarray:
     """Return how much the geometry changes at each pixel, (H, W).
 
     ``surface`` has :data:`FINER` rays along each side of a pixel.
     """
     layers = np.concatenate([surface.normal, surface.hit[..., None]], axis=-1)
+    height, width = surface.hit.shape
     # Means over the rays of a pixel, (H, W, 4).
-    return _edges(layers.reshape(height, FINER, width, FINER, 4).mean(axis=(1, 3)))
+    by_pixel = layers.reshape(height // FINER, FINER, width // FINER, FINER, 4)
+    return _edges(by_pixel.mean(axis=(1, 3)))
 
 
 def scene_edges(surface: "GBuffer", textbook: np.ndarray | None) -> list[np.ndarray]:
@@ -69,8 +71,7 @@ def scene_edges(surface: "GBuffer", textbook: np.ndarray | None) -> list[np.ndar
 
     For ``surface`` see :func:`geometry_edges`; ``textbook`` is the textbook half, (H, W, 3).
     """
-    height, width = surface.hit.shape
-    edges = [geometry_edges(surface, width // FINER, height // FINER)]
+    edges = [geometry_edges(surface)]
     return edges if textbook is None else [*edges, picture_edges(textbook)]
 
 

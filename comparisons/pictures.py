@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from fotismos.comparisons import alignment, picture_mistakes
 from fotismos.comparisons.comparison import Agreement, Comparison, Images, PictureFiles
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.mapped_sums import MappedReference, reference_sums
+from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedReference
 from fotismos.comparisons.departure.marks import NoiseShown
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.tone_maps import Light
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light, ToneMap
 from fotismos.comparisons.estimates import Estimates, PassSums
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
@@ -144,18 +144,18 @@ class PictureHalf:
         return Times.of(self.times, 0.0)
 
 
-class PicturePassSums(PassSums):
-    """Running sums of passes; the reference is shown by a tone map, if its name is given."""
+class MappedPassSums(PassSums):
+    """Running sums of passes, of which the reference is shown by a tone map."""
 
-    def __init__(self, counted: NDArray[np.bool_], tone_map: str | None) -> None:
+    def __init__(self, counted: NDArray[np.bool_], tone_map: ToneMap) -> None:
         super().__init__(counted)
-        self._reference, self._difference = reference_sums(tone_map, counted)
+        self._mapped = MappedReference(counted, tone_map)
+        self._reference = self._mapped
+        self._difference = MappedDifference(counted, self._mapped)
 
     def estimates(self) -> Estimates:
         """Return the estimates so far, in single precision, like the files."""
-        reference = self._reference
-        light = reference.light() if isinstance(reference, MappedReference) else None
-        return replace(super().estimates(), light=light)
+        return replace(super().estimates(), light=self._mapped.light())
 
 
 # --- Reading -----------------------------------------------------------------------------------
@@ -196,7 +196,8 @@ class GivenPictures:
 
     def pass_sums(self, counted: NDArray[np.bool_]) -> PassSums:
         """Return sums of passes, in which the reference is shown as the pictures show light."""
-        return PicturePassSums(counted, self.image.tone_map if self.image else None)
+        name = self.image.tone_map if self.image else None
+        return PassSums(counted) if name is None else MappedPassSums(counted, TONE_MAPS[name])
 
     def where(self) -> NDArray[np.bool_]:
         """Return the pixels (H, W) that count: in the mask, and opaque in all pictures."""

@@ -33,9 +33,6 @@ from fotismos.reference.records import Interval, Missing
 from fotismos.reference.rendering.gbuffer import image_size, resize, size_of_width
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, Stream, passes, warm
 
-LEAST_S = 0.05
-"""Seconds that the largest rendering of a method takes, at least."""
-
 DRAWS = 400
 """Sets of rounds drawn for an interval."""
 

@@ -71,6 +71,9 @@ REFERENCE_SPP = 64
 REFERENCE_PASSES = 16
 """Samples per pixel of each pass of the converged reference, and passes at least."""
 
+LEAST_S = 0.05
+"""Seconds that the largest rendering of a method takes, at least."""
+
 MOST_SAMPLES = 2**24
 """Samples of one image, at most."""
 
@@ -274,7 +277,7 @@ def tried(
 ) -> dict[Key, Renderer]:
     """Return ``{(name, samples per pixel): renderer}`` for ``counts``, and some for the time.
 
-    The largest takes at least :data:`timing.LEAST_S`, and one a fourth of its samples. ``firsts``
+    The largest takes at least :data:`LEAST_S`, and one a fourth of its samples. ``firsts``
     have the most samples of the method's counts. All are warm.
     """
     renderers: dict[Key, Renderer] = {}
@@ -286,12 +289,12 @@ def tried(
         while True:
             warm(last)
             seconds = last.times[-1]
-            if seconds >= timing.LEAST_S or 4 * last.pass_spp * pixels > MOST_SAMPLES:
+            if seconds >= LEAST_S or 4 * last.pass_spp * pixels > MOST_SAMPLES:
                 break
             # With a fourth of these samples it would take less than LEAST_S: counts are skipped.
             most = MOST_SAMPLES / (last.pass_spp * pixels)
             more = 4
-            while more * seconds < timing.LEAST_S and 4 * more <= most:
+            while more * seconds < LEAST_S and 4 * more <= most:
                 more *= 4
             last = first.sampled(more * last.pass_spp)
             by_spp[last.pass_spp] = last

@@ -14,24 +14,13 @@ import numpy as np
 
 from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light, ToneMap, derivative
+from fotismos.comparisons.departure.tone_maps import Light, ToneMap, derivative
 from fotismos.reference.rendering.sums import (
     DEVIATION,
     Accumulator,
     DifferenceEstimate,
     DifferenceSums,
 )
-
-
-def reference_sums(tone_map: str | None, counted: np.ndarray) -> tuple[Accumulator, DifferenceSums]:
-    """Return sums for a reference, and for its difference from a test image.
-
-    ``counted`` (H, W) are the pixels whose difference counts.
-    """
-    if tone_map is None:
-        return Accumulator(DEVIATION), DifferenceSums(counted)
-    reference = MappedReference(counted, TONE_MAPS[tone_map])
-    return reference, MappedDifference(counted, reference)
 
 
 class MappedReference(DifferenceSums):

@@ -296,6 +296,11 @@ def picture_record(path: Path) -> PictureBaseline:
 def read_pictures(path: Path) -> tuple[PictureBaseline, Repeats]:
     """Read a baseline, and the statistics of its repeats from the EXR beside it."""
     baseline = picture_record(path)
+    return baseline, kept_repeats(path, baseline)
+
+
+def kept_repeats(path: Path, baseline: PictureBaseline) -> Repeats:
+    """Read the statistics of a baseline's repeats from the EXR beside it."""
     # Only the name counts: a baseline must not lead to files elsewhere.
     kept = path.parent / Path(baseline.images).name
     how = program.command("check", path, "--update", "--picture", f"{path.stem}=PATTERN")
@@ -305,4 +310,4 @@ def read_pictures(path: Path) -> tuple[PictureBaseline, Repeats]:
     is_same = np.allclose(repeats.mean.mean(axis=(0, 1)), baseline.mean, rtol=1e-5, atol=1e-9)
     if not (is_same and (repeats.variance >= 0).all() and baseline.correlation < np.inf):
         raise InputError(f"{kept}: this is not of {path.name}. Write both again: `{how}`.")
-    return baseline, repeats
+    return repeats

@@ -1,7 +1,6 @@
 """Checking scenes against baselines, and writing baselines: one, or all of a command."""
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -19,6 +18,7 @@ from fotismos.comparisons.check.measurement import (
 from fotismos.comparisons.check.moved import LEVEL, READERS, Check, Move, check, level_of_each
 from fotismos.comparisons.check.pictures import (
     SIDE,
+    PictureBaseline,
     PictureCheck,
     PictureGate,
     Repeats,
@@ -365,38 +365,33 @@ def update_pictures(
 ) -> tuple[CheckRecord, None]:
     """Write the baseline of the pictures that match a pattern, unless nothing moved from it."""
     begin = perf_counter()
-    status = "created"
-    before = None
-    if path.exists():
-        status = "updated"
-        known = baselines.picture_record(path)
-        with suppress(InputError):  # what cannot be read is replaced
-            _, before = baselines.read_pictures(path)
-        is_read_alike = (transfer or known.transfer, over or known.over) == (
-            known.transfer,
-            known.over,
-        )
+    known = baselines.picture_record(path) if path.exists() else None
+    if known is not None:
         transfer = transfer or known.transfer
         over = over or known.over
     repeats, files = baselines.read_repeats(pattern, transfer, over)
-    # Pictures of another size or number, or read in another way, replace what is there.
-    if before is not None and (
-        before.mean.shape != repeats.mean.shape
-        or before.count != repeats.count
-        or not is_read_alike
-    ):
-        before = None
-    if before is None:
-        baselines.write_pictures(path, repeats, transfer, over)
-        found = check_pictures(repeats, repeats, level)
+    before = None
+    if known is not None and (transfer, over) == (known.transfer, known.over):
+        before = _comparable(path, known, repeats)
+    found = None if before is None else check_pictures(before, repeats, level)
+    status = "created" if known is None else "updated"
+    if found is not None and not found.moved:
+        status = "unchanged"
     else:
-        found = check_pictures(before, repeats, level)
-        if found.moved:
-            baselines.write_pictures(path, repeats, transfer, over)
-        else:
-            status = "unchanged"
+        baselines.write_pictures(path, repeats, transfer, over)
+    found = found or check_pictures(repeats, repeats, level)
     made = of_pictures(path, pattern, status=status, found=found, begin=begin, files=files)
     return made, None
+
+
+def _comparable(path: Path, known: PictureBaseline, repeats: Repeats) -> Repeats | None:
+    """Return a baseline's repeats if others are as many and as large; None if it is damaged."""
+    try:
+        before = baselines.kept_repeats(path, known)
+    except InputError:
+        return None
+    is_alike = before.count == repeats.count and before.mean.shape == repeats.mean.shape
+    return before if is_alike else None
 
 
 def of_pictures(

@@ -185,10 +185,7 @@ def _pictures(record: ComparisonRecord, found: Agreement) -> Iterator[str]:
     """Yield a picture's shift, and what is odd about it: all numbers depend on that."""
     ratio = ", ".join(f"{value:.3g}" for value in found.ratio)
     shift = found.shift
-    # Added to 0, a shift that rounds to -0 becomes 0.
-    shifted = "not known"
-    if shift is not None:
-        shifted = ", ".join(f"{round(length, 1) + 0.0:.1f}" for length in shift) + " pixels"
+    shifted = "not known" if shift is None else f"{shift[0]:+z.1f}, {shift[1]:+z.1f} pixels"
     if record.picture:
         yield from _files(record.scene, "picture", record.picture)
     if record.reference_picture:

@@ -361,7 +361,7 @@ def test_mistakes_in_words_are_refused(run, tmp_path, rgb, written):
         ("bsdf", "dielectric", {}, "passes it in one direction"),
         ("bsdf", "roughdielectric", {"int_ior": 1.05}, "too narrow"),
         ("bsdf", "none.py:matte", {}, "^none.py: there is no such file"),
-        ("bsdf", "sphere", {}, "'sphere' is a plugin of Mitsuba, but no BSDF"),
+        ("bsdf", "sphere", {}, "'sphere' is a plugin of Mitsuba, but not a BSDF"),
         ("bsdf", scalar, {}, "in variant llvm_ad_rgb"),
         ("bsdf", "roughplastic", {"alpha": 0.01}, "too narrow"),
         ("bsdf", "plastic", {"int_ior": 0.0}, "int_ior = 0 is not allowed: give an index of"),

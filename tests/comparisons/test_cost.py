@@ -10,7 +10,6 @@ import msgspec
 import pytest
 from msgspec import structs
 
-from fotismos.comparisons import timing
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.comparison import MeanError
 from fotismos.comparisons.cost import cost as studies
@@ -42,7 +41,7 @@ CORPUS = Path(__file__).parents[1] / "corpus"
 def short():
     """Times of these scenes need not repeat."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(timing, "LEAST_S", 0.0)
+        patched.setattr(measure, "LEAST_S", 0.0)
         patched.setattr(measure, "REFERENCE_SPP", 4)
         yield
 

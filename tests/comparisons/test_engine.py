@@ -12,9 +12,8 @@ import pytest
 from msgspec import structs
 
 import fotismos
-from fotismos.comparisons import timing
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.cost import engine
+from fotismos.comparisons.cost import engine, measure
 from fotismos.comparisons.cost.cost import require_other_names, truth
 from fotismos.comparisons.cost.cost_record import Cost
 from fotismos.comparisons.cost.front import fronted
@@ -34,7 +33,7 @@ SINGLE = "The picture is one file, so its noise is unknown"
 def short():
     """Times of these scenes need not repeat."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(timing, "LEAST_S", 0.0)
+        patched.setattr(measure, "LEAST_S", 0.0)
         yield
 
 

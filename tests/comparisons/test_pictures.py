@@ -45,7 +45,7 @@ def cornell():
     ready = prepare(case.source, case.options)
     images = [np.array(half.render(5), float) for half in (ready.reference, ready.heuristic)]
     surface = gbuffer(ready.scene, (alignment.FINER * SIDE, alignment.FINER * SIDE))
-    edges = alignment.geometry_edges(surface, SIDE, SIDE)
+    edges = alignment.geometry_edges(surface)
     return images[0], images[1], [edges, alignment.picture_edges(images[1])], ready.counted
 
 

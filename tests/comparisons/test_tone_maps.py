@@ -15,7 +15,7 @@ from fotismos.comparisons import alignment, picture_mistakes
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure import tone_maps
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
-from fotismos.comparisons.departure.mapped_sums import reference_sums
+from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedReference
 from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light, aces, agx, neutral, reinhard
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options, ToneMapName
@@ -136,7 +136,8 @@ def test_the_noise_is_that_of_means_shown_by_the_curve(rgb, name):
     count = 16
     found: dict[str, list[np.ndarray]] = {}
     for _ in range(300):
-        reference, difference = reference_sums(name, counted)
+        reference = MappedReference(counted, TONE_MAPS[name])
+        difference = MappedDifference(counted, reference)
         # Of all channels alike in the first row, of each by itself in the second.
         paths = rng.gamma(4.0, 1 / 4.0, (count, *truth.shape))
         paths[:, 0] = paths[:, 0, :, :1]
