@@ -473,7 +473,7 @@ class ScatteringSubject(Subject):
             ) from error
         if not isinstance(made, mi.BSDF):
             raise InputError(
-                f"{self.plugin!r} is a plugin of Mitsuba, but no BSDF. Give a BSDF, such as"
+                f"{self.plugin!r} is a plugin of Mitsuba, but not a BSDF. Give one, such as"
                 " roughplastic."
             )
         return made

@@ -67,7 +67,7 @@ def read_table(name: str) -> list[dict[str, str]]:
 def compared(
     scene: Any, name: str | None = None, then: Sequence[Step] = (), **options: Any
 ) -> Comparison:
-    """Compare a scene as a command does, with options by name."""
+    """Compare a scene with the given options, as a command does."""
     case = open_case(scene, Options(**options), name=name)
     return compare(case.source, case.options, then=then)
 
