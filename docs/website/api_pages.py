@@ -13,7 +13,7 @@ ROOMS = ("heuristic", "reference", "comparisons", "reports")
 def pages() -> Iterator[tuple[str, str]]:
     """Yield the name of each package and its page, in reStructuredText."""
     for room in ROOMS:
-        for path in sorted((ROOT / room).rglob("__init__.py")):
+        for path in sorted((ROOT / "fotismos" / room).rglob("__init__.py")):
             yield dotted(path.parent), "\n".join(lines(path.parent))
 
 
@@ -50,4 +50,4 @@ def name(path: str, words: str) -> str:
 
 def dotted(path: Path) -> str:
     """Return the name of a module or package."""
-    return ".".join(("fotismos", *path.relative_to(ROOT).parts))
+    return ".".join(path.relative_to(ROOT).parts)

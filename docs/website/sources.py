@@ -123,7 +123,7 @@ def with_links(text: str, page: str, linked: set[str]) -> str:
             return match[0]
         if path.endswith((".md", ".ipynb")):
             return f"[{words}]({place(target)}{anchor})"
-        if path.partition("/")[0] in api_pages.ROOMS and (name := api_pages.name(path, words)):
+        if path.startswith("fotismos/") and (name := api_pages.name(path, words)):
             return f"[{words}](#{name})"
         if not (ROOT / path).is_file() or path.endswith(".parquet"):
             return words  # the site has no page for a folder

@@ -9,9 +9,8 @@ from pathlib import Path
 
 __version__ = "0.4.0"
 
-ROOT = Path(__file__).resolve().parents[1]
-"""The folder of the rooms, also where they were imported through the links in fotismos/."""
-FOLDERS = ("fotismos", "heuristic", "reference", "comparisons", "reports")
+PACKAGE = Path(__file__).resolve().parents[1]
+"""The folder of the package, which holds the four rooms."""
 
 VARIABLE = "FOTISMOS_PROGRAM"
 """Environment variable with the words that start the program, such as ``./run``."""
@@ -20,12 +19,12 @@ VARIABLE = "FOTISMOS_PROGRAM"
 @lru_cache
 def source_digest() -> str:
     """Return a digest of the sources where fotismos runs from a checkout; empty if installed."""
-    if not (ROOT / "pyproject.toml").is_file():
+    if not (PACKAGE.parent / "pyproject.toml").is_file():
         return ""
     whole = hashlib.sha256()
-    for path in sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.*")):
+    for path in sorted(PACKAGE.rglob("*.*")):
         if "__pycache__" not in path.parts and path.is_file():
-            whole.update(f"{path.relative_to(ROOT)}\0".encode())
+            whole.update(f"{path.relative_to(PACKAGE)}\0".encode())
             whole.update(hashlib.sha256(path.read_bytes()).digest())
     return whole.hexdigest()
 

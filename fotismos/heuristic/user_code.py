@@ -16,7 +16,7 @@ import mitsuba as mi
 import numpy as np
 
 from fotismos.heuristic.errors import suggestion
-from fotismos.heuristic.program import FOLDERS, ROOT
+from fotismos.heuristic.program import PACKAGE
 
 CALLED = {"PairedMaterial": "material", "LightAtPoint": "light"}
 """What a user's code calls the objects of these classes."""
@@ -83,8 +83,7 @@ def is_users(path: Path) -> bool:
 def _left_out() -> tuple[str, ...]:
     installed = sysconfig.get_paths()
     names = ("stdlib", "platstdlib", "purelib", "platlib")
-    project = [str(ROOT / folder) for folder in FOLDERS]
-    places = [installed[name] for name in names] + site.getsitepackages() + project
+    places = [*(installed[name] for name in names), *site.getsitepackages(), str(PACKAGE)]
     return (*places, *map(os.path.realpath, places), site.getusersitepackages())
 
 

@@ -12,7 +12,7 @@ from tests.shared.programs import ROOT
 
 FOLDER = ROOT / "tests/javascript"
 COMPILER = FOLDER / "node_modules/.bin/tsc"
-SCRIPTS = ROOT / "reports/page/templates/viewer"
+SCRIPTS = ROOT / "fotismos/reports/page/templates/viewer"
 
 JSON = re.compile(r'<script type="application/json"[^>]*>(.*?)</script>', re.DOTALL)
 

@@ -7,15 +7,12 @@ import pytest
 
 from tests.shared.programs import ROOT
 
-ROOMS = ("heuristic", "reference", "comparisons", "reports")
-
 
 def with_examples():
     """The names of all modules that hold an example."""
-    for room in ROOMS:
-        for path in sorted((ROOT / room).rglob("*.py")):
-            if ">>>" in path.read_text():
-                yield ".".join(("fotismos", *path.relative_to(ROOT).with_suffix("").parts))
+    for path in sorted((ROOT / "fotismos").rglob("*.py")):
+        if ">>>" in path.read_text():
+            yield ".".join(path.relative_to(ROOT).with_suffix("").parts)
 
 
 @pytest.mark.parametrize("name", list(with_examples()))

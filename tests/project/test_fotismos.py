@@ -6,7 +6,6 @@ from typing import get_type_hints
 import pytest
 
 from fotismos.comparisons.options import Options, OptionValues
-from fotismos.heuristic.program import FOLDERS
 from tests.shared.programs import ROOT, python
 
 LAZY = """
@@ -39,20 +38,22 @@ print(fotismos.check(BASELINE).status)
 DIGEST = "from fotismos.heuristic import program; print(program.source_digest())"
 
 
-@pytest.mark.parametrize("room", FOLDERS[1:])
+ROOMS = ("heuristic", "reference", "comparisons", "reports")
+
+
+@pytest.mark.parametrize("room", ROOMS)
 def test_a_room_is_imported_from_the_package_alone(room):
     done = python("-c", f"import {room}")
     expected = f"ImportError: write `import fotismos.{room}` in place of `import {room}`"
     assert done.stderr.splitlines()[-1] == expected
 
 
-@pytest.mark.parametrize("file", ["heuristic/terms.py", "fotismos/__init__.py"])
+@pytest.mark.parametrize("file", ["heuristic/terms.py", "__init__.py"])
 def test_a_changed_source_changes_the_digest_that_decides_on_reuse(file, tmp_path):
-    for folder in FOLDERS:
-        shutil.copytree(ROOT / folder, tmp_path / folder, symlinks=True)
+    shutil.copytree(ROOT / "fotismos", tmp_path / "fotismos")
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     before = python("-c", DIGEST, PYTHONPATH=str(tmp_path)).stdout
-    with (tmp_path / file).open("a") as source:
+    with (tmp_path / "fotismos" / file).open("a") as source:
         source.write("# changed\n")
     after = python("-c", DIGEST, PYTHONPATH=str(tmp_path)).stdout
     assert len(before) == len(after) == 65

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 
 from tests.shared.programs import ROOT
 
-ROOMS = ("heuristic", "reference", "comparisons", "reports")
-FILES = [path for room in ROOMS for path in sorted((ROOT / room).rglob("*.py"))]
-SCRIPTS = sorted((ROOT / "reports/page/templates/viewer").glob("*.js"))
+FILES = sorted((ROOT / "fotismos").rglob("*.py"))
+SCRIPTS = sorted((ROOT / "fotismos/reports/page/templates/viewer").glob("*.js"))
 TREES = {path: ast.parse(path.read_text()) for path in FILES}
 TRUTHS = (ast.Compare, ast.BoolOp, ast.UnaryOp)
 
