@@ -167,11 +167,12 @@ def test_rows_chart_sentence_and_address_agree_about_prices(prices):
     )
     assert rows["b"].text_content() == "More than 65,536 samples per pixel pass."
     assert "In 0 of 2 scenes" in page.locator("#costs-sentence").text_content()
-    # From 1 to 100, and a part for what has no price.
-    first = plot["x"] + plot["width"] * math.log10(32) / 3
+    # The axis is from 1 to 100; what is not known has no place on it.
+    first = plot["x"] + plot["width"] * math.log10(32) / 2
     assert centre("a") == pytest.approx(first, abs=3)
-    assert centre("b") == pytest.approx(plot["x"] + plot["width"], abs=3)
-    assert "no price is known" in points["b"].get_attribute("title")
+    assert not points["b"].is_visible()
+    unknown = page.locator("#unpriced")
+    assert unknown.text_content() == "Not known of b."
 
     slider.focus()
     for _ in range(4):
@@ -179,8 +180,9 @@ def test_rows_chart_sentence_and_address_agree_about_prices(prices):
     assert page.evaluate("location.hash") == "#t=3"
     assert rows["a"].text_content().startswith("4 samples per pixel pass: 2.00 times")
     assert rows["b"].text_content().startswith("16 samples per pixel pass: 8.00 times")
-    assert centre("a") == pytest.approx(plot["x"] + plot["width"] * math.log10(2) / 3, abs=3)
-    assert centre("b") == pytest.approx(plot["x"] + plot["width"] * math.log10(8) / 3, abs=3)
+    assert centre("a") == pytest.approx(plot["x"] + plot["width"] * math.log10(2) / 2, abs=3)
+    assert centre("b") == pytest.approx(plot["x"] + plot["width"] * math.log10(8) / 2, abs=3)
+    assert unknown.text_content() == ""
     points["a"].click()
     # The link names the scene; then the page adds its threshold.
     page.wait_for_function("() => location.hash === '#scene=a&t=3'")
@@ -190,7 +192,7 @@ def test_rows_chart_sentence_and_address_agree_about_prices(prices):
 
 def test_points_of_the_chart_stay_within_it_and_names_do_not_overlap(prices):
     page, address = prices
-    page.goto(f"{address}#t=2")
+    page.goto(f"{address}#t=3")
     names = page.locator(".plot .named span")
     assert names.count() == 2
     boxes = [name.bounding_box() for name in names.all()]

@@ -258,10 +258,7 @@ def _digits(price: float | None) -> float | None:
 
 
 def _axis(scenes: Sequence[PageScene]) -> dict[str, Any]:
-    """Return the ends of the chart of prices, and its marks: powers of ten.
-
-    The last part of the axis, from the largest power on, holds the scenes without a price.
-    """
+    """Return the ends of the chart of prices, and its marks: powers of ten."""
     prices = [price for scene in scenes for price in scene.prices if price]
     low = math.floor(math.log10(min(prices, default=1.0)))
     high = max(math.ceil(math.log10(max(prices, default=1.0))), low + 1)

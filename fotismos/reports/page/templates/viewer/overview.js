@@ -21,7 +21,7 @@ function showOverview(t) {
   showPrices(place);
 }
 
-/** Place each scene in the chart of prices. @param {number} place */
+/** Place each scene whose price is known in the chart, and name the others. @param {number} place */
 function showPrices(place) {
   const sentence = document.getElementById("costs-sentence");
   if (!sentence) return;
@@ -30,16 +30,22 @@ function showPrices(place) {
   const points = elementsIn("[data-price]");
   const labelled = /** @type {{from: number, to: number, y: number}[]} */ ([]);
   const plot = points[0]?.parentElement?.clientWidth || 1;
-  const spots = points.map(point => {
+  const unknown = /** @type {string[]} */ ([]);
+  const spots = points.flatMap(point => {
     const scene = /** @type {Scene} */ (compared.get(point.dataset.price ?? ""));
     const price = scene.prices[place];
-    // The last part of the axis holds what has no price.
-    const steps = price ? clamp(Math.log10(price) - low, 0, high - low) : high - low + 1;
-    const time = price ? `${significant(price, 2)} times the time` : "no price is known";
+    point.hidden = price === null;
+    if (price === null) {
+      unknown.push(scene.name);
+      return [];
+    }
+    const steps = clamp(Math.log10(price) - low, 0, high - low);
+    const time = `${significant(price, 2)} times the time`;
     const link = /** @type {HTMLElement} */ (point.firstElementChild);
     link.title = `${scene.name}: ${percentText(scene.shares[place])} differ, ${time}`;
-    return {point, x: steps / (high - low + 1), y: scene.shares[place]};
+    return [{point, x: steps / (high - low), y: scene.shares[place]}];
   });
+  byId("unpriced").textContent = unknown.length ? `Not known of ${unknown.join(", ")}.` : "";
   // The names of those that differ most, as far as they do not overlap.
   spots.sort((a, b) => b.y - a.y);
   for (const {point, x, y} of spots) {
