@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from fotismos.comparisons.audit import checks, furnace
+from fotismos.comparisons.audit import checks, furnace, samples
 from fotismos.comparisons.audit.subjects import (
     DISTANCES,
     EXTREMES,
@@ -173,7 +173,7 @@ def test_rough_glass_passes_what_a_quadrature_over_its_facets_finds(rgb):
         np.testing.assert_allclose([curve.seen, curve.returned], [expected] * 2, rtol=1e-3)
     found, _ = checked(small(subject, (48, 36)))
     assert failing(found) == {"white furnace"}
-    assert found["sampling"].verdict == "holds"
+    assert found["directions"].verdict == found["weights"].verdict == "holds"
     subject.eta = 1.9  # not its own
     expected = 2 * (4 - 1.9**2) / (4 + 1.9**2)
     assert checks.reciprocity(subject).value == pytest.approx(expected, rel=0.02)
@@ -253,29 +253,110 @@ class Matte(mi.BSDF):
     def sample(self, context, si, sample1, sample2, active=True):
         bs = dr.zeros(mi.BSDFSample3f)
         bs.wo = mi.warp.square_to_cosine_hemisphere(sample2)
-        return bs, mi.Spectrum(1)
+        bs.pdf = self.pdf(context, si, bs.wo)
+        bs.eta = 1
+        bs.sampled_type = +mi.BSDFFlags.DiffuseReflection
+        weight = mi.Spectrum(1)
+        return bs, weight & (si.wi.z > 0)
 
     def eval(self, context, si, wo, active=True):
         return mi.Spectrum(dr.maximum(wo.z, 0) / dr.pi) & (si.wi.z > 0)
 
     def pdf(self, context, si, wo, active=True):
-        return mi.warp.square_to_cosine_hemisphere_pdf(wo)
+        return mi.warp.square_to_cosine_hemisphere_pdf(wo) & (si.wi.z > 0)
+
+    def eval_pdf(self, context, si, wo, active=True):
+        return self.eval(context, si, wo), self.pdf(context, si, wo)
 
 mi.register_bsdf("matte", Matte)
 """
 
 
 def test_a_bsdf_in_a_file_has_its_density_checked(rgb, written):
-    for text, verdict in (
-        (MATTE, "holds"),
-        (MATTE.replace("to_cosine_hemisphere(", "to_uniform_hemisphere("), "does not hold"),
+    for text, wrong in (
+        (MATTE, set()),
+        (MATTE.replace("to_cosine_hemisphere(", "to_uniform_hemisphere("), {"directions"}),
     ):
         found, _ = checked(small(ScatteringSubject(f"{written(text)}:matte", {}), (24, 18)))
-        assert found["sampling"].verdict == verdict
-        assert failing(found) <= {"sampling"}
+        assert failing(found) == wrong
     written(MATTE.replace("wo.z, 0)", "wo.w, 0)"))
-    with pytest.raises(InputError, match=r"^mine.py, line 16: .* 'w' .*BSDF mine.py:matte"):
+    with pytest.raises(InputError, match=r"^mine.py, line 20: .* 'w' .*BSDF mine.py:matte"):
         checks.audit("bsdf", "mine.py:matte", {})
+
+
+WRONG_SAMPLES = {
+    "half": ("mi.Spectrum(1)", "mi.Spectrum(0.5)", "weight of sample is 0.5 times eval / pdf"),
+    "eval": ("mi.Spectrum(1)", "self.eval(context, si, bs.wo)", "weight of sample"),
+    "grazing": ("mi.Spectrum(1)", "mi.Spectrum(dr.select(si.wi.z < 0.2, 0.5, 1))", "is 0.5 times"),
+    "channels": ("mi.Spectrum(1)", "mi.Color3f(1.2, 1, 1)", "weight of sample is 1.2 times"),
+    "azimuth": ("mi.Spectrum(1)", "mi.Spectrum(1 + 0.5 * dr.sign(bs.wo.x))", "weight of sample"),
+    "lobe drawn": ("mi.Spectrum(1)", "mi.Spectrum(dr.select(sample1 < 0.5, 1.9, 0.3))", "is 1.1"),
+    "behind": (" & (si.wi.z > 0)\n\n    def eval(", "\n\n    def eval(", "is not 0, as is eval"),
+    "not a number": ("mi.Spectrum(1)", "mi.Spectrum(dr.select(sample2.x < 1e-4, dr.nan, 1))",
+                     "not finite"),
+    "density": ("bs.pdf = self.pdf(context, si, bs.wo)", "bs.pdf = 0.5 / dr.pi", "pdf of sample"),
+    "no density": ("bs.pdf = self.pdf(context, si, bs.wo)", "", "pdf of sample is 0 times pdf"),
+    "mirror": ("+mi.BSDFFlags.Diffuse", "+mi.BSDFFlags.Delta", "sampled_type of sample"),
+    "no index": ("bs.eta = 1", "", "eta of a reflected sample is 0 times 1"),
+    "both, eval": ("return self.eval(context, si, wo),", "return 1.3 * self.eval(context, si, wo),",
+                   "eval of eval_pdf is 1.3 times eval"),
+    "both, pdf": (", self.pdf(context, si, wo)\n", ", 2 * self.pdf(context, si, wo)\n",
+                  "pdf of eval_pdf is 2 times pdf"),
+    "both, behind": ("return self.eval(context, si, wo),", "return mi.Spectrum(dr.abs(wo.z)),",
+                     "eval of eval_pdf is not 0"),
+}  # fmt: skip
+
+
+@pytest.mark.guarantee(
+    "kernel", "An audit names samples whose weight or density is wrong, and accuses no right ones."
+)
+@pytest.mark.parametrize("kind", WRONG_SAMPLES)
+def test_wrong_samples_are_named(rgb, written, kind):
+    before, after, said = WRONG_SAMPLES[kind]
+    assert MATTE.count(before) == 1
+    found = checks.weights(ScatteringSubject(f"{written(MATTE.replace(before, after))}:matte", {}))
+    assert (found.verdict, said in found.worst) == ("does not hold", True), found.worst
+
+
+LOBES = """
+        is_uniform = sample1 < 0.5
+        bs.wo = dr.select(is_uniform, mi.warp.square_to_uniform_hemisphere(sample2), bs.wo)
+        own = dr.select(is_uniform, 0.5 / dr.pi, bs.wo.z / dr.pi)
+        bs.pdf = self.pdf(context, si, bs.wo)
+        weight = self.eval(context, si, bs.wo) / own
+"""
+
+
+def test_a_lobe_that_is_weighed_by_itself_is_right_in_the_mean(rgb, written):
+    """Of half a uniform and half a cosine lobe; the density is that of both."""
+    text = MATTE.replace("        weight = mi.Spectrum(1)\n", LOBES[1:]).replace(
+        "return mi.warp.square_to_cosine_hemisphere_pdf(wo) &",
+        "return dr.select(wo.z > 0, (0.5 * wo.z + 0.25) / dr.pi, 0) &",
+    )
+    found = checks.weights(ScatteringSubject(f"{written(text)}:matte", {}))
+    assert found.verdict == "holds", found.worst
+    # The density of that lobe alone would weigh lamps too little.
+    text = text.replace(LOBES[1:], LOBES[1:].replace("self.pdf(context, si, bs.wo)", "own"))
+    found = checks.weights(ScatteringSubject(f"{written(text)}:matte", {}))
+    assert "pdf of sample" in found.worst
+
+
+RIGHT = (
+    {"type": "diffuse"},
+    {"type": "roughplastic", "alpha": 0.1},
+    {"type": "roughconductor", "alpha_u": 0.1, "alpha_v": 0.5},
+    {"type": "roughconductor", "distribution": "ggx", "sample_visible": False, "alpha": 0.3},
+    {"type": "roughdielectric", "alpha": 0.3},
+    {"type": "principled", "roughness": 0.5, "spec_trans": 0.5, "clearcoat": 1.0},
+    {"type": "principledthin", "roughness": 0.5, "spec_trans": 0.5, "diff_trans": 0.5},
+    {"type": "twosided", "a": {"type": "roughplastic"}},
+    {"type": "blendbsdf", "weight": 0.3, "a": {"type": "diffuse"}, "b": {"type": "roughconductor"}},
+)
+
+
+@pytest.mark.parametrize("scattering", RIGHT, ids=str)
+def test_samples_of_mitsubas_own_bsdfs_are_right(rgb, scattering):
+    assert samples.worst(mi.load_dict(scattering)).value < 1e-3
 
 
 # --- Hard cases ----------------------------------------------------------------------------------

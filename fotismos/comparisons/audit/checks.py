@@ -9,7 +9,7 @@ import mitsuba as mi
 import numpy as np
 from msgspec import Meta
 
-from fotismos.comparisons.audit import diagnosis, furnace
+from fotismos.comparisons.audit import diagnosis, furnace, samples
 from fotismos.comparisons.audit.subjects import (
     INCIDENT,
     LEVEL,
@@ -35,7 +35,7 @@ PICTURED = 0.3
 """Roughness of the lobes."""
 
 TOLERANCE = 0.01
-"""Of albedos."""
+"""Of albedos, and of what samples carry."""
 
 RECIPROCAL = 1e-3
 """Largest relative difference of ``f(i, o)`` and ``f(o, i)`` in single precision."""
@@ -181,7 +181,8 @@ def all_checks(
         horizon(subject),
         light_from_below(subject),
         gradient(subject, derivatives),
-        sampling(subject),
+        directions(subject),
+        weights(subject),
         values(subject),  # last: it reports what the others met
     )
 
@@ -279,15 +280,29 @@ def light_from_below(subject: Subject) -> Checked:
     return _checked("light from below", value <= 1e-5, value, "0", worst)
 
 
-def sampling(subject: Subject) -> Checked:
+def directions(subject: Subject) -> Checked:
     """Check the density of samples against ``pdf``, of BSDFs."""
     bound = 1 - (1 - LEVEL) ** (1 / len(furnace.both_sides(INCIDENT, subject.eta)))  # Šidák
     expected = f"p of χ² at least {bound:.2g}"
-    if not isinstance(subject, ScatteringSubject):
-        return _checked("sampling", None, None, expected, "textbook shading is not sampled")
-    if (least := subject.sampling()) is None:
-        return _checked("sampling", None, None, expected, "it scatters nothing")
-    return _checked("sampling", least[0] >= bound, least[0], expected, least[1])
+    if not isinstance(subject, ScatteringSubject) or subject.is_black:
+        return _checked("directions", None, None, expected, _why_not_sampled(subject))
+    value, worst = subject.directions()
+    return _checked("directions", value >= bound, value, expected, worst)
+
+
+def weights(subject: Subject) -> Checked:
+    """Check what samples carry against ``eval`` and ``pdf``, of BSDFs."""
+    expected = f"at most {TOLERANCE:.0%} off"
+    if not isinstance(subject, ScatteringSubject) or subject.is_black:
+        return _checked("weights", None, None, expected, _why_not_sampled(subject))
+    deviations = [samples.worst(bsdf) for bsdf in subject.bsdfs.values()]
+    value, worst = max(deviations, key=lambda deviation: deviation.value)
+    return _checked("weights", value <= TOLERANCE, value, expected, worst)
+
+
+def _why_not_sampled(subject: Subject) -> str:
+    is_bsdf = isinstance(subject, ScatteringSubject)
+    return "it scatters nothing" if is_bsdf else "textbook shading is not sampled"
 
 
 def values(subject: Subject) -> Checked:

@@ -42,13 +42,18 @@ def evaluate(bsdf: Any, light: Floats, view: Floats) -> Any:
     """Return a BSDF's response as a Dr.Jit array; Mitsuba's ``wi`` is the viewer's side."""
     count = max(light.shape[1], view.shape[1])
     toward = mi.Vector3f(np.broadcast_to(light, (3, count)))
-    wi = mi.Vector3f(np.broadcast_to(view, (3, count)))
-    si = dr.zeros(mi.SurfaceInteraction3f, count)
-    si.wi = wi
-    if mi.is_spectral:
-        si.wavelengths = 550.0
+    si = interaction(np.broadcast_to(view, (3, count)))
     # Mitsuba's `eval` includes the cosine of `wo`, here the light's.
     return dr.pi * mi.Spectrum(bsdf.eval(mi.BSDFContext(), si, toward))
+
+
+def interaction(view: Floats) -> Any:
+    """Return points that are seen from directions (3, N)."""
+    si = dr.zeros(mi.SurfaceInteraction3f, view.shape[1])
+    si.wi = mi.Vector3f(view)
+    if mi.is_spectral:
+        si.wavelengths = 550.0
+    return si
 
 
 def direction(theta: ArrayLike, phi: ArrayLike) -> Floats:

@@ -7,7 +7,7 @@ file registers by this name.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -335,8 +335,7 @@ def registered(word: str) -> str:
 def _index(bsdf: Any) -> float:
     """Return the relative index of refraction below a BSDF, as its samples report it, or 1."""
     lobe, x, y = np.random.default_rng(0).random((3, 256))
-    si = dr.zeros(mi.SurfaceInteraction3f, 256)
-    si.wi = mi.Vector3f(0, 0, 1)
+    si = furnace.interaction(np.broadcast_to(UP, (3, 256)))
     found, _ = bsdf.sample(
         mi.BSDFContext(), si, mi.Float(lobe), mi.Point2f(mi.Float(x), mi.Float(y))
     )
@@ -424,14 +423,14 @@ class ScatteringSubject(Subject):
                 centre = min(max(centre, 0.1), 0.9) if is_share else centre
                 yield key, centre, partial(self._changed, key, type(value), light, view)
 
-    def sampling(self) -> tuple[float, str] | None:
-        """Return the least p of χ² between samples and ``pdf`` (Mitsuba's test), and its angle.
-
-        It is None for a BSDF that scatters nothing.
-        """
+    @cached_property
+    def is_black(self) -> bool:
+        """Whether it scatters nothing."""
         light, view = furnace.random_pairs(256, self.eta)
-        if not furnace.of_bsdf(self.bsdf)(light, view).any():
-            return None
+        return not furnace.of_bsdf(self.bsdf)(light, view).any()
+
+    def directions(self) -> tuple[float, str]:
+        """Return the least p of χ² between samples and ``pdf`` (Mitsuba's test), and its angle."""
         angles = furnace.both_sides(INCIDENT, self.eta)
         return min((self._p_value(angle), f"viewer at {angle:g}°") for angle in angles)
 
