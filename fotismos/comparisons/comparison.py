@@ -386,6 +386,12 @@ class ComparisonRecord(Record):
     colour_science: Deviations | None = None
     record_version: int = VERSION
 
+    @property
+    def is_noise_known(self) -> bool:
+        """Whether passes or repeats show the noise: two single pictures do not."""
+        halves = (self.picture, self.reference_picture)
+        return any(half is None or half.repeats > 1 for half in halves)
+
 
 @dataclass(frozen=True)
 class Images:

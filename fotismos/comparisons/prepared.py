@@ -178,6 +178,7 @@ class Prepared:
             name=self.source.name,
             allow_empty=self.options.allow_empty,
             is_picture=bool(self.options.image),
+            exposure=self.options.viewing.exposure,
         )
 
     def plan_record(self, passes: int) -> Plan:

@@ -85,6 +85,7 @@ def look(options: Options, name: str, command: str = "") -> FirstLook:
             name=name,
             allow_empty=options.allow_empty,
             is_picture=True,
+            exposure=options.viewing.exposure,
         ),
         picture=given.image.record(),
         reference_picture=given.reference.record(),

@@ -80,12 +80,6 @@ def truth(record: ComparisonRecord) -> HalfNames:
     return HalfNames(subject="Physical picture", title="Physical", name="physical")
 
 
-def is_noise_known(record: ComparisonRecord) -> bool:
-    """Return whether passes or repeats show the noise: two single pictures do not."""
-    halves = (record.picture, record.reference_picture)
-    return any(half is None or half.repeats > 1 for half in halves)
-
-
 def is_searched(record: ComparisonRecord) -> bool:
     """Return whether a method may be looked for: of a scene whose shader has no mistakes."""
     return bool(record.command and record.plan and not record.mistakes)
@@ -388,9 +382,12 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
     decisions = Counter(decision(record, threshold) for record in records)
     if len(records) > 1:
         undecided = decisions["undecided"]
-        close = f"; {undecided} {'is' if undecided == 1 else 'are'} too close to call"
-        count = f"{decisions['pass']} of {len(records)} scenes"
-        return f"{subject} looks right in {count}{close if undecided else ''}."
+        doubtful = sum(bool(record.caution) for record in records)
+        said = f"{subject} looks right in {decisions['pass']} of {len(records)} scenes"
+        for count, state in ((undecided, "too close to call"), (doubtful, "in doubt")):
+            if count:
+                said += f"; {count} {'is' if count == 1 else 'are'} {state}"
+        return f"{said}."
     (record,) = records
     if record.caution:
         return f"{record.scene}: {record.caution}"
@@ -433,8 +430,15 @@ def most_missing(records: Sequence[ComparisonRecord], threshold: float = TOLERAN
 
 
 def advice(scenes: Sequence[Studied], threshold: float = TOLERANCE) -> Iterator[str]:
-    """Yield a line for each scene that does not pass: what is missing, and what is needed."""
+    """Yield a line for each scene that does not pass, or is in doubt.
+
+    It says what is missing, and what is needed, or the mistakes of a picture.
+    """
     for record, cost in scenes:
-        if decision(record, threshold) != "pass" and not record.caution:
-            parts = (f"{record.scene}:", cause(record), sentence(record, cost, threshold))
-            yield " ".join(filter(None, parts))
+        is_right = decision(record, threshold) == "pass"
+        # The headline of a single scene is its doubt.
+        doubt = record.caution if len(scenes) > 1 else ""
+        wanted = "" if is_right or record.caution else sentence(record, cost, threshold)
+        why = cause(record) if record.agreement or wanted else ""
+        if said := " ".join(filter(None, (doubt, why, wanted))):
+            yield f"{record.scene}: {said}"

@@ -26,7 +26,7 @@ SCENE = f"#scene={NOISY_ID}"
 SCENES = (
     "fig-8-11-n9", "fig-6-5-m40", "fig-6-10", "plastic-spheres", "cornell-box", "two-intensities",
 )  # fmt: skip
-SCRIPTS = ("page", "images", "terms", "shading", "numbers")
+SCRIPTS = ("page", "images", "panels", "terms", "shading", "numbers")
 
 STEP = 1 / 255
 """What a screen of 8 bits can show."""
@@ -448,3 +448,36 @@ def test_an_exponent_is_printed_plainly_in_one_line(visitor):
     output = slider(section, "n").locator("xpath=../output")
     assert output.text_content() == "1020"
     assert output.bounding_box()["height"] < 30
+
+
+LIGHT = """
+const light = { name: "spot", intensity: [3, 3, 3], specular_intensity: [3, 3, 3], lobe: 1,
+  cosIncidence: 1, cosReflection: 1, diffuse: [0, 0, 0], specular: [0, 0, 0], ...data };
+return lightRows(light, { k_d: [1, 1, 1], k_s: [1, 1, 1], n: 8, form: "phong" })[0].textContent;"""
+
+
+def test_a_factor_of_0_is_named(run):
+    """As outside of a spot's cone: "3 × 0" would not say which factor it is."""
+    assert "Ip0 fatt = 3 × 0.5" in run(LIGHT, {"attenuation": 0.5})
+    said = run(LIGHT, {"attenuation": 0})
+    assert "fatt = 0: none of its light arrives; Ip0 = 3" in said
+
+
+RATIO = """
+page.epsilon = 1e-4;
+const scene = { judged: { name: "textbook" }, truth: { name: "physical" } };
+const ratio = Painter.prototype.ratio;
+return ratioText({ scene, ratio, luminances: () => data }, 0);"""
+
+
+@pytest.mark.parametrize(
+    ("luminances", "said"),
+    [
+        ([0, 0.1], "textbook is black"),
+        ([0.1, 0], "physical is black"),
+        ([0, 0], "both are black"),
+        ([0.2, 0.1], "1.0 stops"),
+    ],
+)
+def test_a_ratio_to_black_is_not_a_number_of_stops(run, luminances, said):
+    assert run(RATIO, luminances) == said

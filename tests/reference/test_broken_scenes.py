@@ -15,6 +15,10 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.check.measurement import measure_scene
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.cost.cost import cost
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.departure import criterion
+from fotismos.comparisons.departure.criterion import TOLERANCE, caution
+from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.fit.fit import fit
 from fotismos.comparisons.options import LARGEST_SPP, Options
 from fotismos.comparisons.prepared import Prepared
@@ -335,3 +339,48 @@ def test_a_study_in_a_pipe_is_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="pipe: it is not a regular file"):
         design.read(tmp_path / "pipe")
+
+
+def test_what_is_called_dark_is_as_near_to_black_as_may_pass():
+    distance = leading_distance(DEFAULT_VIEWING)(np.full((1, 3), criterion.DARK), np.zeros((1, 3)))
+    assert distance[0] == pytest.approx(TOLERANCE, rel=0.06)
+
+
+@pytest.mark.parametrize(
+    ("lit", "level", "exposure", "is_doubtful"),
+    [
+        (24, 1.0, 1.0, True),
+        (50, 1.0, 1.0, True),
+        (51, 1.0, 1.0, False),
+        (1000, 0.003, 1.0, True),
+        (1000, 0.003, 10.0, False),
+        (24, 1e4, 1.0, True),
+    ],
+)
+def test_a_picture_that_shows_almost_nothing_is_in_doubt(lit, level, exposure, is_doubtful):
+    """Of 1,000 pixels so many are lit; up to 5 % may differ, so that these would pass alone."""
+    light = np.zeros((1000, 3))
+    light[:lit] = level * np.random.default_rng(0).uniform(0.9, 1, (lit, 3))
+
+    def doubt(test, reference):
+        return caution(
+            test, reference, name="a", allow_empty=False, is_picture=True, exposure=exposure
+        )
+
+    assert ("Both pictures are nearly black" in doubt(light, 0.9 * light)) == is_doubtful
+    assert doubt(light, np.random.default_rng(1).uniform(0.1, 1, light.shape)) == ""
+
+
+WALL = """<shape type="rectangle"><transform name="to_world"><scale x="0.5"/>
+<lookat origin="0, -4, 1.6" target="0, -3, 1.2" up="0, 0, 1"/><translate x="-0.14"/></transform></shape>"""
+"""A wall whose back, which both halves show black, hides all but the right border of the view."""
+
+
+@pytest.mark.guarantee("runs", "A verdict on a picture that shows almost nothing says so first.")
+def test_a_room_from_behind_its_wall_does_not_look_right_in_silence(rgb, tmp_path):
+    case = case_of(tmp_path, SCENE.replace(END, WALL + END), resolution=(40, 30))
+    record = compare(case.source, case.options).record
+    assert verdict.decision(record) == "pass"
+    assert "Both pictures are nearly black: " in verdict.headline([record])
+    assert "looks right in 2 of 2 scenes; 2 are in doubt." in verdict.headline([record, record])
+    assert all(record.caution in line for line in verdict.advice([(record, None)] * 2))

@@ -26,8 +26,8 @@ def seen(near, far):
 def test_a_material_is_named_by_its_id_or_else_after_its_shape(rgb):
     assert seen('<bsdf type="diffuse" id="a"/>', '<bsdf type="diffuse" id="b"/>') == {"a", "b"}
     none = '<bsdf type="diffuse"/>'
-    assert seen(none, none) == {"material of near", "material of far"}
-    assert seen('<bsdf type="diffuse" id="a"/>', none) == {"a", "material of far"}
+    assert seen(none, none) == {"unnamed material of near", "unnamed material of far"}
+    assert seen('<bsdf type="diffuse" id="a"/>', none) == {"a", "unnamed material of far"}
 
 
 def test_equal_names_are_told_apart(rgb):
@@ -42,5 +42,5 @@ def test_equal_names_are_told_apart(rgb):
     )
     assert {name for name in gbuffer(scene, (16, 16)).bsdf.names if name} in (
         {"bsdf of one", "bsdf of two"},
-        {"material of one", "material of two"},
+        {"unnamed material of one", "unnamed material of two"},
     )

@@ -1,7 +1,9 @@
 """The verdict on a scene and on a run: one sentence for each case, on made-up records."""
 
+from concurrent.futures import Future
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from msgspec import structs
 
@@ -10,9 +12,11 @@ from fotismos.comparisons.cost import cost_record
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.price_record import EffectsThatPass, Price, SamplesThatPass, Saving
+from fotismos.comparisons.processes.pool import Task
 from fotismos.heuristic.heuristics import HEURISTICS, Interpolation, Point
 from fotismos.reference.records import Interval
 from fotismos.reports import verdict
+from fotismos.reports.terminal import progress
 from tests.shared import records
 from tests.shared.small_scene import PLAIN
 
@@ -251,6 +255,48 @@ def test_a_run_counts_scenes_and_names_what_those_that_fail_lack_by_pixels():
     lines = list(verdict.advice(scenes))
     assert [line.partition(":")[0] for line in lines] == ["a", "b", "d"]
     assert lines[0].startswith("a: Mostly missing: interreflection. None of the ")
+
+
+def test_scenes_in_doubt_are_counted_and_named():
+    doubtful = scene(0.01, name="b", caution="Both pictures are black.")
+    made = [scene(0.01), doubtful]
+    assert verdict.headline(made).endswith("looks right in 2 of 2 scenes; 1 is in doubt.")
+    assert list(verdict.advice([(record, None) for record in made])) == [
+        "b: Both pictures are black."
+    ]
+    assert list(verdict.advice([(doubtful, None)])) == []  # the headline has it
+
+
+def test_two_pictures_are_judged_once_and_without_noise_that_is_not_known(run, tmp_path):
+    picture = np.random.default_rng(3).uniform(0.1, 0.5, (24, 32, 3)).astype(np.float32)
+    np.save(tmp_path / "a.npy", 2 * picture)
+    np.save(tmp_path / "b.npy", picture)
+    words = ("--image", tmp_path / "a.npy", "--reference", tmp_path / "b.npy")
+    code, printed, _ = run("compare", *words, "-o", tmp_path / "out")
+    said = " ".join(printed.split())
+    assert code == 0
+    assert said.count("times as bright") == 1
+    assert said.index("differs visibly") < said.index("times as bright")
+    assert "shift none" in said
+    row = next(line for line in printed.splitlines() if "100 %" in line)
+    assert row.split()[4] == "–"
+    page = (tmp_path / "out/index.html").read_text()
+    assert "The noise of single pictures is not known." in page
+    assert "is not moved; its" in page
+
+
+def test_the_progress_counts_scenes_alone(capsys):
+    def each(tasks):
+        for task in tasks:
+            outcome = Future()
+            outcome.set_result(None)
+            yield task, outcome
+
+    with progress.shown() as bar:
+        scenes = [Task(name, print, (), progress=bar.of(name)) for name in "ab"]
+        tasks = [scenes[0], Task("hard cases", print, ()), scenes[1]]
+        assert len(list(bar.each(SimpleNamespace(each=each), tasks, "scenes"))) == 3
+    assert capsys.readouterr().err.splitlines() == ["a: finished, 1 of 2", "b: finished, 2 of 2"]
 
 
 def test_a_run_ends_with_its_verdict_and_finds_causes(

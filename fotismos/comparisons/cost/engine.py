@@ -210,6 +210,7 @@ def _setting(
         name=picture.name,
         allow_empty=allow_empty,
         is_picture=True,
+        exposure=truth.viewing.exposure,
     )
     agreed = agreement(pictures, images, truth.edges, Names(), truth.textbook)
     odd = [*agreed.odd, *same_files(given), *unknown_noise(GivenPictures(image=pictures))]

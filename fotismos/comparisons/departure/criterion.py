@@ -2,7 +2,7 @@
 
 The share of counted pixels whose difference is above a threshold t decides, without noise. Pixels
 that noise leaves undecided widen its interval, and so a scene may be undecided, too. Of pictures
-that are black, or one colour, the error means nothing.
+that are black, nearly so, or one colour, the error means little.
 """
 
 from collections.abc import Sequence
@@ -20,6 +20,9 @@ LIMIT = 0.05
 
 TOLERANCE = 2.0
 """ΔE2000: the threshold unless chosen; visible side by side."""
+
+DARK = 0.004
+"""Display-linear: nobody sees a grey below it beside black, from which it is ΔE2000 2 away."""
 
 UNIFORM = 1e-6
 """Relative differences within a picture that are rounding."""
@@ -68,13 +71,19 @@ def decide(
 
 
 def caution(
-    test: np.ndarray, reference: np.ndarray, name: str, allow_empty: bool, is_picture: bool
+    test: np.ndarray,
+    reference: np.ndarray,
+    name: str,
+    allow_empty: bool,
+    is_picture: bool,
+    exposure: float = 1.0,
 ) -> str:
     """Return why the error of linear pixels (N, 3) may mean nothing; often empty.
 
-    ``is_picture`` says that the pixels to be tested were given: textbook shading may be black. If
-    both are black, it raises `InputError`, unless ``allow_empty``: they would agree, whatever is
-    wrong.
+    They are shown at an ``exposure``. If so few pixels are seen to be lit that all of these may
+    differ, pictures pass, whatever is wrong. ``is_picture`` says that the pixels to be tested were
+    given: textbook shading may be black. If both are black, it raises `InputError`, unless
+    ``allow_empty``: they would agree, whatever is wrong.
     """
     if not test.size:
         return ""
@@ -96,6 +105,12 @@ def caution(
         )
     if test_is_black and is_picture:
         return "The picture is black."
+    lit = float((exposure * np.maximum(*sides).max(axis=-1) >= DARK).mean())
+    if lit <= LIMIT:
+        return (
+            f"Both pictures are nearly black: {100 * lit:.2g} % of the pixels show any light, so it"
+            " means little that the others agree. Check the lights, and where the camera stands."
+        )
     if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in sides):
         return "Each picture is one colour, so nothing shows whether they are of the same view."
     return ""

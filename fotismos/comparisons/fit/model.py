@@ -269,8 +269,9 @@ def _names(scene: Any, bsdfs: Sequence[Any]) -> list[str]:
     shapes: dict[Any, str] = {}
     for shape in scene.shapes():
         shapes.setdefault(shape.bsdf(), shape.id())
+    unnamed = {bsdf: f"unnamed material of {shape}" for bsdf, shape in shapes.items()}
     return [
-        bsdf.id() or (f"material of {shapes[bsdf]}" if bsdf in shapes else f"material {number}")
+        bsdf.id() or unnamed.get(bsdf, f"material {number}")
         for number, bsdf in enumerate(bsdfs, start=1)
     ]
 

@@ -132,7 +132,7 @@ def _named_apart(materials: ObjectIds, shapes: ObjectIds) -> ObjectIds:
     def named(name: str, shape: int) -> str:
         if shape == unseen or (name != UNNAMED and times[name] == 1):
             return name
-        return f"{'material' if name == UNNAMED else name} of {shapes.names[shape]}"
+        return f"{'unnamed material' if name == UNNAMED else name} of {shapes.names[shape]}"
 
     return replace(materials, names=tuple(map(named, materials.names, first)))
 

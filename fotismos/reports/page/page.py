@@ -277,7 +277,7 @@ def _scene_data(scene: PageScene) -> dict[str, Any]:
         "judged": asdict(verdict.judged(record)),
         "truth": asdict(verdict.truth(record)),
         "arePictures": record.pairing is None,
-        "isNoiseKnown": verdict.is_noise_known(record),
+        "isNoiseKnown": record.is_noise_known,
         "mean": difference(record.metrics[LEADING.name].mean),
         "worst": {"pixel": scene.worst, "error": difference(record.metrics[LEADING.name].max)},
         "shares": scene.shares,

@@ -58,14 +58,19 @@ class Bar:
     def each(
         self, pool: Pool, tasks: Sequence[Task], what: str
     ) -> Iterator[tuple[Task, Future[Any]]]:
-        """Do tasks in a pool, and yield each with its outcome; ``what`` they are all called."""
-        total = len(tasks)
+        """Do tasks in a pool, and yield each with its outcome; ``what`` they are all called.
+
+        Tasks without progress are none of these, and not counted.
+        """
+        total = sum(task.progress is not None for task in tasks)
         is_one = total == 1
         whole = None if is_one else self._progress.add_task(f"{what}, 0 of {total}", total=total)
-        for done, (task, outcome) in enumerate(pool.each(tasks), start=1):
+        done = 0
+        for task, outcome in pool.each(tasks):
             if task.progress in self._tasks:
                 self._progress.remove_task(self._tasks.pop(task.progress))
-            if whole is not None:
+            if whole is not None and task.progress is not None:
+                done += 1
                 state = f"{what}, {done} of {total}"
                 self._progress.update(whole, advance=1, description=state)
                 if self._has_lines:

@@ -136,7 +136,8 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
     rows: list[tuple[str, ...]] = [("scene", *headings)]
     for record in records:
         metric = record.metrics[LEADING.name]
-        means = (metric.mean, metric.noise_floor, metric.after_exposure.mean)
+        noise = metric.noise_floor if record.is_noise_known else None
+        means = (metric.mean, noise, metric.after_exposure.mean)
         rows.append(
             (
                 record.scene,
@@ -182,17 +183,22 @@ def time_ratio(record: ComparisonRecord) -> str:
 
 
 def _pictures(record: ComparisonRecord, found: Agreement) -> Iterator[str]:
-    """Yield a picture's shift, and what is odd about it: all numbers depend on that."""
+    """Yield a picture's shift, and what is odd about it: all numbers depend on that.
+
+    Its mistakes are part of the verdict.
+    """
     ratio = ", ".join(f"{value:.3g}" for value in found.ratio)
     shift = found.shift
-    shifted = "not known" if shift is None else f"{shift[0]:+z.1f}, {shift[1]:+z.1f} pixels"
+    shifted = "not known"
+    if shift is not None:
+        is_still = round(shift[0], 1) == round(shift[1], 1) == 0
+        shifted = "none" if is_still else f"{shift[0]:+z.1f}, {shift[1]:+z.1f} pixels"
     if record.picture:
         yield from _files(record.scene, "picture", record.picture)
     if record.reference_picture:
         yield from _files(record.scene, "reference", record.reference_picture)
     other = "the reference's" if record.picture else f"those of {record.heuristic}"
     yield f"shift {shifted}; red, green, blue {ratio} times {other}"
-    yield from found.mistakes
     yield from found.odd
     yield ""
 

@@ -136,19 +136,23 @@ class Painter {
     return ["R", "G", "B"].map(channel => VALUES[this.images.codes[`${half}.${channel}`][place]]);
   }
 
+  /** Luminances of both halves. @param {number} place */
+  luminances(place) {
+    return ["heuristic", "reference"].map(half =>
+      Math.max(
+        this.colour(half, place).reduce(
+          (sum, value, channel) => sum + page.xyz[1][channel] * value,
+          0,
+        ),
+        0,
+      ),
+    );
+  }
+
   /** Luminance of the first half over that of the reference, in stops. @param {number} place */
   ratio(place) {
-    const [test, reference] = ["heuristic", "reference"].map(
-      half =>
-        Math.max(
-          this.colour(half, place).reduce(
-            (sum, value, channel) => sum + page.xyz[1][channel] * value,
-            0,
-          ),
-          0,
-        ) + page.epsilon,
-    );
-    return Math.log2(test / reference);
+    const [test, reference] = this.luminances(place);
+    return Math.log2((test + page.epsilon) / (reference + page.epsilon));
   }
 
   /** The letter of the effect that dominates at a place. @param {number} place */

@@ -114,7 +114,7 @@ class Panels {
       heuristic_hex: seen(textbook),
       reference_hex: seen(physical),
       dE2000: isWorst ? scene.worst.error : differenceText(painter.differences[place]),
-      log2_luminance: `${significant(painter.ratio(place), 2)} stops`,
+      log2_luminance: ratioText(painter, place),
       standard_error: added
         ? UNKNOWN
         : scene.isNoiseKnown
@@ -128,6 +128,20 @@ class Panels {
       if (name.endsWith("_hex")) cell.style.borderColor = String(texts[name]);
     }
   }
+}
+
+/**
+ * The ratio of the luminances at a place, unless one of them is 0: then it is how that half is
+ * called.
+ * @param {Painter} painter
+ * @param {number} place
+ */
+function ratioText(painter, place) {
+  const [isTestDark, isReferenceDark] = painter.luminances(place).map(value => value === 0);
+  if (isTestDark && isReferenceDark) return "both are black";
+  if (isTestDark) return `${painter.scene.judged.name} is black`;
+  if (isReferenceDark) return `${painter.scene.truth.name} is black`;
+  return `${significant(painter.ratio(place), 2)} stops`;
 }
 
 /**

@@ -163,10 +163,12 @@ function lightRows(light, material) {
   const specularText = material.k_s.some(Boolean)
     ? `I k_{s} (${angle})^{n}: k_{s} = ${colourText(material.k_s)}, ${shine}`
     : "k_{s} = 0: no highlight";
+  const arriving = `I = ${symbol} f_{att} = ${diffuse} × ${factor(light.attenuation)}`;
+  const dark = `f_{att} = 0: none of its light arrives; ${symbol} = ${diffuse}`;
   return [
     termRow(
       light.name,
-      `I = ${symbol} f_{att} = ${diffuse} × ${factor(light.attenuation)}${second}`,
+      `${light.attenuation > 0 ? arriving : dark}${second}`,
       ["", "", ""],
       "light",
     ),
