@@ -15,8 +15,8 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.check.measurement import measure_scene
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.cost.cost import cost
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure import criterion
+from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.criterion import TOLERANCE, caution
 from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.fit.fit import fit
@@ -372,7 +372,8 @@ def test_a_picture_that_shows_almost_nothing_is_in_doubt(lit, level, exposure, i
 
 
 WALL = """<shape type="rectangle"><transform name="to_world"><scale x="0.5"/>
-<lookat origin="0, -4, 1.6" target="0, -3, 1.2" up="0, 0, 1"/><translate x="-0.14"/></transform></shape>"""
+<lookat origin="0, -4, 1.6" target="0, -3, 1.2" up="0, 0, 1"/><translate x="-0.14"/>
+</transform></shape>"""
 """A wall whose back, which both halves show black, hides all but the right border of the view."""
 
 
