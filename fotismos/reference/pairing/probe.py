@@ -30,12 +30,17 @@ from fotismos.reference.scene.graph import Graph
 
 SAMPLES = 8192
 SAMPLES_OF_LIGHTS = 65_536
+DIRECTIONS = 610
+"""Directions in which a place looks for a lamp; they and :data:`LATTICE_OF_DIRECTIONS` are numbers
+of Fibonacci, two apart."""
+
 NODES = 256
 """Cosines of an :class:`AlbedoTable`; at each the BSDF is sampled :data:`SAMPLES` times."""
 
 LATTICE = (1, 3547, 1663, 5413, 2689)
 """Generator of the rank-1 lattice (Korobov): three numbers for the sample, two for the texture."""
 LATTICE_OF_LIGHTS = (1, 19_463)
+LATTICE_OF_DIRECTIONS = (1, 233)
 
 OFF_LOBE = radians(60.0)
 
@@ -238,6 +243,31 @@ def surface_mean(graph: Graph, shape: mi.Shape) -> Any:
     si.wi = mi.Vector3f(0, 0, 1)
     means = [_channel_means(emitter.eval(_at(si, wavelengths))) for wavelengths in _wavelengths()]
     return as_value(graph, np.maximum(np.concatenate(means), 0), emitted=True)
+
+
+def share_of_directions(shape: mi.Shape, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Return the share (M,) of the hemisphere, by cosine, in which places (M, 3) see its front.
+
+    It is what a white diffuse surface of that ``normal`` (M, 3) sends if the shape has the radiance
+    1. Other shapes hide nothing, but parts of the shape hide others.
+    """
+    alone = mi.load_dict({"type": "scene", "shape": shape})
+    number = dr.arange(mi.UInt32, len(position) * DIRECTIONS)
+    place = number // DIRECTIONS
+
+    def column(rows: np.ndarray) -> Any:
+        return [dr.gather(mi.Float, mi.Float(values), place) for values in rows.T]
+
+    x, y = (
+        dr.gather(mi.Float, mi.Float(row), number % DIRECTIONS)
+        for row in lattice(DIRECTIONS, LATTICE_OF_DIRECTIONS)
+    )
+    frame = mi.Frame3f(mi.Vector3f(*column(normal)))
+    direction = frame.to_world(mi.warp.square_to_cosine_hemisphere(mi.Point2f(x, y)))
+    si = alone.ray_intersect(mi.Ray3f(mi.Point3f(*column(position)), direction))
+    is_seen = np.array(si.is_valid() & (si.wi.z > 0), float)
+    shares: np.ndarray = is_seen.reshape(-1, DIRECTIONS).mean(axis=1)
+    return shares
 
 
 def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:
