@@ -4,8 +4,7 @@
 radiance. One that surrounds what the camera sees is ``I_a``, if that is nearer. ``constant``,
 ``envmap`` and any other plugin whose light surrounds the scene: ``I_a``, the mean radiance over the
 sphere; the sun of ``sunsky`` and ``timed_sunsky`` is a directional light of its irradiance and mean
-direction. Any other light, such as ``projector`` or a textured ``spot``, is left out: it has no
-nearest form.
+direction. Any other light, such as ``projector``, is left out: it has no nearest form.
 
 Spots differ. Mitsuba's is even up to its beam width and falls linearly in the angle to 0 at its
 cutoff; the chapters' (6.4) falls as ``cos^m`` and is cut off. Neither can reproduce the other. The
@@ -231,9 +230,13 @@ STEPS = 2048
 
 def exponent_for(cutoff: float, beam_width: float) -> float:
     """Return the ``m`` of 6.4 nearest to Mitsuba's fall-off at equal flux; angles in degrees."""
-    theta, weight = _cone(cutoff)
+    theta, _ = _cone(cutoff)
     target = linear_falloff(theta, cutoff, beam_width)
-    flux = linear_flux(cutoff, beam_width)
+    return _exponent(cutoff, target, linear_flux(cutoff, beam_width))
+
+
+def _exponent(cutoff: float, target: np.ndarray, flux: float) -> float:
+    theta, weight = _cone(cutoff)
 
     def distance(log_m: float) -> float:
         m = np.expm1(log_m)
@@ -308,14 +311,25 @@ def _cone(cutoff: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def spot_to_heuristic(light: LightNode) -> None:
-    """Replace a spot by the nearest heuristic one; leave out one that projects a picture."""
-    if light.value("texture", None) is not None:
-        light.leave_out()
-        return
+    """Replace a spot by the nearest heuristic one; one that projects a picture is measured."""
     cutoff = light.number("cutoff_angle", 20.0)
-    beam_width = light.number("beam_width", 0.75 * cutoff)
-    exponent = exponent_for(cutoff, beam_width)
-    factor = INTENSITY_FACTOR * linear_flux(cutoff, beam_width) / power_flux(cutoff, exponent)
+    if light.value("texture", None) is None:
+        beam_width = light.number("beam_width", 0.75 * cutoff)
+        exponent = exponent_for(cutoff, beam_width)
+        factor = INTENSITY_FACTOR * linear_flux(cutoff, beam_width) / power_flux(cutoff, exponent)
+        intensity = light.value("intensity", 1.0)
+        fall_off = f"the linear fall-off from {beam_width:g} to {cutoff:g} deg"
+        is_round = True
+    else:
+        theta, weight = _cone(cutoff)
+        sent, is_round = probe.sent_at_angles(light.emitter, np.radians(theta))
+        fluxes = sent @ weight * np.radians(cutoff) / STEPS
+        mean = sent.mean(axis=0)
+        exponent = _exponent(cutoff, mean, float(fluxes.mean())) if mean.any() else 0.0
+        factor = INTENSITY_FACTOR
+        level = fluxes / power_flux(cutoff, exponent)
+        intensity = probe.as_value(light.graph, level, emitted=True)
+        fall_off = "the mean fall-off of its picture"
     props = heuristic(
         "heuristic_spot",
         factor,
@@ -323,10 +337,11 @@ def spot_to_heuristic(light: LightNode) -> None:
         direction=mi.ScalarVector3f(light.column(2)),
         cutoff=cutoff,
         exponent=exponent,
-        intensity=light.value("intensity", 1.0),
+        intensity=intensity,
     )
-    ends = f"from {beam_width:g} to {cutoff:g} deg"
-    note = f"m = {exponent:.4g} fitted to the linear fall-off {ends}; same flux"
+    note = f"m = {exponent:.4g} fitted to {fall_off}; same flux"
+    if not is_round:
+        light.replaced.lose(light.label, light.plugin, "picture that the spot projects", note)
     light.replace(props, factor, exact=False, note=note)
 
 

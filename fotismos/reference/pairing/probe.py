@@ -30,6 +30,9 @@ from fotismos.reference.scene.graph import Graph
 
 SAMPLES = 8192
 SAMPLES_OF_LIGHTS = 65_536
+AROUND = 32
+"""Directions around the axis of a spot that is measured."""
+
 DIRECTIONS = 610
 """Directions in which a place looks for a lamp; they and :data:`LATTICE_OF_DIRECTIONS` are numbers
 of Fibonacci, two apart."""
@@ -268,6 +271,28 @@ def share_of_directions(shape: mi.Shape, position: np.ndarray, normal: np.ndarra
     is_seen = np.array(si.is_valid() & (si.wi.z > 0), float)
     shares: np.ndarray = is_seen.reshape(-1, DIRECTIONS).mean(axis=1)
     return shares
+
+
+def sent_at_angles(emitter: mi.Emitter, theta: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Return the mean intensity (channels, T) of a point-like light at angles off its z axis.
+
+    Also whether it is the same all around, but for 1 % of its largest on average.
+    """
+    angle = np.repeat(theta, AROUND)
+    around = np.tile(2 * np.pi * (np.arange(AROUND) + 0.5) / AROUND, len(theta))
+    sine = np.sin(angle)
+    local = (sine * np.cos(around), sine * np.sin(around), np.cos(angle))
+    it = dr.zeros(mi.SurfaceInteraction3f, len(angle))
+    # At the distance 1 the irradiance is the intensity.
+    it.p = emitter.world_transform() @ mi.Point3f(*map(mi.Float, local))
+    sent = []
+    is_round = True
+    for wavelengths in _wavelengths():
+        _, weight = emitter.sample_direction(_at(it, wavelengths), mi.Point2f(0.5))
+        rings = np.array(weight, float).reshape(-1, len(theta), AROUND)
+        is_round &= bool(np.ptp(rings, axis=2).mean() <= 0.01 * rings.max())
+        sent.append(rings.mean(axis=2))
+    return np.concatenate(sent), is_round
 
 
 def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:
