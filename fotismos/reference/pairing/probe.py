@@ -258,16 +258,14 @@ def share_of_directions(shape: mi.Shape, position: np.ndarray, normal: np.ndarra
     number = dr.arange(mi.UInt32, len(position) * DIRECTIONS)
     place = number // DIRECTIONS
 
-    def column(rows: np.ndarray) -> Any:
-        return [dr.gather(mi.Float, mi.Float(values), place) for values in rows.T]
+    def spread(rows: np.ndarray, indices: Any) -> list[Any]:
+        return [dr.gather(mi.Float, mi.Float(row), indices) for row in rows]
 
-    x, y = (
-        dr.gather(mi.Float, mi.Float(row), number % DIRECTIONS)
-        for row in lattice(DIRECTIONS, LATTICE_OF_DIRECTIONS)
-    )
-    frame = mi.Frame3f(mi.Vector3f(*column(normal)))
-    direction = frame.to_world(mi.warp.square_to_cosine_hemisphere(mi.Point2f(x, y)))
-    si = alone.ray_intersect(mi.Ray3f(mi.Point3f(*column(position)), direction))
+    cells = lattice(DIRECTIONS, LATTICE_OF_DIRECTIONS)
+    cell = mi.Point2f(*spread(cells, number % DIRECTIONS))
+    frame = mi.Frame3f(mi.Vector3f(*spread(normal.T, place)))
+    direction = frame.to_world(mi.warp.square_to_cosine_hemisphere(cell))
+    si = alone.ray_intersect(mi.Ray3f(mi.Point3f(*spread(position.T, place)), direction))
     is_seen = np.array(si.is_valid() & (si.wi.z > 0), float)
     shares: np.ndarray = is_seen.reshape(-1, DIRECTIONS).mean(axis=1)
     return shares

@@ -48,7 +48,7 @@ README = """# {name}, for another program
 
 {losses}
 
-## Then
+## Your picture
 
 Write the picture as linear values with BT.709's primaries, without alpha, and compare it:
 

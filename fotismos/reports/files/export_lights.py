@@ -67,7 +67,7 @@ def light(given: dict[str, Any], scene: PlainScene) -> tuple[dict[str, Any], lis
     }
     if cone:
         as_gltf["spot"] = cone
-    return as_gltf, [f"light {given['name']}: {loss}" for loss in losses]
+    return as_gltf, [f"{given['name']}: {loss}" for loss in losses]
 
 
 def cone_of(cutoff: float, exponent: float) -> tuple[float, float, float]:
