@@ -17,6 +17,7 @@ from gltf_file import IOR, LIGHTS, STRENGTH, File, extension, local
 
 MESHES = Path(tempfile.gettempdir(), f"gltf-{Path.home().name}")
 WRAPS = {33071: "clamp", 33648: "mirror"}
+WIDEST = np.radians(89)  # of a spot; beyond, light that grazes its plane is cut off
 BACK = np.diag((-1.0, 1.0, -1.0, 1.0))  # cameras and spots face -z in glTF, +z in Mitsuba
 
 
@@ -67,7 +68,8 @@ class Scene:
         if (eta, metallic) == (1, 0):  # without a highlight, as glTF's diffuse part
             bsdf = {"type": "diffuse", "reflectance": base}
         if info := material.get("normalTexture"):
-            bsdf = {"type": "normalmap", "normalmap": self.texture(info, 1), "bsdf": bsdf}
+            bsdf = {"type": "normalmap", "normalmap": self.normals(info), "bsdf": bsdf}
+            bsdf["use_shadowing_function"] = False  # glTF's bumps cast no shadows on themselves
         return {"type": "twosided", "bsdf": bsdf} if material.get("doubleSided") else bsdf
 
     def colour(self, factor, info):
@@ -78,14 +80,28 @@ class Scene:
 
     def texture(self, info, factor, channels=slice(3), is_colour=False):
         """Return channels of a texture times a factor; colours are decoded from sRGB."""
+        pixels = self.pixels(info, is_colour)[..., channels] * np.float32(factor)
+        return self.bitmap(info, pixels, is_colour)
+
+    def normals(self, info):
+        """Return a normal map, its tilt times its scale."""
+        tilted = (2 * self.pixels(info) - 1) * (info.get("scale", 1), info.get("scale", 1), 1)
+        lengths = np.maximum(np.linalg.norm(tilted, axis=-1, keepdims=True), 1e-6)
+        return self.bitmap(info, ((tilted / lengths + 1) / 2).astype(np.float32))
+
+    def pixels(self, info, is_colour=False):
+        """Return the pixels of a texture as linear RGB."""
         texture = self.json["textures"][info["index"]]
         stream = mi.MemoryStream()
         stream.write(self.file.content(self.json["images"][texture["source"]]))
         stream.seek(0)
         bitmap = mi.Bitmap(stream)
         bitmap.set_srgb_gamma(is_colour)
-        linear = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
-        pixels = np.array(linear)[..., channels] * np.float32(factor)
+        return np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+
+    def bitmap(self, info, pixels, is_colour=False):
+        """Return pixels as a texture that is wrapped as the file says."""
+        texture = self.json["textures"][info["index"]]
         sampler = self.json["samplers"][texture["sampler"]] if "sampler" in texture else {}
         return {
             "type": "bitmap",
@@ -148,11 +164,8 @@ class Scene:
             return {"type": "directional", "direction": travel, "irradiance": power}
         if light["type"] == "point":
             return {"type": "point", "position": to_world[:3, 3].tolist(), "intensity": power}
-        cone = {"outerConeAngle": np.pi / 4, "innerConeAngle": 0} | light["spot"]
         spot = {"type": "spot", "to_world": facing(to_world), "intensity": power}
-        spot["cutoff_angle"] = float(np.degrees(cone["outerConeAngle"]))
-        spot["beam_width"] = float(np.degrees(cone["innerConeAngle"]))
-        return spot
+        return spot | fall_off(**light.get("spot", {}))
 
     def camera_of_all(self):
         """Return a camera before all meshes, a little above."""
@@ -168,6 +181,24 @@ def facing(to_world):
     """Return Mitsuba's transform of a camera or spot, without scale."""
     lengths = np.linalg.norm(to_world[:3, :3], axis=0)
     return mi.ScalarTransform4f(to_world @ np.diag((*(1 / lengths), 1)) @ BACK)
+
+
+def fall_off(innerConeAngle=0, outerConeAngle=np.pi / 4):
+    """Return the parameters of a spot whose picture is the fall-off of KHR_lights_punctual.
+
+    Mitsuba puts the picture on a plane, in steps of the tangent: wide cones need many of them.
+    """
+    edge = min(outerConeAngle, WIDEST)
+    side = 512 if edge < 1 else 2048
+    steps = np.tan(edge) * (np.arange(1, 2 * side, 2) / side - 1)
+    cosine = 1 / np.sqrt(1 + steps**2 + steps[:, None] ** 2)
+    dark = np.cos(outerConeAngle)
+    # The extension's own formula, with its least width.
+    level = np.clip((cosine - dark) / max(np.cos(innerConeAngle) - dark, 1e-3), 0, 1) ** 2
+    pixels = mi.Bitmap(level[..., None].astype(np.float32))
+    picture = {"type": "bitmap", "bitmap": pixels, "raw": True, "wrap_mode": "clamp"}
+    cutoff = float(np.degrees(edge))
+    return {"texture": picture, "cutoff_angle": cutoff, "beam_width": cutoff * (1 - 1e-5)}
 
 
 def camera(to_world, yfov, aspectRatio=4 / 3, **_):

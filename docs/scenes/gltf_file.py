@@ -12,7 +12,7 @@ IOR = "KHR_materials_ior"
 STRENGTH = "KHR_materials_emissive_strength"
 EXTENSIONS = {LIGHTS, IOR, STRENGTH, "KHR_mesh_quantization"}
 LEFT_OUT = {"animations", "skins", "targets", "sparse", "COLOR_0", "texCoord 1", "occlusionTexture"}
-LEFT_OUT |= {"alphaMode MASK", "alphaMode BLEND", "type orthographic", "range", "innerConeAngle"}
+LEFT_OUT |= {"alphaMode MASK", "alphaMode BLEND", "type orthographic", "range"}
 LEFT_OUT |= {f"mode {number}" for number in (0, 1, 2, 3, 5, 6)}  # all but triangles
 DTYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
@@ -43,7 +43,11 @@ class File:
 
     def left_out(self):
         """Return the names of what the file has, and a scene of it does not."""
-        return sorted(self.unknown("extensionsUsed") | (LEFT_OUT & set(words(self.json))))
+        names = self.unknown("extensionsUsed") | (LEFT_OUT & set(words(self.json)))
+        for sampler in self.json.get("samplers", []):
+            if sampler.get("wrapT", 10497) != sampler.get("wrapS", 10497):
+                names.add("wrapT, apart from wrapS")  # Mitsuba has one for both
+        return sorted(names)
 
     def content(self, part):
         """Return the bytes of a buffer or an image, or of the view of a buffer that it names."""

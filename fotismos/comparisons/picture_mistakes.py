@@ -69,7 +69,10 @@ EVEN = 0.2
 """A tint is the white's if it spreads by this share at most over the blocks."""
 
 NEAR_PI = 0.05
-"""Relative distance within which a level counts as a factor of pi."""
+"""Relative distance within which a level counts as a factor of pi, or of :data:`LUMENS`."""
+
+LUMENS = 683.0
+"""Lumens per watt at 555 nm (SI), by which programs take light from watts to lumens."""
 
 SHIFT = 0.5
 """Smallest shift in pixels that is named, and the steps in which it is."""
@@ -293,13 +296,12 @@ def _other_curve(curves: Curves, given: FittedCurve, names: Names) -> Mistake | 
 def _exposure(given: FittedCurve, names: Names) -> Mistake | None:
     """Return the factor of the light that a tone map shows; None if it is near 1."""
     level = given.exposure
-    reason = factor_of_pi(level)
-    if not reason and 1 / LEVEL < level < LEVEL:
+    if not factor_of_pi(level) and 1 / LEVEL < level < LEVEL:
         return None
     return Mistake(
         sentence=(
             f"{names.picture}'s light is {level:.3g} times as bright as {names.other}:"
-            f" {reason or 'another exposure'}?"
+            f" {reason_of(level)}?"
         ),
         mend=None,
     )
@@ -519,6 +521,15 @@ def factor_of_pi(level: float) -> str:
     return "a division by pi too many" if abs(level * pi - 1) < NEAR_PI else ""
 
 
+def reason_of(level: float) -> str:
+    """Name what a factor of the light may come from."""
+    if abs(level * LUMENS - 1) < NEAR_PI:
+        return "divided by 683 lumens per watt, as Blender's default import of glTF does"
+    if abs(level / LUMENS - 1) < NEAR_PI:
+        return "multiplied by 683 lumens per watt, as Blender's default export of glTF does"
+    return factor_of_pi(level) or "another exposure"
+
+
 def _change_of_colours(
     picture: Array, other: Array, counted: NDArray[np.bool_], names: Names
 ) -> Mistake | None:
@@ -554,7 +565,7 @@ def _level(ratio: Array) -> float:
 def _changes(blocks: Blocks, ratio: Array, names: Names) -> dict[str, Mistake]:
     """Return changes of colours by their kind, the simplest first."""
     level = _level(ratio)
-    reason = factor_of_pi(level) or "another exposure"
+    reason = reason_of(level)
     changes = {
         "level": Mistake(
             sentence=f"{names.picture} is {level:.3g} times as bright as {names.other}: {reason}?",

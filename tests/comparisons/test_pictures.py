@@ -264,6 +264,16 @@ def test_mistakes_in_a_picture_are_named(rgb, tmp_path, cornell):
     assert record.warnings[0] == mistake
 
 
+@pytest.mark.parametrize("error", [0.98, 1, 1.02])
+def test_lumens_per_watt_are_named(rgb, cornell, error):
+    """683 lm/W, the definition of the candela, either way; and no other factor of that size."""
+    (said,) = mistakes(683 * error * cornell[0], cornell)
+    assert "multiplied by 683 lumens per watt, as Blender's default export" in said
+    assert "divided by 683 lumens" in picture_mistakes.reason_of(error / 683)
+    for other in (600, 800, 1 / 600, 1 / 800, 5):
+        assert picture_mistakes.reason_of(other) == "another exposure"
+
+
 def test_a_lamp_that_a_picture_clips_does_not_count_as_exposure():
     reference = np.full((32, 32, 3), (0.2, 0.3, 0.4))
     reference[8:24, 8:32] = 40.0

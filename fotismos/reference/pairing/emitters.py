@@ -39,11 +39,16 @@ EMITTER = mi.ObjectType.Emitter
 
 
 def to_heuristic(
-    graph: Graph, geometry: Callable[[], mi.Scene], hide_emitters: bool, replaced: Replacements
+    graph: Graph,
+    geometry: Callable[[], mi.Scene],
+    surface: Callable[[], Any],
+    hide_emitters: bool,
+    replaced: Replacements,
 ) -> Any:
     """Replace physical lights by heuristic ones, and return the radiance that becomes ``I_a``.
 
-    ``geometry()`` returns the Mitsuba scene. The environment stays as a background. With
+    ``geometry()`` returns the Mitsuba scene, ``surface()`` the `GBuffer` of what the camera sees
+    without the shapes that shine. The environment stays as a background. With
     ``hide_emitters`` the shapes of area lights are taken out.
     """
     ambient = None
@@ -55,6 +60,7 @@ def to_heuristic(
             index=index,
             shape=shape,
             geometry=geometry,
+            surface=surface,
             hide_emitters=hide_emitters,
             replaced=replaced,
         )
@@ -63,7 +69,8 @@ def to_heuristic(
             light.leave_out()
             continue
         glow = _rule(kind.to_heuristic)(light)
-        ambient = ambient if glow is None else glow
+        if glow is not None:
+            ambient = glow if ambient is None else values.total_emission(graph, ambient, glow)
     return ambient
 
 

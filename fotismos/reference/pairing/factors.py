@@ -16,6 +16,7 @@ Physical (Mitsuba)                             Heuristic
 small flat ``area`` light, ``L`` and ``A``     spot at its centroid: ``I_p0 = L A / pi``, ``m = 1``,
                                                cone 90 degrees, ``f_att = 1 / d^2``
 closed ``area`` light, ``L`` and ``A``         point at its centroid: ``I_p0 = L A / (4 pi)``
+``area`` light around the scene, ``L``         ``I_a = L``
 ``constant``, radiance ``L``                   ``I_a = L``
 emission of radiance ``L``                     ``k_i = L``
 =============================================  =====================================================

@@ -19,11 +19,13 @@ from fotismos.reference.pairing import bsdfs, emitters
 from fotismos.reference.pairing.factors import Convention, Replacements, specular_albedo
 from fotismos.reference.pairing.pairing_record import Override, Pairing, Unrepresentable
 from fotismos.reference.pairing.settings import Settings, complete
-from fotismos.reference.rendering.gbuffer import gbuffer
+from fotismos.reference.rendering.gbuffer import GBuffer, gbuffer
+from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph, properties
 from fotismos.reference.scene.source import Source
 
 BSDF = mi.ObjectType.BSDF
+EMITTER = mi.ObjectType.Emitter
 INTEGRATOR = mi.ObjectType.Integrator
 MEDIUM = mi.ObjectType.Medium
 SHAPE = mi.ObjectType.Shape
@@ -107,6 +109,14 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
                 bare.detach(shape, key)
     geometry = cache(bare.instantiate)
 
+    @cache
+    def unlit_surface() -> GBuffer:
+        unlit = bare.copy()
+        for shape in unlit.nodes(SHAPE):
+            if unlit.children(shape, EMITTER):
+                unlit.remove(shape)
+        return gbuffer(unlit.instantiate())
+
     # The textbook half.
     model = named(options.heuristic)
     half = graph.copy()
@@ -121,8 +131,16 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
     bsdfs.to_heuristic(context, replaced)
     for index in half.nodes(BSDF, "phong") if model.form else ():
         half.props(index)["form"] = model.form
-    radiance = emitters.to_heuristic(half, geometry, settings.hide_emitters, replaced)
-    ambient = settings.ambient if settings.ambient is not None else radiance
+    ambient = emitters.to_heuristic(
+        half,
+        geometry=geometry,
+        surface=unlit_surface,
+        hide_emitters=settings.hide_emitters,
+        replaced=replaced,
+    )
+    if settings.ambient is not None:
+        own = 0.0 if ambient is None else ambient
+        ambient = values.total_emission(half, settings.ambient, own)
     extra = {} if ambient is None else {"ambient": ambient}
     props = properties(
         "heuristic",

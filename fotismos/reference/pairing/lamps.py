@@ -1,10 +1,10 @@
 """Spots, lights with an extent, and those that must be measured, to their nearest forms.
 
 ``area``: in the far field a point or an even spot, nearby a glow ``k_i``; of a texture the mean
-radiance. ``constant``, ``envmap`` and any other plugin whose light surrounds the scene: ``I_a``,
-the mean radiance over the sphere; the sun of ``sunsky`` and ``timed_sunsky`` is a directional light
-of its irradiance and mean direction. Any other light, such as ``projector`` or a textured ``spot``,
-is left out: it has no nearest form.
+radiance. One that surrounds what the camera sees is ``I_a``, if that is nearer. ``constant``,
+``envmap`` and any other plugin whose light surrounds the scene: ``I_a``, the mean radiance over the
+sphere; the sun of ``sunsky`` and ``timed_sunsky`` is a directional light of its irradiance and mean
+direction. Any other light, such as ``projector``, is left out: it has no nearest form.
 
 Spots differ. Mitsuba's is even up to its beam width and falls linearly in the angle to 0 at its
 cutoff; the chapters' (6.4) falls as ``cos^m`` and is cut off. Neither can reproduce the other. The
@@ -14,6 +14,7 @@ gives equal flux, ``s int f sin = int g sin``. On the axis the two then differ.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import mitsuba as mi
@@ -21,7 +22,9 @@ import numpy as np
 
 from fotismos.reference.pairing import probe
 from fotismos.reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR
-from fotismos.reference.pairing.lights import LightNode, heuristic, level
+from fotismos.reference.pairing.lights import GLOWING, LightNode, heuristic, level
+from fotismos.reference.rendering.gbuffer import GBuffer
+from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Reference, properties
 
 BSDF = mi.ObjectType.BSDF
@@ -51,10 +54,21 @@ FLAT = 1 - 1e-4
 """A light with a mean normal longer than this is flat."""
 
 
-def area_to_heuristic(light: LightNode) -> None:
-    """Replace a shape's light by a point or an even spot, and a glow of the shape."""
+CLOSED = 1 - 1e-3
+"""A lamp that a larger share of directions meets is closed: few rays slip between triangles."""
+
+VISIBLE = 1024
+"""Places of the visible surface at which the light of a lamp is measured."""
+
+
+def area_to_heuristic(light: LightNode) -> Any:
+    """Replace a shape's light by a point, an even spot or ambient light, and a glow of the shape.
+
+    Returns the radiance that becomes ``I_a``, if any.
+    """
     graph = light.graph
     shape = light.shape
+    label = graph.label(shape)
     radiance = light.value("radiance", 1.0)
     if light.hide_emitters:
         # Mitsuba's integrators look through it, and the heuristic casts no shadows.
@@ -62,62 +76,128 @@ def area_to_heuristic(light: LightNode) -> None:
     else:  # its own copy of its phong shines
         ((key, bsdf),) = graph.children(shape, BSDF)
         props = mi.Properties(graph.props(bsdf))
-        props.set_id(f"{graph.label(shape)}_glowing")
+        props.set_id(GLOWING.format(label))
         props["k_i"] = radiance
         graph.attach(shape, key, graph.add(BSDF, props))
     identifier = graph.props(shape).id()
     body = next(shape for shape in light.geometry().shapes() if shape.id() == identifier)
-    centroid, area, normal, radius = _extent(body)
+    extent = Extent.of(body)
     is_texture = isinstance(radiance, Reference)
     if is_texture and graph.instantiate(radiance.index()).is_spatially_varying():
         radiance = probe.surface_mean(graph, body)
-    flatness = float(np.linalg.norm(normal))
+    else:
+        is_texture = False
+    flatness = float(np.linalg.norm(extent.normal))
     if flatness > FLATNESS:
         # On its axis L times the projected area, and pi L A in all: I_0 2 pi / (m + 1) of 6.4.
         flatness = 1.0 if flatness > FLAT else flatness
         plugin = "heuristic_spot"
-        factor = INTENSITY_FACTOR * area * flatness
+        factor = INTENSITY_FACTOR * extent.area * flatness
         form = ""
         exponent = 2 * flatness - 1
-        cone = {"direction": mi.ScalarVector3f(normal), "cutoff": 90.0, "exponent": exponent}
+        axis = mi.ScalarVector3f(extent.normal)
+        cone = {"direction": axis, "cutoff": 90.0, "exponent": exponent}
     else:
         plugin = "heuristic_point"
-        factor = CLOSED_LIGHT_FACTOR * area
+        factor = CLOSED_LIGHT_FACTOR * extent.area
         form = "closed, "
+        exponent = 0.0
         cone = {}
+    note = f"{form}area {extent.area:.6g}, in the far field; the shape keeps its emission as k_i"
     if flatness < 1:  # its light leaves through the shape
-        cone["shell"] = radius
+        cone["shell"] = extent.radius
+        share = _ambient_share(light.surface(), body, extent, factor, exponent)
+        if share is not None:
+            note = f"I_a is its mean radiance times {share:.4g}, the share of directions it fills"
+            is_exact = share in (0, 1) and not is_texture
+            light.replaced.emitter(label, "area", "ambient", share, is_exact, note)
+            if not is_exact:
+                light.replaced.lose(label, "area", "directions of the lamp's light", note)
+            return values.product(graph, radiance, share)
+        if extent.is_inward:
+            light.replaced.lose(label, "area", "places within the lamp", note)
     # A sphere has the area 4 pi r^2, a disk pi r^2; a rectangle has its two half edges.
     match graph.plugin(shape):
         case "sphere" | "disk" as kind:
-            cone["radius"] = np.sqrt(area / np.pi) / (2 if kind == "sphere" else 1)
+            cone["radius"] = np.sqrt(extent.area / np.pi) / (2 if kind == "sphere" else 1)
         case "rectangle":
             matrix = np.array(mi.traverse(body)["to_world"].matrix, float).reshape(4, 4, -1)
             cone["half_u"] = mi.ScalarVector3f(matrix[:3, 0, 0])
             cone["half_v"] = mi.ScalarVector3f(matrix[:3, 1, 0])
-    position = mi.ScalarPoint3f(centroid)
+    position = mi.ScalarPoint3f(extent.centroid)
     derived = heuristic(plugin, factor, **cone, position=position, intensity=radiance)
-    derived.set_id(f"lamp ‘{graph.label(shape)}’")
+    derived.set_id(f"lamp ‘{label}’")
     graph.attach(0, f"light_of_{shape}", graph.add(EMITTER, derived))
-    note = f"{form}area {area:.6g}, in the far field; the shape keeps its emission as k_i"
-    light.replaced.emitter(graph.label(shape), "area", plugin, factor, False, note)
+    light.replaced.emitter(label, "area", plugin, factor, False, note)
+    return None
+
+
+def _ambient_share(
+    visible: GBuffer, body: mi.Shape, extent: "Extent", factor: float, exponent: float
+) -> float | None:
+    """Return ``I_a`` of a lamp over its radiance, None if a point or spot is nearer.
+
+    Nearer is what differs less, by least squares, from the light that arrives at the surface that
+    the camera sees. Only a lamp that shines inwards may be ambient light; and one of whose light
+    nothing arrives, since a point at its centre could shine where its back is.
+    """
+    position, normal = visible.places(VISIBLE)
+    if not len(position):
+        return None
+    arriving = probe.share_of_directions(body, position, normal)
+    if not arriving.any():
+        return 0.0
+    offset = extent.centroid - position
+    distance = np.maximum(np.linalg.norm(offset, axis=1), np.finfo(float).tiny)
+    toward = offset / distance[:, None]
+    cosine = np.maximum(np.sum(normal * toward, axis=1), 0)
+    fall_off = 1.0
+    if exponent:
+        ahead = -toward @ extent.normal / np.linalg.norm(extent.normal)
+        fall_off = np.maximum(ahead, 0) ** exponent
+    far = factor * cosine * fall_off / distance**2
+    # The mean is the nearest even light, so its error is the variance.
+    if not extent.is_inward or np.mean((arriving - far) ** 2) < np.var(arriving):
+        return None
+    share = float(np.mean(arriving))
+    return 1.0 if share > CLOSED else share
 
 
 ROOM = 1.02
 """Factor on the radius of a lamp: the grid's places lie up to a 64th inside its edges."""
 
 
-def _extent(shape: mi.Shape) -> tuple[list[float], float, list[float], float]:
-    # Mitsuba's sampling is even in area, so means over the grid are means over the surface.
-    cells = (np.arange(64) + 0.5) / 64
-    x, y = np.reshape(np.meshgrid(cells, cells), (2, -1))
-    sample = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))
-    places = np.array(sample.p, float)
-    centroid = places.mean(axis=1)
-    normal = np.array(sample.n).mean(axis=1)
-    radius = ROOM * np.linalg.norm(places - centroid[:, None], axis=0).max()
-    area = float(np.ravel(shape.surface_area())[0])
-    return centroid.tolist(), area, normal.tolist(), float(radius)
+@dataclass(frozen=True)
+class Extent:
+    """Where a lamp is and how large: centre (3,), area, mean normal (3,), and radius.
+
+    ``is_inward`` says that its front faces its centre: ``int (p - c).n dA`` is below 0, which is
+    three times the volume of a closed shape.
+    """
+
+    centroid: np.ndarray
+    area: float
+    normal: np.ndarray
+    radius: float
+    is_inward: bool
+
+    @classmethod
+    def of(cls, shape: mi.Shape) -> "Extent":
+        """Measure a shape: Mitsuba's sampling is even in area, so means over a grid are of it."""
+        cells = (np.arange(64) + 0.5) / 64
+        x, y = np.reshape(np.meshgrid(cells, cells), (2, -1))
+        sample = shape.sample_position(0.0, mi.Point2f(mi.Float(x), mi.Float(y)))
+        normals = np.array(sample.n, float).T
+        places = np.array(sample.p, float).T
+        centroid = places.mean(axis=0)
+        offset = places - centroid
+        return cls(
+            centroid=centroid,
+            area=float(np.ravel(shape.surface_area())[0]),
+            normal=normals.mean(axis=0),
+            radius=float(ROOM * np.linalg.norm(offset, axis=1).max()),
+            is_inward=bool(np.sum(offset * normals) < 0),
+        )
 
 
 def sky_to_ambient(light: LightNode) -> Any:
@@ -150,9 +230,13 @@ STEPS = 2048
 
 def exponent_for(cutoff: float, beam_width: float) -> float:
     """Return the ``m`` of 6.4 nearest to Mitsuba's fall-off at equal flux; angles in degrees."""
-    theta, weight = _cone(cutoff)
+    theta, _ = _cone(cutoff)
     target = linear_falloff(theta, cutoff, beam_width)
-    flux = linear_flux(cutoff, beam_width)
+    return _exponent(cutoff, target, linear_flux(cutoff, beam_width))
+
+
+def _exponent(cutoff: float, target: np.ndarray, flux: float) -> float:
+    theta, weight = _cone(cutoff)
 
     def distance(log_m: float) -> float:
         m = np.expm1(log_m)
@@ -227,14 +311,25 @@ def _cone(cutoff: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def spot_to_heuristic(light: LightNode) -> None:
-    """Replace a spot by the nearest heuristic one; leave out one that projects a picture."""
-    if light.value("texture", None) is not None:
-        light.leave_out()
-        return
+    """Replace a spot by the nearest heuristic one; one that projects a picture is measured."""
     cutoff = light.number("cutoff_angle", 20.0)
-    beam_width = light.number("beam_width", 0.75 * cutoff)
-    exponent = exponent_for(cutoff, beam_width)
-    factor = INTENSITY_FACTOR * linear_flux(cutoff, beam_width) / power_flux(cutoff, exponent)
+    if light.value("texture", None) is None:
+        beam_width = light.number("beam_width", 0.75 * cutoff)
+        exponent = exponent_for(cutoff, beam_width)
+        factor = INTENSITY_FACTOR * linear_flux(cutoff, beam_width) / power_flux(cutoff, exponent)
+        intensity = light.value("intensity", 1.0)
+        fall_off = f"the linear fall-off from {beam_width:g} to {cutoff:g} deg"
+        is_round = True
+    else:
+        theta, weight = _cone(cutoff)
+        sent, is_round = probe.sent_at_angles(light.emitter, np.radians(theta))
+        fluxes = sent @ weight * np.radians(cutoff) / STEPS
+        mean = sent.mean(axis=0)
+        exponent = _exponent(cutoff, mean, float(fluxes.mean())) if mean.any() else 0.0
+        factor = INTENSITY_FACTOR
+        level = fluxes / power_flux(cutoff, exponent)
+        intensity = probe.as_value(light.graph, level, emitted=True)
+        fall_off = "the mean fall-off of its picture"
     props = heuristic(
         "heuristic_spot",
         factor,
@@ -242,10 +337,11 @@ def spot_to_heuristic(light: LightNode) -> None:
         direction=mi.ScalarVector3f(light.column(2)),
         cutoff=cutoff,
         exponent=exponent,
-        intensity=light.value("intensity", 1.0),
+        intensity=intensity,
     )
-    ends = f"from {beam_width:g} to {cutoff:g} deg"
-    note = f"m = {exponent:.4g} fitted to the linear fall-off {ends}; same flux"
+    note = f"m = {exponent:.4g} fitted to {fall_off}; same flux"
+    if not is_round:
+        light.replaced.lose(light.label, light.plugin, "picture that the spot projects", note)
     light.replace(props, factor, exact=False, note=note)
 
 

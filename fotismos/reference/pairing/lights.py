@@ -26,14 +26,17 @@ FALLOFF_OF_MITSUBA = dict(zip(("k0", "k1", "k2"), map(float, INVERSE_SQUARE), st
 SECOND_INTENSITY = "specular intensity L_s"
 """What a light of two intensities loses."""
 
+GLOWING = "{}_glowing"
+"""The id of the textbook material of a lamp, by the lamp's label."""
+
 
 @dataclass
 class LightNode:
     """A light of a graph that becomes one of the halves; rules read, replace and record it.
 
     ``shape`` is the node of the shape that shines, if any. ``geometry()`` returns the Mitsuba scene
-    without materials, ``surface()`` the visible `GBuffer`. With ``hide_emitters`` camera rays look
-    through lights.
+    without materials, ``surface()`` the visible `GBuffer`, without the shapes that shine if the
+    light is physical. With ``hide_emitters`` camera rays look through lights.
     """
 
     graph: Graph

@@ -30,12 +30,20 @@ from fotismos.reference.scene.graph import Graph
 
 SAMPLES = 8192
 SAMPLES_OF_LIGHTS = 65_536
+AROUND = 32
+"""Directions around the axis of a spot that is measured."""
+
+DIRECTIONS = 610
+"""Directions in which a place looks for a lamp; they and :data:`LATTICE_OF_DIRECTIONS` are numbers
+of Fibonacci, two apart."""
+
 NODES = 256
 """Cosines of an :class:`AlbedoTable`; at each the BSDF is sampled :data:`SAMPLES` times."""
 
 LATTICE = (1, 3547, 1663, 5413, 2689)
 """Generator of the rank-1 lattice (Korobov): three numbers for the sample, two for the texture."""
 LATTICE_OF_LIGHTS = (1, 19_463)
+LATTICE_OF_DIRECTIONS = (1, 233)
 
 OFF_LOBE = radians(60.0)
 
@@ -238,6 +246,51 @@ def surface_mean(graph: Graph, shape: mi.Shape) -> Any:
     si.wi = mi.Vector3f(0, 0, 1)
     means = [_channel_means(emitter.eval(_at(si, wavelengths))) for wavelengths in _wavelengths()]
     return as_value(graph, np.maximum(np.concatenate(means), 0), emitted=True)
+
+
+def share_of_directions(shape: mi.Shape, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Return the share (M,) of the hemisphere, by cosine, in which places (M, 3) see its front.
+
+    It is what a white diffuse surface of that ``normal`` (M, 3) sends if the shape has the radiance
+    1. Other shapes hide nothing, but parts of the shape hide others.
+    """
+    alone = mi.load_dict({"type": "scene", "shape": shape})
+    number = dr.arange(mi.UInt32, len(position) * DIRECTIONS)
+    place = number // DIRECTIONS
+
+    def spread(rows: np.ndarray, indices: Any) -> list[Any]:
+        return [dr.gather(mi.Float, mi.Float(row), indices) for row in rows]
+
+    cells = lattice(DIRECTIONS, LATTICE_OF_DIRECTIONS)
+    cell = mi.Point2f(*spread(cells, number % DIRECTIONS))
+    frame = mi.Frame3f(mi.Vector3f(*spread(normal.T, place)))
+    direction = frame.to_world(mi.warp.square_to_cosine_hemisphere(cell))
+    si = alone.ray_intersect(mi.Ray3f(mi.Point3f(*spread(position.T, place)), direction))
+    is_seen = np.array(si.is_valid() & (si.wi.z > 0), float)
+    shares: np.ndarray = is_seen.reshape(-1, DIRECTIONS).mean(axis=1)
+    return shares
+
+
+def sent_at_angles(emitter: mi.Emitter, theta: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Return the mean intensity (channels, T) of a point-like light at angles off its z axis.
+
+    Also whether it is the same all around, but for 1 % of its largest on average.
+    """
+    angle = np.repeat(theta, AROUND)
+    around = np.tile(2 * np.pi * (np.arange(AROUND) + 0.5) / AROUND, len(theta))
+    sine = np.sin(angle)
+    local = (sine * np.cos(around), sine * np.sin(around), np.cos(angle))
+    it = dr.zeros(mi.SurfaceInteraction3f, len(angle))
+    # At the distance 1 the irradiance is the intensity.
+    it.p = emitter.world_transform() @ mi.Point3f(*map(mi.Float, local))
+    sent = []
+    is_round = True
+    for wavelengths in _wavelengths():
+        _, weight = emitter.sample_direction(_at(it, wavelengths), mi.Point2f(0.5))
+        rings = np.array(weight, float).reshape(-1, len(theta), AROUND)
+        is_round &= bool(np.ptp(rings, axis=2).mean() <= 0.01 * rings.max())
+        sent.append(rings.mean(axis=2))
+    return np.concatenate(sent), is_round
 
 
 def _arriving(emitter: mi.Emitter) -> tuple[np.ndarray, np.ndarray]:

@@ -110,19 +110,33 @@ def has_cone(facts: Facts) -> tuple[bool, str]:
     return any(lights.of(plugin).has("cutoff") for plugin in plugins), facts.light_kinds
 
 
+def surrounding_lamps(facts: Facts) -> list[str]:
+    """Return the labels of the shapes whose light is ambient light in the textbook half."""
+    pairs = facts.pair.pairing.emitters
+    return [light.name for light in pairs if (light.given, light.derived) == ("area", "ambient")]
+
+
 def shining_shapes(facts: Facts) -> list[int]:
-    """Find the shapes that shine."""
+    """Find the shapes that shine, but for those that are ambient light in the textbook half."""
     graph = facts.pair.physical
-    return [shape for shape in graph.nodes(SHAPE) if graph.children(shape, EMITTER)]
+    surrounding = surrounding_lamps(facts)
+    return [
+        shape
+        for shape in graph.nodes(SHAPE)
+        if graph.children(shape, EMITTER) and graph.label(shape) not in surrounding
+    ]
+
+
+def has_far_lights(facts: Facts) -> tuple[bool, str]:
+    """Whether a shape shines that is a spot or point in the textbook half."""
+    return bool(shining_shapes(facts)), facts.light_kinds
 
 
 def put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
     """Put the textbook half's lights into a graph, in place of shapes that shine."""
     for shape in shapes:
         for key, _ in graph.children(shape, EMITTER):
-            graph.detach(shape, key)
-            if facts.pair.hide_emitters:
-                graph.remove(shape)
+            detach(graph, facts, [(shape, key)])
     # The lights that only the textbook half has are those in place of shapes.
     before = dict(facts.pair.physical.children(0, EMITTER))
     emitters = facts.pair.heuristic.children(0, EMITTER)
@@ -130,34 +144,51 @@ def put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
 
 
 def own_light(phong: mi.Properties, facts: Facts) -> dict[str, Any]:
-    """Return the light of a textbook material itself."""
-    return {"k_i": phong["k_i"]} if "k_i" in phong else {}
+    """Return the light of a textbook material itself, unless its shape surrounds the scene."""
+    is_there = "k_i" in phong and not _surrounds(phong, facts)
+    return {"k_i": phong["k_i"]} if is_there else {}
 
 
-def surroundings(facts: Facts) -> list[str]:
-    """Find the keys of lights that shine from everywhere."""
+def _surrounds(phong: mi.Properties, facts: Facts) -> bool:
+    return phong.id() in map(lights.GLOWING.format, surrounding_lamps(facts))
+
+
+def surroundings(facts: Facts) -> list[tuple[int, str]]:
+    """Find the lights that shine from everywhere, as node of their parent, and key in it."""
     graph = facts.pair.physical
-    children = graph.children(0, EMITTER)
-    return [key for key, index in children if not lights.of(graph.plugin(index)).exact]
+    surrounding = surrounding_lamps(facts)
+    shapes = [shape for shape in graph.nodes(SHAPE) if graph.label(shape) in surrounding]
+    return [
+        (parent, key)
+        for parent in (0, *shapes)
+        for key, index in graph.children(parent, EMITTER)
+        if parent or not lights.of(graph.plugin(index)).exact
+    ]
 
 
 def is_surrounded(facts: Facts) -> tuple[bool, str]:
     """Whether a light shines from everywhere."""
     kinds = (light.kind for light in facts.lights if light.shape is None)
-    return any(lights.of(kind).surrounds for kind in kinds), facts.light_kinds
+    around = surrounding_lamps(facts)
+    evidence = f"; around the scene: {', '.join(around)}" if around else ""
+    is_there = bool(around) or any(lights.of(kind).surrounds for kind in kinds)
+    return is_there, facts.light_kinds + evidence
 
 
-def detach(graph: Graph, facts: Facts, keys: Sequence[str]) -> None:
-    """Remove lights from a graph."""
-    for key in keys:
-        graph.detach(0, key)
+def detach(graph: Graph, facts: Facts, sites: Sequence[tuple[int, str]]) -> None:
+    """Remove lights from a graph, and the shapes that shone if emitters are hidden."""
+    for parent, key in sites:
+        graph.detach(parent, key)
+        if parent and facts.pair.hide_emitters:
+            graph.remove(parent)
 
 
 def ambient_light(phong: mi.Properties, facts: Facts) -> dict[str, Any]:
-    """Return the ambient light that a textbook material reflects."""
-    if "k_a" not in phong or "ambient" not in facts.kernel:
-        return {}
-    return {"k_a": phong["k_a"], "ambient": facts.kernel["ambient"]}
+    """Return the ambient light that a textbook material reflects, and its own if it surrounds."""
+    emitted = {"k_i": phong["k_i"]} if _surrounds(phong, facts) else {}
+    if "k_a" in phong and "ambient" in facts.kernel:
+        emitted |= {"k_a": phong["k_a"], "ambient": facts.kernel["ambient"]}
+    return emitted
 
 
 # --- Surfaces that differ in form ------------------------------------------------------------

@@ -41,6 +41,11 @@ class GBuffer:
     shape: ObjectIds
     bsdf: ObjectIds
 
+    def places(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return up to ``count`` positions and normals (M, 3), spread over the picture."""
+        step = max(1, int(self.hit.sum()) // count)
+        return self.position[self.hit][::step], self.normal[self.hit][::step]
+
     def mean_irradiance(
         self,
         light_position: Sequence[float],

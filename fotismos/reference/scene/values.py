@@ -107,6 +107,24 @@ def total(graph: Graph, a: Any, b: Any) -> Any:
     return _combined(graph, "heuristic_sum", np.add, a=a, b=b)
 
 
+def total_emission(graph: Graph, a: Any, b: Any) -> Any:
+    """Return ``a + b`` of emitted light: beside a spectrum, a plain value is daylight too."""
+    if mi.is_spectral and not is_zero(a) and not is_zero(b):
+        terms = [plain(a), plain(b)]
+        if None in terms and terms != [None, None]:
+            return total(graph, *(_daylight(graph, value) for value in (a, b)))
+    return total(graph, a, b)
+
+
+def _daylight(graph: Graph, value: Any) -> Any:
+    level = plain(value)
+    if level is None:
+        return value
+    if isinstance(level, tuple):
+        return node(graph, "d65", color=mi.ScalarColor3f(level))
+    return node(graph, "d65", scale=level)
+
+
 def share(graph: Graph, a: Any, weight: Any) -> Any:
     """Return ``a weight``; the weight is a scalar, clipped to [0, 1]."""
     if is_zero(a) or is_zero(weight):

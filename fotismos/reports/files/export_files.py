@@ -2,14 +2,14 @@
 
 import base64
 import json
-from math import atan, pi, radians, sqrt
+from math import atan, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fotismos.comparisons.plain_scene import PlainScene, Triangles
-from fotismos.reports.files import images, results
+from fotismos.reports.files import export_lights, images, results
 
 README = """# {name}, for another program
 
@@ -27,16 +27,28 @@ README = """# {name}, for another program
   (x + 0.5, y + 0.5).
 - Light is display-linear: a white diffuse surface that faces a light of intensity 1 has the value
   1. With a light's intensity I and attenuation (k0, k1, k2), the distance d makes it
-  I / (k0 + k1 d + k2 d^2). In glTF a light's intensity is pi times I, as irradiance is. A
-  `diffuse_intensity` takes the place of I for k_d, and in glTF; a `specular_intensity` for k_s.
+  I / (k0 + k1 d + k2 d^2). A `diffuse_intensity` takes the place of I for k_d, and in glTF; a
+  `specular_intensity` for k_s.
+- In glTF a light's intensity is pi I / k2, or pi I if it is directional, as irradiance is: a white
+  diffuse surface under pi lux has the radiance 1. Candela, lux and radiance are to be read as plain
+  numbers, without 683 lumens per watt. Blender: import with the lighting mode "Unitless", since
+  "Standard" divides lights by 683 (and multiplies them when it exports); emission stays.
 - `ambient` in lights.json is added times k_a; in physical terms it is an environment of that
   radiance.
 - Angles are in degrees in JSON, in radians in glTF; `direction` is that in which light travels.
+- A lamp with an area is there twice: as a light, and as a surface that shines. A path tracer needs
+  one of them.
 - `alpha` is the root mean square slope of the microfacets; glTF's roughness is its square root.
 - `k_d`, `k_s`, `n` are Phong's, as paired; `base_color`, `alpha`, `ior`, `metallic` are the
   physical material's. Those in `varies` are textures, given by their value in the middle.
 - `shape.Y` is the number of the mesh in scene.gltf, from 1; 0 is the background. Spheres, disks
   and cylinders are exact in gbuffer.exr, and triangles elsewhere (`--tessellation` says how fine).
+
+## What scene.gltf does not hold
+
+{losses}
+
+## Your picture
 
 Write the picture as linear values with BT.709's primaries, without alpha, and compare it:
 
@@ -47,12 +59,18 @@ Write the picture as linear values with BT.709's primaries, without alpha, and c
 def write(folder: Path, scene: PlainScene, command: str) -> None:
     """Write the files of a scene to a folder."""
     results.own(folder)
+    file = gltf(scene)
     texts = {
         "camera.json": _json(scene.camera),
         "lights.json": _json({"ambient": scene.ambient, "lights": scene.lights}),
         "materials.json": _json(scene.materials),
-        "scene.gltf": json.dumps(gltf(scene)),
-        "README.md": README.format(name=scene.name, command=command, **scene.camera),
+        "scene.gltf": json.dumps(file),
+        "README.md": README.format(
+            name=scene.name,
+            command=command,
+            losses="\n".join(f"- {loss}." for loss in file["extras"]["losses"]) or "Nothing.",
+            **scene.camera,
+        ),
     }
     for name, text in texts.items():
         results.write(folder / name, text)
@@ -70,9 +88,9 @@ def _json(content: object) -> str:
 def gltf(scene: PlainScene) -> dict[str, Any]:
     """Return a scene as glTF 2.0, buffer included.
 
-    A light's intensity is pi times the I_p of the pair, or L_d, as irradiance is. Attenuation other
-    than by the inverse square, which glTF lacks, is in ``extras``, as L_s and Phong's coefficients
-    are. By hand, since libraries keep neither lights nor the index of refraction.
+    Lights are those of :mod:`fotismos.reports.files.export_lights`. What glTF lacks is in
+    ``extras``: the light as paired, Phong's coefficients, and of the file all ``losses``. By hand,
+    since libraries keep neither lights nor the index of refraction.
     """
     arrays: list[np.ndarray] = []
     meshes = [_mesh(shape, arrays) for shape in scene.shapes]
@@ -80,16 +98,26 @@ def gltf(scene: PlainScene) -> dict[str, Any]:
     nodes: list[dict[str, Any]] = [
         *({"name": shape.name, "mesh": number} for number, shape in enumerate(scene.shapes)),
         {"name": "camera", "camera": 0, "matrix": _columns(np.linalg.inv(camera["view"]))},
-        *(_light_node(light, number) for number, light in enumerate(scene.lights)),
+        *(export_lights.node(light, number) for number, light in enumerate(scene.lights)),
     ]
     # Elements of all arrays have 4 bytes, so each array begins where glTF allows it. The last of
     # the starts is the whole length.
     starts = np.cumsum([0, *(array.nbytes for array in arrays)]).tolist()
     content = base64.b64encode(b"".join(array.tobytes() for array in arrays)).decode()
-    lights = [_light(light) for light in scene.lights]
+    lights = []
+    losses = _losses(scene)
+    for given in scene.lights:
+        light, lost = export_lights.light(given, scene)
+        lights.append(light)
+        losses += lost
     return {
         "asset": {"version": "2.0", "generator": "fotismos"},
-        "extensionsUsed": ["KHR_materials_ior", "KHR_lights_punctual"],
+        "extras": {"losses": losses},
+        "extensionsUsed": [
+            "KHR_materials_ior",
+            "KHR_materials_emissive_strength",
+            "KHR_lights_punctual",
+        ],
         "extensions": {"KHR_lights_punctual": {"lights": lights}},
         "scene": 0,
         "scenes": [{"name": scene.name, "nodes": list(range(len(nodes)))}],
@@ -151,53 +179,37 @@ def _accessor(number: int, array: np.ndarray) -> dict[str, Any]:
 
 
 def _material(material: dict[str, Any]) -> dict[str, Any]:
-    # glTF limits factors to 1.
+    # glTF limits factors to 1; emission has a strength besides.
+    strength = max(*material["k_i"], 1.0)
     return {
         "name": material["name"],
         "doubleSided": material["twosided"],
-        "emissiveFactor": [min(value, 1.0) for value in material["k_i"]],
+        "emissiveFactor": [value / strength for value in material["k_i"]],
         "pbrMetallicRoughness": {
             "baseColorFactor": [*(min(value, 1.0) for value in material["base_color"]), 1.0],
             "metallicFactor": material["metallic"],
             "roughnessFactor": sqrt(material["alpha"]),
         },
-        "extensions": {"KHR_materials_ior": {"ior": material["ior"]}},
+        "extensions": {
+            "KHR_materials_ior": {"ior": material["ior"]},
+            "KHR_materials_emissive_strength": {"emissiveStrength": strength},
+        },
         "extras": {name: material[name] for name in ("k_i", "k_a", "k_d", "k_s", "n", "form")},
     }
 
 
-def _light(light: dict[str, Any]) -> dict[str, Any]:
-    intensity = light.get("diffuse_intensity", light["intensity"])
-    # glTF splits light into a colour up to 1 and an intensity; a dark light must not divide by 0.
-    largest = max(max(intensity), 1e-30)
-    # glTF has three types of light.
-    cone = {}
-    if "cutoff" in light:
-        kind = "spot"
-        cone = {"innerConeAngle": 0.0, "outerConeAngle": min(radians(light["cutoff"]), pi / 2)}
-    else:
-        kind = "point" if "position" in light else "directional"
-    return {
-        "name": light["name"],
-        "type": kind,
-        "color": [value / largest for value in intensity],
-        "intensity": pi * largest,
-        "extras": {key: value for key, value in light.items() if key not in ("name", "type")},
-        **({"spot": cone} if cone else {}),
-    }
-
-
-def _light_node(light: dict[str, Any], number: int) -> dict[str, Any]:
-    """Return a light's node, whose -z is the direction in which it shines."""
-    matrix = np.eye(4)
-    if "direction" in light:
-        z = -np.array(light["direction"], float) / np.linalg.norm(light["direction"])
-        side = np.cross([0, 1, 0] if abs(z[1]) < 0.9 else [1, 0, 0], z)
-        side /= np.linalg.norm(side)
-        matrix[:3, :3] = np.stack([side, np.cross(z, side), z], axis=1)
-    matrix[:3, 3] = light.get("position", (0, 0, 0))
-    extensions = {"KHR_lights_punctual": {"light": number}}
-    return {"name": light["name"], "extensions": extensions, "matrix": _columns(matrix)}
+def _losses(scene: PlainScene) -> list[str]:
+    """Return what glTF does not hold of the ambient light and the materials, as sentences."""
+    losses = []
+    if any(scene.ambient):
+        losses.append(f"ambient light of {', '.join(f'{part:.4g}' for part in scene.ambient)}")
+    for material in scene.materials:
+        name = material["name"]
+        if material["varies"]:
+            losses.append(f"material {name}: textures of {', '.join(material['varies'])}")
+        if max(material["base_color"]) > 1:
+            losses.append(f"material {name}: a base colour above 1")
+    return losses
 
 
 def _columns(matrix: np.ndarray) -> list[float]:
