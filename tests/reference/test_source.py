@@ -3,10 +3,15 @@
 import json
 import re
 
+import mitsuba as mi
+import numpy as np
 import pytest
 
+from fotismos.heuristic.errors import InputError
 from fotismos.reference import Source
 from fotismos.reference.pairing import halves
+from fotismos.reference.scene.source import digest
+from tests.shared.misplanned import scene as described
 from tests.shared.small_scene import PLAIN
 
 BALL = '<bsdf type="diffuse"><rgb name="reflectance" value="$grey"/></bsdf>'
@@ -79,3 +84,70 @@ def test_another_film_keeps_its_size_its_crop_and_its_filter(rgb, tmp_path):
     assert films[0].rfilter().radius() == 1.5
     told = {kind: [each.what for each in one.overridden] for kind, one in made.items()}
     assert told == {"specfilm": ["film"], "hdrfilm": []}
+
+
+ORANGE = np.tile(np.float32([0.8, 0.3, 0.1]), (4, 4, 1))
+LAMP = {"type": "point", "position": [1, -4, 3], "intensity": 30.0}
+LAMP_ABOVE = {"type": "rectangle", "to_world": mi.ScalarTransform4f().translate([0, 0, 2])}
+LAMP_ABOVE["to_world"] = LAMP_ABOVE["to_world"] @ mi.ScalarTransform4f().rotate([1, 0, 0], 180)
+WITH_PICTURES = {
+    "reflectance": lambda picture: {"ball": ball(picture), "lamp": LAMP},
+    "two shapes": lambda picture: {
+        "ball": ball(picture),
+        "other": ball(picture) | {"center": [2, 0, 0]},
+        "lamp": LAMP,
+    },
+    "base colour": lambda picture: {
+        "ball": {"type": "sphere", "bsdf": {"type": "principled", "base_color": picture}},
+        "lamp": LAMP,
+    },
+    "area": lambda picture: {
+        "ball": {"type": "sphere"},
+        "lamp": LAMP_ABOVE | {"light": {"type": "area", "radiance": picture}},
+    },
+    "projector": lambda picture: {
+        "ball": {"type": "sphere"},
+        "lamp": {
+            "type": "projector",
+            "irradiance": picture,
+            "to_world": mi.ScalarTransform4f().look_at([0, -4, 1], [0, 0, 0], [0, 0, 1]),
+        },
+    },
+}
+"""Places of a picture in a scene whose colours a load in a spectral variant turns into spectra."""
+
+
+def ball(picture):
+    return {"type": "sphere", "bsdf": {"type": "diffuse", "reflectance": picture}}
+
+
+@pytest.mark.parametrize("place", WITH_PICTURES)
+def test_a_load_changes_nothing_that_the_scene_holds(spectral, tmp_path, place):
+    """Each load is as from a file; ``mitsuba.load_dict`` overwrites such a bitmap."""
+    made = WITH_PICTURES[place]
+    bitmap = mi.Bitmap(ORANGE.copy())
+    bitmap.write(str(tmp_path / "orange.exr"))
+
+    def rendered(**picture):
+        parts = made({"type": "bitmap", **picture})
+        source = Source("a test", described((0, -4, 1), size=8, **parts))
+        before = digest(source)
+        scenes = [source.parse().instantiate() for _ in range(2)]
+        assert digest(source) == before
+        return [np.array(mi.render(scene, spp=16, seed=1)) for scene in scenes]
+
+    in_file, _ = rendered(filename=str(tmp_path / "orange.exr"))
+    assert in_file.mean() > 1e-3
+    for image in rendered(bitmap=bitmap):
+        np.testing.assert_allclose(image, in_file, atol=1e-6)
+    np.testing.assert_array_equal(np.array(bitmap), ORANGE)
+
+
+@pytest.mark.parametrize("key", ["bsdf", "film", "lamp"])
+def test_what_is_already_made_is_refused_by_name(rgb, key):
+    """Before, a default took the place of a BSDF, an integrator and a film."""
+    scene = described((0, -4, 1), size=8, ball=ball(0.5), lamp=LAMP)
+    holder = {"bsdf": scene["ball"], "film": scene["sensor"], "lamp": scene}[key]
+    holder[key] = mi.load_dict(holder[key])
+    with pytest.raises(InputError, match=f"{key} is an object .* Give the dictionary"):
+        Source("a test", scene).parse()

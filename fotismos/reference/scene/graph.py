@@ -116,8 +116,10 @@ class Graph:
         state = Parser.ParserState(self.state)
         for node in state.nodes:
             for key in node.props.keys():  # noqa: SIM118  Properties is not a mapping
-                if isinstance(node.props[key], mi.TensorXf):  # a plugin removes it
-                    node.props[key] = mi.TensorXf(node.props[key])
+                value = node.props[key]
+                # Plugins empty a tensor, and turn a bitmap's colours into spectra in place.
+                if isinstance(value, (mi.TensorXf, mi.Bitmap)):
+                    node.props[key] = type(value)(value)
                 # Reading a value marks it as used, and would hide it from Mitsuba's check.
                 node.props.mark_queried(key, False)
         # A Python plugin that evaluates something while several threads make plugins would wait

@@ -216,7 +216,22 @@ class Source:
             raise InputError(f"{self.name}: its outermost element must be <scene>.")
         graph = Graph(self.name, config, state)
         graph.resolver = resolver
+        _require_dictionaries(graph)
         return graph
+
+
+def _require_dictionaries(graph: Graph) -> None:
+    """Refuse objects whose parts pairing has to read, and all that another variant made."""
+    whole = mi.Texture, mi.Volume, mi.PhaseFunction, mi.ReconstructionFilter
+    usable = (*whole, mi.VolumeGrid, mi.Bitmap)
+    for index in graph.nodes_in_use():
+        for key, value in graph.props(index).items():
+            if isinstance(value, mi.Object) and not isinstance(value, usable):
+                raise InputError(
+                    f"{graph.name}: {graph.label(index)}: {key} is an object that Mitsuba has"
+                    f" already made ({type(value).__name__}). Give the dictionary that it was made"
+                    " from."
+                )
 
 
 def _require_regular(
