@@ -20,6 +20,7 @@ from fotismos.reference.pairing.factors import Convention, Replacements, specula
 from fotismos.reference.pairing.pairing_record import Override, Pairing, Unrepresentable
 from fotismos.reference.pairing.settings import Settings, complete
 from fotismos.reference.rendering.gbuffer import gbuffer
+from fotismos.reference.scene import spectra
 from fotismos.reference.scene.graph import Graph, properties
 from fotismos.reference.scene.source import Source
 
@@ -177,7 +178,7 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
             misses=tuple(replaced.misses),
         ),
         unrepresentable=tuple(dict.fromkeys(replaced.lost)),
-        warnings=(*_energy_warnings(half), *model.remarks),
+        warnings=(*spectra.doubts(graph), *_energy_warnings(half), *model.remarks),
         integrator=settings.integrator,
         rr_depth=settings.rr_depth,
         media=media,
