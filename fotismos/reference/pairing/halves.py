@@ -22,6 +22,7 @@ from fotismos.reference.pairing.settings import Settings, complete
 from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.scene import spectra
 from fotismos.reference.scene.graph import Graph, properties
+from fotismos.reference.scene.messages import plain_message
 from fotismos.reference.scene.source import Source
 
 BSDF = mi.ObjectType.BSDF
@@ -94,8 +95,10 @@ def pair(source: Source, options: PairOptions | None = None) -> Pair:
         return _paired(graph, settings, options)
     except FotismosError:
         raise
-    except Exception:
+    except Exception as error:
         graph.instantiate()  # Mitsuba's message is better, if it rejects the scene too
+        if isinstance(error, RuntimeError):  # as Mitsuba's are
+            raise InputError(f"{graph.name}: {plain_message(error)}") from error
         raise
 
 

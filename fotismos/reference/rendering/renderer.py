@@ -26,6 +26,7 @@ from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.records import Times
 from fotismos.reference.rendering.finite import LARGEST_VALUE, require_finite, wrong_pixels
 from fotismos.reference.rendering.gbuffer import image_size, resize
+from fotismos.reference.scene.messages import plain_message
 
 try:
     import resource
@@ -116,7 +117,7 @@ class Renderer:
                 for cause in chain:
                     if isinstance(cause, FotismosError):
                         raise cause from None
-                reason = str(chain[-1]).strip()
+                reason = plain_message(chain[-1])
                 raise InputError(f"{self.label}: Mitsuba cannot render it: {reason}") from error
             self.times.append(perf_counter() - begin)
             self.processor_times.append(process_time() - used)
