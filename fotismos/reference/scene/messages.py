@@ -103,6 +103,10 @@ PLAIN_WORDS: tuple[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]],
         r" light than it receives.",
     ),
     (
+        re.compile("maximum recursion depth exceeded.*", re.S),
+        "its elements are nested too deeply, such as masks within masks. Give fewer.",
+    ),
+    (
         re.compile(r"\w+Distribution: no probability mass found!"),
         r"one of its spectra is 0 at all visible wavelengths. Give others, or another `material`.",
     ),
