@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
 import msgspec
 from msgspec import Meta, inspect, structs
 
-from fotismos.heuristic import program
+from fotismos.heuristic import llvm, program
 from fotismos.heuristic.errors import InputError, unknown
 
 if TYPE_CHECKING:  # the command line reads options without loading Dr.Jit
@@ -159,10 +159,7 @@ class Options(
         An unknown name, or a value that is not allowed, raises :class:`InputError`.
         """
         if others := sorted(set(given) - set(cls.__struct_fields__)):
-            raise InputError(
-                f"unknown options {', '.join(others)}: choose from"
-                f" {', '.join(sorted(cls.__struct_fields__))}."
-            )
+            raise unknown("option", others[0], sorted(cls.__struct_fields__))
         return cls(**{name: value for name, value in given.items() if value is not None})
 
     def changed(self, **changes: Any) -> Options:
@@ -287,6 +284,8 @@ def _refusal(name: str, value: object, kind: Any) -> InputError:
     while isinstance(allowed, (inspect.Metadata, inspect.UnionType)):
         allowed = allowed.type if isinstance(allowed, inspect.Metadata) else allowed.types[0]
     match allowed:
+        case inspect.LiteralType(values) if name.endswith("variant"):
+            return llvm.unknown_variant(name, value)
         case inspect.LiteralType(values):
             return unknown(name, value, map(str, values))
         case inspect.IntType():

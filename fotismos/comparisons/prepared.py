@@ -271,7 +271,9 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
         spp = max(1, spp * passes // given.passes)
         passes = given.passes
     heuristic: Any = _heuristic_renderer(source, pair, chosen=chosen, spp=spp, options=options)
-    reference: Any = Renderer(physical, integrator, pass_spp=spp, label="physical picture")
+    reference: Any = Renderer(
+        physical, integrator, pass_spp=spp, label="physical picture", warnings=pair.warnings
+    )
     if given is not None and given.image is not None:
         heuristic = pictures.PictureHalf(given.image, passes, heuristic.variant, heuristic)
     if given is not None and given.reference is not None:
@@ -326,4 +328,5 @@ def _heuristic_renderer(
         if options.heuristic_variant:
             pair = pair_for(source, options)
         scene = with_sampler(pair.heuristic, chosen.sampler).instantiate()
-        return Renderer(scene, None, pass_spp=spp, label="textbook picture")
+        label = "textbook picture"
+        return Renderer(scene, None, pass_spp=spp, label=label, warnings=pair.warnings)

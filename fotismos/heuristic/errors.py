@@ -15,6 +15,11 @@ traceback and exits with the class's `exit_code`.
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from functools import wraps
+from inspect import signature
+from typing import Any, TypeVar
+
+Kind = TypeVar("Kind")
 
 
 class FotismosError(Exception):
@@ -55,16 +60,33 @@ def unknown(what: str, given: object, allowed: Iterable[str]) -> InputError:
     ``what`` stands before the word, such as ``loss`` or ``form =``.
     """
     allowed = list(allowed)
-    return InputError(
-        f"{what} {given!r} is not known{suggestion(given, allowed)}: choose one of"
-        f" {', '.join(allowed)}."
-    )
+    choice = f"choose one of {', '.join(allowed)}" if allowed else "there is none, so omit it"
+    return InputError(f"{what} {given!r} is not known{suggestion(given, allowed)}: {choice}.")
 
 
-def suggestion(given: object, allowed: Iterable[str]) -> str:
-    """Return a question that suggests the nearest allowed word; empty if none is near."""
-    near = get_close_matches(str(given), list(allowed), n=1)
+def suggestion(given: object, allowed: Iterable[str], least: float = 0.6) -> str:
+    """Return a question that suggests the nearest allowed word; empty if none is near.
+
+    ``least`` is the share of letters in common, in their order, from which a word is near.
+    """
+    near = get_close_matches(str(given), list(allowed), n=1, cutoff=least)
     return f" (did you mean {near[0]}?)" if near else ""
+
+
+def with_known_words(kind: type[Kind]) -> type[Kind]:
+    """Let a class answer a misspelt keyword with an `InputError` that suggests the right one."""
+    make = kind.__init__
+    known = list(signature(kind).parameters)
+
+    @wraps(make)
+    def checked(self: Kind, *values: Any, **words: Any) -> None:
+        for word in words:
+            if word not in known:
+                raise unknown(f"{kind.__name__}: parameter", word, known)
+        make(self, *values, **words)
+
+    setattr(kind, "__init__", checked)  # noqa: B010  mypy refuses the plain form
+    return kind
 
 
 def type_of(value: object) -> str:

@@ -27,7 +27,7 @@ from fotismos.heuristic.convention import (
     Vector,
     Visibility,
 )
-from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.errors import InputError, with_known_words
 from fotismos.heuristic.numerics import is_number
 
 UNATTENUATED = (1, 0, 0)
@@ -191,6 +191,7 @@ class Light:
         return type(self)(**vars(self) | values)
 
 
+@with_known_words
 @dataclass(frozen=True)
 class DirectionalLight(Light):
     """Parallel rays of constant intensity: the limit of a point light at infinity.
@@ -228,6 +229,7 @@ class DirectionalLight(Light):
         return None
 
 
+@with_known_words
 @dataclass(frozen=True)
 class PointLight(Light):
     """A point that shines equally in all directions (6.1).
@@ -252,6 +254,7 @@ class PointLight(Light):
     extent: Extent | None = None
 
 
+@with_known_words
 @dataclass(frozen=True)
 class SpotLight(Light):
     """A point that shines into a cone about an axis (6.2-6.4).

@@ -14,7 +14,7 @@ import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
-from fotismos.heuristic.errors import InstallationError
+from fotismos.heuristic.errors import InputError, InstallationError, unknown
 from fotismos.heuristic.mitsuba_version import require_mitsuba
 
 VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
@@ -60,6 +60,14 @@ class LLVM:
     version: tuple[int, int, int] | None
     path: Path | None
     source: str
+
+
+def unknown_variant(what: str, given: object) -> InputError:
+    """Return the error for a variant of Mitsuba that fotismos does not support."""
+    error = unknown(what, given, VARIANTS)
+    if str(given).startswith(("cuda", "scalar")):
+        return InputError(f"{error} Only LLVM renders here, on the processor.")
+    return error
 
 
 def configure() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fotismos.heuristic import numerics
 from fotismos.heuristic.convention import Colour, Number
-from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.errors import InputError, unknown, with_known_words
 
 FORMS = ("phong", "blinn")
 
@@ -105,6 +105,7 @@ def as_array(value: Any, vector_type: type) -> Colour:
     return dr.replace_shape_t(vector_type, shape)(value)
 
 
+@with_known_words
 @dataclass(frozen=True)
 class Material:
     """Reflection coefficients of a surface (8.10, 6.11).

@@ -22,7 +22,7 @@ from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import CAN_SHARE, Pool, cores
 from fotismos.heuristic import llvm, program
-from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.errors import InputError, unknown
 from fotismos.reports.terminal.words import as_typed, echo, level, quiet_option, verbose_option
 
 Decorator: TypeAlias = Callable[[Any], Any]
@@ -139,6 +139,15 @@ fresh_option = click.option(
 )
 
 
+class OneOf(click.Choice):  # type: ignore[type-arg]  # older ones take none
+    """A word; the message on another suggests the nearest, and says why a variant is not there."""
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
+        if llvm.VARIANTS[0] in self.choices:
+            return str(llvm.unknown_variant("variant", value))
+        return str(unknown("word", value, self.choices))
+
+
 class Within(click.FloatRange):
     """A number in an interval; NaN is in none."""
 
@@ -211,7 +220,7 @@ def _kind(kind: Any) -> dict[str, Any]:
     # The second type of a union is None, which stands for an omitted option.
     match kind.types[0] if isinstance(kind, inspect.UnionType) else kind:
         case inspect.LiteralType(values):
-            return {"type": click.Choice(sorted(values))}
+            return {"type": OneOf(sorted(values))}
         case inspect.IntType(ge=low, le=high):
             return {"type": click.IntRange(low, high)}
         case inspect.FloatType(gt=above, ge=low, le=high):

@@ -8,6 +8,8 @@ from fotismos.comparisons.fit.fit import fit
 from fotismos.comparisons.gallery.builtin import builtin
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.study import design, running
+from fotismos.reports.page import page
+from fotismos.reports.page.page import Failure
 from fotismos.reports.run import audit_files, fit_files
 from fotismos.reports.work import study as work
 from tests.browser.conftest import Visitor, violations
@@ -73,3 +75,23 @@ def test_axe_finds_no_violation_and_nothing_is_cut_off(rgb, chromium, tmp_path, 
         assert all(page.evaluate(PICTURES))
         context.close()
         assert visitor.complaints == []
+
+
+@pytest.mark.parametrize(("age_s", "reloads"), [(1, True), (30, False), (3600, False)])
+def test_a_page_that_grows_reloads_ever_less_often_and_then_no_more(
+    chromium, tmp_path, monkeypatch, age_s, reloads
+):
+    """As when its command was killed: the page is not written again."""
+    now = page.time()
+    monkeypatch.setattr(page, "time", lambda: now - age_s)
+    file = tmp_path / "index.html"
+    failures = [Failure(scene="lost", error="there is no such file")]
+    file.write_text(page.render([], failures=failures, state="In progress.", reloads=True))
+    seen = chromium.new_page()
+    seen.goto(file.as_uri())
+    seen.evaluate("() => { window.isFirst = true; }")
+    seen.wait_for_timeout(2500)
+    assert seen.evaluate("() => !window.isFirst") == reloads
+    is_over = "no longer written" in seen.text_content("#state")
+    seen.close()
+    assert is_over == (age_s > 600)

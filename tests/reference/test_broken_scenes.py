@@ -28,6 +28,7 @@ from fotismos.reference.rendering.renderer import LARGEST_PASS
 from fotismos.reference.scene.source import Source
 from fotismos.reports import verdict
 from tests.shared import corpus_files
+from tests.shared.misplanned import scene as described
 from tests.shared.small_scene import SCENE
 
 SMALL = {"spp": 4, "resolution": (12, 8)}
@@ -135,6 +136,15 @@ def test_doubts_about_pictures_are_told_from_their_values():
     assert not Prepared.require_light(view(np.zeros((4, 5), bool)), black, black)
     with pytest.raises(InputError, match="a: both pictures are black"):
         doubt(black, 1e-6 * noise)
+
+
+def test_masks_within_masks_without_end_are_refused_in_words(rgb):
+    bsdf = {"type": "diffuse"}
+    for _ in range(300):
+        bsdf = {"type": "mask", "opacity": 0.999, "inner": bsdf}
+    scene = described(size=8, ball={"type": "sphere", "bsdf": bsdf})
+    with pytest.raises(InputError, match="nested too deeply, such as masks within masks"):
+        compare(Source("a test", scene), Options(**SMALL))
 
 
 CORPUS = Path(__file__).parents[1] / "corpus"

@@ -107,11 +107,15 @@ def require_pictures(*images):
 
 @pytest.mark.parametrize("name", sorted(REFUSED))
 def test_a_scene_is_refused_as_mitsuba_refuses_it(name, rgb, corpus):
+    """In Mitsuba's words, or in plainer ones about the same names."""
     path = corpus / f"{name}.xml"
     mi.set_variant(variant_of(path))
     with pytest.raises(InputError) as refusal:
         compare(Source(name, path), Options(spp=4))
-    assert reason_of_mitsuba(path) in unnumbered(refusal)
+    reason = reason_of_mitsuba(path)
+    names = re.findall(r'"([^"]+)"', reason)
+    said = unnumbered(refusal)
+    assert reason in said or (names and all(name in said for name in names))
 
 
 ENDS_PYTHON = ("sensor-batch",)

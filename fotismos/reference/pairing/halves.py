@@ -20,8 +20,9 @@ from fotismos.reference.pairing.factors import Convention, Replacements, specula
 from fotismos.reference.pairing.pairing_record import Override, Pairing, Unrepresentable
 from fotismos.reference.pairing.settings import Settings, complete
 from fotismos.reference.rendering.gbuffer import GBuffer, gbuffer
-from fotismos.reference.scene import values
+from fotismos.reference.scene import spectra, values
 from fotismos.reference.scene.graph import Graph, properties
+from fotismos.reference.scene.messages import plain_message
 from fotismos.reference.scene.source import Source
 
 BSDF = mi.ObjectType.BSDF
@@ -95,8 +96,10 @@ def pair(source: Source, options: PairOptions | None = None) -> Pair:
         return _paired(graph, settings, options)
     except FotismosError:
         raise
-    except Exception:
+    except Exception as error:
         graph.instantiate()  # Mitsuba's message is better, if it rejects the scene too
+        if isinstance(error, RuntimeError):  # as Mitsuba's are
+            raise InputError(f"{graph.name}: {plain_message(error)}") from error
         raise
 
 
@@ -195,7 +198,7 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
             misses=tuple(replaced.misses),
         ),
         unrepresentable=tuple(dict.fromkeys(replaced.lost)),
-        warnings=(*_energy_warnings(half), *model.remarks),
+        warnings=(*spectra.doubts(graph), *_energy_warnings(half), *model.remarks),
         integrator=settings.integrator,
         rr_depth=settings.rr_depth,
         media=media,

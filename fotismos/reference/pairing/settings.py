@@ -106,9 +106,10 @@ def keep_sensor(graph: Graph, number: int) -> int:
     if not places:
         raise InputError(f"{graph.name}: the scene has no sensor. Add one, such as perspective.")
     if not 0 <= number < len(places):
-        raise InputError(
-            f"{graph.name}: there is no sensor {number}: choose one from 0 to {len(places) - 1}."
-        )
+        allowed = f"choose one from 0 to {len(places) - 1}"
+        if len(places) == 1:
+            allowed = "the scene has one, number 0. Omit `sensor`"
+        raise InputError(f"{graph.name}: there is no sensor {number}: {allowed}.")
     for choice, (parent, key, _) in enumerate(places):
         if choice != number:
             graph.detach(parent, key)

@@ -26,6 +26,7 @@ from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.records import Times
 from fotismos.reference.rendering.finite import LARGEST_VALUE, require_finite, wrong_pixels
 from fotismos.reference.rendering.gbuffer import image_size, resize
+from fotismos.reference.scene.messages import plain_message
 
 try:
     import resource
@@ -59,7 +60,8 @@ class Renderer:
 
     ``integrator`` None takes the scene's own; ``pass_spp`` are samples per pixel and pass; ``size``
     is a width and height in place of the film's, of the same shape. Passes replay the kernels of
-    the first, unless the integrator's code ``is_traced`` at each.
+    the first, unless the integrator's code ``is_traced`` at each. ``warnings`` of its pair explain
+    pixels that are not finite.
     """
 
     def __init__(
@@ -70,6 +72,7 @@ class Renderer:
         label: str,
         size: tuple[int, int] | None = None,
         is_traced: bool = False,
+        warnings: Sequence[str] = (),
     ):
         self.scene = scene
         self.integrator = integrator or scene.integrator()
@@ -82,8 +85,10 @@ class Renderer:
         self.times: list[float] = []
         self.processor_times: list[float] = []
         self.compilation = 0.0
-        # A user's code may be impossible to record: NumPy ends the process.
-        is_traced = is_traced or self._is_users
+        self.warnings = warnings
+        # A user's code may be impossible to record: NumPy ends the process. Mitsuba's tables of the
+        # eye's sensitivity always are: they are no inputs that Python could name.
+        is_traced = is_traced or self._is_users or mi.is_spectral
         self._replayed = None if is_traced else dr.freeze(_rendered, warn_after=100)
 
     def render(self, seed: int) -> Any:
@@ -112,7 +117,7 @@ class Renderer:
                 for cause in chain:
                     if isinstance(cause, FotismosError):
                         raise cause from None
-                reason = str(chain[-1]).strip()
+                reason = plain_message(chain[-1])
                 raise InputError(f"{self.label}: Mitsuba cannot render it: {reason}") from error
             self.times.append(perf_counter() - begin)
             self.processor_times.append(process_time() - used)
@@ -126,7 +131,7 @@ class Renderer:
         # Written so that a NaN fails it too.
         if not dr.all(dr.abs(image.array) <= LARGEST_VALUE):
             pixels = np.array(image)
-            require_finite(pixels, layer)
+            require_finite(pixels, layer, self.warnings)
             wrong = wrong_pixels(pixels, np.abs(pixels) <= LARGEST_VALUE, "too bright")
             raise InputError(
                 f"{layer}: {wrong}. At most {LARGEST_VALUE:g} is allowed: divide all lights by the"
@@ -168,8 +173,9 @@ class Renderer:
                     return self._replayed(self.scene, self.integrator, spp, seed)
             except InputError:  # the scene cannot be prepared
                 raise
-            except Exception:  # a plugin's message is better when it is traced
-                LOGGER.info("%s: passes are traced, not replayed", self.label, exc_info=True)
+            except Exception as error:  # a plugin's message is better when it is traced
+                *_, cause = _chain(error)
+                LOGGER.info("%s: passes are traced, not replayed: %s", self.label, cause)
                 self._replayed = None
         return _rendered(self.scene, self.integrator, spp, seed)
 

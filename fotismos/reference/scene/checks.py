@@ -14,7 +14,7 @@ import numpy as np
 from fotismos.heuristic import meshes
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.lights import plugins_with
-from fotismos.reference.scene.graph import Graph, find_file, require_regular_file
+from fotismos.reference.scene.graph import FILENAME, Graph, find_file, require_regular_file
 
 LARGEST = float(np.finfo(np.float32).max)
 
@@ -67,12 +67,28 @@ A roughness is the root mean square slope of facets: at 10 these lean by 84 degr
 
 
 def check(graph: Graph) -> None:
-    """Reject values that make no sense, and damaged files, in all elements in use."""
+    """Reject values that make no sense, missing and damaged files, in all elements in use."""
+    _require_files(graph)
     for index in graph.nodes_in_use():
         check_node(graph, index)
         is_mesh = graph.plugin(index) in ("obj", "ply", "serialized")
         if is_mesh and (objection := damage(graph, index)):
             raise _refusal(graph, index, objection)
+
+
+def _require_files(graph: Graph) -> None:
+    """Reject a scene whose files are missing, with all of them."""
+    missing = []
+    for index in graph.nodes_in_use():
+        name = graph.props(index).get(FILENAME, None)
+        if isinstance(name, str) and graph.file(index) is None:
+            missing.append(f"{name} ({graph.label(index)})")
+    if missing:
+        count = "a file is" if len(missing) == 1 else f"{len(missing)} files are"
+        raise InputError(
+            f"{graph.name}: {count} missing: {'; '.join(missing)}. Correct the paths, which begin"
+            " at the scene's folder, or add the files."
+        )
 
 
 def check_node(graph: Graph, index: int) -> None:

@@ -4,7 +4,6 @@ Both halves of a pair are derived from one such graph. It comes from an XML file
 dictionary, and knows the file and line of each node for error messages.
 """
 
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,22 +13,15 @@ import mitsuba as mi
 import numpy as np
 
 from fotismos.heuristic import llvm
-from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.plugins import PLUGINS
+from fotismos.reference.scene.messages import plain_message
 
 FILENAME = "filename"
 """The parameter with which every plugin names its file."""
 
 SCRIPT = "scene"
 """Name of a Python file's dictionary, or of the function that returns it."""
-
-CONTENT = re.compile(r'((?:of spectrum file "[^"]*"|PLY header: unknown token))[: ]*".*', re.DOTALL)
-"""Ends of messages that repeat a line of a file, which may be any file."""
-
-LONG = re.compile(r'("[^"]{60})[^"]+([^"]{20})(?=")')
-
-INCLUDES = re.compile(r"(?:.* while processing <include>:\n)+(?=.* while processing <include>:\n)")
-"""All but the innermost of the files that include each other, a line each."""
 
 KINDS = {
     "bsdf": mi.ObjectType.BSDF,
@@ -46,7 +38,7 @@ Reference = mi.Properties.ResolvedReference
 def set_variant(variant: str) -> None:
     """Switch Mitsuba to one of the variants that fotismos supports."""
     if variant not in llvm.VARIANTS:
-        raise unknown("variant", variant, llvm.VARIANTS)
+        raise llvm.unknown_variant("variant", variant)
     llvm.use_threads()
     mi.set_variant(variant)
 
@@ -116,8 +108,10 @@ class Graph:
         state = Parser.ParserState(self.state)
         for node in state.nodes:
             for key in node.props.keys():  # noqa: SIM118  Properties is not a mapping
-                if isinstance(node.props[key], mi.TensorXf):  # a plugin removes it
-                    node.props[key] = mi.TensorXf(node.props[key])
+                value = node.props[key]
+                # Plugins empty a tensor, and turn a bitmap's colours into spectra in place.
+                if isinstance(value, (mi.TensorXf, mi.Bitmap)):
+                    node.props[key] = type(value)(value)
                 # Reading a value marks it as used, and would hide it from Mitsuba's check.
                 node.props.mark_queried(key, False)
         # A Python plugin that evaluates something while several threads make plugins would wait
@@ -268,17 +262,6 @@ def resolving(resolver: Any) -> Iterator[None]:
         yield
     finally:
         mi.set_file_resolver(before)
-
-
-def plain_message(error: Exception) -> str:
-    """Return Mitsuba's message without what a file holds; for a Python plugin, its own message."""
-    text = str(error).strip()
-    if isinstance(error, UnicodeDecodeError):
-        text = error.object.decode("utf-8", "replace")
-    if "Traceback" in text:
-        location, _, trace = text.partition(": failed to instantiate")
-        text = f"{location}: {trace.splitlines()[-1].partition(': ')[2]}"
-    return LONG.sub(r"\1…\2", CONTENT.sub(r"\1", INCLUDES.sub("", text)))
 
 
 def properties(plugin: str, **values: Any) -> Any:

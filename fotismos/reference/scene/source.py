@@ -28,10 +28,10 @@ from fotismos.reference.scene.graph import (
     Graph,
     Reference,
     find_file,
-    plain_message,
     require_regular_file,
     resolving,
 )
+from fotismos.reference.scene.messages import plain_message
 
 Parser = mi.parser
 Content = str | PathLike[str] | Mapping[str, Any] | Callable[[], Mapping[str, Any]]
@@ -39,6 +39,12 @@ Edit = Callable[[Graph], None]
 
 UNUSED = re.compile(r"Found unused parameters:\s*- \$(\w+)=")
 """In Mitsuba's message on a value for which a file has no placeholder: its name."""
+
+
+DEFAULT = re.compile(r"<default\s[^>]*name=[\"'](\w+)")
+UNDEFINED = "undefined parameter"
+NOT_XML = "Parsing of XML file"
+"""Words of Mitsuba's messages, and a placeholder's own value in a file."""
 
 
 def text_of(path: Path) -> str:
@@ -211,12 +217,54 @@ class Source:
                     f"{suggestion(unused[1], known)}; it has {', '.join(sorted(known)) or 'none'}."
                     " Correct the name, or omit it."
                 ) from error
+            if UNDEFINED in str(error):
+                raise self._without_values(files) from error
+            if NOT_XML in str(error) and (cut := _cut_off(files)):
+                raise InputError(
+                    f"{self.name}: {cut} ends before its last element is closed. Save the scene"
+                    " again, or write what is missing."
+                ) from error
             raise InputError(f"{self.name}: {plain_message(error)}") from error
         if state.root.type != mi.ObjectType.Scene:
             raise InputError(f"{self.name}: its outermost element must be <scene>.")
         graph = Graph(self.name, config, state)
         graph.resolver = resolver
+        _require_dictionaries(graph)
         return graph
+
+    def _without_values(self, files: Iterable[Path]) -> InputError:
+        """Return the error for placeholders that get a value nowhere."""
+        texts = [text_of(path) for path in files]
+        given = {*self.parameters, *(name for text in texts for name in DEFAULT.findall(text))}
+        missing = sorted(set().union(*map(placeholders, files)) - given)
+        shown = ", ".join(f"${name}" for name in missing)
+        options = " ".join(f"-D {name}=VALUE" for name in missing)
+        return InputError(f"{self.name}: {shown} without a value: give {options}.")
+
+
+def _cut_off(files: Iterable[Path]) -> Path | None:
+    """Return the first file that does not end with the end of its outermost element."""
+    for path in files:
+        text = re.sub(r"<!--.*?-->|<\?.*?\?>", "", text_of(path), flags=re.DOTALL).strip()
+        outermost = re.match(r"<(\w+)", text)
+        is_empty = re.fullmatch(r"<[^<>]*/>", text)
+        if outermost and not is_empty and not text.endswith(f"</{outermost[1]}>"):
+            return path
+    return None
+
+
+def _require_dictionaries(graph: Graph) -> None:
+    """Refuse objects whose parts pairing has to read, and all that another variant made."""
+    whole = mi.Texture, mi.Volume, mi.PhaseFunction, mi.ReconstructionFilter
+    usable = (*whole, mi.VolumeGrid, mi.Bitmap)
+    for index in graph.nodes_in_use():
+        for key, value in graph.props(index).items():
+            if isinstance(value, mi.Object) and not isinstance(value, usable):
+                raise InputError(
+                    f"{graph.name}: {graph.label(index)}: {key} is an object that Mitsuba has"
+                    f" already made ({type(value).__name__}). Give the dictionary that it was made"
+                    " from."
+                )
 
 
 def _require_regular(

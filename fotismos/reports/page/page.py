@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from datetime import date
+from time import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -110,7 +111,7 @@ def render(
 
     `failures` are the scenes that could not be compared; `state` is a sentence on an unfinished
     run; `moved` are pictures without a scene that moved. The page ``reloads`` itself until one
-    that does not takes its place.
+    that does not takes its place, or until none was written for a while.
     """
     page_title = title or title_of([view.record for view in views])
     taken: set[str] = set()
@@ -129,6 +130,7 @@ def render(
             *map(_scene_data, scenes),
             *({"id": id, "name": failure.scene, "failed": True} for id, failure in failed.items()),
         ],
+        "written": round(1000 * time()) if reloads else None,
         "thresholds": THRESHOLDS,
         "usual": threshold,
         "headlines": _runs(lambda t: headline if since else verdict.headline(records, t)),
@@ -159,7 +161,6 @@ def render(
         details=DETAILS,
         state=state,
         moved=moved,
-        reloads=reloads,
     )
 
 

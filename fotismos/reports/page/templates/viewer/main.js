@@ -118,3 +118,13 @@ const [only, ...others] = page.scenes;
 if (!address.read() && only?.images && !others.length)
   address.replace(fragmentOf({ ...DEFAULT_VIEW, scene: only.id }));
 follow();
+
+/** Milliseconds without a new page, after which the command that writes it is taken to be gone. */
+const PATIENCE = 10 * 60 * 1000;
+
+if (page.written !== null) {
+  const age = Date.now() - page.written;
+  // The older the page, the longer the next one takes.
+  if (age < PATIENCE) setTimeout(() => location.reload(), Math.max(2000, age / 10));
+  else byId("state").textContent = "Unfinished, and no longer written: run the command again.";
+}

@@ -49,6 +49,7 @@
 /**
  * @typedef {object} Page
  * @property {(Scene | Failed)[]} scenes
+ * @property {number | null} written     of a page that grows: milliseconds since 1970
  * @property {number[]} thresholds
  * @property {number} usual              the threshold shown first
  * @property {Runs} headlines
