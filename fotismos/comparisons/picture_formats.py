@@ -116,6 +116,20 @@ def deep_png(path: Path) -> NDArray[np.uint16]:
     return np.concatenate([colours, alpha.astype(np.uint16)], axis=-1)
 
 
+def png_chunk(path: Path, name: bytes) -> bytes | None:
+    """Return the content of a chunk that stands before a PNG's pixels; None if there is none."""
+    with path.open("rb") as stream:
+        stream.seek(8)
+        while True:
+            size = int.from_bytes(stream.read(4), "big")
+            kind = stream.read(4)
+            if kind == name:
+                return stream.read(size)
+            if kind in (b"", b"IDAT"):
+                return None
+            stream.seek(size + 4, 1)
+
+
 def _decoded(path: Path, coding: str) -> NDArray[np.uint8]:
     """Return the bytes (H, W, C) that Pillow makes of a file by one of its codings of pixels."""
     with Image.open(path) as file:
