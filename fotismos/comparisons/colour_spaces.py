@@ -98,7 +98,9 @@ def of_primaries(primaries: Sequence[float]) -> ColourSpace:
     if _are_same(primaries, CHROMATICITIES):
         return ColourSpace()
     red, green, blue, white = np.reshape(primaries, (4, 2))
-    if abs(np.linalg.det(np.stack([green - red, blue - red]))) < SAME_PRIMARIES or white[1] <= 0:
+    is_finite = np.isfinite(primaries).all()
+    area = abs(np.linalg.det(np.stack([green - red, blue - red]))) if is_finite else 0.0
+    if area < SAME_PRIMARIES or white[1] <= 0:
         raise ValueError(f"{_named(primaries)} span no colours")
     to_xyz = rgb_to_xyz(tuple(zip(primaries[0::2], primaries[1::2], strict=True)))
     return ColourSpace(

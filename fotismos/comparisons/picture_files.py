@@ -8,7 +8,8 @@ File                   Read as
 ``.png``               as its cICP, iCCP, sRGB, gAMA and cHRM chunks say, the first of them first,
                        else sRGB; 8 or 16 bits
 ``.jpg``, ``.jpeg``    as its ICC profile says, else sRGB
-``.hdr``, ``.pfm``     linear
+``.hdr``               linear; its header's exposures are undone, and its primaries converted
+``.pfm``               linear
 ``.npy``               linear; an array (H, W, 3), (H, W, 4) with alpha, or (H, W)
 =====================  ==========================================================================
 
@@ -32,7 +33,7 @@ from PIL import Image
 
 from fotismos.comparisons import colour_spaces, picture_formats
 from fotismos.comparisons.colour_spaces import ColourSpace, Curve
-from fotismos.comparisons.departure.colour import Array, from_srgb
+from fotismos.comparisons.departure.colour import CHROMATICITIES, Array, from_srgb
 from fotismos.comparisons.names import ARRAYS, PICTURES, picture_parts
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
@@ -325,8 +326,8 @@ def _in_window(path: Path, values: Floats, data: Any, display: Any) -> Floats:
 BEGINNINGS = {".hdr": (b"#?",), ".pfm": (b"PF", b"Pf")}
 """What files begin with; a PNG or JPEG is told by its content."""
 
-READERS = {".hdr": picture_formats.hdr, ".pfm": picture_formats.pfm}
-"""How files are read that Pillow does not read."""
+HDR_BITS = 8
+"""Bits of a mantissa."""
 
 PNG_HEADER = 26
 """Bytes that a PNG file begins with; the last two are its bit depth and its kind of colours."""
@@ -348,8 +349,10 @@ def _bitmap(path: Path, suffix: str, is_stated: bool) -> Layer:
     space = ColourSpace()
     notes: tuple[str, ...] = ()
     try:
-        if suffix in READERS:
-            return _layer(path, READERS[suffix](path).astype(float))
+        if suffix == ".pfm":
+            return _layer(path, picture_formats.pfm(path).astype(float))
+        if suffix == ".hdr":
+            return _radiance(path, picture_formats.hdr(path))
         is_deep = suffix == ".png" and header[24:25] == b"\x10" and header[25:26] != b"\0"
         with Image.open(path) as file:
             pixels = picture_formats.deep_png(path) if is_deep else _by_pillow(path, file)
@@ -370,6 +373,26 @@ def _bitmap(path: Path, suffix: str, is_stated: bool) -> Layer:
         step=step,
         is_encoded=space.ends_at_white,
         notes=notes,
+    )
+
+
+def _radiance(path: Path, picture: picture_formats.RadiancePicture) -> Layer:
+    """Return a Radiance picture as the light that it had before its exposures."""
+    values = picture.values.astype(float)
+    factor = picture.exposure * picture.correction
+    _, exponents = np.frexp(values.max(axis=-1, keepdims=True, initial=0.0))
+    notes = ["read half a step above its codes, as Radiance does"]
+    if picture.exposure != 1:
+        notes.append(f"divided by its EXPOSURE, {picture.exposure:g}")
+    if (picture.correction != 1).any():
+        shown = " ".join(f"{number:g}" for number in picture.correction)
+        notes.append(f"divided by its COLORCORR, {shown}")
+    primaries = picture.primaries
+    return replace(
+        _layer(path, values / factor),
+        space=_known(path, lambda: colour_spaces.of_primaries(primaries or CHROMATICITIES)),
+        step=np.ldexp(1.0, exponents - HDR_BITS) / factor,
+        notes=tuple(notes),
     )
 
 
