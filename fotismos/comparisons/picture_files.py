@@ -332,6 +332,10 @@ HDR_BITS = 8
 PNG_HEADER = 26
 """Bytes that a PNG file begins with; the last two are its bit depth and its kind of colours."""
 
+GREY = 0
+PALETTE = 3
+"""Kinds of a PNG's colours."""
+
 MODES = ("L", "LA", "RGB", "RGBA", "I;16")
 """What Pillow calls the pixels that are read as they are."""
 
@@ -353,11 +357,17 @@ def _bitmap(path: Path, suffix: str, is_stated: bool) -> Layer:
             return _layer(path, picture_formats.pfm(path).astype(float))
         if suffix == ".hdr":
             return _radiance(path, picture_formats.hdr(path))
-        is_deep = suffix == ".png" and header[24:25] == b"\x10" and header[25:26] != b"\0"
         with Image.open(path) as file:
-            pixels = picture_formats.deep_png(path) if is_deep else _by_pillow(path, file)
+            is_png = file.format == "PNG"
+            bits, of_colours = header[PNG_HEADER - 2 :] if is_png else (8, GREY)
+            if bits == 16 and of_colours != GREY:
+                pixels = picture_formats.deep_png(path)
+            elif is_png and of_colours == GREY and "transparency" in file.info:
+                pixels = picture_formats.grey_png(file, bits)
+            else:
+                pixels = _by_pillow(path, file)
             if not is_stated:
-                cicp = picture_formats.png_chunk(path, b"cICP") if suffix == ".png" else None
+                cicp = picture_formats.png_chunk(path, b"cICP") if is_png else None
                 space = _known(path, lambda: colour_spaces.of_bitmap(file, kind, cicp))
             turn = colour_spaces.turn(file)
     except (OSError, RuntimeError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
@@ -366,11 +376,10 @@ def _bitmap(path: Path, suffix: str, is_stated: bool) -> Layer:
     if turn is not None:
         pixels = turn(pixels)
         notes = ("turned as its EXIF data say",)
-    step = 1 / float(np.iinfo(pixels.dtype).max)
     return replace(
-        _layer(path, pixels.astype(float) * step),
+        _layer(path, pixels / float(np.iinfo(pixels.dtype).max)),
         space=space,
-        step=step,
+        step=1.0 / (2 ** (8 if of_colours == PALETTE else bits) - 1),
         is_encoded=space.ends_at_white,
         notes=notes,
     )

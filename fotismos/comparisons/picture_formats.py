@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -165,10 +166,25 @@ def deep_png(path: Path) -> NDArray[np.uint16]:
     high = _decoded(path, coding).astype(np.uint16)
     low = _decoded(path, coding.replace("16B", "16L"))
     colours: NDArray[np.uint16] = high << np.uint16(8) | low
-    if clear is None:
-        return colours
-    alpha = np.where((colours == clear).all(axis=-1, keepdims=True), 0, 2**16 - 1)
-    return np.concatenate([colours, alpha.astype(np.uint16)], axis=-1)
+    return colours if clear is None else with_alpha(colours, clear)
+
+
+def grey_png(file: Image.Image, bits: int) -> NDArray[Any]:
+    """Return the codes (H, W, 2) of a grey PNG with a clear one, of so many bits, and their alpha.
+
+    Pillow compares codes of 2 and 4 bits that it has scaled to 8, and cuts those of 16.
+    """
+    codes = np.array(file.convert("L") if file.mode == "1" else file)
+    largest = 2**bits - 1
+    scale = int(np.iinfo(codes.dtype).max) // largest
+    return with_alpha(codes[..., None], (file.info["transparency"] & largest) * scale)
+
+
+def with_alpha(codes: NDArray[Any], clear: Any) -> NDArray[Any]:
+    """Return codes (H, W, C) with an alpha that is 0 where they are the clear one."""
+    is_clear = (codes == clear).all(axis=-1, keepdims=True)
+    alpha = np.where(is_clear, 0, np.iinfo(codes.dtype).max).astype(codes.dtype)
+    return np.concatenate([codes, alpha], axis=-1)
 
 
 def png_chunk(path: Path, name: bytes) -> bytes | None:

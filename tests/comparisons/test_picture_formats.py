@@ -3,7 +3,6 @@
 import subprocess
 from contextlib import suppress
 from pathlib import Path
-from zlib import crc32
 
 import colour
 import mitsuba as mi
@@ -14,6 +13,7 @@ import pytest
 from fotismos.comparisons import picture_formats
 from fotismos.comparisons.picture_files import read_file
 from fotismos.heuristic.errors import InputError, NonFiniteError
+from tests.shared.colour_files import png
 
 PVALUE = Path(pyradiance.__file__).parent / "bin/pvalue"
 
@@ -135,19 +135,25 @@ def test_pfm_has_an_order_of_bytes_and_a_scale(tmp_path):
         np.testing.assert_allclose(picture_formats.pfm(path), abs(scale) * image, rtol=1e-6)
 
 
-def test_a_deep_png_may_have_a_clear_colour(rgb, tmp_path):
-    """All 16 bits of it count."""
-    codes = np.full((2, 3, 3), 1000, np.uint16)
-    codes[1, 2] = 1001
+@pytest.mark.parametrize(("channels", "bits"), [(1, 1), (1, 2), (1, 4), (1, 8), (1, 16), (3, 16)])
+@pytest.mark.parametrize("is_there", [True, False])
+def test_a_clear_colour_of_a_png_changes_alpha_only(tmp_path, channels, bits, is_there):
+    """All bits of it count, and none above its depth."""
+    largest = 2**bits - 1
+    codes = np.random.default_rng(3).integers(0, largest + 1, (6, 9, channels))
+    codes = codes.astype(np.uint16 if bits == 16 else np.uint8)
+    codes[0, 0] = largest
+    codes[0, 1] = largest - 1
+    clear = np.full(channels, largest if is_there else 0, ">u2")
+    if not is_there:
+        codes = np.maximum(codes, 1)
     path = tmp_path / "x.png"
-    mi.Bitmap(codes).write(str(path))
-    content = path.read_bytes()
-    place = content.index(b"IDAT") - 4
-    chunk = b"tRNS" + np.full(3, 1001, ">u2").tobytes()
-    framed = b"\0\0\0\6" + chunk + crc32(chunk).to_bytes(4, "big")
-    path.write_bytes(content[:place] + framed + content[place:])
-    alpha = picture_formats.deep_png(path)[..., 3]
-    np.testing.assert_array_equal(alpha, [[65535] * 3, [65535, 65535, 0]])
+    path.write_bytes(png(codes, {"tRNS": clear.tobytes()}, bits))
+    found = read_file(str(path), "linear", is_mask=True)
+    expected = np.broadcast_to(codes / largest, (6, 9, 3))
+    np.testing.assert_allclose(found.image, expected, atol=1e-6)
+    np.testing.assert_array_equal(found.opaque, (codes != clear).any(axis=-1))
+    np.testing.assert_allclose(found.rounding, 0.5 / largest, rtol=0.4)
 
 
 HDR = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n"
