@@ -210,28 +210,30 @@ def _opaque(path: Path, image: Floats, layer: Layer, behind: Array | None) -> Fl
 
 
 def _exr(path: Path, name: str) -> Layer:
-    import OpenEXR  # loaded late: other pictures do not need it
-
-    try:
-        with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
-            parts = [part.name() for part in file.parts]
-            if not parts:  # the library keeps none that it cannot read to its end
-                raise ValueError("it ends too soon, or is damaged")
-            header = dict(file.header())
-            channels = {name: np.array(c.pixels) for name, c in file.channels().items()}
-    except Exception as error:  # the library raises many types for a file that is not EXR
-        raise _unreadable(path, "EXR", error) from error
-    if len(parts) > 1:
-        raise InputError(
-            f"{path}: it has {len(parts)} parts, {', '.join(map(repr, parts))}. Save the picture"
-            " as a file of one part; several layers are allowed."
-        )
+    header = _exr_header(path)
+    sampling = {c.name: (c.xSampling, c.ySampling) for c in header["channels"]}
     prefix = f"{name}." if name else ""
-    if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
-        raise _without_colours(path, name, channels)
-    colours: Floats = np.stack(
-        [channels[f"{prefix}{c}"].astype(np.float32) for c in "RGB"], axis=-1
-    )
+    names = [f"{prefix}{c}" for c in "RGB"]
+    if not set(names) <= set(sampling):
+        names = [f"{prefix}Y"]
+        if {f"{prefix}RY", f"{prefix}BY"} & set(sampling):
+            raise InputError(
+                f"{path}: its colours are luminance and chroma, {prefix}Y, RY and BY. Save it as R,"
+                " G and B."
+            )
+    if not set(names) <= set(sampling):
+        raise _without_colours(path, name, sampling)
+    for channel in (*names, f"{prefix}A"):
+        x_step, y_step = sampling.get(channel, (1, 1))
+        if (x_step, y_step) != (1, 1):
+            raise InputError(
+                f"{path}: its channel {channel} has one value for {x_step}x{y_step} pixels. Save it"
+                " with a sampling of 1."
+            )
+    channels = _exr_channels(path)
+    is_half = any(channels[channel].dtype == np.float16 for channel in names)
+    colours: Floats = np.stack([channels[channel].astype(np.float32) for channel in names], axis=-1)
+    colours = np.broadcast_to(colours, (*colours.shape[:2], 3))
     alpha = channels.get(f"{prefix}A")
     notes = []
     data = np.array(header["dataWindow"]).tolist()
@@ -241,7 +243,6 @@ def _exr(path: Path, name: str) -> Layer:
         if alpha is not None:
             alpha = _in_window(path, alpha[..., None], data, display)[..., 0]
         notes.append("its data window was put into its display window")
-    is_half = any(channels[f"{prefix}{c}"].dtype == np.float16 for c in "RGB")
     return Layer(
         colours=colours,
         alpha=alpha,
@@ -250,6 +251,39 @@ def _exr(path: Path, name: str) -> Layer:
         is_premultiplied=True,
         notes=tuple(notes),
     )
+
+
+def _exr_header(path: Path) -> dict[str, Any]:
+    """Return the header of an EXR file of one part."""
+    import OpenEXR  # loaded late: other pictures do not need it
+
+    try:
+        with _quiet(), OpenEXR.File(str(path), header_only=True) as file:
+            parts = [part.name() for part in file.parts]
+            header = dict(file.header())
+    except Exception as error:  # the library raises many types for a file that is not EXR
+        raise _unreadable(path, "EXR", error) from error
+    if len(parts) > 1:
+        raise InputError(
+            f"{path}: it has {len(parts)} parts, {', '.join(map(repr, parts))}. Save the picture"
+            " as a file of one part; several layers are allowed."
+        )
+    if "deep" in str(header.get("type")):
+        raise InputError(f"{path}: it is deep, with several samples in a pixel. Flatten it.")
+    return header
+
+
+def _exr_channels(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the channels (H, W) of an EXR file of one part."""
+    import OpenEXR
+
+    try:
+        with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
+            if not file.parts:  # the library keeps none that it cannot read to its end
+                raise ValueError("it ends too soon, or is damaged")
+            return {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+    except Exception as error:
+        raise _unreadable(path, "EXR", error) from error
 
 
 def _known(path: Path, read: Callable[[], ColourSpace]) -> ColourSpace:
@@ -280,12 +314,12 @@ def _quiet() -> Iterator[None]:
 
 
 def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> InputError:
-    layers = sorted({name[:-2] for name in channels if name.endswith(".R")})
+    layers = sorted({name[:-2] for name in channels if name.endswith((".R", ".Y"))})
     if layer and {*"RGB"} <= set(channels):
         return InputError(f"{path}: it has R, G and B but no layer {layer!r}: give {path}.")
     if not layers:
         return InputError(
-            f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B."
+            f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B, or Y."
         )
     where = f"no layer {layer!r}{suggestion(layer, layers)}" if layer else "no channel R"
     return InputError(
