@@ -5,13 +5,16 @@ File                   Read as
 =====================  ==========================================================================
 ``.exr``               linear; other primaries are converted, by the file's chromaticities; a data
                        window is put into its display window, black around it
-``.png``               as its sRGB or gAMA chunk says, else sRGB; 8 or 16 bits
-``.jpg``, ``.jpeg``    sRGB
-``.hdr``, ``.pfm``     linear
+``.png``               as its cICP, iCCP, sRGB, gAMA and cHRM chunks say, the first of them first,
+                       else sRGB; 8 or 16 bits
+``.jpg``, ``.jpeg``    as its ICC profile says, else sRGB
+``.hdr``               linear; its header's exposures are undone, and its primaries converted
+``.pfm``               linear
 ``.npy``               linear; an array (H, W, 3), (H, W, 4) with alpha, or (H, W)
 =====================  ==========================================================================
 
-``transfer`` replaces the encoding. What a file did not say plainly is said in words. Where alpha is
+PNG and JPEG are turned as their EXIF data say. ``transfer`` replaces what they say about colours,
+and the encoding of other files. What a file did not say plainly is said in words. Where alpha is
 below 1, the picture is put over the colour ``over``: in EXR colours are premultiplied, in other
 files they are not. Without that colour, these pixels do not count.
 """
@@ -20,7 +23,7 @@ import hashlib
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,15 +31,13 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fotismos.comparisons import picture_formats
-from fotismos.comparisons.departure.colour import BT709, CHROMATICITIES, Array, from_srgb
+from fotismos.comparisons import colour_spaces, picture_formats
+from fotismos.comparisons.colour_spaces import ColourSpace, Curve
+from fotismos.comparisons.departure.colour import CHROMATICITIES, Array, from_srgb
 from fotismos.comparisons.names import ARRAYS, PICTURES, picture_parts
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
 from fotismos.reference.rendering.finite import LARGEST_VALUE
-
-SAME_PRIMARIES = 2e-3
-"""Largest difference of chromaticities that are the same: some files round them."""
 
 MOST_NEGATIVE = -1e-3
 """Below this, a negative value is more than rounding."""
@@ -47,33 +48,30 @@ OPAQUE = 1 - 1 / 512
 MOST_PIXELS = 2**27
 """Pixels of the largest window that a data window is put into."""
 
+HALF_STEP = 2.0**-10
+"""Largest distance of neighbouring half floats, relative to their value."""
+
 COLOURS = {"black": (0.0, 0.0, 0.0), "white": (1.0, 1.0, 1.0)}
 """The names of colours that a picture can be put over."""
 
-GAMMA_OF_SRGB = 1 / 2.2
-"""What a gAMA chunk has for sRGB (PNG specification, 11.3.3.2)."""
-
-PRIMARIES = {
-    "BT.2020": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, 0.3127, 0.3290),
-    "Display P3": (0.680, 0.320, 0.265, 0.690, 0.150, 0.060, 0.3127, 0.3290),
-    "ACEScg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
-    "ACES2065-1": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767),
-}
-"""Names of known primaries: x and y of red, green, blue and white."""
+STATED: dict[str, Curve | None] = {"srgb": from_srgb, "linear": None}
+"""Curves by the words of `transfer`."""
 
 
 @dataclass(frozen=True)
 class Layer:
     """What a file holds, as encoded in it: colours (H, W, 3), and alpha (H, W) if it has any.
 
-    ``transfer`` decodes the colours; None if they are linear. ``encoding`` says how that is known,
-    ``notes`` what else was done to them.
+    ``space`` decodes the colours. ``step`` is the distance of neighbouring codes, one or (H, W, C),
+    0 if it is far below what can be seen. ``is_encoded``: they end at display white. ``notes`` say
+    what was done to them.
     """
 
     colours: Floats
     alpha: Floats | None = None
-    transfer: Callable[[Array], Array] | None = None
-    encoding: str = ""
+    space: ColourSpace = field(default_factory=ColourSpace)
+    step: Floats | float = 0.0
+    is_encoded: bool = False
     is_premultiplied: bool = False
     notes: tuple[str, ...] = ()
 
@@ -83,12 +81,14 @@ class PictureFile:
     """A picture, linear (H, W, 3) in float32, and how it was read, in words.
 
     ``opaque`` (H, W) are the pixels without transparency, ``digest`` is the file's SHA-256. What
-    ``is_encoded`` ends at display white, as in a PNG.
+    ``is_encoded`` ends at display white, as in a PNG. ``rounding`` (3,) is how far the file's steps
+    may move the mean of red, green and blue, if all its values are rounded to one side.
     """
 
     image: Floats
     opaque: NDArray[np.bool_]
     digest: str
+    rounding: Array
     is_encoded: bool = False
     notes: tuple[str, ...] = ()
 
@@ -114,18 +114,18 @@ def read_file(
     elif path.suffix.lower() == ".npy":
         layer = _array(path, is_light=transfer is None)
     else:
-        layer = _bitmap(path, path.suffix.lower())
+        layer = _bitmap(path, path.suffix.lower(), is_stated=transfer is not None)
     # A NaN would pass the later tests: it is neither above nor below.
     wrong = ~np.isfinite(layer.colours)
     if layer.alpha is not None:
         wrong |= ~np.isfinite(layer.alpha)[..., None]
     if wrong.any():
         raise NonFiniteError(f"{word}: {_counted(wrong)} NaN or infinite. Repair the picture.")
-    decode = {"srgb": from_srgb, "linear": None}.get(transfer or "", layer.transfer)
-    image = layer.colours if decode is None else decode(layer.colours.astype(float))
+    space = layer.space if transfer is None else replace(layer.space, curve=STATED[transfer])
+    image = space.light(layer.colours)
     behind = None if over is None else colour_over(over)
     opaque = np.ones(image.shape[:2], bool)
-    notes = [layer.encoding if transfer is None else "", *layer.notes]
+    notes = [*layer.space.notes, *layer.notes]
     if layer.alpha is not None and behind is None and is_mask:
         opaque = layer.alpha >= OPAQUE
         if not opaque.all():
@@ -153,9 +153,21 @@ def read_file(
         image=np.ascontiguousarray(image, np.float32),
         opaque=opaque,
         digest=hashlib.sha256(content).hexdigest(),
-        is_encoded=bool(layer.encoding),
-        notes=tuple(filter(None, notes)),
+        rounding=_rounding(layer, space),
+        is_encoded=layer.is_encoded,
+        notes=tuple(notes),
     )
+
+
+def _rounding(layer: Layer, space: ColourSpace) -> Array:
+    """Return the mean of half the step of light (3,) that a step of the codes makes."""
+    half = np.asarray(layer.step) / 2
+    if not half.any():
+        return np.zeros(3)
+    above = space.light(layer.colours + half)
+    below = space.light(np.maximum(layer.colours - half, 0.0))
+    rounding: Array = np.abs(above - below).mean(axis=(0, 1)) / 2
+    return rounding
 
 
 # --- Alpha -------------------------------------------------------------------------------------
@@ -198,28 +210,30 @@ def _opaque(path: Path, image: Floats, layer: Layer, behind: Array | None) -> Fl
 
 
 def _exr(path: Path, name: str) -> Layer:
-    import OpenEXR  # loaded late: other pictures do not need it
-
-    try:
-        with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
-            parts = [part.name() for part in file.parts]
-            if not parts:  # the library keeps none that it cannot read to its end
-                raise ValueError("it ends too soon, or is damaged")
-            header = dict(file.header())
-            channels = {name: np.array(c.pixels) for name, c in file.channels().items()}
-    except Exception as error:  # the library raises many types for a file that is not EXR
-        raise _unreadable(path, "EXR", error) from error
-    if len(parts) > 1:
-        raise InputError(
-            f"{path}: it has {len(parts)} parts, {', '.join(map(repr, parts))}. Save the picture"
-            " as a file of one part; several layers are allowed."
-        )
+    header = _exr_header(path)
+    sampling = {c.name: (c.xSampling, c.ySampling) for c in header["channels"]}
     prefix = f"{name}." if name else ""
-    if not {f"{prefix}{c}" for c in "RGB"} <= set(channels):
-        raise _without_colours(path, name, channels)
-    colours: Floats = np.stack(
-        [channels[f"{prefix}{c}"].astype(np.float32) for c in "RGB"], axis=-1
-    )
+    names = [f"{prefix}{c}" for c in "RGB"]
+    if not set(names) <= set(sampling):
+        names = [f"{prefix}Y"]
+        if {f"{prefix}RY", f"{prefix}BY"} & set(sampling):
+            raise InputError(
+                f"{path}: its colours are luminance and chroma, {prefix}Y, RY and BY. Save it as R,"
+                " G and B."
+            )
+    if not set(names) <= set(sampling):
+        raise _without_colours(path, name, sampling)
+    for channel in (*names, f"{prefix}A"):
+        x_step, y_step = sampling.get(channel, (1, 1))
+        if (x_step, y_step) != (1, 1):
+            raise InputError(
+                f"{path}: its channel {channel} has one value for {x_step}x{y_step} pixels. Save it"
+                " with a sampling of 1."
+            )
+    channels = _exr_channels(path)
+    is_half = any(channels[channel].dtype == np.float16 for channel in names)
+    colours: Floats = np.stack([channels[channel].astype(np.float32) for channel in names], axis=-1)
+    colours = np.broadcast_to(colours, (*colours.shape[:2], 3))
     alpha = channels.get(f"{prefix}A")
     notes = []
     data = np.array(header["dataWindow"]).tolist()
@@ -229,11 +243,58 @@ def _exr(path: Path, name: str) -> Layer:
         if alpha is not None:
             alpha = _in_window(path, alpha[..., None], data, display)[..., 0]
         notes.append("its data window was put into its display window")
-    primaries = header.get("chromaticities")
-    if primaries is not None and not _are_same(primaries, CHROMATICITIES):
-        colours = _converted(path, colours, primaries)
-        notes.append(f"converted from {_named(primaries)} to BT.709")
-    return Layer(colours=colours, alpha=alpha, is_premultiplied=True, notes=tuple(notes))
+    return Layer(
+        colours=colours,
+        alpha=alpha,
+        space=_known(path, lambda: colour_spaces.of_exr(header)),
+        step=np.abs(colours) * HALF_STEP if is_half else 0.0,
+        is_premultiplied=True,
+        notes=tuple(notes),
+    )
+
+
+def _exr_header(path: Path) -> dict[str, Any]:
+    """Return the header of an EXR file of one part."""
+    import OpenEXR  # loaded late: other pictures do not need it
+
+    try:
+        with _quiet(), OpenEXR.File(str(path), header_only=True) as file:
+            parts = [part.name() for part in file.parts]
+            header = dict(file.header())
+    except Exception as error:  # the library raises many types for a file that is not EXR
+        raise _unreadable(path, "EXR", error) from error
+    if len(parts) > 1:
+        raise InputError(
+            f"{path}: it has {len(parts)} parts, {', '.join(map(repr, parts))}. Save the picture"
+            " as a file of one part; several layers are allowed."
+        )
+    if "deep" in str(header.get("type")):
+        raise InputError(f"{path}: it is deep, with several samples in a pixel. Flatten it.")
+    return header
+
+
+def _exr_channels(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the channels (H, W) of an EXR file of one part."""
+    import OpenEXR
+
+    try:
+        with _quiet(), OpenEXR.File(str(path), separate_channels=True) as file:
+            if not file.parts:  # the library keeps none that it cannot read to its end
+                raise ValueError("it ends too soon, or is damaged")
+            return {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+    except Exception as error:
+        raise _unreadable(path, "EXR", error) from error
+
+
+def _known(path: Path, read: Callable[[], ColourSpace]) -> ColourSpace:
+    """Return a colour space; InputError if it is not one that is read."""
+    try:
+        return read()
+    except ValueError as fault:
+        raise InputError(
+            f"{path}: {fault}. Save it as linear BT.709 or sRGB; `transfer` reads a PNG or JPEG as"
+            " if it named no colour space."
+        ) from fault
 
 
 @contextmanager
@@ -253,12 +314,12 @@ def _quiet() -> Iterator[None]:
 
 
 def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> InputError:
-    layers = sorted({name[:-2] for name in channels if name.endswith(".R")})
+    layers = sorted({name[:-2] for name in channels if name.endswith((".R", ".Y"))})
     if layer and {*"RGB"} <= set(channels):
         return InputError(f"{path}: it has R, G and B but no layer {layer!r}: give {path}.")
     if not layers:
         return InputError(
-            f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B."
+            f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B, or Y."
         )
     where = f"no layer {layer!r}{suggestion(layer, layers)}" if layer else "no channel R"
     return InputError(
@@ -293,105 +354,99 @@ def _in_window(path: Path, values: Floats, data: Any, display: Any) -> Floats:
     return whole
 
 
-def _are_same(primaries: Any, others: Any) -> bool:
-    return bool(max(abs(np.subtract(primaries, others))) <= SAME_PRIMARIES)
-
-
-def _named(primaries: Any) -> str:
-    for name, known in PRIMARIES.items():
-        if _are_same(primaries, known):
-            return name
-    return f"the primaries and white ({', '.join(f'{value:.4g}' for value in primaries)})"
-
-
-def _converted(path: Path, colours: Floats, primaries: Any) -> Floats:
-    """Return linear colours with the primaries of BT.709; those outside it are clipped at 0.
-
-    Whites are adapted by Bradford's matrix, as ICC profiles do.
-    """
-    with np.printoptions():  # which colour-science changes
-        import colour  # loaded late: few pictures need it
-    from colour.adaptation import matrix_chromatic_adaptation_VonKries
-
-    red, green, blue, white = np.reshape(primaries, (4, 2))
-    area = np.linalg.det(np.stack([green - red, blue - red]))
-    if abs(area) < SAME_PRIMARIES or not (white > 0).all():
-        raise InputError(
-            f"{path}: its primaries and white ({', '.join(f'{v:.4g}' for v in primaries)}) span no"
-            " colours. Write the chromaticities of its colour space."
-        )
-    *our_primaries, our_white = np.array(BT709)
-    to_xyz = colour.normalised_primary_matrix(np.stack([red, green, blue]), white)
-    from_xyz = np.linalg.inv(colour.normalised_primary_matrix(np.stack(our_primaries), our_white))
-    adapted = matrix_chromatic_adaptation_VonKries(
-        colour.xy_to_XYZ(white), colour.xy_to_XYZ(our_white), transform="Bradford"
-    )
-    converted: Array = np.maximum(colours @ (from_xyz @ adapted @ to_xyz).T, 0)
-    return converted
-
-
 # --- Other files -------------------------------------------------------------------------------
 
 
 BEGINNINGS = {".hdr": (b"#?",), ".pfm": (b"PF", b"Pf")}
 """What files begin with; a PNG or JPEG is told by its content."""
 
-READERS = {".hdr": picture_formats.hdr, ".pfm": picture_formats.pfm}
-"""How files are read that Pillow does not read."""
+HDR_BITS = 8
+"""Bits of a mantissa."""
 
 PNG_HEADER = 26
 """Bytes that a PNG file begins with; the last two are its bit depth and its kind of colours."""
+
+GREY = 0
+PALETTE = 3
+"""Kinds of a PNG's colours."""
 
 MODES = ("L", "LA", "RGB", "RGBA", "I;16")
 """What Pillow calls the pixels that are read as they are."""
 
 
-def _bitmap(path: Path, suffix: str) -> Layer:
-    """Read a file by Pillow, or by :mod:`fotismos.comparisons.picture_formats`."""
+def _bitmap(path: Path, suffix: str, is_stated: bool) -> Layer:
+    """Read a file by Pillow, or by :mod:`fotismos.comparisons.picture_formats`.
+
+    If its encoding ``is_stated``, what it says about its colours does not count.
+    """
     kind = (suffix or path.name).removeprefix(".").upper()
     with path.open("rb") as stream:
         header = stream.read(PNG_HEADER)
     if not header.startswith(BEGINNINGS.get(suffix, (b"",))):
         raise _unreadable(path, kind, ValueError("it does not begin as one"))
-    is_deep = suffix == ".png" and header[24:25] == b"\x10" and header[25:26] != b"\0"
-    read = picture_formats.deep_png if is_deep else READERS.get(suffix, _by_pillow)
+    space = ColourSpace()
+    notes: tuple[str, ...] = ()
     try:
-        pixels = read(path)
+        if suffix == ".pfm":
+            return _layer(path, picture_formats.pfm(path).astype(float))
+        if suffix == ".hdr":
+            return _radiance(path, picture_formats.hdr(path))
+        with Image.open(path) as file:
+            is_png = file.format == "PNG"
+            bits, of_colours = header[PNG_HEADER - 2 :] if is_png else (8, GREY)
+            if bits == 16 and of_colours != GREY:
+                pixels = picture_formats.deep_png(path)
+            elif is_png and of_colours == GREY and "transparency" in file.info:
+                pixels = picture_formats.grey_png(file, bits)
+            else:
+                pixels = _by_pillow(path, file)
+            if not is_stated:
+                cicp = picture_formats.png_chunk(path, b"cICP") if is_png else None
+                space = _known(path, lambda: colour_spaces.of_bitmap(file, kind, cicp))
+            turn = colour_spaces.turn(file)
     except (OSError, RuntimeError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         raise _unreadable(path, kind, error) from error
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
-    if pixels.dtype.kind == "f":
-        return _layer(path, pixels.astype(float))
-    layer = _layer(path, pixels / float(np.iinfo(pixels.dtype).max))
-    transfer: Callable[[Array], Array] | None = from_srgb
-    gamma = None
-    if suffix == ".png":
-        with Image.open(path) as file:
-            gamma = None if "srgb" in file.info else file.info.get("gamma")
-    encoding = f"read as sRGB, as {kind} files are"
-    if gamma is not None and gamma > 0:
-        encoding = f"read with the gamma of its gAMA chunk, {gamma:g}"
-        if abs(gamma - 1) < SAME_PRIMARIES:
-            transfer = None
-        elif abs(gamma - GAMMA_OF_SRGB) >= SAME_PRIMARIES:
-            exponent = 1 / gamma
-
-            def transfer(values: Array) -> Array:
-                decoded: Array = values**exponent
-                return decoded
-
-    return Layer(colours=layer.colours, alpha=layer.alpha, transfer=transfer, encoding=encoding)
+    if turn is not None:
+        pixels = turn(pixels)
+        notes = ("turned as its EXIF data say",)
+    return replace(
+        _layer(path, pixels / float(np.iinfo(pixels.dtype).max)),
+        space=space,
+        step=1.0 / (2 ** (8 if of_colours == PALETTE else bits) - 1),
+        is_encoded=space.ends_at_white,
+        notes=notes,
+    )
 
 
-def _by_pillow(path: Path) -> NDArray[Any]:
-    with Image.open(path) as file:
-        if file.has_transparency_data and file.mode not in MODES[1::2]:
-            return np.array(file.convert("RGBA"))
-        if file.mode in ("1", "P"):
-            return np.array(file.convert("L" if file.mode == "1" else "RGB"))
-        if file.mode not in MODES:
-            raise InputError(f"{path}: its colours are {file.mode}. Save it as RGB.")
-        return np.array(file)
+def _radiance(path: Path, picture: picture_formats.RadiancePicture) -> Layer:
+    """Return a Radiance picture as the light that it had before its exposures."""
+    values = picture.values.astype(float)
+    factor = picture.exposure * picture.correction
+    _, exponents = np.frexp(values.max(axis=-1, keepdims=True, initial=0.0))
+    notes = ["read half a step above its codes, as Radiance does"]
+    if picture.exposure != 1:
+        notes.append(f"divided by its EXPOSURE, {picture.exposure:g}")
+    if (picture.correction != 1).any():
+        shown = " ".join(f"{number:g}" for number in picture.correction)
+        notes.append(f"divided by its COLORCORR, {shown}")
+    primaries = picture.primaries
+    return replace(
+        _layer(path, values / factor),
+        space=_known(path, lambda: colour_spaces.of_primaries(primaries or CHROMATICITIES)),
+        step=np.ldexp(1.0, exponents - HDR_BITS) / factor,
+        notes=tuple(notes),
+    )
+
+
+def _by_pillow(path: Path, file: Image.Image) -> NDArray[Any]:
+    if file.has_transparency_data and file.mode not in MODES[1::2]:
+        return np.array(file.convert("RGBA"))
+    if file.mode in ("1", "P"):
+        return np.array(file.convert("L" if file.mode == "1" else "RGB"))
+    if file.mode not in MODES:
+        raise InputError(f"{path}: its colours are {file.mode}. Save it as RGB.")
+    return np.array(file)
 
 
 def _array(path: Path, is_light: bool) -> Layer:

@@ -130,12 +130,14 @@ def test_damaged_files_are_refused_in_one_message(suffix, tmp_path, reference, c
     assert "it is not a regular file" in refusal(capfd, [path], reference)
 
 
-GREY = sound()[..., 0]
+GREY = np.ascontiguousarray(sound()[..., 0])  # the library writes strided arrays wrongly
 LAYERED = {f"beauty.{c}": GREY for c in "RGB"}
 WITHOUT_COLOURS = (
-    ({"Z": GREY}, "", "its channels are Z. Give R, G and B."),
-    ({"Y": GREY}, "", "its channels are Y. Give R, G and B."),
-    ({"Y": GREY, "A": GREY}, "", "its channels are A, Y. Give"),
+    ({"Z": GREY}, "", "its channels are Z. Give R, G and B, or Y."),
+    ({"A": GREY}, "", "its channels are A. Give"),
+    ({"Y": GREY, "RY": GREY, "BY": GREY}, "", "are luminance and chroma, Y, RY and BY. Save it as"),
+    ({"x.Y": GREY, "x.RY": GREY, "x.BY": GREY}, ":x", "are luminance and chroma, x.Y, RY and BY"),
+    ({"x.Y": GREY}, "", "it has no channel R. Its layers are x: give"),
     ({"R": GREY, "G": GREY}, "", "its channels are G, R. Give"),
     (LAYERED, "", "Its layers are beauty: give"),
     (LAYERED, ":beuty", "did you mean beauty?"),
@@ -151,6 +153,29 @@ def test_channels_that_are_no_colours_are_refused(
     assert message in refusal(capfd, [f"{tmp_path / 'x.exr'}{layer}"], reference)
 
 
+@pytest.mark.parametrize("channel", "BA")
+def test_channels_with_fewer_samples_are_refused_by_name(channel, tmp_path, reference, capfd):
+    path = tmp_path / "x.exr"
+    exr(path, {"RGB": sound(), "A": np.ones(SIZE, np.float32)})
+    content = path.read_bytes()
+    entry = f"{channel}\0".encode() + bytes([2, 0, 0, 0, 0, 0, 0, 0])
+    place = content.index(entry) + len(entry)
+    path.write_bytes(content[:place] + bytes([2, 0, 0, 0, 2, 0, 0, 0]) + content[place + 8 :])
+    message = refusal(capfd, [path], reference)
+    assert f"its channel {channel} has one value for 2x2 pixels. Save it with" in message
+
+
+def test_an_exr_may_be_grey(tmp_path, reference):
+    """By a channel Y, in a layer or not, as other files of one channel."""
+    exr(tmp_path / "x.exr", {"Y": GREY, "A": np.ones(SIZE, np.float32)})
+    exr(tmp_path / "layer.exr", {"grey.Y": GREY})
+    np.save(tmp_path / "x.npy", GREY)
+    whole = compared([tmp_path / "x.npy"], [reference]).metrics["dE2000"].mean
+    for name in ("x.exr", "layer.exr:grey"):
+        found = compared([f"{tmp_path / name}"], [reference]).metrics["dE2000"].mean
+        assert found == pytest.approx(whole, rel=1e-6)
+
+
 def test_a_window_of_too_many_pixels_is_refused(tmp_path, reference, capfd):
     window = (np.array((0, 0), np.int32), np.array((200_000, 200_000), np.int32))
     exr(tmp_path / "x.exr", {"RGB": sound()}, displayWindow=window)
@@ -164,6 +189,10 @@ def test_files_of_other_colours_or_windows_are_refused(tmp_path, reference, capf
     far = (np.array([50, 50], np.int32), np.array([81, 73], np.int32))
     exr(tmp_path / "primaries.exr", colours, chromaticities=(0.3,) * 8)
     exr(tmp_path / "window.exr", colours, displayWindow=far)
+    samples = np.empty((1, 1), object)
+    samples[0, 0] = np.array([0.1, 0.2], np.float32)
+    deep = {"kind": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
+    exr(tmp_path / "deep.exr", {channel: samples for channel in "RGB"}, **deep)
     header = {"type": OpenEXR.scanlineimage}
     parts = [OpenEXR.Part(dict(header), dict(colours), name) for name in ("left", "right")]
     with OpenEXR.File(parts) as file:
@@ -174,6 +203,7 @@ def test_files_of_other_colours_or_windows_are_refused(tmp_path, reference, capf
     os.mkfifo(tmp_path / "pipe.exr")
     for name, message in {
         "primaries.exr": "span no colours",
+        "deep.exr": "it is deep, with several samples in a pixel. Flatten it.",
         "window.exr": "lies outside its display window",
         "parts.exr": "it has 2 parts, 'left', 'right'. Save the",
         "parts.exr:right": "it has 2 parts, 'left', 'right'",

@@ -12,6 +12,7 @@ from PIL.PngImagePlugin import PngInfo
 
 from fotismos.comparisons import alignment, picture_files, picture_mistakes
 from fotismos.comparisons.case import open_case
+from fotismos.comparisons.colour_spaces import PRIMARIES
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.departure.mapped_sums import Light
@@ -137,7 +138,7 @@ def test_files_say_how_they_are_encoded(rgb, tmp_path):
         assert stated.notes == ()
 
 
-@pytest.mark.parametrize("name", picture_files.PRIMARIES)
+@pytest.mark.parametrize("name", ["BT.2020", "Display P3", "ACEScg", "ACES2065-1"])
 def test_other_primaries_are_converted_by_their_chromaticities(rgb, tmp_path, name):
     """As colour-science converts its own spaces, whites adapted by Bradford's matrix."""
     names = {"BT.2020": "ITU-R BT.2020", "Display P3": "Display P3"}
@@ -146,7 +147,7 @@ def test_other_primaries_are_converted_by_their_chromaticities(rgb, tmp_path, na
     expected = colour.RGB_to_RGB(
         linear, space, "ITU-R BT.709", chromatic_adaptation_transform="Bradford"
     )
-    header = {"chromaticities": picture_files.PRIMARIES[name]}
+    header = {"chromaticities": PRIMARIES[name]}
     found = picture_files.read_file(write(tmp_path / "x.exr", linear, header))
     assert np.abs(linear - expected).max() > 0.05
     np.testing.assert_allclose(found.image, np.maximum(expected, 0), atol=2e-3)

@@ -127,6 +127,12 @@ def from_srgb(encoded: ArrayLike) -> Array:
     return np.where(low, encoded / 12.92, ((np.maximum(encoded, 0.04045) + 0.055) / 1.055) ** 2.4)
 
 
+def from_pq(encoded: ArrayLike) -> Array:
+    """Return the luminance in cd/m², 0 to 10,000, of values from 0 to 1 (ITU-R BT.2100-2)."""
+    power = np.asarray(encoded, np.float64) ** (1 / _PQ_M2)
+    return PQ_PEAK * (np.maximum(power - _PQ_C1, 0) / (_PQ_C2 - _PQ_C3 * power)) ** (1 / _PQ_M1)
+
+
 # --- Formulas ---
 
 
@@ -136,11 +142,10 @@ def rgb_to_xyz(primaries: tuple[tuple[float, float], ...]) -> Array:
 
     It follows from the primaries at full precision: white is exactly D65, so greys have no chroma.
     """
-    xyz = np.array([[x / y, 1.0, (1.0 - x - y) / y] for x, y in primaries])
-    colours = xyz[:-1].T
-    white = xyz[-1]
+    *colours, white = np.array([[x, y, 1.0 - x - y] for x, y in primaries])
+    columns = np.transpose(colours)
     # Columns are the primaries, scaled so that RGB (1, 1, 1) is white.
-    return colours * np.linalg.solve(colours, white)
+    return columns * np.linalg.solve(columns, white / white[1])
 
 
 def xyz_to_lab(xyz: Colours, white: Sequence[float]) -> Colours:

@@ -24,7 +24,6 @@ from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.colour import (
     Array,
     Viewing,
-    luminance,
     rgb_to_xyz,
     times,
     xyz_to_lab,
@@ -41,12 +40,12 @@ SHOWN = 2.118872
 LARGEST = 65504.0
 """Largest value of half floats; HDR-FLIP sees no difference beyond it."""
 
-DARKEST = 1e-9
-"""Luminance, in units of display white, below which a pixel is black: exposing it overflows."""
+DARKEST = 2.0**-23
+"""Luminance, in units of display white, below which all is black: the authors take the rounding of
+single floats near 1."""
 
-MOST_STOPS = 8.0
-"""Most stops between the first and last exposure of HDR-FLIP: each takes as long as FLIP, and the
-authors' program takes 23 if most of the reference is black."""
+# Of BT.709, rounded as the authors have it.
+_LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
 
 # The white of the authors' matrices differs from BT.709's in the fifth digit.
 _PRIMARIES = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.31271, 0.32902))
@@ -101,18 +100,12 @@ def hdr_flip(test: Array, reference: Array, viewing: Viewing) -> Plane:
 def exposures(reference: Array) -> tuple[float, float]:
     """Return the first and last exposure of HDR-FLIP in stops, for a linear image (H, W, 3) ≥ 0.
 
-    ``log2(SHOWN / Y)``, where Y is the largest and the median luminance; if the median is black, it
-    is that of all other pixels. At most `MOST_STOPS` apart; both are 0 for a black image.
+    ``log2(SHOWN / Y)``, where Y is the largest and the median luminance, at least `DARKEST`; of two
+    medians the larger one. They are at most 39 stops apart, and one of a black image.
     """
-    light = luminance(reference)
-    lit = light[light > DARKEST]
-    if not lit.size:
-        return 0.0, 0.0
-    middle = np.median(light)
-    middle = middle if middle > DARKEST else np.median(lit)
-    start = float(np.log2(SHOWN / light.max()))
-    stop = float(np.log2(SHOWN / middle))
-    return start, min(stop, start + MOST_STOPS)
+    light = np.maximum((reference @ _LUMINANCE).ravel(), DARKEST)
+    middle = np.partition(light, light.size // 2)[light.size // 2]
+    return float(np.log2(SHOWN / light.max())), float(np.log2(SHOWN / middle))
 
 
 def _flip(test: Array, reference: Array, viewing: Viewing, curves: Sequence[Curve]) -> Plane:

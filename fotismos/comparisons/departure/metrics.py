@@ -350,9 +350,9 @@ METRICS.own(
         label="HDR-FLIP",
         unit="from 0 to 1, the distance of green and blue",
         definition="The largest LDR-FLIP over exposures from one for the reference's brightest "
-        "light to one for its median (Andersson et al. 2021, ACES). Unlike its authors', they are "
-        "at most 8 stops apart, and black pixels do not count for the median.",
-        caution="Nobody sees all these exposures at once: the worst one counts at each pixel.",
+        "light to one for its median (Andersson et al. 2021, ACES), in steps of at most a stop.",
+        caution="Nobody sees all these exposures at once: the worst one counts at each pixel. If "
+        "most of the reference is black, the last one shows noise of a millionth of white.",
         map_range=(0.0, 1.0),
         rounding=1e-4,
         drawn=False,
