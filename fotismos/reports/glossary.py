@@ -116,6 +116,9 @@ EFFECTS: Terms = {
     ("interreflection",): (
         "Light that reaches a surface from other surfaces. The textbook has ambient light instead."
     ),
+    ("bumps", "shadows or layers of bumps"): (
+        "Shadows that bumps cast on themselves, and maps over maps. The textbook has neither."
+    ),
     ("microfacets and Fresnel",): (
         "Highlights of rough, transparent coats, stronger at grazing angles. Phong’s are not."
     ),

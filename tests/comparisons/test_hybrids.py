@@ -18,7 +18,13 @@ from fotismos.comparisons.hybrids import HybridImages, HybridScenes
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded, prepare
 from fotismos.comparisons.steps import steps
-from fotismos.reference.planning.effects import EXTENDED, INTERREFLECTION, OCCLUSION, labelled
+from fotismos.reference.planning.effects import (
+    BUMPS,
+    EXTENDED,
+    INTERREFLECTION,
+    OCCLUSION,
+    labelled,
+)
 from fotismos.reference.rendering.renderer import Stream, passes
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Source
@@ -26,7 +32,7 @@ from tests.shared import noisy_scenes
 from tests.shared.misplanned import BLACK, DIFFUSE
 from tests.shared.misplanned import scene as described
 from tests.shared.noisy import require_equal, whole
-from tests.shared.parts import camera, moved, shadowed
+from tests.shared.parts import camera, moved, rgb_of, shadowed
 from tests.shared.programs import ROOT
 
 MADE_OF = {
@@ -38,6 +44,40 @@ MADE_OF = {
     "narrow-band-lamp": {"occlusion", "spectral"},
 }  # fmt: skip
 """Effects of scenes that between them have all that the built-in ones have."""
+
+
+def bumpy(shadows=True):
+    """A plate whose one normal is tilted away from a light at its side."""
+    bumps = {
+        "type": "normalmap",
+        "normalmap": rgb_of(0.933, 0.5, 0.75),
+        "use_shadowing_function": shadows,
+        "inner": {"type": "diffuse"},
+    }
+    return {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 2},
+        "sensor": camera((0, 0, 5), up=(0, 1, 0), size=16),
+        "light": {"type": "point", "position": [5, 0, 4], "intensity": 60.0},
+        "plate": {"type": "rectangle", "bsdf": {"type": "twosided", "bumps": bumps}},
+    }
+
+
+def test_shadows_of_bumps_are_the_cause_where_only_they_differ(rgb):
+    """Stock Mitsuba renders the plate without them as the textbook does."""
+    source = Source("bumps", bumpy())
+    options = Options(spp=16)
+    ready = guarded(source, options)
+    found = attribution.find(ready, source, options)
+    removes = {part.effect: part.removes.value for part in found.record.effects}
+    assert max(removes, key=removes.get) == BUMPS.label
+    assert removes[BUMPS.label] > 2
+    assert sum(removes.values()) == pytest.approx(removes[BUMPS.label], rel=1e-3)
+    scenes = HybridScenes(ready.pair, ready.plan, ready.scene)
+    pair = scenes.of(set(scenes.differences) - {BUMPS}), mi.load_dict(bumpy(shadows=False))
+    path = mi.load_dict({"type": "path", "max_depth": 2})
+    without, expected = (np.array(mi.render(scene, integrator=path, spp=64)) for scene in pair)
+    np.testing.assert_allclose(without[6:10, 6:10], expected[6:10, 6:10], rtol=5e-3)
 
 
 # -- Attribution -----------------------------------------------------------------------------------

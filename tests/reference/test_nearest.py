@@ -74,6 +74,12 @@ EXACT = {
     "texture": DIFFUSE,
     "blend": {"type": "blendbsdf", "weight": GREY_CHECKS, "a": OTHER, "b": DIFFUSE},
     "front": {"type": "twosided", "a": DIFFUSE, "b": OTHER},
+    "blend with a back": {
+        "type": "blendbsdf",
+        "weight": 0.25,
+        "a": DIFFUSE,
+        "b": {"type": "twosided", "nested": OTHER},
+    },
     "normal map": {
         "type": "normalmap",
         "normalmap": normal_map,
@@ -297,7 +303,8 @@ def test_two_sides_share_one_form_of_the_lobe_and_one_normal_map():
         (chalk, blinn, "blinn", 0),
         (blinn, chalk, "blinn", 0),
         (phong, blinn, "phong", 1),
-        (chalk, rough, "phong", 2),  # one of them of the bumps by themselves
+        (chalk, rough, "phong", 1),  # the bumps have losses of their own
+        (rough, chalk, "phong", 1),
     ):
         found = material({"type": "twosided", "front": front, "back": back})
         assert (found.form, len(found.lost)) == (form, losses), (front, back)

@@ -340,6 +340,57 @@ def test_what_has_no_pair_is_named_with_what_is_lost(rgb):
     assert {("mirror", "mirror image"), ("beam", "this kind of light")} <= lost
 
 
+SHADOWS = "shadows that bumps cast on themselves"
+
+
+def bitmap():
+    pixels = np.full((2, 2, 3), (0.6, 0.5, 0.9), np.float32)
+    return {"type": "bitmap", "raw": True, "bitmap": mi.Bitmap(pixels)}
+
+
+def mapped(name, plugin="normalmap", inner="diffuse", shadows=True):
+    """A map of bumps around a BSDF, which may be given as the name of its plugin."""
+    inner = {"type": inner} if isinstance(inner, str) else inner
+    own = {"type": plugin, "id": name, "use_shadowing_function": shadows}
+    return own | {"normalmap" if plugin == "normalmap" else "heights": bitmap(), "inner": inner}
+
+
+def of_two(plugin, first, second="diffuse", **more):
+    parts = [{"type": part} if isinstance(part, str) else part for part in (first, second)]
+    return {"type": plugin, "id": "two", "first": parts[0], "second": parts[1], **more}
+
+
+ROUGH = {"type": "roughplastic", "alpha": 0.3}
+LOST = {
+    "normal map": (mapped("map"), {("map", SHADOWS)}),
+    "bump map": (mapped("map", "bumpmap"), {("map", SHADOWS)}),
+    "without shadows": (mapped("map", shadows=False), set()),
+    "twosided": ({"type": "twosided", "inner": mapped("map")}, {("map", SHADOWS)}),
+    "mask": ({"type": "mask", "inner": mapped("map", inner=ROUGH)}, {("map", SHADOWS)}),
+    "maps in maps": (
+        mapped("outer", inner=mapped("inner", "bumpmap"), shadows=False),
+        {("outer", "nested normal maps"), ("inner", SHADOWS)},
+    ),
+    "two lobes": (of_two("blendbsdf", ROUGH, ROUGH, weight=0.5), {("two", "two lobes")}),
+    "two normals": (
+        of_two("blendbsdf", "diffuse", mapped("map", shadows=False), weight=0.5),
+        {("two", "two normals at a point")},
+    ),
+    "front and back": (
+        of_two("twosided", mapped("map", "bumpmap")),
+        {("two", "the normals of the back"), ("map", SHADOWS)},
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_what_each_wrapper_loses_is_recorded_under_its_own_label(name, rgb):
+    bsdf, expected = LOST[name]
+    found = [(loss.name, loss.lost) for loss in pair_of(bsdf).unrepresentable]
+    assert len(found) == len(set(found))
+    assert set(found) == expected
+
+
 def test_a_coefficient_that_is_no_reflectance_and_a_missing_camera_are_named(rgb):
     """Wherever it is noticed: when the pair is derived, or when its halves are made."""
     for name in ("k_a", "k_d", "k_s"):

@@ -36,8 +36,17 @@ it reflects nothing; values are defaults. A plugin without parameters may always
 TRANSMITTANCES = {"principled": {"spec_trans": 0.0}}
 """Parameters with which one of these transmits, unless they are 0."""
 
-WRAPPERS = ("twosided", "mask", "blendbsdf", "normalmap", "bumpmap")
+BUMPS = ("normalmap", "bumpmap")
+WRAPPERS = ("twosided", "mask", "blendbsdf", *BUMPS)
 """Plugins that are made of other BSDFs."""
+
+BUMP_SHADOWS = ("shadows that bumps cast on themselves", "none")
+LAYERED_BUMPS = (
+    ("nested normal maps", "only the outer one"),
+    ("the normals of the back", "those of the front"),
+    ("two normals at a point", "that of the first map"),
+)
+"""What is lost of bumps, and what replaces it: maps in maps, in `twosided`, in `blendbsdf`."""
 
 COLOURS = {
     "diffuse": ("reflectance",),
@@ -54,6 +63,11 @@ PLASTICS = (1.3, 1.8)
 """Indices of refraction of real plastics: fluoropolymers have 1.3, those rich in sulphur 1.76."""
 
 
+def has_bump_shadows(props: mi.Properties) -> bool:
+    """Return whether a BSDF is a map whose bumps cast shadows on themselves, as is usual."""
+    return props.plugin_name() in BUMPS and bool(props.get("use_shadowing_function", True))
+
+
 def give_default(graph: Graph) -> None:
     """Give shapes without a BSDF Mitsuba's default, so it can be paired."""
     for shape in graph.nodes(mi.ObjectType.Shape):
@@ -68,7 +82,8 @@ class NearestPhong:
     """The phong material that replaces a BSDF; with values as in ``reference.scene.values``.
 
     ``lost`` are pairs of something that the textbook model has no form for, and the rule for the
-    rest; ``physical`` are parameters of the BSDF, as engines have them, for users' heuristics.
+    rest; nested BSDFs have their own. ``physical`` are parameters of the BSDF, as engines have
+    them, for users' heuristics.
     """
 
     k_i: Any = 0.0
@@ -158,8 +173,8 @@ Rule = Callable[[Context, int], NearestPhong]
 def to_heuristic(context: Context, replaced: Replacements) -> None:
     """Replace the BSDFs of all shapes by the nearest ``phong``.
 
-    Each BSDF that was not ``phong`` is recorded, with what is lost. Of nested BSDFs the inner ones
-    are recorded, and not those around them.
+    What each BSDF loses is recorded under its label, and the partner of each that was neither
+    ``phong`` nor made of others.
     """
     graph = context.graph
     for shape in graph.nodes(mi.ObjectType.Shape):
@@ -168,9 +183,7 @@ def to_heuristic(context: Context, replaced: Replacements) -> None:
     for index, material in sorted(context.done.items()):
         label = graph.label(index)
         plugin = graph.plugin(index)
-        if plugin in WRAPPERS:
-            continue
-        if plugin != "phong":
+        if plugin not in ("phong", *WRAPPERS):
             is_diffuse = plugin == "diffuse"
             parameters = {"k_d": "reflectance"} if is_diffuse else material.parameters()
             replaced.bsdf(label, plugin, "phong", parameters)

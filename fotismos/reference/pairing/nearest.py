@@ -24,10 +24,20 @@ from fotismos.heuristic.materials import COEFFICIENTS, SMALLEST_ALPHA
 from fotismos.heuristic.terms import normalisation
 from fotismos.reference.pairing import albedo, probe
 from fotismos.reference.pairing.albedo import RoughPlastic
-from fotismos.reference.pairing.bsdfs import TEXTURE, Context, NearestPhong, Rule
+from fotismos.reference.pairing.bsdfs import (
+    BUMP_SHADOWS,
+    LAYERED_BUMPS,
+    TEXTURE,
+    Context,
+    NearestPhong,
+    Rule,
+    has_bump_shadows,
+)
 from fotismos.reference.pairing.factors import Convention, exponent_of
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph, Reference
+
+NESTED_MAPS, OTHER_NORMALS_BEHIND, TWO_NORMALS = LAYERED_BUMPS
 
 SMOOTH_ALPHA = 0.05
 """Replaces a smaller roughness: a mirror's lobe has no width, and the model's light no extent. The
@@ -340,7 +350,7 @@ def twosided(context: Context, index: int) -> NearestPhong:
     graph = context.graph
     inner = context.inner(index)
     if len(inner) == 1:
-        return replace(inner[0], twosided=True)
+        return replace(inner[0], twosided=True, lost=())
     front, back = alike(graph, inner[0], inner[1])
     sided = {
         name: values.sides(graph, getattr(front, name), getattr(back, name))
@@ -352,17 +362,18 @@ def twosided(context: Context, index: int) -> NearestPhong:
     }
     # A phong has one form of the lobe and one tilt of the normal for both sides.
     lobes = [side for side in (front, back) if not values.is_zero(side.k_s)]
-    lost = front.lost + back.lost
+    form = lobes[0].form if lobes else front.form
+    lost = []
     if len({side.form for side in lobes}) > 1:
-        lost += (("another form of the lobe behind", f"{front.form} on both sides"),)
-    if back.tilt is not None and back.tilt is not front.tilt:
-        lost += (("the normals of the back", "those of the front"),)
+        lost.append(("another form of the lobe behind", f"{form} on both sides"))
+    if not _are_tilted_alike(graph, front, back):
+        lost.append(OTHER_NORMALS_BEHIND)
     return replace(
         front,
         **sided,
-        form=lobes[0].form if lobes else front.form,
+        form=form,
         twosided=True,
-        lost=lost,
+        lost=tuple(lost),
         physical=physical,
     )
 
@@ -378,42 +389,67 @@ def mask(context: Context, index: int) -> NearestPhong:
     passed = values.total(
         graph, values.rest(graph, 1.0, opacity), values.share(graph, inner.transmittance, opacity)
     )
-    return replace(inner, **reflected, transmittance=passed)
+    return replace(inner, **reflected, transmittance=passed, lost=())
 
 
 def blend(context: Context, index: int) -> NearestPhong:
     """``blendbsdf``: each coefficient, and the exponent, blended by the weight.
 
-    Exact if only one of the two has a lobe, or if the weight is 0 or 1.
+    Exact if only one of the two has a lobe and both have the same normal, or if the weight is 0 or
+    1.
     """
     graph = context.graph
     inner = context.inner(index)
     first, second = alike(graph, inner[0], inner[1])
+    if first.twosided != second.twosided:
+        first = _twosided(graph, first)
+        second = _twosided(graph, second)
     weight = context.value(index, "weight", 0.5)
     mixed = {
         name: values.blend(graph, getattr(first, name), getattr(second, name), weight)
         for name in (*COEFFICIENTS, "transmittance")
     }
-    lost: tuple[tuple[str, str], ...] = ()
+    lost = []
     lobes = [material for material in (first, second) if not values.is_zero(material.k_s)]
     if len(lobes) == 2:
         mixed["n"] = values.blend(graph, first.n, second.n, weight)
-        lost = (("two lobes", "one, of the blended exponent and coefficient"),)
+        lost.append(("two lobes", "one, of the blended exponent and coefficient"))
         form = first.form
     else:
         mixed["n"], form = (lobes[0].n, lobes[0].form) if lobes else (1.0, "phong")
+    if not _are_tilted_alike(graph, first, second):
+        lost.append(TWO_NORMALS)
     return NearestPhong(
         **mixed,
         form=form,
         normalised=first.normalised,
-        twosided=first.twosided or second.twosided,
+        twosided=first.twosided,
         tilt=first.tilt or second.tilt,
-        lost=first.lost + second.lost + lost,
+        lost=tuple(lost),
         physical={
             name: values.blend(graph, value, second.physical[name], weight)
             for name, value in first.physical.items()
         },
     )
+
+
+def _are_tilted_alike(graph: Graph, first: NearestPhong, second: NearestPhong) -> bool:
+    """Return whether two materials have the same normals; of two maps, if they share a texture."""
+    if first.tilt is None or second.tilt is None:
+        return first.tilt is second.tilt
+    return bool(graph.props(first.tilt.index()) == graph.props(second.tilt.index()))
+
+
+def _twosided(graph: Graph, material: NearestPhong) -> NearestPhong:
+    """Return a material as a two-sided one, whose back is black if it had none."""
+    if material.twosided:
+        return material
+    front = {
+        name: values.sides(graph, getattr(material, name), 0.0)
+        for name in COEFFICIENTS
+        if not values.is_zero(getattr(material, name))
+    }
+    return replace(material, **front, twosided=True)
 
 
 def normal_map(context: Context, index: int) -> NearestPhong:
@@ -456,14 +492,14 @@ def _require(context: Context, index: int, texture: Any, ability: str, what: str
 
 def _tilted(context: Context, index: int, **parameters: Any) -> NearestPhong:
     (inner,) = context.inner(index)
-    lost = inner.lost
-    if context.value(index, "use_shadowing_function", True):
-        lost += (("shadows that mapped bumps cast on each other", "none"),)
+    lost = []
+    if has_bump_shadows(context.graph.props(index)):
+        lost.append(BUMP_SHADOWS)
     parameters["flip"] = context.value(index, "flip_invalid_normals", True)
     if inner.tilt is not None:
-        lost += (("nested normal maps", "only the outer one"),)
+        lost.append(NESTED_MAPS)
     tilt = values.node(context.graph, "heuristic_tilt", **parameters)
-    return replace(inner, tilt=tilt, lost=lost)
+    return replace(inner, tilt=tilt, lost=tuple(lost))
 
 
 RULES: dict[str, Rule] = {

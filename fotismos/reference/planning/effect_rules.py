@@ -12,8 +12,13 @@ import mitsuba as mi
 
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.pairing import lights
-from fotismos.reference.pairing.bsdfs import WRAPPERS, is_mirror
-from fotismos.reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
+from fotismos.reference.pairing.bsdfs import (
+    LAYERED_BUMPS,
+    WRAPPERS,
+    has_bump_shadows,
+    is_mirror,
+)
+from fotismos.reference.planning.facts import BSDF, EMITTER, SHAPE, Facts, sides
 from fotismos.reference.scene.graph import Graph, graft
 
 # --- Terms of the heuristic kernel -----------------------------------------------------------
@@ -194,18 +199,76 @@ def ambient_light(phong: mi.Properties, facts: Facts) -> dict[str, Any]:
 # --- Surfaces that differ in form ------------------------------------------------------------
 
 
+def _materials(graph: Graph, shape: int) -> list[int]:
+    """Return the BSDFs of a shape, and all that are nested in them."""
+    return [
+        index
+        for _, bsdf in graph.children(shape, BSDF)
+        for index in graph.nodes_in_use(bsdf)
+        if graph.kind(index) == BSDF
+    ]
+
+
 def inexact_surfaces(facts: Facts, opaque: bool) -> list[int]:
-    """Find the opaque shapes, or the others, whose two BSDFs differ; diffuse ones do not."""
+    """Find the opaque shapes, or the others, whose two BSDFs differ; diffuse ones do not.
+
+    What differs of bumps is an effect of its own.
+    """
     graph = facts.pair.physical
     surfaces = []
     for shape in graph.nodes(SHAPE):
-        shape_facts = facts.by_name.get(graph.props(shape).id())
-        for _, bsdf in graph.children(shape, BSDF):
-            inner = [child for _, child in graph.children(bsdf, BSDF)] or [bsdf]
-            is_exact = all(graph.plugin(index) == "diffuse" for index in inner)
-            if not is_exact and (shape_facts is None or shape_facts.opaque) is opaque:
-                surfaces.append(shape)
+        materials = _materials(graph, shape)
+        inner = [index for index in materials if graph.plugin(index) not in WRAPPERS]
+        is_exact = all(graph.plugin(index) == "diffuse" for index in inner)
+        is_masked = any(graph.plugin(index) == "mask" for index in materials)
+        is_opaque = not is_masked and all(sides(graph, index)[0] for index in inner)
+        if not is_exact and is_opaque is opaque:
+            surfaces.append(shape)
     return surfaces
+
+
+def lossy_bumps(facts: Facts) -> list[int]:
+    """Find the shapes with bumps of which the textbook half lacks shadows or layers."""
+    graph = facts.pair.physical
+    layered = _layered_bumps(facts)
+    return [
+        shape
+        for shape in graph.nodes(SHAPE)
+        if any(
+            index in layered or has_bump_shadows(graph.props(index))
+            for index in _materials(graph, shape)
+        )
+    ]
+
+
+def _layered_bumps(facts: Facts) -> set[int]:
+    """Return the BSDFs of which the textbook half has only one of several maps."""
+    graph = facts.pair.physical
+    names = {
+        loss.name
+        for loss in facts.pair.unrepresentable
+        if (loss.lost, loss.nearest) in LAYERED_BUMPS
+    }
+    return {index for index in graph.nodes(BSDF) if graph.label(index) in names}
+
+
+def put_bumps(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
+    """Take the shadows of bumps from shapes; those with layers get the textbook half's material."""
+    layered = _layered_bumps(facts)
+    for shape in shapes:
+        materials = _materials(graph, shape)
+        if layered.intersection(materials):
+            put_materials(graph, facts, [shape])
+        for index in materials:
+            if has_bump_shadows(graph.props(index)):
+                graph.props(index)["use_shadowing_function"] = False
+
+
+def has_lossy_bumps(facts: Facts) -> tuple[bool, str]:
+    """Whether bumps have shadows, or maps lie over others."""
+    if lossy_bumps(facts):
+        return True, "a map's bumps have shadows, or maps lie over each other"
+    return False, "no map's bumps have shadows, and no maps lie over each other"
 
 
 def put_materials(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:

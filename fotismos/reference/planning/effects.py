@@ -247,6 +247,18 @@ ENVIRONMENT = GlowingEffect(
 
 # --- Surfaces that differ in form: reflection and transmission -------------------------------
 
+BUMPS = ReplacedEffect(
+    label="bumps",
+    noun="shadows or layers of bumps",
+    heuristic="one normal at a point",
+    reference="shadowed bumps, maps over maps",
+    cost="a factor per map",
+    rule=_late("effect_rules:has_lossy_bumps"),
+    colour="#661100",
+    sites=_late("effect_rules:lossy_bumps"),
+    put=_late("effect_rules:put_bumps"),
+)
+
 MICROFACETS = ReplacedEffect(
     label="microfacets and Fresnel",
     heuristic="none",
@@ -312,6 +324,7 @@ EFFECTS: tuple[Effect, ...] = (
     CONE,
     POLYGONS,
     OCCLUSION,
+    BUMPS,
     MICROFACETS,
     EXTENDED,
     ENVIRONMENT,

@@ -183,7 +183,7 @@ class ShapeFacts:
         shown = geometry(shape)
         nested = graph.children(index, BSDF) if index is not None else []
         bsdf = nested[0][1] if nested else None  # an instance has its group's
-        opaque, front, back = _sides(graph, bsdf)
+        opaque, front, back = sides(graph, bsdf)
         return cls(
             name=shape.id(),
             low=np.array(box.min, float).ravel(),
@@ -251,13 +251,14 @@ def _is_sampled_as_hit(graph: Graph, index: int | None, shape: mi.Shape) -> bool
     return index is not None and is_round and bool(np.linalg.det(matrix) > 0)
 
 
-def _sides(graph: Graph, bsdf: int | None) -> tuple[bool, bool, bool]:
+def sides(graph: Graph, bsdf: int | None) -> tuple[bool, bool, bool]:
+    """Return whether a BSDF only reflects, and whether its front and its back may reflect."""
     if bsdf is None:
         return False, True, True
     plugin = graph.plugin(bsdf)
     props = graph.props(bsdf)
     if plugin == "twosided":
-        inner = [_sides(graph, child) for _, child in graph.children(bsdf, BSDF)]
+        inner = [sides(graph, child) for _, child in graph.children(bsdf, BSDF)]
         reflects = any(front or back for _, front, back in inner)
         return bool(inner) and all(side[0] for side in inner), reflects, reflects
     reflectances = REFLECTANCES.get(plugin)
