@@ -37,6 +37,7 @@ from fotismos.reference.rendering.gbuffer import (
 from fotismos.reference.rendering.integrators import SAMPLER, STOCK_SAMPLER
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
 from fotismos.reference.rendering.sampler import with_sampler
+from fotismos.reference.scene.checks import require_frames
 from fotismos.reference.scene.source import Source
 
 if TYPE_CHECKING:  # few comparisons have pictures
@@ -172,14 +173,17 @@ class Prepared:
 
     def require_light(self, test: np.ndarray, reference: np.ndarray) -> str:
         """Return why the error of linear images (H, W, 3) may mean nothing; see :func:`caution`."""
-        return caution(
-            test[self.counted],
-            reference[self.counted],
-            name=self.source.name,
-            allow_empty=self.options.allow_empty,
-            is_picture=bool(self.options.image),
-            exposure=self.options.viewing.exposure,
-        )
+        try:
+            return caution(
+                test[self.counted],
+                reference[self.counted],
+                name=self.source.name,
+                allow_empty=self.options.allow_empty,
+                is_picture=bool(self.options.image),
+                exposure=self.options.viewing.exposure,
+            )
+        except InputError as error:  # a warning may name the reason
+            raise InputError(" ".join([str(error), *self.pair.warnings])) from error
 
     def plan_record(self, passes: int) -> Plan:
         """Return the plan with the samples and passes that were rendered."""
@@ -251,6 +255,7 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
     pair = pair_for(source, options)
     sampler = STOCK_SAMPLER if options.everything else SAMPLER
     physical = with_sampler(pair.physical, sampler).instantiate()
+    require_frames(source.name, physical)
     width, height = image_size(physical)
     if given is not None and given.mask is not None:
         pictures.require_size_of_mask(options, given.mask, (width, height))

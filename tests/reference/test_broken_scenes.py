@@ -23,7 +23,7 @@ from fotismos.comparisons.fit.fit import fit
 from fotismos.comparisons.options import LARGEST_SPP, Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.study import design
-from fotismos.heuristic.errors import FotismosError, InputError
+from fotismos.heuristic.errors import FotismosError, InputError, NonFiniteError
 from fotismos.reference.rendering.renderer import LARGEST_PASS
 from fotismos.reference.scene.source import Source
 from fotismos.reports import verdict
@@ -84,6 +84,90 @@ def test_what_mitsuba_renders_is_not_refused(rgb, tmp_path):
         assert images.reference.max() > 0
 
 
+OBJ_OF_QUAD = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvn 0 0 1\n"
+PARTLY = r"bad\.obj: the face in line {} names no normal, .* or set face_normals"
+UNDEFINED = {
+    "second": ("f 1//1 2//1 3//1\nf 1 3 4\n", 8),
+    "first": ("f 1/1 2/1 3/1\nf 1/1/1 3/1/1 4/1/1\n", 7),
+    "none": ("f 1 2 3\nf 1 3 4", 7),
+    "empty": ("f 1//1 2//1 3//1\nf 1/1/ 3/1/ 4/1/\n", 8),
+    "zero": ("f 1//1 2//1 3//0\nf 1//1 3//1 4//1\n", 7),
+}
+
+
+@pytest.mark.parametrize("name", UNDEFINED)
+def test_faces_without_normals_in_a_file_that_has_some_are_refused(name, rgb, tmp_path):
+    """Mitsuba 3.9 leaves what it does not read as it finds it in memory."""
+    faces, line = UNDEFINED[name]
+    path = tmp_path / "bad.obj"
+    path.write_text(OBJ_OF_QUAD + faces, encoding="utf-8")
+    shown = changed('"sphere">', f'"obj"><string name="filename" value="{path}"/>')
+    with pytest.raises(InputError, match=PARTLY.format(line)):
+        compared(tmp_path, shown)
+    even = shown.replace(f'"{path}"/>', f'"{path}"/><boolean name="face_normals" value="true"/>')
+    assert np.isfinite(compared(tmp_path, even).images.normal).all()
+
+
+def quad(folder, **rows):
+    """Write a PLY of two triangles, of which the first vertex has other values."""
+    names = ("x", "y", "z", "nx", "ny", "nz", "u", "v")
+    points = [(x, y, 0, 0, 0, 1, x, y) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    points[0] = tuple(rows.get(name, value) for name, value in zip(names, points[0], strict=True))
+    head = "".join(f"property float {name}\n" for name in names)
+    path = folder / "quad.ply"
+    path.write_bytes(
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 4\n" + head.encode()
+        + b"element face 2\nproperty list uchar int vertex_indices\nend_header\n"
+        + b"".join(struct.pack("<8f", *point) for point in points)
+        + b"".join(struct.pack("<B3i", 3, *face) for face in ((0, 1, 2), (0, 2, 3)))
+    )  # fmt: skip
+    return f'"ply" id="quad"><string name="filename" value="{path}"/>'
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ({"nz": 0.0}, "quad: the normal of vertex 0 is "),
+        ({"nz": np.nan}, "quad: the normal of vertex 0 is "),
+        ({"u": np.inf}, "quad: the texture coordinate of vertex 0 is "),
+    ],
+)
+def test_meshes_without_shading_frames_are_refused_by_name(rows, message, rgb, tmp_path):
+    with pytest.raises(InputError, match=message):
+        compared(tmp_path, changed('"sphere">', quad(tmp_path, **rows)))
+    # A long one is normalised.
+    found = compared(tmp_path, changed('"sphere">', quad(tmp_path, nz=5.0))).images
+    assert np.linalg.norm(found.normal[found.counted], axis=1) == pytest.approx(1, abs=1e-5)
+
+
+def test_normals_that_only_rays_show_are_named_with_their_shape(rgb, tmp_path):
+    """A mesh within a group, which no scene lists."""
+    group = f'<shape type="shapegroup" id="group"><shape type={quad(tmp_path, nz=0.0)}</shape>'
+    whole = SCENE.replace(
+        END, f'{group}</shape><shape type="instance" id="copy"><ref id="group"/></shape>{END}'
+    )
+    whole = re.sub(r'(?s)<shape type="sphere">.*?</shape>', "", whole, count=1)
+    with pytest.raises(NonFiniteError, match=r"copy: .* without a finite normal"):
+        compared(tmp_path, whole)
+
+
+@pytest.mark.parametrize("mirror", ['<scale x="-1"/>', '<scale value="-1"/>', ""])
+def test_a_mirrored_sphere_is_named_beside_others_and_alone(mirror, rgb, tmp_path):
+    """Its normals point inwards, so it is black from outside, unless they are flipped."""
+    own = f'<transform name="to_world">{mirror}</transform>'
+    own = own if mirror else '<float name="radius" value="-1"/>'
+    dark = changed('"sphere">', f'"sphere" id="ball">{own}')
+    said = "ball: a transform or a negative radius mirrors the sphere"
+    assert [said in line for line in compared(tmp_path, dark).record.warnings] == [True]
+    alone = re.sub(r'(?s)<shape type="rectangle">.*?</shape>', "", dark)
+    alone = re.sub(r'  <emitter type="constant".*\n', "", alone)
+    with pytest.raises(InputError, match=rf"both pictures are black.*{said}"):
+        compared(tmp_path, alone)
+    flip = f'"ball"><boolean name="flip_normals" value="true"/>{own}'
+    right = alone.replace(f'"ball">{own}', flip)
+    assert not compared(tmp_path, right).record.warnings
+
+
 AWAY = SCENE.replace('target="0, 0, 0"', 'target="0, -9, 3"')
 
 
@@ -125,7 +209,10 @@ def test_doubts_about_pictures_are_told_from_their_values():
     black, grey = np.zeros((4, 5, 3)), np.where(seen[..., None], (0.2, 0.3, 0.4), 0.0)
 
     def view(counted):
-        return SimpleNamespace(counted=counted, options=Options(), source=Source("a", None))
+        pair = SimpleNamespace(warnings=())
+        return SimpleNamespace(
+            counted=counted, options=Options(), source=Source("a", None), pair=pair
+        )
 
     def doubt(test, reference):
         return Prepared.require_light(view(seen), test, reference)

@@ -198,13 +198,32 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
             misses=tuple(replaced.misses),
         ),
         unrepresentable=tuple(dict.fromkeys(replaced.lost)),
-        warnings=(*spectra.doubts(graph), *_energy_warnings(half), *model.remarks),
+        warnings=(
+            *spectra.doubts(graph),
+            *_energy_warnings(half),
+            *_mirrored_spheres(graph),
+            *model.remarks,
+        ),
         integrator=settings.integrator,
         rr_depth=settings.rr_depth,
         media=media,
         overridden=tuple(settings.overridden),
         shading=model.name,
     )
+
+
+def _mirrored_spheres(graph: Graph) -> Iterator[str]:
+    for index in graph.nodes(SHAPE, "sphere"):
+        props = graph.props(index)
+        matrix = np.array(props.get("to_world", mi.ScalarTransform4f()).matrix, float)
+        is_mirrored = np.linalg.det(matrix[:3, :3]) * props.get("radius", 1.0) < 0
+        bsdfs_of = [graph.plugin(child) for _, child in graph.children(index, BSDF)]
+        if is_mirrored and not props.get("flip_normals", False) and "twosided" not in bsdfs_of:
+            yield (
+                f"{graph.label(index)}: a transform or a negative radius mirrors the sphere, so in"
+                " Mitsuba its normals point inwards, and a surface of one side is black from"
+                " outside. Take the mirroring away, or set flip_normals."
+            )
 
 
 def _energy_warnings(graph: Graph) -> Iterator[str]:

@@ -11,7 +11,8 @@ import numpy as np
 
 import fotismos.reference.scene  # noqa: F401  it gives Mitsuba a variant
 from fotismos.heuristic.convention import Scene
-from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.errors import InputError, NonFiniteError
+from fotismos.reference.rendering.finite import wrong_pixels
 
 GRID = 192
 """Rays along each side for means over visible surfaces: some 37,000, enough for three digits."""
@@ -117,6 +118,11 @@ def gbuffer(scene: Scene, size: tuple[int, int] = (GRID, GRID)) -> GBuffer:
     # An instance stands for all shapes of its group.
     shape = dr.select(si.instance != None, si.instance, si.shape)  # noqa: E711  of pointers
     shapes = _object_ids(shape, seen)
+    right = np.isfinite(normals)
+    if not right.all():
+        owner = shapes.names[shapes.places[~right.all(axis=2)][0]]
+        wrong = wrong_pixels(normals, right, "without a finite normal")
+        raise NonFiniteError(f"{owner}: {wrong}. Correct the normals of that shape.")
     return GBuffer(
         position=points,
         normal=normals,

@@ -1,11 +1,13 @@
 """Values of a scene that Mitsuba renders in silence, or that end the process.
 
 Mitsuba rejects some values that make no sense, and renders others: a sphere of radius NaN is
-missing, an infinite index of refraction is black.
+missing, an infinite index of refraction is black, a normal that is not finite leaves NaN.
 """
 
+import re
 from collections.abc import Iterator
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import mitsuba as mi
@@ -23,6 +25,15 @@ FILM_SIZE = (768, 576)
 
 SMALLEST_RATIO = 1e-14
 """Ratio of singular values of a matrix with rows and columns of length 1; less is rounding."""
+
+SQUARES = 1e-18, 1e18
+"""Lengths of vertex normals between which Mitsuba can normalise them in single precision."""
+
+WITH_NORMALS = re.compile(rb"^[ \t]*vn\s", re.MULTILINE)
+WITHOUT_NORMALS = re.compile(
+    rb"^[ \t]*f[ \t]+(?:[^\s/]+(?:/[^\s/]*)?|[^\n]*/[^\s/]*/0*)(?=\s|\Z)", re.MULTILINE
+)
+"""Lines of an OBJ: a normal; a face whose first vertex names none, or any of them an empty one."""
 
 PICTURES = ("filename", "bitmap", "data")
 CHILDREN = {"blendbsdf": (mi.ObjectType.BSDF, 2), "volume": (mi.ObjectType.Volume, 1)}
@@ -204,6 +215,8 @@ def damage(graph: Graph, index: int) -> str:
     # A file that is written again has another stamp, and is examined again.
     stamp = state.st_mtime_ns, state.st_size, mi.variant()
     fault = _wrong_mesh(plugin, str(path), number=number, stamp=stamp)
+    if not fault and plugin == "obj" and not graph.props(index).get("face_normals", False):
+        fault = _lacks_normals(str(path), stamp)
     return f"{path}: {fault} Write the file again." if fault else ""
 
 
@@ -230,3 +243,47 @@ def _wrong_mesh(plugin: str, path: str, number: int, stamp: tuple[Any, ...]) -> 
             f" {np.count_nonzero(lost)} vertices in all."
         )
     return ""
+
+
+@lru_cache(maxsize=1024)
+def _lacks_normals(path: str, stamp: tuple[Any, ...]) -> str:
+    """Return which face of an OBJ has no normals while the file has some; empty if none."""
+    content = Path(path).read_bytes()
+    face = WITHOUT_NORMALS.search(content)
+    if not face or not WITH_NORMALS.search(content):
+        return ""
+    line = content.count(b"\n", 0, face.start()) + 1
+    return (
+        f"the face in line {line} names no normal, and the file has some: Mitsuba leaves those of"
+        " its vertices undefined. Give normals to all faces or to none, or set face_normals."
+    )
+
+
+def require_frames(name: str, scene: mi.Scene) -> None:
+    """Reject a mesh whose normals or texture coordinates give no shading frame, by its name."""
+    for mesh in scene.shapes():
+        if not mesh.is_mesh():
+            continue
+        normals = meshes.rows(mesh, meshes.NORMALS)
+        places = meshes.rows(mesh, meshes.TEXCOORDS)
+        if normals is not None:
+            lengths = np.linalg.norm(normals.astype(float), axis=1)
+            low, high = SQUARES
+            _require_vertices(name, mesh, "normal", normals, (low < lengths) & (lengths < high))
+        if places is not None:
+            is_finite = np.isfinite(places).all(axis=1)
+            _require_vertices(name, mesh, "texture coordinate", places, is_finite)
+
+
+def _require_vertices(
+    name: str, mesh: mi.Mesh, what: str, rows: np.ndarray, is_right: np.ndarray
+) -> None:
+    if is_right.all():
+        return
+    used = np.unique(meshes.rows(mesh, meshes.FACES))
+    wrong = used[~is_right[used]]
+    if wrong.size:
+        raise InputError(
+            f"{name}: {mesh.id()}: the {what} of vertex {wrong[0]} is {rows[wrong[0]].tolist()},"
+            f" one of {wrong.size} that cannot be used. Give each vertex a finite one, or none any."
+        )
