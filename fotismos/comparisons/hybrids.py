@@ -17,6 +17,7 @@ from typing import Any
 
 import mitsuba as mi
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from fotismos.comparisons.comparison import CAUSES
@@ -32,6 +33,7 @@ from fotismos.reference.planning.effects import (
     ENVIRONMENT,
     ONE_INTENSITY,
     POLYGONS,
+    PRUNED,
     SPECTRAL,
     Effect,
     GlowingEffect,
@@ -150,6 +152,14 @@ class HybridScenes:
         """Return the effects among them that change the scene."""
         return IN_SCENE & set(simulated) & set(self.differences)
 
+    def rendered_alike(self, simulated: Set[Effect]) -> frozenset[Effect]:
+        """Return the effects that all images of one rendering share.
+
+        Where light passes surfaces, shadow rays are those of `volpath`, which makes one image.
+        """
+        in_transport = frozenset(PRUNED) if self.facts.lets_straight_through else frozenset()
+        return self.key(simulated) | (in_transport & set(simulated))
+
     def transport(self, sets: Sequence[Set[Effect]], spp: int) -> Renderer:
         """Return the renderer of transported light, with an image for each set of effects.
 
@@ -159,6 +169,10 @@ class HybridScenes:
         # Every image has what the halves treat alike: only their differences are left out.
         alike = set(EFFECTS) - set(self.differences)
         plans = [self.plan.directly().simulating(alike | set(simulated)) for simulated in sets]
+        if self.facts.lets_straight_through and plans[0].shadows:
+            through = replace(plans[0], integrator=self.plan.stock_integrator)
+            integrator = physical_integrator(through, scene, self.pair.hide_emitters)
+            return Renderer(scene, integrator, pass_spp=spp, label="image of some effects")
         integrator = physical_integrator(plans[0], scene, self.pair.hide_emitters)
         integrator.transports = tuple(
             Transport(plan.shadows, plan.bsdf_samples, plan.max_depth) for plan in plans
@@ -327,7 +341,7 @@ class HybridImages:
         scenes = self._scenes[self._variant]
         # Only the first image has the weight that the camera gives to light.
         is_weighted = "spectral" in name or scenes.facts.camera.plugin not in UNWEIGHTED
-        return name, effects if is_weighted else scenes.key(effects)
+        return name, effects if is_weighted else scenes.rendered_alike(effects)
 
     def _rendered(self, sets: Sequence[frozenset[Effect]], progress: Progress) -> list[Floats]:
         """Render images of one scene, in their variant, which is current."""

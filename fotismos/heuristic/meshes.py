@@ -44,6 +44,28 @@ def rows(mesh: Mesh, part: str) -> Array:
     return flat.reshape(-1, 2 if part == TEXCOORDS else 3)
 
 
+def mean_normals(mesh: Mesh) -> tuple[Array, Array]:
+    """Return the means over a mesh's surface of the normals of faces, and of vertices, (3,) each.
+
+    Faces are turned to the side of their vertices' normals, which tell what side shines. Without
+    these, both means are those of the faces.
+    """
+    corners = rows(mesh, FACES)
+    first, second, third = (rows(mesh, POSITIONS).astype(float)[corners[:, i]] for i in range(3))
+    across = np.cross(second - first, third - first)
+    areas = np.linalg.norm(across, axis=1)
+    turn = -1 if mesh.has_flipped_normals() else 1
+    smooth = across * turn
+    if mesh.has_vertex_normals():
+        of_vertices = rows(mesh, NORMALS).astype(float)[corners].mean(axis=1) * turn
+        across = across * np.sign(np.sum(across * of_vertices, axis=1, keepdims=True))
+        smooth = of_vertices * areas[:, None]
+    else:
+        across = smooth
+    total = max(areas.sum(), 1e-300)
+    return across.sum(axis=0) / total, smooth.sum(axis=0) / total
+
+
 def new_mesh(
     name: str,
     positions: Position,

@@ -96,7 +96,12 @@ def share(record: ComparisonRecord, threshold: float = TOLERANCE) -> VisibleShar
 def decision(
     record: ComparisonRecord, threshold: float = TOLERANCE, bound: float = LIMIT
 ) -> Verdict:
-    """Return whether a scene passes, fails, or is undecided: at most ``bound`` may differ."""
+    """Return whether a scene passes, fails, or is undecided: at most ``bound`` may differ.
+
+    While its numbers may mean nothing, it is undecided.
+    """
+    if record.caution:
+        return "undecided"
     visible = record.metrics[LEADING.name].visible
     return decide(visible, threshold, bound, is_certain=record.significant.certain)
 

@@ -1,5 +1,6 @@
 """Scenes in which Mitsuba's integrators disagree: what the plan renders, and what is said of it."""
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -134,6 +135,44 @@ def test_a_shape_seen_through_both_sides_of_a_hidden_lamp_is_warned_of(rgb):
         assert ready.caution() == ""
         is_override = "integrator" in {entry.what for entry in ready.overridden}
         assert is_override is (ready.plan.integrator == "volpath")
+
+
+CORNERS = ((-0.3, -0.3, 3), (-0.3, 0.3, 3), (0.3, 0.3, 3), (0.3, -0.3, 3))
+"""Of a square that faces down."""
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize(("degrees", "is_right"), [(0, True), (0.3, True), (5, False), (50, False)])
+def test_the_verdict_waits_where_a_lamps_normals_are_tilted(rgb, tmp_path, degrees, is_right):
+    """Mitsuba samples it by them. Samples of the BSDF alone, and the spot, are as without tilt."""
+    tilt = np.deg2rad(degrees)
+    rows = [f"v {x} {y} {z}" for x, y, z in CORNERS]
+    rows.append(f"vn {np.sin(tilt):.6f} 0 {-np.cos(tilt):.6f}")
+    rows += ["f 1//1 2//1 3//1", "f 1//1 3//1 4//1"]
+    (tmp_path / "lamp.obj").write_text("\n".join(rows), encoding="utf-8")
+    shape = {"type": "obj", "filename": str(tmp_path / "lamp.obj"), "bsdf": BLACK}
+    described = scene(
+        (0, -6, 1.5),
+        integrator={"type": "path", "max_depth": 2},
+        size=16,
+        lamp=shape | {"emitter": {"type": "area", "radiance": 10.0}},
+        floor={"type": "rectangle", "to_world": moved((0, 0, 0), 2), "bsdf": DIFFUSE},
+    )
+    source = Source("a test", described)
+    ready = prepare(source, Options(spp=64))
+    (spot,) = ready.pair.heuristic.nodes(mi.ObjectType.Emitter)
+    aim = np.ravel(ready.pair.heuristic.props(spot)["direction"])
+    np.testing.assert_allclose(aim, (0, 0, -1), atol=1e-6)
+    by_rays = {"type": "direct", "emitter_samples": 0, "bsdf_samples": 4}
+    truth = mi.render(mi.load_dict(described), integrator=mi.load_dict(by_rays), spp=4096)
+    found = np.array(ready.reference.render(0)).mean()
+    assert (found == pytest.approx(np.array(truth).mean(), rel=0.02)) or not is_right
+    record = compare(source, Options(spp=16)).record
+    assert (record.caution == "") is is_right
+    if not is_right:
+        assert "the normals of the lamp lamp are tilted from its surface" in record.caution
+        assert verdict.decision(record) == "undecided"
+        assert verdict.headline([record]).startswith("a test: The reference is wrong")
 
 
 # --- Settings of the scene's own integrator --------------------------------------------------

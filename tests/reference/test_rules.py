@@ -18,10 +18,10 @@ from fotismos.reference.planning.rules import (
     SEEN_FROM_OUTSIDE,
     STILL,
     TABULATED_ENVIRONMENT,
-    loses_light,
 )
 from fotismos.reference.scene.source import Source
 from tests.shared.misplanned import (
+    BLACK,
     DIFFUSE,
     SCENES,
     TWO_SIDED,
@@ -30,6 +30,7 @@ from tests.shared.misplanned import (
     sphere,
     tube,
 )
+from tests.shared.parts import moved
 from tests.shared.verification import planned, stock
 
 SPP = 256
@@ -150,10 +151,8 @@ def test_a_lamp_whose_samples_are_not_its_hits_is_warned_of(rgb):
     assert not any("weights" in line for line in again.warnings())
 
 
-@pytest.mark.parametrize(
-    ("integrator", "kept"), [("direct", 1.0), ("path", 0.75), ("volpath", 1.0)]
-)
-def test_a_mask_reflects_its_share_but_in_mitsubas_path(rgb, integrator, kept):
+@pytest.mark.parametrize("integrator", ["direct", "path", "volpath"])
+def test_a_mask_reflects_its_share_whatever_the_scene_asks_for(rgb, integrator):
     """Half opaque, it reflects half of the light; `path` loses what rays gather that pass twice."""
     masked = {"type": "mask", "opacity": 0.5, "bsdf": DIFFUSE}
     sun = {"type": "directional", "direction": (0.3, 1, -0.2), "irradiance": 1.0}
@@ -162,5 +161,28 @@ def test_a_mask_reflects_its_share_but_in_mitsubas_path(rgb, integrator, kept):
         source = Source("mask", scene(integrator=integrator, ball=sphere(bsdf), sun=sun))
         ready = prepare(source, Options(spp=SPP))
         images[bsdf["type"]] = np.array(ready.reference.render(1)).mean()
-    assert images["mask"] == pytest.approx(0.5 * kept * images["diffuse"], rel=0.01)
-    assert loses_light(ready.plan.integrator, ready.pair) is (kept < 1)
+    assert images["mask"] == pytest.approx(0.5 * images["diffuse"], rel=0.01)
+
+
+@pytest.mark.parametrize("opacity", [0.0, 0.3])
+@pytest.mark.parametrize("integrator", ["direct", "path"])
+def test_masks_let_through_their_share_of_light_and_hide_no_lamp_that_is_hidden(
+    rgb, opacity, integrator
+):
+    """A floor receives its share of light from behind a mask, also where a lamp is hidden."""
+    mask = {"type": "mask", "opacity": opacity, "bsdf": BLACK}
+    plates = {
+        "floor": {"type": "rectangle", "to_world": moved((0, 0, 0), 4), "bsdf": DIFFUSE},
+        "mask": {"type": "rectangle", "to_world": moved((0, 0, 2), 4), "bsdf": mask},
+        "ball": sphere(BLACK) | {"to_world": moved((0, 0, 1), 0.2)},
+        "point": {"type": "point", "position": (0, 0, 3), "intensity": 9.0},
+    }
+    plates["ball"]["emitter"] = {"type": "area", "radiance": 1e-6}
+    found = []
+    for name in ("mask", "none"):
+        shown = {key: value for key, value in plates.items() if key != "mask" or name == "mask"}
+        own = {"type": integrator, "hide_emitters": True}
+        described = scene((0, 0, 1.5), integrator=own, size=8, **shown)
+        ready = prepare(Source("mask", described), Options(spp=SPP))
+        found.append(np.array(ready.reference.render(1)).mean())
+    assert found[0] == pytest.approx((1 - opacity) * found[1], rel=0.01)

@@ -20,6 +20,7 @@ from typing import Any
 import mitsuba as mi
 import numpy as np
 
+from fotismos.heuristic import meshes
 from fotismos.reference.pairing import probe
 from fotismos.reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR
 from fotismos.reference.pairing.lights import GLOWING, LightNode, heuristic, level
@@ -191,10 +192,12 @@ class Extent:
         places = np.array(sample.p, float).T
         centroid = places.mean(axis=0)
         offset = places - centroid
+        # Light leaves along the surface's own normals: those of vertices may be tilted.
+        normal = meshes.mean_normals(shape)[0] if shape.is_mesh() else normals.mean(axis=0)
         return cls(
             centroid=centroid,
             area=float(np.ravel(shape.surface_area())[0]),
-            normal=normals.mean(axis=0),
+            normal=normal,
             radius=float(ROOM * np.linalg.norm(offset, axis=1).max()),
             is_inward=bool(np.sum(offset * normals) < 0),
         )

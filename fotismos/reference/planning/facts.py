@@ -160,7 +160,8 @@ class ShapeFacts:
     ``outer`` and ``inner`` are whether the side away from the body reflects, and the side towards
     it; the outer side of a flat shape is the one that its normal points to. An area light
     ``shines_outwards`` if its normals point away from the body. ``opaque`` is whether its BSDF only
-    reflects, ``sampled_as_hit`` whether the points that Mitsuba samples on it are those that rays
+    reflects, ``lets_straight_through`` whether light may pass it unrefracted, as it does a mask,
+    ``sampled_as_hit`` whether the points that Mitsuba samples on it are those that rays
     hit, and face alike.
     """
 
@@ -173,6 +174,7 @@ class ShapeFacts:
     shines_outwards: bool
     plane: tuple[Any, ...] | None
     opaque: bool
+    lets_straight_through: bool
     sampled_as_hit: bool
     is_mesh: bool
 
@@ -194,6 +196,7 @@ class ShapeFacts:
             shines_outwards=shown.is_outward,
             plane=shown.plane,
             opaque=opaque,
+            lets_straight_through=_lets_straight_through(shape.bsdf()),
             sampled_as_hit=shown.has_true_normals and _is_sampled_as_hit(graph, index, shape),
             is_mesh=shape.is_mesh(),
         )
@@ -230,6 +233,11 @@ class ShapeFacts:
         point, normal = self.plane
         direction = normal if self.outer else -normal
         return direction, float(direction @ point)
+
+
+def _lets_straight_through(bsdf: mi.BSDF | None) -> bool:
+    """Return whether a BSDF has a null component; an instance has its group's, not known here."""
+    return bsdf is None or mi.has_flag(bsdf.flags(), mi.BSDFFlags.Null)
 
 
 def _is_sampled_as_hit(graph: Graph, index: int | None, shape: mi.Shape) -> bool:
@@ -435,6 +443,15 @@ class Facts:
         """
         hidden = self.pair.hide_emitters and len(self.lamps) > 0
         return hidden and not all(shape.is_mesh or shape in self.lamps for shape in self.shapes)
+
+    @cached_property
+    def lets_straight_through(self) -> bool:
+        """Whether light may pass a surface unrefracted, as it does a mask.
+
+        Mitsuba's ``path`` and ``direct`` err there: their shadow rays end at such a surface, camera
+        rays that pass all surfaces lose what masks reflect, and hidden lamps show behind them.
+        """
+        return any(shape.lets_straight_through for shape in self.shapes)
 
     @property
     def is_clear(self) -> bool:

@@ -12,7 +12,9 @@ surfaces, several points or directions  alone (2, 4, 12 lights: 1.3, 1.3, 2.6 ti
                                         ``path``, which picks one of them for each sample)
 interreflection                         ``path``, as deep as the scene allows; with glossy surfaces
                                         their noise decides, and it is the faster
-curved shapes behind hidden lamps       ``volpath`` in place of ``path`` and ``direct``, which err
+curved shapes behind hidden lamps;      ``volpath`` in place of ``path`` and ``direct``, which err
+masks, and what else lets light
+straight through
 a BSDF that may let light through       ``path``, whatever the depth
 participating media                     ``volpath``, or ``volpathmis`` where the scene asks for it
                                         or its extinction is coloured
@@ -120,12 +122,10 @@ def _reference(facts: Facts) -> Plan:
 
 
 def _stock(facts: Facts) -> str:
-    """Return Mitsuba's integrator for a scene: the one that it names, if it is right there.
-
-    ``direct`` is not a ``path`` of depth 2, which loses light at masks.
-    """
+    """Return Mitsuba's integrator for a scene: the one that it names, if it is right there."""
     pair = facts.pair
-    if facts.sees_through_lamps and not pair.media and pair.integrator != "volpathmis":
+    errs = facts.sees_through_lamps or facts.lets_straight_through
+    if errs and not pair.media and pair.integrator != "volpathmis":
         return "volpath"
     if pair.integrator in ("volpath", "volpathmis"):
         return pair.integrator

@@ -12,11 +12,9 @@ import mitsuba as mi
 import numpy as np
 
 from fotismos.reference.pairing import lights
-from fotismos.reference.pairing.halves import Pair
 from fotismos.reference.planning.decisions import RuleResult
 from fotismos.reference.planning.facts import (
     BSDF,
-    EMITTER,
     ROUNDING,
     SHAPE,
     Facts,
@@ -183,20 +181,6 @@ LIGHT_BY_LIGHT = PruningRule(
         ),
     ),
 )
-
-
-def loses_light(integrator: str, pair: Pair) -> bool:
-    """Return whether Mitsuba's ``path`` loses light that surfaces of a scene reflect.
-
-    A camera ray that passes straight through every surface, and ends in nothing visible, counts as
-    black, including the light gathered on its way. A closed mask of opacity ``o`` before nothing
-    loses the share ``(1 - o)^2``. ``volpath`` keeps it.
-    """
-    graph = pair.physical
-    passing = any(graph.plugin(index) in ("mask", "null") for index in graph.nodes(BSDF))
-    emitters = (lights.of(graph.plugin(index)) for index in graph.nodes(EMITTER))
-    is_shown = any(kind.surrounds for kind in emitters) and not pair.hide_emitters
-    return integrator == "path" and passing and not is_shown
 
 
 # --- Shadows ---------------------------------------------------------------------------------
