@@ -51,8 +51,8 @@ def mean_normals(mesh: Mesh) -> tuple[Array, Array]:
     these, both means are those of the faces.
     """
     corners = rows(mesh, FACES)
-    first, second, third = (rows(mesh, POSITIONS).astype(float)[corners[:, i]] for i in range(3))
-    across = np.cross(second - first, third - first)
+    points = rows(mesh, POSITIONS).astype(float)[corners]  # (F, 3, 3): by face and corner
+    across = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
     areas = np.linalg.norm(across, axis=1)
     turn = -1 if mesh.has_flipped_normals() else 1
     smooth = across * turn

@@ -386,8 +386,8 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
     subject = subjects.pop() if len(subjects) == 1 else "Shading"
     decisions = Counter(decision(record, threshold) for record in records)
     if len(records) > 1:
-        undecided = decisions["undecided"]
         doubtful = sum(bool(record.caution) for record in records)
+        undecided = decisions["undecided"] - doubtful
         said = f"{subject} looks right in {decisions['pass']} of {len(records)} scenes"
         for count, state in ((undecided, "too close to call"), (doubtful, "in doubt")):
             if count:

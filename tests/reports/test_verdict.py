@@ -260,7 +260,7 @@ def test_a_run_counts_scenes_and_names_what_those_that_fail_lack_by_pixels():
 def test_scenes_in_doubt_are_counted_and_named():
     doubtful = scene(0.01, name="b", caution="Both pictures are black.")
     made = [scene(0.01), doubtful]
-    assert verdict.headline(made).endswith("looks right in 2 of 2 scenes; 1 is in doubt.")
+    assert verdict.headline(made).endswith("looks right in 1 of 2 scenes; 1 is in doubt.")
     assert list(verdict.advice([(record, None) for record in made])) == [
         "b: Both pictures are black."
     ]

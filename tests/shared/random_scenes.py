@@ -312,7 +312,7 @@ CURVED = ("sphere", "disk", "cylinder")
 def meant(scene, overridden):
     """The scene without the settings that are named as not used, for an integrator that is right.
 
-    Behind hidden lamps only `volpath` is right about curved shapes; about masks `path` disagrees.
+    Only `volpath` is right about masks, and about curved shapes behind hidden lamps.
     """
     scene = {key: dict(part) if isinstance(part, dict) else part for key, part in scene.items()}
     parts = [part for key, part in scene.items() if key not in ("type", "integrator", "sensor")]
@@ -321,12 +321,12 @@ def meant(scene, overridden):
         if f"sampling_weight of {key}" in overridden:
             part["emitter"] = part["emitter"] | {"sampling_weight": 1.0}
     own = {key: value for key, value in scene["integrator"].items() if key not in overridden}
-    if own["hide_emitters"] and lamps:
-        clear = any(part.get("bsdf", {}).get("type") in CLEAR for part in parts)
-        curved = any(part["type"] in CURVED and "emitter" not in part for part in parts)
-        if curved or not clear:
-            ways = {key: value for key, value in own.items() if key not in WAYS}
-            own = {"max_depth": 2} | ways | {"type": "volpath"}
+    bsdfs = {part.get("bsdf", {}).get("type") for part in parts}
+    curved = any(part["type"] in CURVED and "emitter" not in part for part in parts)
+    is_hidden = own["hide_emitters"] and lamps and (curved or not bsdfs.intersection(CLEAR))
+    if is_hidden or bsdfs.intersection(("mask", "null")):
+        ways = {key: value for key, value in own.items() if key not in WAYS}
+        own = {"max_depth": 2} | ways | {"type": "volpath"}
     return scene | {"integrator": own}
 
 
