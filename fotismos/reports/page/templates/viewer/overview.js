@@ -21,7 +21,7 @@ function showOverview(t) {
   showPrices(place);
 }
 
-/** Place each scene whose price is known in the chart, and name the others. @param {number} place */
+/** Put each scene of known price in the chart, and name the others. @param {number} place */
 function showPrices(place) {
   const sentence = document.getElementById("costs-sentence");
   if (!sentence) return;
