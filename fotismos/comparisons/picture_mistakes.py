@@ -53,9 +53,9 @@ SLIGHT = 0.03
 FEWEST = 8
 SLOPES = 400
 CONTRAST = 0.5
-LEAST_POWER = 0.1
+POWERS = (0.1, 0.95)
 """Blocks from which a power or a tint follows, at least and at most; their range in powers of e,
-and the smallest power."""
+and the range of a power or its inverse."""
 
 NOTICED = 0.3
 """ΔE2000 of the blocks, below which nothing needs a reason."""
@@ -64,6 +64,9 @@ LEVEL = 2.0
 TINT = 0.05
 """Factor of brightness, and relative difference of the channels' factors, that are named even if
 they explain little."""
+
+LEAST_RATIO = 1e-3
+"""Factor of a channel that is missing, relative to the largest factor."""
 
 EVEN = 0.2
 """A tint is the white's if it spreads by this share at most over the blocks."""
@@ -487,18 +490,25 @@ def _zoomed(picture: Array, zoom: float) -> Array:
 def ratios(picture: Array, other: Array, counted: NDArray[np.bool_]) -> tuple[float, float, float]:
     """Return how many times as strong a picture's red, green and blue are as the other half's.
 
-    They are medians over blocks that are lit in both, and not clipped.
+    They are medians over blocks that are lit in both, and not clipped. A channel that the other
+    half lacks is as strong as all three together.
     """
     blocks = Blocks.of(picture, other, counted)
     lit = _lit(blocks)
-    # Colours outside BT.709 have negative values.
-    shown = np.maximum(blocks.picture[lit], 0.0)
-    truth = np.maximum(blocks.other[lit], 0.0)
-    if not truth.any():
+    shown = blocks.picture[lit]
+    truth = blocks.other[lit]
+    if not truth.size:
         return 1.0, 1.0, 1.0
-    least = 1e-3 * float(np.median(truth.max(axis=1)))
-    red, green, blue = np.median((shown + least) / (truth + least), axis=0)
-    return float(red), float(green), float(blue)
+    level = float(np.median(shown.mean(axis=1) / truth.mean(axis=1)))
+    least = LIT * float(np.median(truth.max(axis=1)))
+    red, green, blue = (
+        # Colours outside BT.709 have negative values.
+        float(np.median(np.maximum(shown[told, channel], 0.0) / truth[told, channel]))
+        if (told := truth[:, channel] > least).any()
+        else level
+        for channel in range(3)
+    )
+    return red, green, blue
 
 
 def _lit(blocks: Blocks) -> NDArray[np.bool_]:
@@ -539,6 +549,7 @@ def _change_of_colours(
     if before < NOTICED:
         return None
     ratio = np.array(ratios(picture, other, counted))
+    ratio = np.maximum(ratio, LEAST_RATIO * ratio.max())
     changes = _changes(blocks, ratio, names)
     left = {
         kind: Blocks.of(change.mend(picture), other, counted).departure()
@@ -608,10 +619,10 @@ def _power(blocks: Blocks, names: Names) -> Mistake | None:
     far = run > CONTRAST / 2
     power = float(np.median(rise[far] / run[far]))
     scale = float(np.exp(np.median(shown - power * truth)))
-    if not LEAST_POWER < power < 1 / LEAST_POWER:
+    gamma = max(power, 1 / power)
+    if not POWERS[0] < 1 / gamma < POWERS[1]:
         return None
     factor = "" if abs(scale - 1) < TINT else f" and multiplied by {scale:.3g}"
-    gamma = max(power, 1 / power)
     return Mistake(
         sentence=(
             f"{names.picture}'s values look raised to the power {power:.3g}{factor}: a gamma of"

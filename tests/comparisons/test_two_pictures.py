@@ -197,6 +197,15 @@ def test_noise_that_resampling_takes_away_is_no_other_size():
         assert "times as large" not in " ".join(record.agreement.mistakes)
 
 
+@pytest.mark.parametrize("factor", [0.01, 1 / 30, 1 / 683, 0.1, 0.5, 2, 683])
+def test_a_factor_is_named_however_small(factor):
+    image = landscape()
+    agreement = record_of([factor * image], [image]).agreement
+    (sentence,) = agreement.mistakes
+    assert f"is {factor:.3g} times as bright as the reference" in sentence
+    assert agreement.ratio == pytest.approx([factor] * 3, rel=1e-4)
+
+
 def test_what_is_certain_is_said_though_noise_hides_its_share():
     image = landscape(side=128)
     changed = image.copy()
