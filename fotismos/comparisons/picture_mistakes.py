@@ -30,6 +30,7 @@ from fotismos.comparisons.departure.colour import (
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.tone_maps import Curves, FittedCurve, Light
+from fotismos.heuristic.convention import Floats
 
 Mending = Callable[[Array], Array]
 """A function from a picture (H, W, 3) to the one without a mistake."""
@@ -308,7 +309,7 @@ PRIMARIES = {
 """Primaries with the white of BT.709, whose values may have been read as those of BT.709."""
 
 
-def _times(matrix: Array, image: Array) -> Array:
+def _times(matrix: Floats, image: Array) -> Array:
     """Return the colours of an image, each multiplied by a matrix (3, 3)."""
     product: Array = image @ matrix.T
     return product
@@ -476,7 +477,7 @@ def _has_structure(image: Array, counted: NDArray[np.bool_]) -> bool:
     blocks = Blocks.of(light, light**2, counted)
     within = float((blocks.other - blocks.picture**2).mean())
     size = counted.sum() / max(len(blocks.picture), 1)
-    return float(blocks.picture.var()) * size > STRUCTURE * within
+    return bool(blocks.picture.var() * size > STRUCTURE * within)
 
 
 def _moved(picture: Array, other: Array, place: alignment.Place, names: Names) -> Mistake | None:
@@ -736,15 +737,22 @@ def _readings(
             show=redo,
         )
         brightness = _brightness(Blocks.of(undo(picture), other, counted))
-        level = brightness.value
         brighter = replace(
             reading,
             sentence=f"{reading.sentence} It is then {brightness} times as bright.",
-            mend=lambda image, undo=undo, level=level: undo(image) / level,
-            show=lambda image, redo=redo, level=level: redo(level * image),
+            mend=partial(_undone, undo, brightness.value),
+            show=partial(_redone, redo, brightness.value),
         )
         is_all = _left(brighter, picture, other, counted) < WHOLLY * before
-        yield misreading, brighter if is_all and abs(level - 1) > TINT else reading
+        yield misreading, brighter if is_all and abs(brightness.value - 1) > TINT else reading
+
+
+def _undone(undo: Mending, factor: float, image: Array) -> Array:
+    return undo(image) / factor
+
+
+def _redone(redo: Mending, factor: float, image: Array) -> Array:
+    return redo(factor * image)
 
 
 def _brightness(blocks: Blocks) -> Factor:

@@ -389,7 +389,7 @@ def agreement(
     def locate(mend: Mending) -> alignment.Place:
         """Return where the content is after a mending; without a shift if noise may make it."""
         place = alignment.measure(mend(pictures.mean), edges)
-        repeats = [mend(file.image) for file in pictures.files]
+        repeats = [mend(np.asarray(file.image, float)) for file in pictures.files]
         if alignment.is_doubtful(place, by_noise, repeats, edges):
             return replace(place, shift=None)
         return place
