@@ -459,13 +459,18 @@ def _ranks(values: Array) -> Array:
 def _is_of_other_scene(
     picture: Array, other: Array, counted: NDArray[np.bool_], place: alignment.Place
 ) -> bool:
-    """Return whether two pictures share neither edges nor what is bright, though both show much."""
+    """Return whether two pictures share neither edges nor, however turned, what is bright.
+
+    Both must show much.
+    """
     at_end = picture.max(axis=-1)[counted] >= CLIPPED * picture[counted].max()
     if place.correlation > OTHER_EDGES or np.mean(at_end) > MOSTLY:
         return False
     if not all(_has_structure(image, counted) for image in (picture, other)):
         return False
-    return _order_agreement(picture, other, counted) < OTHER_ORDER
+    views = [picture, *(turn(picture) for turn in TURNED.values())]
+    alike = [_order_agreement(view, other, counted) for view in views if view.shape == other.shape]
+    return max(alike) < OTHER_ORDER
 
 
 def _has_structure(image: Array, counted: NDArray[np.bool_]) -> bool:
