@@ -644,9 +644,10 @@ def _lit(blocks: Blocks) -> NDArray[np.bool_]:
         light = colours.mean(axis=1)
         # The median, since a lamp would raise the mean.
         lit &= light > LIT * np.median(light[light > 0]) if (light > 0).any() else False
-    if blocks.picture.size and blocks.picture.max() <= 1.0:
-        free = lit & (blocks.picture.max(axis=1) < CLIPPED)
-        lit = free if free.any() else lit
+    for colours in (blocks.picture, blocks.other):
+        if colours.size and colours.max() <= 1.0:
+            free = lit & (colours.max(axis=1) < CLIPPED)
+            lit = free if free.any() else lit
     return lit
 
 
