@@ -287,6 +287,8 @@ class Agreement(Record):
         blocks of pixels that are lit, and not clipped.
     mistakes
         Mistakes that they seem to have, each with the number that mends it, and what is then left.
+    certain
+        Whether the mistakes are certain, since mending them leaves too little for noise to explain.
     odd
         What else is odd about them, in words.
     """
@@ -295,6 +297,7 @@ class Agreement(Record):
     edges: float
     ratio: tuple[float, float, float]
     mistakes: tuple[str, ...] = ()
+    certain: bool = False
     odd: tuple[str, ...] = ()
 
 

@@ -7,7 +7,7 @@ little.
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import permutations
 from math import pi
@@ -18,16 +18,27 @@ from PIL import Image
 
 from fotismos.comparisons import alignment
 from fotismos.comparisons.departure.blocks import averaged, block_sums, shrunk
-from fotismos.comparisons.departure.colour import BLACK, Array, from_srgb, to_srgb
-from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.departure.colour import (
+    BLACK,
+    BT709,
+    BT2020,
+    Array,
+    from_srgb,
+    rgb_to_xyz,
+    to_srgb,
+)
+from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.tone_maps import BETTER_CURVE, Curves, FittedCurve, Light
+from fotismos.comparisons.departure.tone_maps import Curves, FittedCurve, Light
+from fotismos.heuristic.convention import Floats
 
 Mending = Callable[[Array], Array]
 """A function from a picture (H, W, 3) to the one without a mistake."""
 
 BLOCK = 8
-"""Side of the blocks whose means are compared, in pixels."""
+ALONG = 8
+"""Side of the blocks whose means are compared, in pixels; and how many there are along a side, for
+which smaller ones are taken."""
 
 LIT = 0.02
 """Blocks darker than this times the median tell no ratio."""
@@ -35,14 +46,11 @@ LIT = 0.02
 CLIPPED = 0.99
 """From here on the values of a picture that ends at display white may be clipped."""
 
-HIGHLIGHTS = 95
-"""Percentile of the values, above which they do not count for readings."""
-
-BETTER = 0.5
-"""Largest share of the difference that a credible other reading of the values leaves."""
-
 EXPLAINED = 0.25
-"""Largest share of the departure that a credible change of colours leaves."""
+WHOLLY = 0.1
+BETTER = 0.5
+"""Largest share of the departure that a credible change of colours leaves, that a reading leaves
+which is the only one beside a factor, and that a factor leaves which is named beside others."""
 
 SIMPLER = 1.25
 """Times the departure that the best change leaves, which a simpler one may leave."""
@@ -50,20 +58,45 @@ SIMPLER = 1.25
 SLIGHT = 0.03
 """Share of the departure in which two changes do not differ."""
 
+RIVAL = 0.67
+"""Share of the departure that one explanation leaves, from which another is as good."""
+
+ROUNDING = 0.25 / 255
+ROUNDING_LEFT = 0.02
+"""What rounding to 8 bits leaves: of encoded values, and of the blocks' ΔE2000."""
+
+OTHER_EDGES = 0.35
+OTHER_ORDER = 0.5
+STRUCTURE = 16.0
+MOSTLY = 0.5
+"""Correlations of edges, and of the order of brightness, below which pictures are of different
+scenes, if their blocks differ this many times as much as noise within them would make them, and
+a smaller share of the pixels is clipped."""
+
+LACKING = 0.02
+TURNED_BACK = 0.25
+"""What the order of brightness lacks to agree where a picture may be turned, at least; and the
+largest share of it that a credible turn leaves."""
+
+
 FEWEST = 8
 SLOPES = 400
 CONTRAST = 0.5
-LEAST_POWER = 0.1
+POWERS = (0.1, 0.95)
 """Blocks from which a power or a tint follows, at least and at most; their range in powers of e,
-and the smallest power."""
+and the range of a power or its inverse."""
 
 NOTICED = 0.3
-"""ΔE2000 of the blocks, below which nothing needs a reason."""
+NOTICED_THEN = 1.0
+"""ΔE2000 of the blocks, below which nothing needs a reason; and none beside the first."""
 
 LEVEL = 2.0
 TINT = 0.05
 """Factor of brightness, and relative difference of the channels' factors, that are named even if
 they explain little."""
+
+LEAST_RATIO = 1e-3
+"""Factor of a channel that is missing, relative to the largest factor."""
 
 EVEN = 0.2
 """A tint is the white's if it spreads by this share at most over the blocks."""
@@ -74,10 +107,13 @@ NEAR_PI = 0.05
 LUMENS = 683.0
 """Lumens per watt at 555 nm (SI), by which programs take light from watts to lumens."""
 
+LEAST_PRECISION = 1e-3
+"""Relative precision to which factors are known at best: half floats have half of it."""
+
 SHIFT = 0.5
 """Smallest shift in pixels that is named, and the steps in which it is."""
 
-MOVED = 0.25
+MOVED = 0.55
 """Share of a shift at which the error is least, at least, if it is one."""
 
 PLATEAU = 0.005
@@ -108,12 +144,47 @@ class Names:
 class Mistake:
     """A mistake that a picture seems to have, as a sentence, and what mends it, if that is known.
 
-    ``left`` is the share of the difference that is credible, and that is left; at most 1.
+    ``show`` makes the mistake, so it leads from the other half to the picture. If the mistake
+    ``is_certain``, noise cannot be all of the difference.
     """
 
     sentence: str
-    mend: Mending | None
-    left: float = 0.0
+    mend: Mending | None = None
+    show: Mending | None = None
+    is_certain: bool = False
+
+
+@dataclass(frozen=True)
+class Factor:
+    """A factor of brightness, and relatively how far the true one may be from it."""
+
+    value: float
+    precision: float
+
+    @property
+    def rounded(self) -> float:
+        """The factor with the fewest digits within its precision, three at most."""
+        precision = max(self.precision, LEAST_PRECISION)
+        for digits in (1, 2):
+            value = float(f"{self.value:.{digits}g}")
+            if abs(value / self.value - 1) <= precision:
+                return value
+        return float(f"{self.value:.3g}")
+
+    @property
+    def is_known(self) -> bool:
+        """Whether it is close to a factor with a name, and no round number more exactly."""
+        apart = min(abs(self.value / factor - 1) for factor in (pi, 1 / pi, LUMENS, 1 / LUMENS))
+        is_round = self.rounded == float(f"{self.rounded:.1g}")
+        return apart < NEAR_PI and not (is_round and apart > max(self.precision, LEAST_PRECISION))
+
+    @property
+    def reason(self) -> str:
+        """What it may come from."""
+        return reason_of(self.value) if self.is_known else "another exposure"
+
+    def __str__(self) -> str:
+        return f"{self.value if self.is_known else self.rounded:.3g}"
 
 
 @dataclass(frozen=True)
@@ -143,10 +214,11 @@ class Blocks:
     @classmethod
     def of(cls, picture: Array, other: Array, counted: NDArray[np.bool_]) -> "Blocks":
         """Average over the pixels that count, in whole blocks if there are any."""
-        weights = block_sums(counted.astype(float), BLOCK)[..., None]
+        side = max(1, min(BLOCK, min(counted.shape) // ALONG))
+        weights = block_sums(counted.astype(float), side)[..., None]
         full = (weights[..., 0] >= 0.5 * weights.max()) & (weights[..., 0] > 0)
         means = [
-            (block_sums(np.where(counted[..., None], image, 0.0), BLOCK) / np.maximum(weights, 1))[
+            (block_sums(np.where(counted[..., None], image, 0.0), side) / np.maximum(weights, 1))[
                 full
             ]
             for image in (picture, other)
@@ -162,22 +234,20 @@ def find(
     picture: NoisyImage,
     other: NoisyImage,
     counted: NDArray[np.bool_],
-    place: alignment.Place,
+    locate: Callable[[Mending], alignment.Place],
     is_encoded: bool,
     names: Names,
     light: Light,
     tone_map: str | None = None,
-) -> Iterator[str]:
-    """Yield the mistakes of a picture in words, each mended before the next one is looked for.
+) -> Iterator[Mistake]:
+    """Yield the mistakes of a picture, each mended before the next one is looked for.
 
-    Images are linear; ``counted`` (H, W) are the pixels that count. ``is_encoded`` says that the
-    file ends at display white, as a PNG does. ``light`` is that of the other image, before the tone
-    map of that name.
+    Images are linear; ``counted`` (H, W) are the pixels that count. ``locate`` tells where the
+    content of the picture is after it is mended. ``is_encoded`` says that the file ends at display
+    white, as a PNG does. ``light`` is that of the other image, before the tone map of that name.
     """
     if min(image.mean[counted].max(initial=0.0) for image in (picture, other)) < BLACK:
         return
-    curves = Curves.of(picture.mean, light, counted)
-    given = curves.fit(tone_map)
     truth = other.mean
     mends: list[Mending] = []
 
@@ -187,109 +257,137 @@ def find(
         return image
 
     def candidates() -> Iterator[Mistake | None]:
-        pairs = [(picture.mean[counted], truth[counted])]
-        if tone_map:
-            pairs.append((curves.picture, curves.shown(given)))
-        plain = min(_distance(*map(_below_highlights, pair)) for pair in pairs)
-        reading = _other_reading(picture.mean, truth, counted, names, plain)
-        curve = _other_curve(curves, given, names)
-        if curve and (reading is None or curve.left < reading.left):
-            yield curve
+        yield _turned(picture.mean, truth, counted, names)
+        place = locate(mended)
+        if _is_of_other_scene(mended(picture.mean), truth, counted, place):
+            yield Mistake(
+                sentence=(
+                    f"{names.picture} and {names.other} show different scenes, or different views:"
+                    " neither their edges nor what is bright and dark agree."
+                ),
+                is_certain=True,
+            )
             return
-        change = None if tone_map else _change_of_colours(picture.mean, truth, counted, names)
-        if reading and not _explains_more(change, reading, picture.mean, truth, counted):
-            yield reading  # where its content is, is not known then
-        else:
-            yield _moved(picture.mean, truth, place, names)
-        if tone_map:
-            yield _exposure(given, names)
-            return
-        yield _change_of_colours(mended(picture.mean), truth, counted, names) if mends else change
-        if not is_encoded and not mends:
+        yield _moved(mended(picture.mean), truth, place, names)
+        before = len(mends)
+        yield from _other_values(mended(picture.mean), truth, counted, names, light, tone_map)
+        if tone_map is None and len(mends) > before:
+            yield _change_of_colours(
+                mended(picture.mean), truth, counted, names, noticed=NOTICED_THEN
+            )
+        if not is_encoded and not mends and tone_map is None:
             yield _clipped(picture.mean, truth, counted, names)
 
     for mistake in candidates():
         if mistake is None:
             continue
         if mistake.mend is None:
-            yield mistake.sentence
+            yield mistake
             continue
         mends.append(mistake.mend)
         apart = LEADING(mended(picture.mean), truth)
         noise = np.hypot(picture.noise(mended), other.noise(lambda image: image))
         without_noise = np.sqrt(np.maximum(apart**2 - noise**2, 0.0))
-        left = _percent(float(np.mean(without_noise[counted] > TOLERANCE)))
-        yield f"{mistake.sentence} After that, {left} of the pixels differ visibly."
+        left = float(np.mean(without_noise[counted] > TOLERANCE))
+        after = f"After that, {_percent(left)} of the pixels differ visibly."
+        # No noise is a turn, a factor or a power.
+        yield replace(mistake, sentence=f"{mistake.sentence} {after}", is_certain=left <= LIMIT)
 
 
 def _percent(share: float) -> str:
     return f"{float(f'{100 * share:.2g}'):g} %"
 
 
-def _explains_more(
-    change: Mistake | None,
-    reading: Mistake,
-    picture: Array,
-    other: Array,
-    counted: NDArray[np.bool_],
-) -> bool:
-    """Return whether a change of colours leaves far less than a reading does, at its best level."""
-    if change is None or change.mend is None or reading.mend is None:
-        return False
-    read = reading.mend(picture)
-    blocks = Blocks.of(read, other, counted)
-    # The medians of the light: dark blocks are the most distorted by a wrong reading.
-    light = max(float(np.median(blocks.picture.mean(axis=1))), 1e-9)
-    factor = float(np.median(blocks.other.mean(axis=1))) / light
-    left = Blocks.of(read * factor, other, counted).departure()
-    return Blocks.of(change.mend(picture), other, counted).departure() < BETTER * left
-
-
 # --- Readings of the values --------------------------------------------------------------------
 
 CHANNELS = ("red", "green", "blue")
 
-MISREADINGS: dict[str, Mending] = {
-    "values look sRGB-encoded": from_srgb,
-    "values look decoded twice": to_srgb,
+PRIMARIES = {
+    "BT.2020": BT2020,
+    "Display P3": ((0.680, 0.320), (0.265, 0.690), (0.150, 0.060), BT709[3]),
+}
+"""Primaries with the white of BT.709, whose values may have been read as those of BT.709."""
+
+
+def _times(matrix: Floats, image: Array) -> Array:
+    """Return the colours of an image, each multiplied by a matrix (3, 3)."""
+    product: Array = image @ matrix.T
+    return product
+
+
+MISREADINGS: dict[str, tuple[Mending, Mending]] = {
+    "values look sRGB-encoded": (from_srgb, to_srgb),
+    "values look decoded twice": (to_srgb, from_srgb),
     **{
-        f"channels look like {', '.join(CHANNELS[channel] for channel in order)}": partial(
-            np.take, indices=order, axis=-1
+        f"channels look like {', '.join(CHANNELS[channel] for channel in order)}": (
+            partial(np.take, indices=order, axis=-1),
+            partial(np.take, indices=np.argsort(order), axis=-1),
         )
         for order in permutations(range(3))
         if order != (0, 1, 2)
     },
+    **{
+        f"colours look like those of {name}": (
+            partial(_times, np.linalg.solve(rgb_to_xyz(BT709), rgb_to_xyz(primaries))),
+            partial(_times, np.linalg.solve(rgb_to_xyz(primaries), rgb_to_xyz(BT709))),
+        )
+        for name, primaries in PRIMARIES.items()
+    },
 }
-"""Mistakes in encoding colours: their symptoms, and their inverses."""
+"""Mistakes in encoding colours: their symptoms, what undoes them, and what makes them."""
+
+CURVED = ("values look sRGB-encoded", "values look decoded twice", "offset", "power")
+"""Changes of values that resemble each other, and tone maps."""
 
 CURES = {
+    **{f"colours look like those of {name}": ": convert them to BT.709" for name in PRIMARIES},
     "values look sRGB-encoded": ": write linear values (`transfer=srgb` decodes all pictures)",
     "values look decoded twice": ": decode them once (`transfer=linear` decodes no picture)",
 }
 """What mends a misreading: the option is for all pictures of a comparison."""
 
-TURNED: dict[str, Mending] = {
-    "upside down": lambda image: image[::-1],
-    "mirrored left to right": lambda image: image[:, ::-1],
-    "turned by 180 degrees": lambda image: image[::-1, ::-1],
-}
 
-
-def _other_curve(curves: Curves, given: FittedCurve, names: Names) -> Mistake | None:
-    """Return another tone map than the given one, which a picture seems to have."""
+def _other_values(
+    picture: Array,
+    other: Array,
+    counted: NDArray[np.bool_],
+    names: Names,
+    light: Light,
+    tone_map: str | None,
+) -> Iterator[Mistake | None]:
+    """Yield by what other values a picture shows its light: another tone map, or other colours."""
+    curves = Curves.of(picture, light, counted)
+    given = curves.fit(tone_map)
+    expected = other if tone_map is None else given.shown(light.mean)
+    change = _change_of_colours(picture, expected, counted, names, is_mapped=tone_map is not None)
     curve = curves.other(given)
-    if curve is None:
-        return None
-    cure = "Its values look linear: omit `tone_map`."
-    if curve.name is not None:
-        cure = (
-            f"Its values look tone-mapped: give `tone_map={curve.name}`. It was given"
-            f" {curve.exposure:.3g} times the light of {names.other}."
-        )
-    return Mistake(
-        sentence=f"{names.picture} is misread. {cure}",
-        mend=None,
-        left=curve.distance / given.distance / BETTER_CURVE,
+    if curve is not None:
+        # Both are pixels as they are shown, and rounding makes no difference.
+        left = curve.distance + ROUNDING
+        change_left = np.inf
+        if change is not None and change.show is not None:
+            show = change.show
+            change_left = ROUNDING + curves.distance(
+                lambda light: show(light if tone_map is None else given.shown(light))
+            )
+        if left < RIVAL * change_left:
+            yield Mistake(sentence=f"{names.picture} is misread. {_cure(curve, names)}")
+            return
+        if change is not None and change_left >= RIVAL * left:
+            sentence = f"{change.sentence} Or it is another curve: {_cure(curve, names)}"
+            change = replace(change, sentence=sentence)
+    yield change
+    if tone_map is not None:
+        yield _exposure(given, names)
+
+
+def _cure(curve: FittedCurve, names: Names) -> str:
+    """Return what to give for a picture that shows light by another curve."""
+    if curve.name is None:
+        return "Its values look linear: omit `tone_map`."
+    return (
+        f"Its values look tone-mapped: give `tone_map={curve.name}`. It was given"
+        f" {curve.exposure:.3g} times the light of {names.other}."
     )
 
 
@@ -303,61 +401,88 @@ def _exposure(given: FittedCurve, names: Names) -> Mistake | None:
             f"{names.picture}'s light is {level:.3g} times as bright as {names.other}:"
             f" {reason_of(level)}?"
         ),
-        mend=None,
     )
-
-
-def _other_reading(
-    picture: Array,
-    other: Array,
-    counted: NDArray[np.bool_],
-    names: Names,
-    plain: float,
-) -> Mistake | None:
-    """Return the other reading of its values that brings a picture near the other half.
-
-    ``plain`` is how far they are as they are read, by :func:`_distance`.
-    """
-    if plain < 1e-3:
-        return None
-    readings = {
-        f"Its {misreading}{CURES.get(misreading, '')}.": undo
-        for misreading, undo in MISREADINGS.items()
-    }
-    readings |= {
-        f"It looks {how}, or lit from the other side.": turn for how, turn in TURNED.items()
-    }
-    truth = _below_highlights(other[counted])
-    distances = {
-        symptom: _distance(_below_highlights(undo(picture)[counted]), truth)
-        for symptom, undo in readings.items()
-    }
-    symptom = min(distances, key=distances.__getitem__)
-    if distances[symptom] > BETTER * plain:
-        return None
-    return Mistake(
-        sentence=f"{names.picture} is misread. {symptom}",
-        mend=readings[symptom],
-        left=distances[symptom] / plain / BETTER,
-    )
-
-
-def _below_highlights(image: Array) -> Array:
-    """Return an image clipped, or highlights would decide.
-
-    It is at the same share of the pixels in any image, which no curve changes.
-    """
-    clipped: Array = np.minimum(image, np.percentile(image, HIGHLIGHTS))
-    return clipped
-
-
-def _distance(image: Array, other: Array) -> float:
-    """Return the relative RMS difference after the best factor on an image."""
-    factor = np.sum(image * other) / max(np.sum(image * image), 1e-30)
-    return float(np.sqrt(np.mean((factor * image - other) ** 2) / np.mean(other**2 + 1e-12)))
 
 
 # --- Position ----------------------------------------------------------------------------------
+
+
+TURNED: dict[str, Mending] = {
+    "upside down": lambda image: image[::-1],
+    "mirrored left to right": lambda image: image[:, ::-1],
+    "turned by 180 degrees": lambda image: image[::-1, ::-1],
+    "turned by 90 degrees clockwise": lambda image: np.rot90(image, 1),
+    "turned by 90 degrees anticlockwise": lambda image: np.rot90(image, -1),
+    "mirrored at the diagonal from top left": lambda image: image.transpose(1, 0, 2),
+    "mirrored at the diagonal from top right": lambda image: np.rot90(image, 2).transpose(1, 0, 2),
+}
+"""How a picture may be turned, and what turns it back."""
+
+
+def _turned(
+    picture: Array, other: Array, counted: NDArray[np.bool_], names: Names
+) -> Mistake | None:
+    """Return how a picture is turned; None if it is not, or if turning it back mends too little.
+
+    What is brighter than what stays, whatever the values are.
+    """
+    lacking = {
+        how: 1.0 - _order_agreement(turn(picture), other, counted)
+        for how, turn in TURNED.items()
+        if turn(picture).shape == other.shape
+    }
+    how = min(lacking, key=lacking.__getitem__)
+    before = 1.0 - _order_agreement(picture, other, counted)
+    if before < LACKING or lacking[how] > TURNED_BACK * before:
+        return None
+    return Mistake(
+        sentence=f"{names.picture} looks {how}, or lit from the other side.", mend=TURNED[how]
+    )
+
+
+def _order_agreement(picture: Array, other: Array, counted: NDArray[np.bool_]) -> float:
+    """Return Spearman's correlation of the brightness of small blocks; 1 if one is even."""
+    blocks = Blocks.of(picture, other, counted)
+    ranks = [_ranks(colours.mean(axis=1)) for colours in (blocks.picture, blocks.other)]
+    first, second = (each - each.mean() for each in ranks)
+    size = float(np.sqrt((first**2).sum() * (second**2).sum()))
+    return float((first * second).sum()) / size if size else 1.0
+
+
+def _ranks(values: Array) -> Array:
+    """Return the ranks of values (N,); equal ones share theirs."""
+    _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
+    ranks: Array = (np.cumsum(counts) - (counts - 1) / 2)[places]
+    return ranks
+
+
+def _is_of_other_scene(
+    picture: Array, other: Array, counted: NDArray[np.bool_], place: alignment.Place
+) -> bool:
+    """Return whether two pictures share neither edges nor, however turned, what is bright.
+
+    Both must show much.
+    """
+    at_end = picture.max(axis=-1)[counted] >= CLIPPED * picture[counted].max()
+    if place.correlation > OTHER_EDGES or np.mean(at_end) > MOSTLY:
+        return False
+    if not all(_has_structure(image, counted) for image in (picture, other)):
+        return False
+    views = [picture, *(turn(picture) for turn in TURNED.values())]
+    alike = [_order_agreement(view, other, counted) for view in views if view.shape == other.shape]
+    return max(alike) < OTHER_ORDER
+
+
+def _has_structure(image: Array, counted: NDArray[np.bool_]) -> bool:
+    """Return whether blocks differ by far more than the pixels within them let expect of noise.
+
+    That is the ratio of variances of an analysis of variance; it is 1 for independent noise.
+    """
+    light = np.where(counted, image.mean(axis=-1), 0.0)[..., None]
+    blocks = Blocks.of(light, light**2, counted)
+    within = float((blocks.other - blocks.picture**2).mean())
+    size = counted.sum() / max(len(blocks.picture), 1)
+    return bool(blocks.picture.var() * size > STRUCTURE * within)
 
 
 def _moved(picture: Array, other: Array, place: alignment.Place, names: Names) -> Mistake | None:
@@ -372,23 +497,22 @@ def _moved(picture: Array, other: Array, place: alignment.Place, names: Names) -
             ),
             mend=lambda image: _zoomed(image, 1 / zoom),
         )
-    shift = place.shift
-    if shift is not None and max(map(abs, shift)) >= SHIFT:
-        right = round(shift[0] / SHIFT) * SHIFT
-        down = round(shift[1] / SHIFT) * SHIFT
-        if not _is_moved(picture, other, right=right, down=down):
-            return None
-        across = _in_pixels(right, "to the right", "to the left")
-        along = _in_pixels(down, "down", "up")
-        amount = " and ".join(filter(None, (across, along)))
-        return Mistake(
-            sentence=(
-                f"{names.picture}'s edges are shifted by {amount}, which looks like wrong shading."
-                " Check the camera, the crop and the pixel centres first."
-            ),
-            mend=lambda image: _shifted(image, right=-right, down=-down),
-        )
-    return None
+    if place.shift is None or max(map(abs, place.shift)) < SHIFT:
+        return None
+    right = round(place.shift[0] / SHIFT) * SHIFT
+    down = round(place.shift[1] / SHIFT) * SHIFT
+    if not _is_moved(picture, other, right=right, down=down):
+        return None
+    across = _in_pixels(right, "to the right", "to the left")
+    along = _in_pixels(down, "down", "up")
+    amount = " and ".join(filter(None, (across, along)))
+    return Mistake(
+        sentence=(
+            f"{names.picture}'s edges are shifted by {amount}, which looks like wrong shading."
+            " Check the camera, the crop and the pixel centres first."
+        ),
+        mend=lambda image: _shifted(image, right=-right, down=-down),
+    )
 
 
 def _is_moved(picture: Array, other: Array, right: float, down: float) -> bool:
@@ -396,10 +520,15 @@ def _is_moved(picture: Array, other: Array, right: float, down: float) -> bool:
 
     A parabola through the squared errors of both and of none has its least one ``x = (on - back) /
     (2 (on + back - 2 error))`` of the way back: 1 for a picture that is moved, 0 for a blurred one.
+    Brightness counts by its rank, or a brighter one of two smooth pictures would look moved.
     """
-    error = np.mean((picture - other) ** 2)
-    back = np.mean((_shifted(picture, right=-right, down=-down) - other) ** 2)
-    on = np.mean((_shifted(picture, right=right, down=down) - other) ** 2)
+    alike, expected = (
+        _ranks(image.mean(axis=-1).ravel()).reshape(*image.shape[:2], 1)
+        for image in (picture, other)
+    )
+    error = np.mean((alike - expected) ** 2)
+    back = np.mean((_shifted(alike, right=-right, down=-down) - expected) ** 2)
+    on = np.mean((_shifted(alike, right=right, down=down) - expected) ** 2)
     return bool(on - back > 2 * MOVED * abs(on + back - 2 * error))
 
 
@@ -487,18 +616,25 @@ def _zoomed(picture: Array, zoom: float) -> Array:
 def ratios(picture: Array, other: Array, counted: NDArray[np.bool_]) -> tuple[float, float, float]:
     """Return how many times as strong a picture's red, green and blue are as the other half's.
 
-    They are medians over blocks that are lit in both, and not clipped.
+    They are medians over blocks that are lit in both, and not clipped. A channel that the other
+    half lacks is as strong as all three together.
     """
     blocks = Blocks.of(picture, other, counted)
     lit = _lit(blocks)
-    # Colours outside BT.709 have negative values.
-    shown = np.maximum(blocks.picture[lit], 0.0)
-    truth = np.maximum(blocks.other[lit], 0.0)
-    if not truth.any():
+    shown = blocks.picture[lit]
+    truth = blocks.other[lit]
+    if not truth.size:
         return 1.0, 1.0, 1.0
-    least = 1e-3 * float(np.median(truth.max(axis=1)))
-    red, green, blue = np.median((shown + least) / (truth + least), axis=0)
-    return float(red), float(green), float(blue)
+    level = float(np.median(shown.mean(axis=1) / truth.mean(axis=1)))
+    least = LIT * float(np.median(truth.max(axis=1)))
+    red, green, blue = (
+        # Colours outside BT.709 have negative values.
+        float(np.median(np.maximum(shown[told, channel], 0.0) / truth[told, channel]))
+        if (told := truth[:, channel] > least).any()
+        else level
+        for channel in range(3)
+    )
+    return red, green, blue
 
 
 def _lit(blocks: Blocks) -> NDArray[np.bool_]:
@@ -508,9 +644,10 @@ def _lit(blocks: Blocks) -> NDArray[np.bool_]:
         light = colours.mean(axis=1)
         # The median, since a lamp would raise the mean.
         lit &= light > LIT * np.median(light[light > 0]) if (light > 0).any() else False
-    if blocks.picture.size and blocks.picture.max() <= 1.0:
-        free = lit & (blocks.picture.max(axis=1) < CLIPPED)
-        lit = free if free.any() else lit
+    for colours in (blocks.picture, blocks.other):
+        if colours.size and colours.max() <= 1.0:
+            free = lit & (colours.max(axis=1) < CLIPPED)
+            lit = free if free.any() else lit
     return lit
 
 
@@ -531,47 +668,129 @@ def reason_of(level: float) -> str:
 
 
 def _change_of_colours(
-    picture: Array, other: Array, counted: NDArray[np.bool_], names: Names
+    picture: Array,
+    other: Array,
+    counted: NDArray[np.bool_],
+    names: Names,
+    is_mapped: bool = False,
+    noticed: float = NOTICED,
 ) -> Mistake | None:
-    """Return the simplest change of colours that explains a picture; None if none does."""
+    """Return the simplest change of colours that explains a picture; None if none does.
+
+    If both ``is_mapped``, only readings of the values count: other colours are the light's.
+    """
     blocks = Blocks.of(picture, other, counted)
     before = blocks.departure()
-    if before < NOTICED:
+    if before < noticed:
         return None
+    changes = dict(_readings(picture, other, counted, names, before))
     ratio = np.array(ratios(picture, other, counted))
-    changes = _changes(blocks, ratio, names)
-    left = {
-        kind: Blocks.of(change.mend(picture), other, counted).departure()
-        for kind, change in changes.items()
-        if change.mend is not None
-    }
+    ratio = np.maximum(ratio, LEAST_RATIO * ratio.max())
+    if not is_mapped:
+        changes = _changes(blocks, ratio, names, changes)
+        pixels = Blocks(picture=picture[counted], other=other[counted])
+        # Blocks have less noise, and pixels no edges within.
+        if powers := list(filter(None, (_power(blocks, names), _power(pixels, names)))):
+            changes["power"] = min(powers, key=lambda power: _left(power, picture, other, counted))
+    left = {kind: _left(change, picture, other, counted) for kind, change in changes.items()}
     allowed = SIMPLER * min(left.values()) + SLIGHT * before
     # The first of them is the simplest.
     chosen = next(kind for kind, departure in left.items() if departure <= allowed)
     if left[chosen] <= EXPLAINED * before:
-        return changes[chosen]
+        return _with_rivals(chosen, changes, left)
+    if is_mapped or left["level"] > BETTER * before:
+        return None
     # A large factor, or a white that is the same everywhere, is named though more is wrong.
-    level = _level(ratio)
-    if factor_of_pi(level) or not 1 / LEVEL < level < LEVEL:
+    level = _brightness(blocks)
+    if level.is_known or not 1 / LEVEL < level.value < LEVEL:
         return changes["level"]
     return changes.get("white") if _is_even_tint(blocks) else None
 
 
-def _level(ratio: Array) -> float:
-    """Return the factor of brightness among the factors of the channels."""
-    return float(np.exp(np.log(ratio).mean()))
+def _left(change: Mistake, picture: Array, other: Array, counted: NDArray[np.bool_]) -> float:
+    """Return the departure that the blocks have after a change is mended."""
+    if change.mend is None:
+        return np.inf
+    return Blocks.of(change.mend(picture), other, counted).departure()
 
 
-def _changes(blocks: Blocks, ratio: Array, names: Names) -> dict[str, Mistake]:
-    """Return changes of colours by their kind, the simplest first."""
-    level = _level(ratio)
-    reason = reason_of(level)
+def _with_rivals(chosen: str, changes: dict[str, Mistake], left: dict[str, float]) -> Mistake:
+    """Return a change, or the curve that is far nearer, with the others that are as near."""
+    if chosen not in CURVED:
+        return changes[chosen]
+    curved = {kind: left[kind] + ROUNDING_LEFT for kind in CURVED if kind in left}
+    best = min(curved, key=curved.__getitem__)
+    if curved[best] < RIVAL * curved[chosen]:
+        chosen = best
+    sentences = [changes[chosen].sentence]
+    for kind, departure in curved.items():
+        if kind != chosen and RIVAL * departure <= curved[chosen]:
+            sentences.append(f"Or: {changes[kind].sentence}")
+    return replace(changes[chosen], sentence=" ".join(sentences))
+
+
+def _readings(
+    picture: Array, other: Array, counted: NDArray[np.bool_], names: Names, before: float
+) -> Iterator[tuple[str, Mistake]]:
+    """Yield other readings of a picture's values by their names, with a factor if that is all.
+
+    ``before`` is the departure of the blocks.
+    """
+    for misreading, (undo, redo) in MISREADINGS.items():
+        reading = Mistake(
+            sentence=f"{names.picture} is misread. Its {misreading}{CURES.get(misreading, '')}.",
+            mend=undo,
+            show=redo,
+        )
+        brightness = _brightness(Blocks.of(undo(picture), other, counted))
+        brighter = replace(
+            reading,
+            sentence=f"{reading.sentence} It is then {brightness} times as bright.",
+            mend=partial(_undone, undo, brightness.value),
+            show=partial(_redone, redo, brightness.value),
+        )
+        is_all = _left(brighter, picture, other, counted) < WHOLLY * before
+        yield misreading, brighter if is_all and abs(brightness.value - 1) > TINT else reading
+
+
+def _undone(undo: Mending, factor: float, image: Array) -> Array:
+    return undo(image) / factor
+
+
+def _redone(redo: Mending, factor: float, image: Array) -> Array:
+    return redo(factor * image)
+
+
+def _brightness(blocks: Blocks) -> Factor:
+    """Return how many times as bright a picture is as the other half, over its lit blocks."""
+    lit = _lit(blocks)
+    shown = np.maximum(blocks.picture[lit].mean(axis=1), 0.0)
+    factors = shown / np.maximum(blocks.other[lit].mean(axis=1), BLACK**2)
+    value = float(np.median(factors)) if factors.size else 0.0
+    if value <= 0:
+        return Factor(value=1.0, precision=0.0)
+    # A median's standard error is 1.25 times that of a mean; 1.48 makes a deviation typical.
+    spread = 1.48 * float(np.median(np.abs(factors - value))) / value
+    return Factor(value=value, precision=3 * 1.25 * spread / np.sqrt(len(factors)))
+
+
+def _changes(
+    blocks: Blocks, ratio: Array, names: Names, readings: dict[str, Mistake]
+) -> dict[str, Mistake]:
+    """Return changes of colours by their kind, the simplest first; ``readings`` are among them."""
+    brightness = _brightness(blocks)
     changes = {
         "level": Mistake(
-            sentence=f"{names.picture} is {level:.3g} times as bright as {names.other}: {reason}?",
-            mend=lambda image: image / level,
+            sentence=(
+                f"{names.picture} is {brightness} times as bright as {names.other}:"
+                f" {brightness.reason}?"
+            ),
+            mend=lambda image: image / brightness.value,
+            show=lambda image: image * brightness.value,
         )
     }
+    changes |= readings
+    level = float(np.exp(np.log(ratio).mean()))
     tint = ratio / level
     if np.ptp(np.log(tint)) > TINT:
         relative = ", ".join(f"{value:.3g}" for value in tint)
@@ -582,15 +801,15 @@ def _changes(blocks: Blocks, ratio: Array, names: Names) -> dict[str, Mistake]:
                 f" strong{brighter}: another white?"
             ),
             mend=lambda image: image / ratio,
+            show=lambda image: image * ratio,
         )
     offset = float(np.median((blocks.picture - blocks.other).mean(axis=1)))
     side = "high" if offset > 0 else "low"
     changes["offset"] = Mistake(
         sentence=f"{names.picture}'s values are all {abs(offset):.3g} too {side}.",
         mend=lambda image: np.maximum(image - offset, 0.0),
+        show=lambda image: np.maximum(image + offset, 0.0),
     )
-    if power := _power(blocks, names):
-        changes["power"] = power
     return changes
 
 
@@ -606,18 +825,19 @@ def _power(blocks: Blocks, names: Names) -> Mistake | None:
     run = np.subtract.outer(truth[some], truth[some])
     rise = np.subtract.outer(shown[some], shown[some])
     far = run > CONTRAST / 2
-    power = float(np.median(rise[far] / run[far]))
+    power = max(float(np.median(rise[far] / run[far])), POWERS[0] / 2)
     scale = float(np.exp(np.median(shown - power * truth)))
-    if not LEAST_POWER < power < 1 / LEAST_POWER:
+    gamma = max(power, 1 / power)
+    if not POWERS[0] < 1 / gamma < POWERS[1]:
         return None
     factor = "" if abs(scale - 1) < TINT else f" and multiplied by {scale:.3g}"
-    gamma = max(power, 1 / power)
     return Mistake(
         sentence=(
             f"{names.picture}'s values look raised to the power {power:.3g}{factor}: a gamma of"
             f" {gamma:.3g}?"
         ),
         mend=lambda image: (np.maximum(image, 0.0) / scale) ** (1 / power),
+        show=lambda image: scale * np.maximum(image, 0.0) ** power,
     )
 
 

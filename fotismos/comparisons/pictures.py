@@ -27,7 +27,7 @@ from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light, ToneMap
 from fotismos.comparisons.estimates import Estimates, PassSums
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
-from fotismos.comparisons.picture_mistakes import Names, NoisyImage
+from fotismos.comparisons.picture_mistakes import Mending, Names, NoisyImage
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Times
 
@@ -289,6 +289,8 @@ def require_one_size(images: Iterable[np.ndarray], names: Sequence[str] = ()) ->
         sides = {"wide": wider / width, "high": higher / height}
         differing = [f"{by:.3g} times as {side}" for side, by in sides.items() if by != 1]
         larger = f"the last is {' and '.join(differing)} as the first"
+        if (width, height) == (higher, wider):
+            larger = "one of them looks turned by 90 degrees"
         raise InputError(
             f"pictures of {shown}: {larger}. Give pictures of one size; none is scaled."
         )
@@ -335,7 +337,8 @@ def with_records(
 ) -> Comparison:
     """Return a comparison with the records of its pictures, and what is odd about them.
 
-    ``expected`` and ``textbook`` are as for :func:`agreement`.
+    ``expected`` and ``textbook`` are as for :func:`agreement`. Where a mistake is certain, so is a
+    difference.
     """
     record = comparison.record
     images = comparison.images
@@ -351,11 +354,13 @@ def with_records(
         )
         found = agreement(given.reference, swapped, expected, REFERENCE)
     found = structs.replace(found, odd=(*same_files(given), *found.odd, *unknown_noise(given)))
+    is_certain = record.significant.certain or found.certain
     record = structs.replace(
         record,
         picture=given.image and given.image.record(),
         reference_picture=given.reference and given.reference.record(),
         agreement=found,
+        significant=structs.replace(record.significant, certain=is_certain),
         warnings=(*found.mistakes, *found.odd, *record.warnings),
     )
     return replace(comparison, record=record)
@@ -378,22 +383,30 @@ def agreement(
     other = images.reference.astype(float)
     counted = images.counted
     edges = [*expected, alignment.picture_edges(other)]
-    place = alignment.measure(pictures.mean, edges)
     # The other half is in its place: what a shift gains there, noise and shading make.
     by_noise = alignment.measure(other, expected) if expected else None
-    repeats = [file.image for file in pictures.files]
-    if alignment.is_doubtful(place, by_noise, repeats, edges):
-        place = alignment.Place(shift=None, correlation=place.correlation, gain=place.gain)
+
+    def locate(mend: Mending) -> alignment.Place:
+        """Return where the content is after a mending; without a shift if noise may make it."""
+        place = alignment.measure(mend(pictures.mean), edges)
+        repeats = [mend(np.asarray(file.image, float)) for file in pictures.files]
+        if alignment.is_doubtful(place, by_noise, repeats, edges):
+            return replace(place, shift=None)
+        return place
+
+    place = locate(lambda image: image)
     error = images.reference_stderr
-    mistakes = picture_mistakes.find(
-        NoisyImage(picture, pictures.two_halves),
-        NoisyImage(other, (other + error, other - error)),
-        counted,
-        place=place,
-        is_encoded=any(file.is_encoded for file in pictures.files),
-        names=names,
-        light=images.light or Light(mean=other, standard_error=error),
-        tone_map=pictures.tone_map,
+    mistakes = list(
+        picture_mistakes.find(
+            NoisyImage(picture, pictures.two_halves),
+            NoisyImage(other, (other + error, other - error)),
+            counted,
+            locate=locate,
+            is_encoded=any(file.is_encoded for file in pictures.files),
+            names=names,
+            light=images.light or Light(mean=other, standard_error=error),
+            tone_map=pictures.tone_map,
+        )
     )
     odd = []
     if place.shift is None:
@@ -404,7 +417,8 @@ def agreement(
         shift=place.shift,
         edges=place.correlation,
         ratio=picture_mistakes.ratios(picture, other, counted),
-        mistakes=tuple(mistakes),
+        mistakes=tuple(mistake.sentence for mistake in mistakes),
+        certain=any(mistake.is_certain for mistake in mistakes),
         odd=tuple(odd),
     )
 

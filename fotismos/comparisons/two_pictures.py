@@ -13,7 +13,7 @@ from fotismos.comparisons.comparison import (
     TimeSpent,
     versions,
 )
-from fotismos.comparisons.departure.criterion import caution
+from fotismos.comparisons.departure.criterion import caution, decide
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, declared
 from fotismos.comparisons.estimates import Estimates, measure, summarised
 from fotismos.comparisons.options import Options
@@ -91,12 +91,13 @@ def look(options: Options, name: str, command: str = "") -> FirstLook:
         reference_picture=given.reference.record(),
         **numbers,
     )
-    return FirstLook(
-        options=options,
-        given=given,
-        estimates=estimates,
-        comparison=Comparison(record=record, images=images),
-    )
+    comparison = Comparison(record=record, images=images)
+    shares = record.metrics[LEADING.name].visible
+    if decide(shares, is_certain=record.significant.certain) == "undecided":
+        significant = pictures.with_records(comparison, given).record.significant
+        record = structs.replace(record, significant=significant)  # a mistake may decide
+        comparison = replace(comparison, record=record)
+    return FirstLook(options=options, given=given, estimates=estimates, comparison=comparison)
 
 
 def finish(first: FirstLook) -> Comparison:

@@ -106,6 +106,11 @@ def decision(
     return decide(visible, threshold, bound, is_certain=record.significant.certain)
 
 
+def shows_only_noise(record: ComparisonRecord, threshold: float = TOLERANCE) -> bool:
+    """Return whether no difference is certain, and noise may make all that are visible."""
+    return not record.significant.certain and share(record, threshold).low == 0
+
+
 def missing(record: ComparisonRecord) -> dict[str, float]:
     """Return ``{effect: its share of what all surely remove}``, the largest first."""
     effects = record.why.effects if record.why else ()
@@ -153,13 +158,19 @@ def sentence(
     looks = decision(record, threshold)
     if record.mistakes and looks != "pass":
         return "Correct the shader first."
+    has_mistakes = bool(record.agreement and record.agreement.mistakes)
     match looks:
         case "pass":
             return "No visible difference." if lead.high <= EXACT else "Nothing to do."
-        case "undecided":
+        case "undecided" if not has_mistakes:
             has_pictures = record.picture or record.reference_picture
             more = "repeats of the pictures" if has_pictures else "samples (--spp)"
-            if found.low > LIMIT:
+            if shows_only_noise(record, threshold):
+                doubt = (
+                    f"Noise may hide a difference in up to {percent(found.high)} of the pixels."
+                    f" More {more} decide."
+                )
+            elif found.low > LIMIT:
                 doubt = (
                     f"Noise may explain it: {percent(found.value)} of the pixels differ, but no"
                     f" difference is certain anywhere. More {more} decide."
@@ -171,7 +182,7 @@ def sentence(
                     " decide."
                 )
             return f"{doubt} {_samples_needed(record, threshold)}".strip()
-    if record.agreement and record.agreement.mistakes:
+    if has_mistakes:
         return ""
     if _brightness_suffices(record, threshold):
         factor = lead.after_exposure.exposure
@@ -401,6 +412,8 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
     if decisions["pass"]:
         return f"{subject} looks right in {record.scene}."
     if decisions["undecided"]:
+        if shows_only_noise(record, threshold):
+            return f"{record.scene}: no difference beyond noise was found."
         return f"{subject} may look right in {record.scene}."
     wrong = percent(share(record, threshold).value)
     return f"{subject} differs visibly in {wrong} of the pixels of {record.scene}."
@@ -415,6 +428,8 @@ def _difference(record: ComparisonRecord, subject: str, threshold: float) -> str
             if record.significant.certain:
                 hidden = "noise hides in how many pixels it is visible"
                 return f"{record.scene}: {subject} differs from the reference; {hidden}."
+            if shows_only_noise(record, threshold):
+                return f"{record.scene}: no difference beyond noise was found."
             return f"{record.scene}: {subject} may look like the reference."
     wrong = percent(share(record, threshold).value)
     return f"{record.scene}: {subject} differs visibly from the reference in {wrong} of the pixels."

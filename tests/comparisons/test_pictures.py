@@ -228,10 +228,14 @@ def test_a_right_picture_that_is_shifted_is_said_to_be_shifted_by_that_alone(rgb
 def mistakes(picture, cornell):
     """Return what is said of a picture."""
     reference, _, expected, counted = cornell
-    place = alignment.measure(picture, expected)
     sides = NoisyImage(picture), NoisyImage(reference)
     light = Light(mean=reference, standard_error=0 * reference)
-    return list(picture_mistakes.find(*sides, counted, place, False, Names(), light))
+
+    def locate(mend):
+        return alignment.measure(mend(picture), expected)
+
+    found = picture_mistakes.find(*sides, counted, locate, False, Names(), light)
+    return [mistake.sentence for mistake in found]
 
 
 ODD = {

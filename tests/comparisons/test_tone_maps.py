@@ -192,13 +192,13 @@ def said(picture, light, counted, tone_map=None):
         NoisyImage(picture),
         NoisyImage(reference),
         counted,
-        place=place,
+        locate=lambda mend: place,
         is_encoded=True,
         names=Names(),
         light=light,
         tone_map=tone_map,
     )
-    return " ".join(mistakes)
+    return " ".join(mistake.sentence for mistake in mistakes)
 
 
 def saved(image):

@@ -14,7 +14,9 @@ import fotismos
 from fotismos.comparisons import pictures, two_pictures
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure import marks
+from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.departure.metrics import LEADING, METRICS
+from fotismos.comparisons.departure.tone_maps import reinhard
 from fotismos.comparisons.names import as_files
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import read_file
@@ -104,7 +106,10 @@ def test_the_first_page_has_the_verdict_and_reloads_into_the_whole(run, two, mon
     assert 0 < time() - begun / 1000 < 600
     assert ended is None
     assert ("In progress" in first, "In progress" in whole) == (True, False)
-    for later in ("It looks upside down", f'<th scope="row">{METRICS["ldr_flip"].label}</th>'):
+    for later in (
+        "The picture looks upside down",
+        f'<th scope="row">{METRICS["ldr_flip"].label}</th>',
+    ):
         assert later not in first
         assert later in whole
 
@@ -197,12 +202,115 @@ def test_noise_that_resampling_takes_away_is_no_other_size():
         assert "times as large" not in " ".join(record.agreement.mistakes)
 
 
+@pytest.mark.parametrize("factor", [0.01, 1 / 30, 1 / 683, 0.1, 0.5, 2, 683])
+def test_a_factor_is_named_however_small(factor):
+    image = landscape()
+    agreement = record_of([factor * image], [image]).agreement
+    (sentence,) = agreement.mistakes
+    assert f"is {factor:.3g} times as bright as the reference" in sentence
+    assert agreement.ratio == pytest.approx([factor] * 3, rel=1e-4)
+
+
+def test_a_factor_is_named_as_the_round_number_that_its_reading_allows():
+    """8 bits know a factor to about a percent; a factor of 3 in floats is no factor of pi."""
+    image = 0.4 * landscape()
+    codes = from_srgb(np.round(255 * to_srgb(0.5 * image)) / 255)
+    for given, words in (
+        (codes, "is 0.5 times as bright"),
+        (3 * image, "is 3 times as bright as the reference: another exposure"),
+        (np.pi * image, "is 3.14 times as bright as the reference: a missing division by pi"),
+    ):
+        assert words in record_of([given], [image]).agreement.mistakes[0]
+
+
+TURNS = {
+    "upside down": np.flipud,
+    "mirrored left to right": np.fliplr,
+    "turned by 180 degrees": lambda image: np.rot90(image, 2),
+    "turned by 90 degrees clockwise": lambda image: np.rot90(image, -1),
+    "turned by 90 degrees anticlockwise": np.rot90,
+    "mirrored at the diagonal from top left": lambda image: np.swapaxes(image, 0, 1),
+    "mirrored at the diagonal from top right": lambda image: np.rot90(image, 2).swapaxes(0, 1),
+}
+
+
+@pytest.mark.parametrize("how", TURNS)
+def test_a_turned_picture_is_certain_to_differ(how):
+    """Though it is one file, whose noise is unknown: no noise is a turn. Nor are values it."""
+    image = discs(3, 48, 48)
+    for values in (image, (2 * image) ** 0.7):
+        record = record_of([TURNS[how](values)], [image])
+        assert f"The picture looks {how}," in record.agreement.mistakes[0]
+        assert "After that, 0 % of" in record.agreement.mistakes[-1]
+        assert verdict.decision(record) == "fail"
+        assert "Noise may explain" not in verdict.sentence(record)
+
+
+def test_a_quarter_turn_of_a_wide_picture_is_named_with_its_size():
+    with pytest.raises(InputError, match="one of them looks turned by 90 degrees"):
+        record_of([np.rot90(discs(3))], [discs(3)])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_factor_with_a_power_is_no_tone_map(seed):
+    """Of codes of 8 bits, too; a tone map stays one."""
+    image = 0.8 * landscape(seed)
+    light = 1.2 * image
+    shown = from_srgb(np.round(255 * to_srgb(light ** (1 / 1.8))) / 255)
+    for picture in (light ** (1 / 1.8), shown):
+        (sentence,) = record_of([picture], [image]).agreement.mistakes
+        assert re.search(r"raised to the power 0\.5[56]\d? and multiplied by 1\.1[01]?:", sentence)
+    (sentence,) = record_of([reinhard(4 * image)], [image]).agreement.mistakes
+    assert "tone_map=reinhard`. It was given 4 times" in sentence
+
+
+def test_pictures_of_different_scenes_are_called_that():
+    """Without a shift, a factor or advice on samples; the same scene lit otherwise is the same."""
+    for seed in range(4):
+        image = discs(seed, 64, 48)
+        record = record_of([discs(50 + seed, 64, 48)], [image])
+        (sentence,) = record.agreement.mistakes
+        assert "show different scenes, or different views" in sentence
+        assert "More" not in verdict.about(record)
+        slope = np.linspace(0.2, 2, 64)[:, None]
+        record = record_of([image * slope], [image * slope[::-1]])
+        assert "different scenes" not in " ".join(record.agreement.mistakes)
+
+
+@pytest.mark.parametrize("factor", [1.3, 2])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_smooth_picture_that_is_brighter_is_neither_shifted_nor_of_another_white(factor, seed):
+    """In codes of 8 bits, whose steps make edges."""
+    y, x = np.mgrid[:48, :64]
+    random = np.random.default_rng(seed)
+    image = np.full((48, 64, 3), 0.05)
+    for _ in range(3):
+        place = random.uniform(0, (64, 48))
+        size = random.uniform(15, 35)
+        bump = np.exp(-((x - place[0]) ** 2 + (y - place[1]) ** 2) / (2 * size**2))
+        image += random.uniform(0.02, 0.1, 3) * bump[..., None]
+    pair = [from_srgb(np.round(255 * to_srgb(part * image)) / 255) for part in (factor, 1)]
+    (sentence,) = record_of(pair[:1], pair[1:]).agreement.mistakes
+    assert f"is {factor:g} times as bright" in sentence
+
+
+def test_equal_pictures_with_noise_show_no_difference_beyond_it():
+    image = landscape()
+    record = record_of(noisy(image, 4, 1, 0.07), noisy(image, 4, 2, 0.07))
+    if verdict.decision(record) == "undecided":
+        assert verdict.headline([record]) == "x: no difference beyond noise was found."
+    assert record.agreement.mistakes == ()
+
+
 def test_what_is_certain_is_said_though_noise_hides_its_share():
     image = landscape(side=128)
     changed = image.copy()
     changed[32:80, 32:80] *= 0.6
     reference = noisy(image, 4, size=0.15)
-    for given, said in ((changed, "noise hides in how many pixels"), (image, "may look like")):
+    for given, said in (
+        (changed, "noise hides in how many pixels"),
+        (image, "x: no difference beyond noise"),
+    ):
         record = record_of(noisy(given, 4, seed=2, size=0.15), reference)
         assert verdict.decision(record) == "undecided"
         assert said in verdict.headline([record])

@@ -228,7 +228,7 @@ def _is_even(ratios: Array) -> bool:
 # --- Probes ------------------------------------------------------------------------------------
 
 ENCODINGS: dict[str, Callable[[Array], Array]] = {
-    **{name: undo for name, undo in MISREADINGS.items() if name.startswith("values")},
+    **{name: undo for name, (undo, _) in MISREADINGS.items() if name.startswith("values")},
     "values look encoded by a power of 1/2.2": lambda value: value**2.2,
     "values look decoded by a power of 2.2": lambda value: value ** (1 / 2.2),
     "values look sRGB-encoded twice": lambda value: from_srgb(from_srgb(value)),

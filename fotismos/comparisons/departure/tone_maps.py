@@ -171,6 +171,10 @@ class FittedCurve:
     exposure: float
     distance: float
 
+    def shown(self, light: np.ndarray) -> np.ndarray:
+        """Return light (..., 3) as the curve shows it."""
+        return CURVES[self.name](self.exposure * light)
+
 
 @dataclass(frozen=True)
 class Light:
@@ -201,27 +205,26 @@ class Curves:
         """Return a curve at its best exposure."""
         encoded = to_srgb(self.picture)
 
-        def shown(stops: float, light: np.ndarray) -> np.ndarray:
-            return to_srgb(CURVES[name](2.0**stops * light))
-
         def distance(stops: float) -> float:
-            return float(np.abs(encoded - shown(stops, self.light)).mean())
+            shown = to_srgb(CURVES[name](2.0**stops * self.light))
+            return float(np.abs(encoded - shown).mean())
 
         start = min(STOPS, key=distance)
-        stops, left = minimum(distance, start - 1, start + 1)
-        # Two images whose noise is normal and alike are 2 / √π of their standard error apart.
-        above = shown(stops, self.light + self.standard_error)
-        below = shown(stops, self.light - self.standard_error)
-        noise = np.abs(above - below).mean() / np.sqrt(np.pi)
+        exposure = float(2.0 ** minimum(distance, start - 1, start + 1)[0])
         return FittedCurve(
             name=name,
-            exposure=float(2.0**stops),
-            distance=float(np.sqrt(max(left**2 - noise**2, 0.0))),
+            exposure=exposure,
+            distance=self.distance(lambda light: CURVES[name](exposure * light)),
         )
 
-    def shown(self, curve: FittedCurve) -> np.ndarray:
-        """Return the light as a curve shows it, (N, 3)."""
-        return CURVES[curve.name](curve.exposure * self.light)
+    def distance(self, show: ToneMap) -> float:
+        """Return how far a picture is from light as it is shown, as :class:`FittedCurve` has it."""
+        left = np.abs(to_srgb(self.picture) - to_srgb(show(self.light))).mean()
+        # Two images whose noise is normal and alike are 2 / √π of their standard error apart.
+        above = to_srgb(show(self.light + self.standard_error))
+        below = to_srgb(show(self.light - self.standard_error))
+        noise = np.abs(above - below).mean() / np.sqrt(np.pi)
+        return float(np.sqrt(max(left**2 - noise**2, 0.0)))
 
     def other(self, given: FittedCurve) -> FittedCurve | None:
         """Return the curve that leaves the least of the difference; None if none leaves far less.
@@ -230,6 +233,11 @@ class Curves:
         """
         if given.distance < LEAST_CURVE:
             return None
-        others = [self.fit(name) for name in CURVES if name != given.name]
+        # No tone map shows more than display white.
+        is_beyond = bool(self.picture.max() > 1.0 + LEAST_CURVE)
+        names = CURVES.keys() & {None} if is_beyond else CURVES.keys()
+        others = [self.fit(name) for name in names if name != given.name]
+        if not others:
+            return None
         best = min(others, key=lambda curve: curve.distance)
         return best if best.distance <= BETTER_CURVE * given.distance else None
