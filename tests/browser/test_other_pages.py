@@ -11,7 +11,7 @@ from fotismos.comparisons.study import design, running
 from fotismos.reports.page import page
 from fotismos.reports.page.page import Failure
 from fotismos.reports.run import audit_files, fit_files
-from fotismos.reports.work import study as work
+from fotismos.reports.run import study as work
 from tests.browser.conftest import Visitor, violations
 
 STUDY = """title = "Gloss"

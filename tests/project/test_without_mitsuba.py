@@ -13,7 +13,8 @@ ROOTS = (
     "fotismos.comparisons.departure.definitions",
     "fotismos.reports.cli",
     "fotismos.reports.run.pictures",
-    "fotismos.reports.work.cost",
+    "fotismos.reports.commands.cost",
+    "fotismos.reports.run.cost_files",
 )
 """They import the others."""
 

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
+import click
+
 from fotismos.comparisons import atomic
 from fotismos.comparisons.comparison import ComparisonRecord
 from fotismos.comparisons.departure.criterion import TOLERANCE, Verdict
@@ -18,10 +20,12 @@ from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.heuristic.errors import FotismosError, InputError, OutputError
 from fotismos.reports import verdict
 from fotismos.reports.terminal.tables import escaped, markdown, printed
-from fotismos.reports.terminal.words import number, percent, visible
+from fotismos.reports.terminal.words import echo, is_quiet, number, percent, tell, visible
 
 if TYPE_CHECKING:
     from fotismos.reports.ci.checks import CheckRecord
+    from fotismos.reports.jobs import Terminal
+    from fotismos.reports.page.scene_view import SceneView
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 """The variable with the file whose Markdown GitHub, Forgejo and Gitea show."""
@@ -100,6 +104,52 @@ def gate_outcome(gates: Sequence[Gate]) -> str:
 
 
 # --- Files -----------------------------------------------------------------------------------
+
+
+def conclude(
+    terminal: Terminal,
+    folder: Path,
+    views: Sequence[SceneView],
+    errors: Mapping[str, FotismosError],
+) -> int:
+    """Print the gates of a comparison, write its files for CI, and return the exit code."""
+    require_free(terminal.junit, terminal.summary, [])  # nor what this command wrote
+    studied = [view.studied for view in views]
+    found = gates([record for record, _ in studied], terminal.max_visible, terminal.within)
+    code = int(any(gate.state != "pass" for gate in found))
+    for line in gate_lines(found) if found else ():
+        if code or not is_quiet():  # the reason of a failure is never lost
+            echo(line, err=is_quiet())
+    write_junit(terminal.junit, lambda: junit_of_gates(found, errors))
+    page = str(folder / "index.html") if views else ""
+    append(
+        terminal.summary,
+        lambda: of_comparison(studied, found, errors=errors, page=page, threshold=terminal.within),
+    )
+    return code
+
+
+def conclude_checks(
+    outcomes: Sequence[CheckRecord], terminal: Terminal, significance: float, page: str
+) -> int:
+    """Print what checks or updates found, unless as JSON, and write files for CI.
+
+    Returns the exit code.
+    """
+    for made in outcomes:
+        if made.status == "error":
+            echo(f"fotismos: error: {made.message}", err=True)
+    write_junit(terminal.junit, lambda: junit_of_checks(outcomes))
+    append(terminal.summary, lambda: of_checks(outcomes, significance, page))
+    # 2, could not be checked, outweighs 1, moved.
+    code = max(made.exit_code for made in outcomes)
+    if not (is_quiet() or terminal.as_json):
+        tell(lines(outcomes, significance))
+        if page:
+            click.echo(f"page: {page}")
+    elif code and not terminal.as_json:
+        click.echo(outcome(outcomes, significance))
+    return code
 
 
 def require_free(junit: Path | None, summary: Path | None, inputs: Iterable[str | Path]) -> None:

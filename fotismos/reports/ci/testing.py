@@ -34,8 +34,8 @@ from fotismos.reference.rendering.sums import student
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines, checks, summary
 from fotismos.reports.files import images, results
-from fotismos.reports.jobs import share_of
 from fotismos.reports.page.scene_view import Before, SceneView
+from fotismos.reports.terminal.parsing import share_of
 
 Pictures = np.ndarray | Sequence[np.ndarray] | str | Path
 """A linear picture (H, W, 3), several that differ by noise, a file, or a pattern of files."""

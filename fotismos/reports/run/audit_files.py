@@ -7,10 +7,19 @@ from typing import Any
 
 import altair as alt
 
-from fotismos.comparisons.audit.checks import Audit, Checked
+from fotismos.comparisons.audit.checks import (
+    Audit,
+    Checked,
+    Kind,
+    audit_with_subject,
+    spheres,
+)
+from fotismos.comparisons.case import RGB
+from fotismos.heuristic import plugins
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.heuristics import in_file
 from fotismos.reference import records
+from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.charts import vega
 from fotismos.reports.charts.vega import FAINT, Spec
 from fotismos.reports.files import results
@@ -31,6 +40,16 @@ SHOWN = (0.0, 60.0, 80.0, 120.0, 180.0)
 
 Rows = list[dict[str, Any]]
 """Points of lines, in their order: ``x``, ``y`` and what the line is ``of``."""
+
+
+def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, target: Path) -> Audit:
+    """Audit a heuristic or a BSDF, and write the audit's files."""
+    set_variant(RGB)
+    plugins.register()
+    record, subject = audit_with_subject(kind, name, parameters=parameters, command=command)
+    shown = [curve.material for curve in record.curves if curve.lobes]
+    write(target, record, spheres(subject, shown))
+    return record
 
 
 def furnace(record: Audit) -> Spec:
@@ -108,16 +127,16 @@ def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerCha
     return alt.LayerChart(layer=[below, above], width=WIDTH, height=WIDTH // 2)
 
 
-def write(folder: Path, record: Audit, spheres: Mapping[str, Floats]) -> None:
+def write(folder: Path, record: Audit, pictures: Mapping[str, Floats]) -> None:
     """Write ``audit.svg``, ``index.html`` and ``audit.json`` to a folder; the record comes last."""
     results.own(folder)
     results.write(folder / "audit.svg", vega.paper(lobes(record)))
-    results.write(folder / results.PAGE, render(record, folder, spheres))
+    results.write(folder / results.PAGE, render(record, folder, pictures))
     results.write(folder / "audit.json", records.to_json(record))
 
 
 def render(
-    record: Audit, folder: Path | None = None, spheres: Mapping[str, Floats] | None = None
+    record: Audit, folder: Path | None = None, pictures: Mapping[str, Floats] | None = None
 ) -> str:
     """Return the page of an audit in a folder, with linear pictures by material; no scripts."""
     return rendered(
@@ -126,7 +145,7 @@ def render(
         head=head("audit", folder),
         record=record,
         found=value_of,
-        spheres={name: webp(tonemap(picture)) for name, picture in (spheres or {}).items()},
+        spheres={name: webp(tonemap(picture)) for name, picture in (pictures or {}).items()},
         lobes=vega.figure("Lobes", lobes(record)),
         furnace=vega.figure("White furnace", furnace(record)),
     )

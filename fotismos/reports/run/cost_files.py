@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from PIL.Image import Resampling
 
+from fotismos.comparisons.cost import engine as engines
 from fotismos.comparisons.cost.engine_record import Engine, EngineCost
+from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
+from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Floats
 from fotismos.reference import records
 from fotismos.reports import glossary
@@ -18,6 +22,7 @@ from fotismos.reports.charts import cost_charts, vega
 from fotismos.reports.files import images, results
 from fotismos.reports.page.scene_view import EFFECT_COLOURS, CostView, EngineView, Figure
 from fotismos.reports.page.templating import HELP, head, rendered
+from fotismos.reports.terminal import cost_tables
 from fotismos.reports.terminal.cost_tables import (
     OWN_FRONT,
     answer,
@@ -43,6 +48,51 @@ FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BS
 
 STRIP = 320
 """Pixels of the longer side of a page's pictures, at most."""
+
+
+def judged(
+    name: str, options: Options, engine: EngineTimes, within: float, target: Path, progress: Any
+) -> EngineCost:
+    """Judge the pictures of an engine's settings without a scene, and write the files."""
+    chosen = None if within == TOLERANCE else f"{within:g}"
+    command = options.command("cost", "", **engine.as_options(), within=chosen)
+    study = engines.front_of_pictures(options, engine, name, command)
+    write(target, study, view_of_pictures(study, within))
+    return study.record
+
+
+def measured(
+    name: str,
+    options: Options,
+    rounds: int | None,
+    at: tuple[int, int] | None,
+    is_measured: bool,
+    engine: EngineTimes | None,
+    target: Path,
+    progress: Any,
+) -> Cost:
+    """Study what each step of accuracy costs, and write its files."""
+    from fotismos.comparisons.case import open_case  # loaded late: pictures need no Mitsuba
+    from fotismos.comparisons.cost.cost import cost  # as late
+    from fotismos.comparisons.cost.measure import Effort  # as late
+
+    case = open_case(name, options)
+    effort = Effort() if rounds is None else Effort(rounds=rounds)
+    size = at and f"{at[0]}x{at[1]}"
+    given = {} if engine is None else engine.as_options()
+    repeated = case.command("cost", rounds=rounds, at=size, measure=is_measured or None, **given)
+    study = cost(
+        case.source,
+        case.options,
+        effort,
+        progress,
+        repeated,
+        at,
+        is_measured,
+        engine_times=engine,
+    )
+    write(target, study, view(study))
+    return study.record
 
 
 def documents(study: AnyStudy) -> dict[str, bytes]:
@@ -85,6 +135,13 @@ def write(folder: Path, study: AnyStudy, shown: CostView) -> None:
     results.write(folder / results.PAGE, page)
     for name, content in made.items():
         results.write(folder / name, content)
+
+
+def lines(record: Cost | EngineCost, within: float) -> Iterator[str]:
+    """Yield the lines of a study of a scene, or of pictures without one."""
+    if isinstance(record, EngineCost):
+        return cost_tables.lines_of_pictures(record, within)
+    return cost_tables.lines(record)
 
 
 def figure(record: Cost | EngineCost) -> Figure:

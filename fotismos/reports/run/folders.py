@@ -1,4 +1,4 @@
-"""Work on scenes whose results go to a folder each, such as ``OUTPUT/cost/SCENE``."""
+"""Scenes whose results go to a folder each, such as ``OUTPUT/cost/SCENE``."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

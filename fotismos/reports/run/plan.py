@@ -1,4 +1,4 @@
-"""The work of ``fotismos plan``."""
+"""Plans of scenes, and the price and fastest method of a scene within a tolerance."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -28,7 +28,7 @@ LARGEST = 2**17
 """
 
 
-def run(pool: Pool, scene: str, options: Options, within: float | None, as_json: bool) -> int:
+def show(pool: Pool, scene: str, options: Options, within: float | None, as_json: bool) -> int:
     """Print a scene's plan, or its price and fastest method within a tolerance.
 
     Returns the exit code.

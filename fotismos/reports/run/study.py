@@ -1,9 +1,9 @@
-"""The work of ``fotismos study``."""
+"""A study: its points rendered, its dataset, figures and page."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ from fotismos.comparisons.study.sheet import sheet_of
 from fotismos.reports.charts import study_charts, vega
 from fotismos.reports.files import results
 from fotismos.reports.files.results import PAGE, hold_results, own
-from fotismos.reports.jobs import command_line
+from fotismos.reports.jobs import Terminal, command_line
 from fotismos.reports.page.templating import head, rendered
 from fotismos.reports.terminal import progress, tables
 from fotismos.reports.terminal.words import tell
@@ -29,22 +29,24 @@ if TYPE_CHECKING:
 FIGURES = "figures"
 
 
-def run(pool: Pool, file: Path, output: Path, many: Callable[[int], Pool]) -> None:
+def show(pool: Pool, file: Path, terminal: Terminal) -> None:
     """Render the points of a study, and write its dataset and figures.
 
-    ``pool`` lists the points, since scenes are read for that; ``many(tasks)`` renders them.
+    ``pool`` lists the points, since scenes are read for that; others then render them.
     """
     dataset.arrow()  # before anything is rendered
     chosen = design.read(file)
     dataset.check_figures(chosen)
-    with hold_results(output / "study", [(chosen.name, file)], command_line()) as (folder,):
+    with hold_results(terminal.output / "study", [(chosen.name, file)], command_line()) as (
+        folder,
+    ):
         points = pool.do(Task(chosen.name, running.all_points, (chosen,)))
         # Its work is done, and the renderers get the cores and the memory.
         pool.end()
         tasks = len(points) // running.WORTH_A_PROCESS + 1
         for part in (folder / FIGURES, folder / running.POINTS):
             own(part)  # a study replaces only its own results
-        with many(tasks) as renderers, progress.shown("points") as bar:
+        with terminal.pool(tasks) as renderers, progress.shown("points") as bar:
             table, done = running.run(chosen, folder, renderers, bar.of(chosen.name), points)
         written = write(chosen, table, points, folder)
     tell([*summary(chosen, table, done), ""])
