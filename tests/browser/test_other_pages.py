@@ -31,7 +31,7 @@ BEYOND = "all => all.map((e) => e.getBoundingClientRect().right - innerWidth)"
 def audited(folder):
     file = folder / "index.html"
     sphere = {"rough metal": np.full((8, 8, 3), 0.5)}
-    file.write_text(audit_files.render(audit("bsdf", "roughconductor", {}), spheres=sphere))
+    file.write_text(audit_files.render(audit("bsdf", "roughconductor", {}), pictures=sphere))
     return file
 
 

@@ -13,8 +13,8 @@ from fotismos.comparisons.departure.colour import BT709, DEFAULT_VIEWING, ciede2
 from fotismos.comparisons.departure.definitions import AGREEMENT, DEFINED
 from fotismos.comparisons.departure.metrics import LEADING, METRICS
 from fotismos.comparisons.options import Options
+from fotismos.reports import tables
 from fotismos.reports.page import page
-from fotismos.reports.terminal import tables
 from tests.shared import records
 from tests.shared.misplanned import SKY, scene, sphere
 

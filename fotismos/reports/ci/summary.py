@@ -19,7 +19,8 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.heuristic.errors import FotismosError, InputError, OutputError
 from fotismos.reports import verdict
-from fotismos.reports.terminal.tables import escaped, markdown, printed
+from fotismos.reports.tables import SHOWN, certainty, moved
+from fotismos.reports.terminal.table import Column, Table, escaped, markdown, printed
 from fotismos.reports.terminal.words import echo, is_quiet, number, percent, tell, visible
 
 if TYPE_CHECKING:
@@ -32,9 +33,6 @@ STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 
 JUNIT_HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"fotismos "
 """How JUnit files of fotismos begin."""
-
-SHOWN = 12
-"""Quantities of a scene that are listed; all are in the record."""
 
 # XML 1.0 forbids all other characters, even as references; a lone surrogate is no UTF-8 either.
 NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -52,20 +50,27 @@ class Gate:
     found: VisibleShare
     state: Verdict
 
-    def cells(self) -> tuple[str, ...]:
-        """Return its row of a table: scene, at most, share, from, to, result."""
-        numbers = self.bound, self.found.value, self.found.low, self.found.high
-        return self.scene, *map(percent, numbers), self.state
-
     def __str__(self) -> str:
-        _, bound, share, low, high, state = self.cells()
         return (
-            f"{share} of the pixels ({low} to {high}) differ by more than {LEADING.label}"
-            f" {self.found.threshold:g}, at most {bound} may: {state}"
+            f"{percent(self.found.value)} of the pixels ({percent(self.found.low)} to"
+            f" {percent(self.found.high)}) differ by more than {LEADING.label}"
+            f" {self.found.threshold:g}, at most {percent(self.bound)} may: {self.state}"
         )
 
 
-GATE_HEADINGS = ("scene", "at most", "pixels that differ", "from", "to", "result")
+def gated(gates: Sequence[Gate]) -> Table:
+    """Return the table of gates."""
+    names = ("at most", "pixels that differ", "from", "to")
+    columns = [
+        Column("scene"),
+        *(Column(name, percent, is_right=True) for name in names),
+        Column("result", is_right=True),
+    ]
+    rows = [
+        (gate.scene, gate.bound, gate.found.value, gate.found.low, gate.found.high, gate.state)
+        for gate in gates
+    ]
+    return Table(columns, rows)
 
 
 def gates(
@@ -88,7 +93,7 @@ def gates(
 def gate_lines(gates: Sequence[Gate]) -> Iterator[str]:
     """Yield the lines on the gates of a run."""
     yield ""
-    yield from printed([GATE_HEADINGS, *(gate.cells() for gate in gates)], right=1)
+    yield from printed(gated(gates))
     yield gate_outcome(gates)
 
 
@@ -277,24 +282,25 @@ def of_comparison(
     threshold: float = TOLERANCE,
 ) -> str:
     """Return the summary of a run: verdict, a row for each scene, gates, and errors."""
-    headings = ("Scene", "Pixels that differ", f"Mean {LEADING.label}", "What makes it look right")
-    rows: list[tuple[str, ...]] = []
+    columns = (
+        Column("Scene"),
+        Column("Pixels that differ", percent, is_right=True),
+        Column(f"Mean {LEADING.label}", number, is_right=True),
+        Column("What makes it look right", is_right=True),
+    )
+    rows = []
     for record, cost in scenes:
-        numbers = (
-            percent(verdict.share(record, threshold).value),
-            number(record.metrics[LEADING.name].mean),
-        )
         wanted = (verdict.cause(record), verdict.sentence(record, cost, threshold))
         sentences = " ".join(filter(None, (*record.mistakes, *wanted)))
-        rows.append((record.scene, *numbers, sentences))
+        share = verdict.share(record, threshold).value
+        rows.append((record.scene, share, record.metrics[LEADING.name].mean, sentences))
     records = [record for record, _ in scenes]
     first = verdict.headline(records, threshold)
     second = verdict.most_missing(records, threshold)
     parts = ["### fotismos compare", escaped(f"{first} {second}".strip())]
-    parts.append(_marked_down([headings, *rows]))
+    parts.append(_marked_down(Table(columns, rows)))
     if gates:
-        rows = [gate.cells() for gate in gates]
-        parts += [_marked_down([GATE_HEADINGS, *rows]), gate_outcome(gates)]
+        parts += [_marked_down(gated(gates)), gate_outcome(gates)]
     parts += [escaped(f"{name}: {error}") for name, error in errors.items()]
     parts += [_where(page)] if page else []
     # The next summary may be appended to the same file.
@@ -303,22 +309,14 @@ def of_comparison(
 
 def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
     """Return the summary of checks; ``page`` is empty if none was written."""
-    rows: list[tuple[str, ...]] = [
-        ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
-    ]
-    for made in checks:
-        cells: tuple[str, ...] = (made.message, "", "", "", "")
-        if made.moved and (most := made.largest):
-            what, *numbers = most.cells()
-            cells = (f"{what}, {most.change} ({len(made.moved)} in all)", *numbers)
-        rows.append((made.name, made.status, *cells))
-    parts = ["### fotismos check", outcome(checks, level), _marked_down(rows, right=3)]
+    parts = ["### fotismos check", outcome(checks, level), _marked_down(most_moved(checks))]
     parts += [escaped(f"{made.name}: {' '.join(made.causes)}") for made in checks if made.causes]
     return "\n\n".join([*parts, *([_where(page)] if page else ())]) + "\n\n"
 
 
-def _marked_down(rows: Sequence[Sequence[str]], right: int = 1) -> str:
-    return "\n".join(markdown([[*map(escaped, row)] for row in rows], right))
+def _marked_down(table: Table) -> str:
+    rows = [[escaped(cell) for cell in row] for row in table.texts()]
+    return "\n".join(markdown(Table(table.columns, rows)))
 
 
 def _where(page: str) -> str:
@@ -334,7 +332,7 @@ def lines(checks: Sequence[CheckRecord], level: float) -> Iterator[str]:
     for made in checks:
         yield from _details(made)
     if len(checks) > 1:
-        yield from printed(_table(checks), right=2)
+        yield from printed(checked(checks))
         yield ""
     yield from dict.fromkeys(filter(None, (made.other_mitsuba for made in checks)))
     yield outcome(checks, level)
@@ -361,16 +359,10 @@ def outcome(checks: Sequence[CheckRecord], level: float) -> str:
 
 def moved_lines(made: CheckRecord) -> Iterator[str]:
     """Yield the table of what moved: from, to, by how many standard errors, p-value; and causes."""
-    moved = made.moved or ()
-    rows: list[tuple[str, ...]] = [
-        ("what moved", "baseline", "now", "change", "standard errors", "p")
-    ]
-    for move in moved[:SHOWN]:
-        name, before, now, *certainty = move.cells()
-        rows.append((name, before, now, move.change, *certainty))
-    yield from printed(rows, right=2)
-    if len(moved) > SHOWN:
-        yield f"and {len(moved) - SHOWN} more; {made.tested} quantities were tested"
+    moves = made.moved or ()
+    yield from printed(moved(moves))
+    if len(moves) > SHOWN:
+        yield f"and {len(moves) - SHOWN} more; {made.tested} quantities were tested"
     yield from made.causes
 
 
@@ -390,13 +382,45 @@ def _details(made: CheckRecord) -> Iterator[str]:
     yield ""
 
 
-def _table(checks: Sequence[CheckRecord]) -> Iterator[Sequence[str]]:
-    yield "baseline", "result", "moved", "of", "mean ΔE2000", "now", "time"
+def most_moved(checks: Sequence[CheckRecord]) -> Table:
+    """Return the table of checks, each with what moved most, for a summary."""
+    columns = (
+        Column("Baseline"),
+        Column("Result"),
+        Column("What moved most"),
+        Column("Baseline", "{:.6g}".format, is_right=True),
+        Column("Now", "{:.6g}".format, is_right=True),
+        Column("Standard errors", "{:+.1f}".format, is_right=True),
+        Column("p", "{:.1g}".format, is_right=True),
+    )
+    rows = []
     for made in checks:
-        cells = [""] * 4
+        cells: tuple[float | str, ...] = (made.message, "", "", "", "")
+        if made.moved and (most := made.largest):
+            what = f"{most.name}, {most.change} ({len(made.moved)} in all)"
+            cells = (what, most.before, most.after, *certainty(most))
+        rows.append((made.name, made.status, *cells))
+    return Table(columns, rows)
+
+
+def checked(checks: Sequence[CheckRecord]) -> Table:
+    """Return the table of checks."""
+    columns = (
+        Column("baseline"),
+        Column("result"),
+        Column("moved", str, is_right=True),
+        Column("of", str, is_right=True),
+        Column("mean ΔE2000", "{:.3f}".format, is_right=True),
+        Column("now", "{:.3f}".format, is_right=True),
+        Column("time", "{:.1f} s".format, is_right=True),
+    )
+    rows = []
+    for made in checks:
+        cells: list[float | str] = [""] * 4
         if made.tested is not None:
-            cells[:2] = f"{len(made.moved or ())}", f"{made.tested}"
+            cells[:2] = len(made.moved or ()), made.tested
         if made.metrics is not None:
             lead = made.metrics["dE2000"]
-            cells[2:] = f"{lead.before:.3f}", f"{lead.after:.3f}"
-        yield made.name, made.status, *cells, f"{made.seconds:.1f} s"
+            cells[2:] = lead.before, lead.after
+        rows.append((made.name, made.status, *cells, made.seconds))
+    return Table(columns, rows)

@@ -123,7 +123,7 @@ def render(
     # On the page of a check, what moved takes the place of the verdict.
     since = [*(view.before for view in views if view.before), *moved]
     headline = " ".join(
-        [title, *(f"{check.name}: {check.headline}" for check in since[:FIRST_MOVED])]
+        [title, *(f"{one.check.name}: {one.check.headline}" for one in since[:FIRST_MOVED])]
     )
     data = {
         "scenes": [

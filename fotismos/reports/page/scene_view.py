@@ -8,6 +8,7 @@ from typing import Any
 from msgspec import field
 
 from fotismos.comparisons.comparison import ComparisonRecord
+from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.reference.planning.effects import EFFECTS
 from fotismos.reference.records import Record, plain
 from fotismos.reports.page.embedding import Embedded
@@ -87,57 +88,30 @@ class LiveView(TermsView):
     fit: tuple[float, int, int] | None = None
 
 
-class EngineView(Record):
-    """A page's sentences on an engine's settings, and their shares above the usual threshold.
-
-    ``judgements`` are one for each, ``stated`` says what their times are of, and ``odd`` what is
-    odd about the pictures. ``shares`` are those of the pixels above the ΔE2000 ``within``.
-    """
-
-    judgements: tuple[str, ...]
-    stated: str
-    odd: tuple[str, ...]
-    within: float
-    shares: tuple[Any, ...]
-
-
 class CostView(Record):
     """A page's data of a study.
 
-    ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, whose type few pages need
-    to load. ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are
-    sentences on its sums and on the machine, ``answer`` one on the cheapest method that looks
-    right; ``colours`` are those of the effects; ``left_out`` are sentences on methods. ``engine``
-    is None without given pictures; ``reference`` is a small WebP file. Without a scene, ``judged``
-    says by which reference, and ``record`` is an ``EngineCost``.
+    ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, or an ``EngineCost``
+    without a scene, whose types few pages need to load. ``images`` are small WebP files by the
+    methods' names, ``reference`` is one. Pixels of given pictures differ visibly above the ΔE2000
+    ``within``.
     """
 
     record: Any
     images: dict[str, bytes]
-    answer: str
-    said: str = ""
-    busy: str = ""
-    colours: tuple[str, ...] = ()
-    engine: EngineView | None = None
-    left_out: tuple[str, ...] = ()
-    reference: bytes | None = None
-    judged: str = ""
+    reference: bytes
+    within: float = TOLERANCE
 
 
 class Before(Record):
     """What moved in a scene or picture since its baseline.
 
-    ``headline`` says what moved most; ``moved`` has a name, before, now, standard errors and p.
+    ``check`` is a :class:`fotismos.reports.ci.checks.CheckRecord`, which only checks need to load.
     ``pictures`` are WebP files by their captions: how it was, and maps of the change.
     """
 
-    name: str
-    headline: str
-    sentences: tuple[str, ...]
-    moved: tuple[tuple[str, ...], ...]
-    tested: int
+    check: Any
     pictures: dict[str, bytes]
-    command: str
 
 
 class SceneView(Record):

@@ -9,7 +9,6 @@ import altair as alt
 
 from fotismos.comparisons.audit.checks import (
     Audit,
-    Checked,
     Kind,
     audit_with_subject,
     spheres,
@@ -17,7 +16,6 @@ from fotismos.comparisons.audit.checks import (
 from fotismos.comparisons.case import RGB
 from fotismos.heuristic import plugins
 from fotismos.heuristic.convention import Floats
-from fotismos.heuristic.heuristics import in_file
 from fotismos.reference import records
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.charts import vega
@@ -25,7 +23,8 @@ from fotismos.reports.charts.vega import FAINT, Spec
 from fotismos.reports.files import results
 from fotismos.reports.files.images import tonemap, webp
 from fotismos.reports.page.templating import head, rendered
-from fotismos.reports.terminal import tables
+from fotismos.reports.sentences import of_audit
+from fotismos.reports.terminal.table import Column, Table, printed
 from fotismos.reports.terminal.words import number
 
 WIDTH = 270
@@ -141,10 +140,10 @@ def render(
     """Return the page of an audit in a folder, with linear pictures by material; no scripts."""
     return rendered(
         "audit.html.j2",
-        title=headline(record),
+        title=of_audit(record),
         head=head("audit", folder),
         record=record,
-        found=value_of,
+        checks=_checks(record),
         spheres={name: webp(tonemap(picture)) for name, picture in (pictures or {}).items()},
         lobes=vega.figure("Lobes", lobes(record)),
         furnace=vega.figure("White furnace", furnace(record)),
@@ -154,33 +153,31 @@ def render(
 # --- On a terminal ---------------------------------------------------------------------------
 
 
-def headline(record: Audit) -> str:
-    """Return the subject with its parameters, and which checks failed."""
-    name = record.subject
-    if located := in_file(name):
-        file = Path(located[0]).name
-        name = f"{located[1]} ({file})" if located[1] else file
-    title = ", ".join([name, *(f"{key} {value}" for key, value in record.parameters.items())])
-    failed = [check.name for check in record.checks if check.verdict == "does not hold"]
-    if not failed:
-        return f"{title}: all checks hold"
-    return f"{title}: {', '.join(failed)} {'does' if len(failed) == 1 else 'do'} not hold"
+def _checks(record: Audit) -> Table:
+    """Return the table of checks."""
+    columns = (
+        Column("check"),
+        Column("verdict"),
+        Column("found", _counted),
+        Column("expected"),
+        Column("worst case"),
+    )
+    rows = [
+        (check.name, check.verdict, check.value, check.expected, check.worst)
+        for check in record.checks
+    ]
+    return Table(columns, rows)
 
 
-def value_of(check: Checked) -> str:
+def _counted(value: float) -> str:
     """Return the value of a check; a count has no decimals."""
-    value = check.value
-    return f"{value:g}" if value is not None and value == int(value) else number(value)
+    return f"{value:g}" if value == int(value) else number(value)
 
 
 def lines(record: Audit) -> Iterator[str]:
     """Yield the lines of an audit."""
-    yield headline(record)
+    yield of_audit(record)
     yield ""
-    rows = [
-        (check.name, check.verdict, value_of(check), check.expected, check.worst)
-        for check in record.checks
-    ]
-    yield from tables.printed([("check", "verdict", "found", "expected", "worst case"), *rows])
+    yield from printed(_checks(record))
     if record.mistakes:
         yield from ("", *record.mistakes)

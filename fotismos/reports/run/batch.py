@@ -21,14 +21,14 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import FotismosError, InputError, InstallationError, OutputError
 from fotismos.reference.records import to_json
-from fotismos.reports import jobs, verdict
+from fotismos.reports import jobs, tables, verdict
 from fotismos.reports.files import results
 from fotismos.reports.files.results import FIGURES, START, TABLES, Failure, RunRecord
 from fotismos.reports.jobs import Job, Terminal, command_line
 from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files
-from fotismos.reports.terminal import progress, tables
+from fotismos.reports.terminal import progress
 from fotismos.reports.terminal.words import as_typed, remark, tell, tell_where
 
 if TYPE_CHECKING:  # a comparison has no hard cases

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,33 +9,18 @@ from typing import TYPE_CHECKING, Any
 from PIL.Image import Resampling
 
 from fotismos.comparisons.cost import engine as engines
-from fotismos.comparisons.cost.engine_record import Engine, EngineCost
+from fotismos.comparisons.cost.engine_record import EngineCost
 from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.blocks import shrunk
-from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
+from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Floats
 from fotismos.reference import records
-from fotismos.reports import glossary
+from fotismos.reports import cost_tables, glossary
 from fotismos.reports.charts import cost_charts, vega
 from fotismos.reports.files import images, results
-from fotismos.reports.page.scene_view import EFFECT_COLOURS, CostView, EngineView, Figure
+from fotismos.reports.page.scene_view import CostView, Figure
 from fotismos.reports.page.templating import HELP, head, rendered
-from fotismos.reports.terminal import cost_tables
-from fotismos.reports.terminal.cost_tables import (
-    OWN_FRONT,
-    answer,
-    answer_of_pictures,
-    busy,
-    closure,
-    judgements,
-    left_out,
-    oddities,
-    reference_of,
-    stated,
-    together,
-)
-from fotismos.reports.terminal.words import as_typed
 
 if TYPE_CHECKING:  # pictures without a scene need no Mitsuba
     from fotismos.comparisons.cost.cost_record import Cost
@@ -57,7 +41,7 @@ def judged(
     chosen = None if within == TOLERANCE else f"{within:g}"
     command = options.command("cost", "", **engine.as_options(), within=chosen)
     study = engines.front_of_pictures(options, engine, name, command)
-    write(target, study, view_of_pictures(study, within))
+    write(target, study, view(study, within))
     return study.record
 
 
@@ -121,7 +105,7 @@ def write(folder: Path, study: AnyStudy, shown: CostView) -> None:
     """
     results.own(folder)
     made = documents(study)
-    by = ", judged by" if shown.judged else " on"
+    by = ", judged by" if isinstance(study.record, EngineCost) else " on"
     page = rendered(
         "cost_page.html.j2",
         HELP,
@@ -156,54 +140,19 @@ def _plain(name: str) -> str:
     return "".join(c if c.isalnum() else "-" for c in name.lower()).replace("--", "-")
 
 
-def view_of_pictures(study: Study[EngineCost], within: float) -> CostView:
-    """Return the view of settings without a scene; pixels differ visibly above a ΔE2000."""
-    record = study.record
-    return CostView(
-        record=record,
-        images=_strip(study),
-        engine=_engine(record.engine, within),
-        answer=answer_of_pictures(record, within),
-        reference=_small(study.reference, record.viewing.exposure),
-        judged=reference_of(record),
-    )
-
-
-def _strip(study: AnyStudy) -> dict[str, bytes]:
+def view(study: AnyStudy, within: float = TOLERANCE) -> CostView:
+    """Return the :class:`CostView` of a study; pixels differ visibly above a ΔE2000."""
     exposure = study.record.viewing.exposure
     named = {**study.methods, **study.settings}
-    return {name: _small(image, exposure) for name, image in named.items()}
+    return CostView(
+        record=study.record,
+        images={name: _small(image, exposure) for name, image in named.items()},
+        reference=_small(study.reference, exposure),
+        within=within,
+    )
 
 
 def _small(image: Floats, exposure: float) -> bytes:
     """Return an image (H, W, 3) as a WebP file for a strip."""
     picture = images.tonemap(image, exposure)
     return images.webp(picture.resize(shrunk(picture.size, STRIP), Resampling.BOX))
-
-
-def _engine(engine: Engine, within: float = TOLERANCE, more: str = "") -> EngineView:
-    return EngineView(
-        judgements=tuple(judgements(engine)),
-        stated=stated(engine) + more,
-        odd=tuple(oddities(engine)),
-        within=within,
-        shares=tuple(share_above(one.visible, within) for one in engine.settings),
-    )
-
-
-def view(study: Study[Cost]) -> CostView:
-    """Return the :class:`CostView` of a study of a scene."""
-    record = study.record
-    effects = record.attribution.effects
-    said = [together(record), closure(record)] if effects else []
-    return CostView(
-        record=record,
-        images=_strip(study),
-        engine=_engine(record.engine, more=OWN_FRONT) if record.engine else None,
-        said=re.sub(r"(?<!\d)-(?=\d)", "−", " ".join(said)),
-        busy=busy(record) if record.is_busy else "",
-        answer=as_typed(answer(record)),
-        left_out=tuple(map(as_typed, left_out(record))),
-        reference=_small(study.reference, record.viewing.exposure),
-        colours=tuple(EFFECT_COLOURS[effect.effect] for effect in effects),
-    )

@@ -1,6 +1,6 @@
 """Plans of scenes, and the price and fastest method of a scene within a tolerance."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
 import click
@@ -12,16 +12,15 @@ from fotismos.comparisons.comparison import ComparisonRecord
 from fotismos.comparisons.cost.cost import Choice, choose
 from fotismos.comparisons.cost.measure import WIDTH, reduced, requested
 from fotismos.comparisons.departure.criterion import checked_threshold
-from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.comparisons.steps import steps
 from fotismos.reference.records import Record, to_json
-from fotismos.reports import verdict
-from fotismos.reports.terminal import cost_tables, plan_lines, progress
+from fotismos.reports import sentences
+from fotismos.reports.terminal import plan_lines, progress
 from fotismos.reports.terminal.plan_lines import PlanReport, plan_report
-from fotismos.reports.terminal.words import parameter, tell
+from fotismos.reports.terminal.words import tell
 
 LARGEST = 2**17
 """Pixels of a picture that is compared for its price; the width of a larger one is that of a study.
@@ -50,7 +49,7 @@ def show(pool: Pool, scene: str, options: Options, within: float | None, as_json
                 Task(scene, chosen, (scene, options, within), progress=of_scene)
             )
         choice = structs.replace(choice, price=record.price)
-        lines = [*price_lines(record, within), *cost_tables.choice_lines(choice)]
+        lines = [*sentences.price_lines(record, within), *sentences.choice_lines(choice)]
         code = int(choice.chosen is None)
         result = choice
     if as_json:
@@ -76,18 +75,6 @@ def priced(name: str, options: Options, within: float, progress: Any) -> Compari
     if width * height > LARGEST:
         options = options.changed(resolution=reduced(source, options, WIDTH))
     return compare(source, options, progress, then=steps(options, why=True)).record
-
-
-def price_lines(record: ComparisonRecord, within: float) -> Iterator[str]:
-    """Yield whether a scene passes, what makes it look right, and what its plan leaves out."""
-    outcome = {"pass": "passes", "fail": "fails"}.get(verdict.decision(record, within))
-    judged = verdict.judged(record).subject
-    what = f"{judged} {outcome or 'is undecided'} at {LEADING.label} {parameter(within)}"
-    size = cost_tables.sized(record.resolution)
-    yield f"At {size}: {what}. {verdict.sentence(record, threshold=within)}"
-    yield from record.mistakes
-    if saving := verdict.saving(record):
-        yield saving
 
 
 def chosen(name: str, options: Options, within: float, progress: Any) -> Choice:

@@ -20,7 +20,8 @@ from fotismos.reports.files import results
 from fotismos.reports.files.results import PAGE, hold_results, own
 from fotismos.reports.jobs import Terminal, command_line
 from fotismos.reports.page.templating import head, rendered
-from fotismos.reports.terminal import progress, tables
+from fotismos.reports.terminal import progress
+from fotismos.reports.terminal.table import Column, Table, printed
 from fotismos.reports.terminal.words import tell
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def write(
         "study.html.j2",
         title=study.title,
         head=head("study", folder),
-        ranges=[_range(part.name, rows) for part in study.parts],
+        ranges=_ranges(study, rows),
         sheets=sheets,
         figures=figures,
         command=command_line(),
@@ -88,22 +89,29 @@ def write(
     return data, folder / FIGURES, folder / PAGE
 
 
-def _range(part: str, rows: Sequence[Row]) -> tuple[str, ...]:
-    """Return the row of a part: name, points, failed ones, least, median and most error."""
-    of_part = [row for row in rows if row["part"] == part]
-    good = sorted(row["dE2000"] for row in of_part if row["error"] is None)
-    errors = ["–", "–", "–"]
-    if good:
-        errors = [f"{error:.2f}" for error in (good[0], good[len(good) // 2], good[-1])]
-    return part, f"{len(of_part)}", f"{len(of_part) - len(good)}", *errors
+def _ranges(study: StudyFile, rows: Sequence[Row]) -> Table:
+    """Return the table of parts: points, failed ones, least, median and most error."""
+    columns = (
+        Column("part"),
+        Column("points", str, is_right=True),
+        Column("failed", str, is_right=True),
+        Column("mean ΔE2000: least", "{:.2f}".format, is_right=True),
+        Column("median", "{:.2f}".format, is_right=True),
+        Column("most", "{:.2f}".format, is_right=True),
+    )
+    ranges = []
+    for part in study.parts:
+        of_part = [row for row in rows if row["part"] == part.name]
+        good = sorted(row["dE2000"] for row in of_part if row["error"] is None)
+        errors = [good[0], good[len(good) // 2], good[-1]] if good else [None] * 3
+        ranges.append((part.name, len(of_part), len(of_part) - len(good), *errors))
+    return Table(columns, ranges)
 
 
 def summary(study: StudyFile, table: pa.Table, done: int) -> Iterator[str]:
     """Yield a line for each part: points, failures, and the range of the error."""
     rows = table.to_pylist()
-    headings = "part", "points", "failed", "mean ΔE2000: least", "median", "most"
-    parts = [_range(part.name, rows) for part in study.parts]
-    yield from tables.printed([headings, *parts], right=1)
+    yield from printed(_ranges(study, rows))
     if done < len(rows):
         yield f"{len(rows) - done} points were kept from an earlier run, or are shared."
     for row in [row for row in rows if row["error"] is not None][:3]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from msgspec.structs import asdict
 
@@ -11,7 +11,8 @@ from fotismos.reference.planning.decisions import Decision
 from fotismos.reference.planning.effects import labelled
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.records import VERSION, Amount, Record
-from fotismos.reports.terminal.tables import printed
+from fotismos.reports.terminal.table import Column, Table, printed
+from fotismos.reports.terminal.words import yes_or_no
 
 
 class PlannedEffect(Record):
@@ -70,12 +71,7 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
     yield from printed(_effects(plan))
     yield ""
     if plan.rules:
-        headings = "pruning rule", "applies", "premise that may fail", "evidence"
-        rules = [
-            (rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence)
-            for rule in plan.rules
-        ]
-        yield from printed([headings, *rules])
+        yield from printed(_rules(plan))
         yield ""
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
     reads = ", ".join(plan.heuristic_reads) or "nothing"
@@ -89,8 +85,28 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
     yield f"planning      {plan.planning_s * 1e3:.0f} ms"
 
 
-def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
-    yield "effect", "needed", "rule", "evidence", "cost"
-    for effect in plan.effects:
-        called = "yes" if effect.called_for else "no"
-        yield effect.name, called, effect.rule, effect.evidence, effect.cost
+def _effects(plan: PlanReport) -> Table:
+    columns = (
+        Column("effect"),
+        Column("needed", yes_or_no),
+        Column("rule"),
+        Column("evidence"),
+        Column("cost"),
+    )
+    rows = [
+        (effect.name, effect.called_for, effect.rule, effect.evidence, effect.cost)
+        for effect in plan.effects
+    ]
+    return Table(columns, rows)
+
+
+def _rules(plan: PlanReport) -> Table:
+    columns = (
+        Column("pruning rule"),
+        Column("applies", yes_or_no),
+        Column("premise that may fail"),
+        Column("evidence"),
+    )
+    return Table(
+        columns, [(rule.name, rule.applies, rule.premise, rule.evidence) for rule in plan.rules]
+    )

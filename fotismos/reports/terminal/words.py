@@ -174,5 +174,10 @@ def percent(value: float) -> str:
     return f"{number(100 * value)} %"
 
 
+def yes_or_no(is_so: bool) -> str:
+    """A truth value."""
+    return "yes" if is_so else "no"
+
+
 def _minus(digits: str) -> str:
     return digits.replace("-", "−")
