@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
 from fotismos.comparisons.cost.front import sufficient
 from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
@@ -27,8 +27,15 @@ from fotismos.reports.terminal.table import Column, Piece, Table, printed
 from fotismos.reports.terminal.words import given_time, number, parameter, percent, seconds
 
 if TYPE_CHECKING:
-    from fotismos.comparisons.cost.cost_record import Cost
-    from fotismos.comparisons.cost.engine_record import Engine, EngineCost
+    from fotismos.comparisons.cost.cost_record import Cost, EffectCost, Point, TimedMethod
+    from fotismos.comparisons.cost.engine_record import (
+        Engine,
+        EngineCost,
+        EngineSetting,
+        FrontPoint,
+    )
+    from fotismos.comparisons.departure.noise import VisibleShare
+    from fotismos.reference.records import Interval
 
 BENT = 0.1
 """Share by which a time is off its method's straight line: more is mentioned."""
@@ -96,176 +103,149 @@ def lines_of_pictures(record: EngineCost, within: float) -> Iterator[str]:
 def times(record: Cost) -> Table:
     """Return the time of each method."""
     columns = (
-        Column("method"),
-        Column("x kernel", "{:.2f}".format),
-        Column("interval", "{:.2f}".format),
-        Column("per sample", seconds),
-        Column("overhead", seconds),
-        Column("first image", seconds, "(preparing)"),
+        Column("method", _called),
+        Column("x kernel", "ratio.value", "{:.2f}".format),
+        Column("interval", "ratio", "{:.2f}".format),
+        Column("per sample", "per_sample_s.value", seconds),
+        Column("overhead", "overhead_s.value", seconds),
+        Column("first image", _first, seconds, "(preparing)"),
     )
-    rows = []
-    for method in record.methods:
-        others = ", ".join(other for other in method.names if other != method.name)
-        preparing = (" (", method.prepare_s, ")") if method.prepare_s else ()
-        rows.append(
-            (
-                f"{method.name} (= {others})" if others else method.name,
-                method.ratio.value,
-                method.ratio,
-                method.per_sample_s.value,
-                method.overhead_s.value,
-                (method.first_s, preparing),
-            )
-        )
-    return Table(columns, rows)
+    return Table(columns, record.methods)
+
+
+def _called(method: TimedMethod) -> str:
+    others = ", ".join(other for other in method.names if other != method.name)
+    return f"{method.name} (= {others})" if others else method.name
+
+
+def _first(method: TimedMethod) -> tuple[Any, ...]:
+    return method.first_s, (" (", method.prepare_s, ")") if method.prepare_s else ""
 
 
 def points(record: Cost) -> Table:
     """Return error and time of one image by each method, with each number of samples."""
-    columns = (
-        Column("method"),
-        Column("samples", str),
-        Column("time", short_time),
-        Column("interval", short_time),
-        Column(f"mean {LEADING.label}", "{:.3f}".format),
-        Column("passes at", "{:.2f}".format),
-        Column("front"),
-    )
     cheapest = sufficient(record.points, TOLERANCE)
-    rows = []
-    for point in record.points:
+
+    def notes(point: Point) -> str:
         is_cheapest = cheapest and (point.method, point.spp) == (cheapest.method, cheapest.spp)
-        rows.append(
-            (
-                point.method,
-                point.spp,
-                point.seconds.value,
-                point.seconds,
-                (point.error.value, " ± ", point.error.high - point.error.value),
-                (point.tolerance.value, " ± ", point.tolerance.high - point.tolerance.value),
-                _front(
-                    point.front,
-                    point.ties if point.front else (),
-                    "cheapest that looks right" if is_cheapest else "",
-                ),
-            )
-        )
-    return Table(columns, rows)
+        more = ", cheapest that looks right" if is_cheapest else ""
+        return f"{_front(point) if point.front else ''}{more}".removeprefix(", ")
+
+    columns = (
+        *_timed(),
+        Column(f"mean {LEADING.label}", lambda point: _spread(point.error), "{:.3f}".format),
+        Column("passes at", lambda point: _spread(point.tolerance), "{:.2f}".format),
+        Column("front", notes),
+    )
+    return Table(columns, record.points)
 
 
-def _front(is_on: bool, ties: Sequence[str], more: str = "") -> str:
+def _timed() -> tuple[Column, ...]:
+    """Return the columns of a method with a number of samples, and its time."""
+    return (
+        Column("method", "method"),
+        Column("samples", "spp", str),
+        Column("time", "seconds.value", short_time),
+        Column("interval", "seconds", short_time),
+    )
+
+
+def _spread(error: Interval) -> tuple[float, str, float]:
+    return error.value, " ± ", error.high - error.value
+
+
+def _front(point: FrontPoint) -> str:
     """Return whether a point is on the front, and with which others."""
-    close = f"too close to call: {', '.join(ties)}" if ties else ""
-    return ", ".join(filter(None, ("front" if is_on else "", close, more)))
+    close = f"too close to call: {', '.join(point.ties)}" if point.ties else ""
+    return ", ".join(filter(None, ("front" if point.front else "", close)))
 
 
 def settings(engine: Engine, within: float = TOLERANCE) -> Table:
     """Return the settings of another renderer; pixels differ visibly above a ΔE2000."""
-    ratio = [Column("x kernel there", number)] if engine.kernel_s else []
+
+    def share(one: EngineSetting) -> VisibleShare:
+        return share_above(one.visible, within)
+
+    def ends(one: EngineSetting) -> Any:
+        # The sign follows the other end.
+        low = Piece(share(one).low, number(100 * share(one).low))
+        return (low, " to ", share(one).high) if one.has_noise else "unknown"
+
     columns = [
-        Column("setting"),
-        Column("files", str),
-        Column("time", given_time),
-        *ratio,
-        Column(f"mean {LEADING.label}", number),
-        Column("95 % interval", number),
-        Column("above", percent, f"{within:g}"),
-        Column("95 % interval", percent),
-        Column("passes at", parameter),
-        Column("front"),
+        Column("setting", "method"),
+        Column("files", "picture.repeats", str),
+        Column("time", "seconds.value", given_time),
+        Column(f"mean {LEADING.label}", "error.value", number),
+        Column("95 % interval", lambda one: one.error if one.has_noise else "unknown", number),
+        Column("above", lambda one: share(one).value, percent, f"{within:g}"),
+        Column("95 % interval", ends, percent),
+        Column(
+            "passes at", lambda one: "none" if one.passes_at is None else one.passes_at, parameter
+        ),
+        Column("front", _front),
     ]
-    rows = []
-    for one in engine.settings:
-        share = share_above(one.visible, within)
-        shown = [one.ratio] if ratio else []
-        low = Piece(share.low, number(100 * share.low))  # the sign follows the other end
-        rows.append(
-            (
-                one.method,
-                one.picture.repeats,
-                one.seconds.value,
-                *shown,
-                one.error.value,
-                one.error if one.has_noise else "unknown",
-                share.value,
-                (low, " to ", share.high) if one.has_noise else "unknown",
-                "none" if one.passes_at is None else one.passes_at,
-                _front(one.front, one.ties),
-            )
-        )
-    return Table(columns, rows)
+    if engine.kernel_s:
+        columns.insert(3, Column("x kernel there", "ratio", number))
+    return Table(columns, engine.settings)
+
+
+def _passes_at(setting: EngineSetting) -> float | str:
+    return "none" if setting.passes_at is None else setting.passes_at
 
 
 def predicted(record: Cost) -> Table:
     """Return the times that are predicted for another size."""
-    columns = (
-        Column("method"),
-        Column("samples", str),
-        Column("time", short_time),
-        Column("interval", short_time),
-    )
-    rows = [
-        (point.method, point.spp, point.seconds.value, point.seconds) for point in record.predicted
-    ]
-    return Table(columns, rows)
+    return Table(_timed(), record.predicted)
 
 
 def off(record: Cost) -> Table:
     """Return how far off the predicted times are, and errors at both sizes."""
-    columns = (
-        Column("method"),
-        Column("time", seconds),
-        Column("predicted", seconds),
-        Column("off", "{:+.0%}".format),
-        Column(f"mean {LEADING.label}", "{:.3f}".format),
-        Column("at", "{:.3f}".format, sized(record.resolution)),
-    )
     forecasts = {(point.method, point.spp): point for point in record.predicted}
-    rows = []
-    for point in record.measured:
-        forecast = forecasts[point.method, point.spp]
-        time = point.seconds.value
-        rows.append(
-            (
-                point.method,
-                time,
-                forecast.seconds.value,
-                forecast.seconds.value / time - 1,
-                point.error.value,
-                forecast.error.value,
-            )
-        )
-    return Table(columns, rows)
+
+    def forecast(point: Point) -> Point:
+        return forecasts[point.method, point.spp]
+
+    def error_before(point: Point) -> float:
+        return forecast(point).error.value
+
+    def ratio(point: Point) -> float:
+        return forecast(point).seconds.value / point.seconds.value - 1
+
+    columns = (
+        Column("method", "method"),
+        Column("time", "seconds.value", seconds),
+        Column("predicted", lambda point: forecast(point).seconds.value, seconds),
+        Column("off", ratio, "{:+.0%}".format),
+        Column(f"mean {LEADING.label}", "error.value", "{:.3f}".format),
+        Column(
+            "at",
+            lambda point: forecast(point).error.value,
+            "{:.3f}".format,
+            sized(record.resolution),
+        ),
+    )
+    return Table(columns, record.measured)
 
 
 def attribution(record: Cost, named: Callable[[str], str] = str) -> Table:
     """Return what each effect removes and adds; ``named`` says how to call it."""
     whole = record.attribution
-    columns = (
-        Column("effect"),
-        Column("removed", "{:.3f}".format),
-        Column("95 % interval", "{:.3f}".format),
-        Column("alone", "{:.3f}".format),
-        Column("last", "{:.3f}".format),
-        Column("adds", short_time, f"at {sized(whole.resolution)}, {whole.spp} samples"),
-        Column("95 % interval", short_time),
-    )
-    rows = []
-    for effect in whole.effects:
+
+    def added(effect: EffectCost) -> float | str:
         # An interval with 0 in it leaves even the sign open.
         is_open = effect.adds_s.low <= 0 <= effect.adds_s.high
-        rows.append(
-            (
-                named(effect.effect),
-                effect.removes.value,
-                effect.removes,
-                effect.alone,
-                effect.last,
-                "no measurable time" if is_open else effect.adds_s.value,
-                effect.adds_s,
-            )
-        )
-    return Table(columns, rows)
+        return "no measurable time" if is_open else effect.adds_s.value
+
+    columns = (
+        Column("effect", lambda effect: named(effect.effect)),
+        Column("removed", "removes.value", "{:.3f}".format),
+        Column("95 % interval", "removes", "{:.3f}".format),
+        Column("alone", "alone", "{:.3f}".format),
+        Column("last", "last", "{:.3f}".format),
+        Column("adds", added, short_time, f"at {sized(whole.resolution)}, {whole.spp} samples"),
+        Column("95 % interval", "adds_s", short_time),
+    )
+    return Table(columns, whole.effects)
 
 
 def short_time(time: float) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from fotismos.comparisons.comparison import Agreement, ComparisonRecord, NoiseTarget, PictureFiles
 from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.statistics import Summary
 from fotismos.comparisons.options import Options
 from fotismos.reference.pairing.pairing_record import Pairing
 from fotismos.reference.planning.plan_record import Plan
@@ -47,8 +48,9 @@ def metrics_csv(records: Iterable[ComparisonRecord]) -> str:
         for name, summary in record.metrics.items()
     ]
     headings = list(dict.fromkeys(key for row in rows for key in row))
-    columns = [Column(heading) for heading in headings]
-    return comma_separated(Table(columns, [[row.get(key, "") for key in headings] for row in rows]))
+    return comma_separated(
+        Table.of([headings, *([row.get(key, "") for key in headings] for row in rows)])
+    )
 
 
 def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -104,28 +106,25 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
 
 def _scenes(records: Sequence[ComparisonRecord], threshold: float) -> Table:
     """Return the table of scenes: pixels that differ, errors, and times."""
+
+    def lead(record: ComparisonRecord) -> Summary:
+        return record.metrics[LEADING.name]
+
+    def differ(record: ComparisonRecord) -> float:
+        return share_above(lead(record).visible, threshold).value
+
+    def noise(record: ComparisonRecord) -> float | None:
+        return lead(record).noise_floor if record.is_noise_known else None
+
     columns = (
-        Column("scene"),
-        Column("differ", percent, is_right=True),
-        Column(f"mean {LEADING.label}", number, is_right=True),
-        Column("noise", number, is_right=True),
-        Column("shape", number, is_right=True),
-        Column("time", is_right=True),
+        Column("scene", "scene"),
+        Column("differ", differ, percent, is_right=True),
+        Column(f"mean {LEADING.label}", lambda r: lead(r).mean, number, is_right=True),
+        Column("noise", noise, number, is_right=True),
+        Column("shape", lambda r: lead(r).after_exposure.mean, number, is_right=True),
+        Column("time", lambda r: "" if r.agreement else time_ratio(r), is_right=True),
     )
-    rows = []
-    for record in records:
-        metric = record.metrics[LEADING.name]
-        rows.append(
-            (
-                record.scene,
-                share_above(metric.visible, threshold).value,
-                metric.mean,
-                metric.noise_floor if record.is_noise_known else None,
-                metric.after_exposure.mean,
-                "" if record.agreement else time_ratio(record),
-            )
-        )
-    return Table(columns, rows)
+    return Table(columns, records)
 
 
 def time_ratio(record: ComparisonRecord) -> str:
@@ -210,14 +209,14 @@ def _noise(record: ComparisonRecord, stop: NoiseTarget) -> str:
 
 def _shares(records: Iterable[ComparisonRecord]) -> Table:
     """Return the table of shapes and materials by their share of the error."""
-    rows = []
+    rows: list[list[Any]] = [["scene", "kind", *SHARES]]
     for record in records:
         for kind, carriers in (("shape", record.objects), ("material", record.materials)):
             for carrier in carriers:
                 values = [getattr(carrier, name) for name in SHARES]
                 texts = ["" if value is None else value for value in values]
                 rows.append([record.scene, kind, *texts])
-    return Table([Column(name) for name in ("scene", "kind", *SHARES)], rows)
+    return Table.of(rows)
 
 
 # --- What moved since a baseline ---------------------------------------------------------------
@@ -226,21 +225,16 @@ def _shares(records: Iterable[ComparisonRecord]) -> Table:
 def moved(moves: Sequence[Move]) -> Table:
     """Return the table of what moved most: from, to, by how many standard errors, and p-value."""
     columns = (
-        Column("what moved"),
-        Column("baseline"),
-        Column("now", "{:.6g}".format, is_right=True),
-        Column("change", is_right=True),
-        Column("standard errors", "{:+.1f}".format, is_right=True),
-        Column("p", "{:.1g}".format, is_right=True),
+        Column("what moved", "name"),
+        Column("baseline", lambda move: f"{move.before:.6g}"),
+        Column("now", "after", "{:.6g}".format, is_right=True),
+        Column("change", "change", is_right=True),
+        Column("standard errors", certainty, "{:+.1f}".format, is_right=True),
+        Column("p", "p_corrected", "{:.1g}".format, is_right=True),
     )
-    rows = [
-        (move.name, f"{move.before:.6g}", move.after, move.change, *certainty(move))
-        for move in moves[:SHOWN]
-    ]
-    return Table(columns, rows)
+    return Table(columns, moves[:SHOWN])
 
 
-def certainty(move: Move) -> tuple[float | str, float]:
-    """Return by how many standard errors a quantity moved, and the p-value."""
-    errors = move.standard_errors
-    return "no noise" if errors is None else errors, move.p_corrected
+def certainty(move: Move) -> float | str:
+    """Return by how many standard errors a quantity moved."""
+    return "no noise" if move.standard_errors is None else move.standard_errors

@@ -91,7 +91,7 @@ def test_a_declaration_makes_the_signature_of_its_function():
     assert function("fig-8-9", "name", 2, spp=4).gain == 2.0
     with pytest.raises(InputError, match=r"gain = 10 is not allowed: give .* and below 10"):
         function(gain=10)
-    with pytest.raises(InputError, match="unknown options gian"):
+    with pytest.raises(InputError, match="option 'gian' is not known"):
         function(gian=1)
     with pytest.raises(TypeError, match="too many positional"):
         function(1, 2, 3, None, 5)

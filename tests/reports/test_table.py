@@ -2,6 +2,7 @@
 
 import csv
 from io import StringIO
+from operator import itemgetter
 
 import pytest
 
@@ -16,10 +17,10 @@ from tests.shared.pages import HOSTILE, Page
 
 TABLE = Table(
     (
-        Column("method"),
-        Column("time", "{:.1f} s".format, is_right=True),
-        Column("interval", "{:.2f}".format, "(95 %)"),
-        Column("noted"),
+        Column("method", itemgetter(0)),
+        Column("time", itemgetter(1), "{:.1f} s".format, is_right=True),
+        Column("interval", itemgetter(2), "{:.2f}".format, "(95 %)"),
+        Column("noted", itemgetter(3)),
     ),
     [
         ("direct|all", 1.25, Interval(value=1.0, low=0.5, high=1.5), None),
@@ -52,13 +53,13 @@ def test_a_page_keeps_the_numbers_in_full_and_escapes_texts():
     assert [value for value, _ in Page(html).values] == [1.25, 0.5, 1.5, 1.0, 0.125]
     assert '<th scope="col">interval <small>(95 %)</small></th>' in html
     assert '<td class="text">[b]x[/b]</td>' in html
-    hostile = page_of(Table((Column(HOSTILE),), [(HOSTILE,)]))
+    hostile = page_of(Table.of([(HOSTILE,), (HOSTILE,)]))
     assert HOSTILE not in hostile
     assert Page(hostile).text.count(HOSTILE) == 2
 
 
 def test_csv_has_numbers_in_full_and_no_formulas():
-    plain = Table(TABLE.columns[:2], [row[:2] for row in TABLE.rows])
+    plain = Table(TABLE.columns[:2], TABLE.rows)
     rows = list(csv.reader(StringIO(comma_separated(plain))))
     assert rows == [["method", "time"], ["direct|all", "1.25"], ["'=sum(1)", "none"]]
 
@@ -73,7 +74,7 @@ def test_headings_of_costs_have_the_glossarys_sentences(table):
 def test_a_gate_is_a_row_and_a_sentence_with_the_same_numbers():
     found = VisibleShare(threshold=2.0, value=0.4, low=0.3, high=0.5)
     gate = summary.Gate(scene="hall", bound=0.05, found=found, state="fail")
-    (row,) = summary.gated([gate]).texts()
+    (row,) = Table(summary.GATES, [gate]).texts()
     assert row == ["hall", "5.00 %", "40.0 %", "30.0 %", "50.0 %", "fail"]
     assert all(text in str(gate) for text in row[1:])
 

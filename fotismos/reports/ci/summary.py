@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import click
@@ -24,6 +24,7 @@ from fotismos.reports.terminal.table import Column, Table, escaped, markdown, pr
 from fotismos.reports.terminal.words import echo, is_quiet, number, percent, tell, visible
 
 if TYPE_CHECKING:
+    from fotismos.comparisons.check.moved import Move
     from fotismos.reports.ci.checks import CheckRecord
     from fotismos.reports.jobs import Terminal
     from fotismos.reports.page.scene_view import SceneView
@@ -58,19 +59,15 @@ class Gate:
         )
 
 
-def gated(gates: Sequence[Gate]) -> Table:
-    """Return the table of gates."""
-    names = ("at most", "pixels that differ", "from", "to")
-    columns = [
-        Column("scene"),
-        *(Column(name, percent, is_right=True) for name in names),
-        Column("result", is_right=True),
-    ]
-    rows = [
-        (gate.scene, gate.bound, gate.found.value, gate.found.low, gate.found.high, gate.state)
-        for gate in gates
-    ]
-    return Table(columns, rows)
+GATES = (
+    Column("scene", "scene"),
+    Column("at most", "bound", percent, is_right=True),
+    Column("pixels that differ", "found.value", percent, is_right=True),
+    Column("from", "found.low", percent, is_right=True),
+    Column("to", "found.high", percent, is_right=True),
+    Column("result", "state", is_right=True),
+)
+"""The table of gates."""
 
 
 def gates(
@@ -93,7 +90,7 @@ def gates(
 def gate_lines(gates: Sequence[Gate]) -> Iterator[str]:
     """Yield the lines on the gates of a run."""
     yield ""
-    yield from printed(gated(gates))
+    yield from printed(Table(GATES, gates))
     yield gate_outcome(gates)
 
 
@@ -282,25 +279,21 @@ def of_comparison(
     threshold: float = TOLERANCE,
 ) -> str:
     """Return the summary of a run: verdict, a row for each scene, gates, and errors."""
-    columns = (
-        Column("Scene"),
-        Column("Pixels that differ", percent, is_right=True),
-        Column(f"Mean {LEADING.label}", number, is_right=True),
-        Column("What makes it look right", is_right=True),
-    )
-    rows = []
+    rows: list[tuple[str, ...]] = [
+        ("Scene", "Pixels that differ", f"Mean {LEADING.label}", "What makes it look right")
+    ]
     for record, cost in scenes:
         wanted = (verdict.cause(record), verdict.sentence(record, cost, threshold))
         sentences = " ".join(filter(None, (*record.mistakes, *wanted)))
-        share = verdict.share(record, threshold).value
-        rows.append((record.scene, share, record.metrics[LEADING.name].mean, sentences))
+        share = percent(verdict.share(record, threshold).value)
+        rows.append((record.scene, share, number(record.metrics[LEADING.name].mean), sentences))
     records = [record for record, _ in scenes]
     first = verdict.headline(records, threshold)
     second = verdict.most_missing(records, threshold)
     parts = ["### fotismos compare", escaped(f"{first} {second}".strip())]
-    parts.append(_marked_down(Table(columns, rows)))
+    parts.append(_marked_down(Table.of(rows)))
     if gates:
-        parts += [_marked_down(gated(gates)), gate_outcome(gates)]
+        parts += [_marked_down(Table(GATES, gates)), gate_outcome(gates)]
     parts += [escaped(f"{name}: {error}") for name, error in errors.items()]
     parts += [_where(page)] if page else []
     # The next summary may be appended to the same file.
@@ -309,14 +302,18 @@ def of_comparison(
 
 def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
     """Return the summary of checks; ``page`` is empty if none was written."""
-    parts = ["### fotismos check", outcome(checks, level), _marked_down(most_moved(checks))]
+    parts = [
+        "### fotismos check",
+        outcome(checks, level),
+        _marked_down(Table(_most_moved(), checks)),
+    ]
     parts += [escaped(f"{made.name}: {' '.join(made.causes)}") for made in checks if made.causes]
     return "\n\n".join([*parts, *([_where(page)] if page else ())]) + "\n\n"
 
 
 def _marked_down(table: Table) -> str:
     rows = [[escaped(cell) for cell in row] for row in table.texts()]
-    return "\n".join(markdown(Table(table.columns, rows)))
+    return "\n".join(markdown(table, rows))
 
 
 def _where(page: str) -> str:
@@ -332,7 +329,7 @@ def lines(checks: Sequence[CheckRecord], level: float) -> Iterator[str]:
     for made in checks:
         yield from _details(made)
     if len(checks) > 1:
-        yield from printed(checked(checks))
+        yield from printed(Table(_checked(), checks))
         yield ""
     yield from dict.fromkeys(filter(None, (made.other_mitsuba for made in checks)))
     yield outcome(checks, level)
@@ -382,45 +379,43 @@ def _details(made: CheckRecord) -> Iterator[str]:
     yield ""
 
 
-def most_moved(checks: Sequence[CheckRecord]) -> Table:
-    """Return the table of checks, each with what moved most, for a summary."""
-    columns = (
-        Column("Baseline"),
-        Column("Result"),
-        Column("What moved most"),
-        Column("Baseline", "{:.6g}".format, is_right=True),
-        Column("Now", "{:.6g}".format, is_right=True),
-        Column("Standard errors", "{:+.1f}".format, is_right=True),
-        Column("p", "{:.1g}".format, is_right=True),
+def _checked() -> tuple[Column, ...]:
+    """Return the columns of checks on a terminal."""
+
+    def lead(end: str) -> Callable[[CheckRecord], float | str]:
+        return lambda made: "" if made.metrics is None else getattr(made.metrics["dE2000"], end)
+
+    def counted(made: CheckRecord) -> int | str:
+        return "" if made.tested is None else len(made.moved or ())
+
+    return (
+        Column("baseline", "name"),
+        Column("result", "status"),
+        Column("moved", counted, is_right=True),
+        Column("of", lambda made: "" if made.tested is None else made.tested, is_right=True),
+        Column("mean ΔE2000", lead("before"), "{:.3f}".format, is_right=True),
+        Column("now", lead("after"), "{:.3f}".format, is_right=True),
+        Column("time", "seconds", "{:.1f} s".format, is_right=True),
     )
-    rows = []
-    for made in checks:
-        cells: tuple[float | str, ...] = (made.message, "", "", "", "")
-        if made.moved and (most := made.largest):
-            what = f"{most.name}, {most.change} ({len(made.moved)} in all)"
-            cells = (what, most.before, most.after, *certainty(most))
-        rows.append((made.name, made.status, *cells))
-    return Table(columns, rows)
 
 
-def checked(checks: Sequence[CheckRecord]) -> Table:
-    """Return the table of checks."""
-    columns = (
-        Column("baseline"),
-        Column("result"),
-        Column("moved", str, is_right=True),
-        Column("of", str, is_right=True),
-        Column("mean ΔE2000", "{:.3f}".format, is_right=True),
-        Column("now", "{:.3f}".format, is_right=True),
-        Column("time", "{:.1f} s".format, is_right=True),
+def _most_moved() -> tuple[Column, ...]:
+    """Return the columns of checks in a summary, with what moved most."""
+
+    def what(made: CheckRecord) -> str:
+        if not made.moved or (most := made.largest) is None:
+            return made.message
+        return f"{most.name}, {most.change} ({len(made.moved)} in all)"
+
+    def of(value: Callable[[Move], Any]) -> Callable[[CheckRecord], Any]:
+        return lambda made: "" if made.largest is None else value(made.largest)
+
+    return (
+        Column("Baseline", "name"),
+        Column("Result", "status"),
+        Column("What moved most", what),
+        Column("Baseline", of(lambda move: move.before), "{:.6g}".format, is_right=True),
+        Column("Now", of(lambda move: move.after), "{:.6g}".format, is_right=True),
+        Column("Standard errors", of(certainty), "{:+.1f}".format, is_right=True),
+        Column("p", of(lambda move: move.p_corrected), "{:.1g}".format, is_right=True),
     )
-    rows = []
-    for made in checks:
-        cells: list[float | str] = [""] * 4
-        if made.tested is not None:
-            cells[:2] = len(made.moved or ()), made.tested
-        if made.metrics is not None:
-            lead = made.metrics["dE2000"]
-            cells[2:] = lead.before, lead.after
-        rows.append((made.name, made.status, *cells, made.seconds))
-    return Table(columns, rows)

@@ -233,7 +233,7 @@ class Fotismos:
             found = found or check_pictures(before, after, level)
             made = checks.of_pictures(path, name, status="failed", found=found, begin=begin)
             _, section = checks.picture_section(made, before, found)
-            section = structs.replace(section, headline=fault, command="pytest --fotismos-update")
+            section = structs.replace(section, fault=fault, approval="pytest --fotismos-update")
             page = _page(folder, f"{name} differs", moved=[section])
             raise AssertionError(f"{path}: {fault}\npage: {page}")
         return True

@@ -33,7 +33,6 @@ from fotismos.comparisons.departure.metrics import (
     declared,
 )
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.reference.records import plain
 from fotismos.reports import glossary, verdict
 from fotismos.reports.files import images
 from fotismos.reports.files.results import DETAILS, Failure, RunRecord
@@ -123,7 +122,7 @@ def render(
     # On the page of a check, what moved takes the place of the verdict.
     since = [*(view.before for view in views if view.before), *moved]
     headline = " ".join(
-        [title, *(f"{one.check.name}: {one.check.headline}" for one in since[:FIRST_MOVED])]
+        [title, *(f"{one.check.name}: {one.headline}" for one in since[:FIRST_MOVED])]
     )
     data = {
         "scenes": [
@@ -291,12 +290,23 @@ def _scene_data(scene: PageScene) -> dict[str, Any]:
             for region in record.regions
         ],
         "images": scene.embedded.manifest() if scene.embedded else None,
-        "effects": plain(why.effects) | {"names": list(map(verdict.noun, why.effects.names))}
-        if why
-        else None,
+        "effects": _effects(why),
         "board": _board(why, record.why),
         "terms": scene.terms.manifest() if scene.terms else None,
         "live": scene.live.manifest() if scene.live else None,
+    }
+
+
+def _effects(why: WhyView | None) -> dict[str, Any] | None:
+    """Return where each effect dominates, with the effects' names and colours."""
+    if not why:
+        return None
+    return {
+        "width": why.width,
+        "height": why.height,
+        "map": why.map,
+        "names": [verdict.noun(name) for name in why.names],
+        "colours": [EFFECT_COLOURS[name] for name in why.names],
     }
 
 
@@ -308,7 +318,7 @@ def _board(why: WhyView | None, found: Attribution | None) -> dict[str, Any] | N
         "images": why.pictures.manifest(),
         "hybrids": [
             {
-                "on": [why.effects.names.index(effect) for effect in hybrid.effects],
+                "on": [why.names.index(effect) for effect in hybrid.effects],
                 "mean": difference(max(hybrid.error, 0.0)),
             }
             for hybrid in found.hybrids

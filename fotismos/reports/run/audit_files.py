@@ -143,7 +143,7 @@ def render(
         title=of_audit(record),
         head=head("audit", folder),
         record=record,
-        checks=_checks(record),
+        checks=Table(CHECKS, record.checks),
         spheres={name: webp(tonemap(picture)) for name, picture in (pictures or {}).items()},
         lobes=vega.figure("Lobes", lobes(record)),
         furnace=vega.figure("White furnace", furnace(record)),
@@ -153,31 +153,25 @@ def render(
 # --- On a terminal ---------------------------------------------------------------------------
 
 
-def _checks(record: Audit) -> Table:
-    """Return the table of checks."""
-    columns = (
-        Column("check"),
-        Column("verdict"),
-        Column("found", _counted),
-        Column("expected"),
-        Column("worst case"),
-    )
-    rows = [
-        (check.name, check.verdict, check.value, check.expected, check.worst)
-        for check in record.checks
-    ]
-    return Table(columns, rows)
-
-
 def _counted(value: float) -> str:
     """Return the value of a check; a count has no decimals."""
     return f"{value:g}" if value == int(value) else number(value)
+
+
+CHECKS = (
+    Column("check", "name"),
+    Column("verdict", "verdict"),
+    Column("found", "value", _counted),
+    Column("expected", "expected"),
+    Column("worst case", "worst"),
+)
+"""The table of checks."""
 
 
 def lines(record: Audit) -> Iterator[str]:
     """Yield the lines of an audit."""
     yield of_audit(record)
     yield ""
-    yield from printed(_checks(record))
+    yield from printed(Table(CHECKS, record.checks))
     if record.mistakes:
         yield from ("", *record.mistakes)

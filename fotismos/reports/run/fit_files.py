@@ -105,58 +105,54 @@ def _notes(fit: FormFit) -> Iterator[str]:
 def _errors(record: FitRecord) -> Table:
     """Return the errors of the paired and the fitted parameters, by form."""
     metrics = drawn()
-    columns = [
-        Column("mean error"),
-        *(Column(metric.label, _unsigned) for metric in metrics.values()),
-        Column(f"minimised: {record.loss['unit']}", "{:.4g}".format),
-    ]
 
-    def row(name: str, form: FormFit, field: str, loss: float | str = "") -> list[Any]:
-        return [name, *(getattr(form.departure[metric], field) for metric in metrics), loss]
+    def row(name: str, form: FormFit, field: str, loss: float | None = None) -> list[str]:
+        means = [f"{getattr(form.departure[metric], field):z.3f}" for metric in metrics]
+        return [name, *means, "" if loss is None else f"{loss:.4g}"]
 
+    labels = [metric.label for metric in metrics.values()]
     nearest = record.nearest
     first = record.fits[0]
     blank = [""] * len(metrics)
     rows = [
+        ["mean error", *labels, f"minimised: {record.loss['unit']}"],
         row("paired", first, "before", nearest.loss + nearest.parameter_error),
         *(row(form.form, form, "after", form.loss) for form in record.fits),
         row("noise alone", first, "noise_floor"),
-        ["parameter error", *blank, nearest.parameter_error],
-        ["model error", *blank, nearest.loss],
+        ["parameter error", *blank, f"{nearest.parameter_error:.4g}"],
+        ["model error", *blank, f"{nearest.loss:.4g}"],
     ]
-    return Table(columns, rows)
-
-
-def _unsigned(mean: float) -> str:
-    return f"{mean:z.3f}"
+    return Table.of(rows, right=len(rows[0]))
 
 
 def _parameters(fit: FormFit) -> Table:
     """Return the parameters before and after, and how certain they are."""
     columns = (
-        Column("material"),
-        Column("parameter"),
-        Column("paired", "{:.4g}".format),
-        Column("fitted", "{:.4g}".format),
-        Column("95 %, by noise alone"),
-        Column("note"),
+        Column("material", lambda row: row[0]),
+        Column("parameter", lambda row: _called(row[1])),
+        Column("paired", lambda row: row[1].paired, "{:.4g}".format),
+        Column("fitted", lambda row: row[1].fitted, "{:.4g}".format),
+        Column("95 %, by noise alone", lambda row: _interval(row[1])),
+        Column("note", lambda row: _note(row[1])),
     )
-    rows = []
     owned = [
         (material.name, parameter)
         for material in fit.materials
         for parameter in material.parameters
     ]
-    for owner, parameter in owned:
-        name = f"{parameter.name} {parameter.channel}".strip()
-        if parameter.is_factor:
-            name += " (factor)"
-        note = "at its bound" if parameter.at_bound else ""
-        if parameter.reason:
-            partners = f" ({', '.join(parameter.partners)})" if parameter.partners else ""
-            note = f"not identifiable: {parameter.reason}{partners}"
-        rows.append((owner, name, parameter.paired, parameter.fitted, _interval(parameter), note))
-    return Table(columns, rows)
+    return Table(columns, owned)
+
+
+def _called(parameter: FittedParameter) -> str:
+    name = f"{parameter.name} {parameter.channel}".strip()
+    return f"{name} (factor)" if parameter.is_factor else name
+
+
+def _note(parameter: FittedParameter) -> str:
+    if parameter.reason:
+        partners = f" ({', '.join(parameter.partners)})" if parameter.partners else ""
+        return f"not identifiable: {parameter.reason}{partners}"
+    return "at its bound" if parameter.at_bound else ""
 
 
 def _interval(parameter: FittedParameter) -> str:

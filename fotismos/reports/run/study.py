@@ -21,7 +21,7 @@ from fotismos.reports.files.results import PAGE, hold_results, own
 from fotismos.reports.jobs import Terminal, command_line
 from fotismos.reports.page.templating import head, rendered
 from fotismos.reports.terminal import progress
-from fotismos.reports.terminal.table import Column, Table, printed
+from fotismos.reports.terminal.table import Table, printed
 from fotismos.reports.terminal.words import tell
 
 if TYPE_CHECKING:
@@ -91,21 +91,17 @@ def write(
 
 def _ranges(study: StudyFile, rows: Sequence[Row]) -> Table:
     """Return the table of parts: points, failed ones, least, median and most error."""
-    columns = (
-        Column("part"),
-        Column("points", str, is_right=True),
-        Column("failed", str, is_right=True),
-        Column("mean ΔE2000: least", "{:.2f}".format, is_right=True),
-        Column("median", "{:.2f}".format, is_right=True),
-        Column("most", "{:.2f}".format, is_right=True),
-    )
-    ranges = []
+    ranges: list[tuple[str, ...]] = [
+        ("part", "points", "failed", "mean ΔE2000: least", "median", "most")
+    ]
     for part in study.parts:
         of_part = [row for row in rows if row["part"] == part.name]
         good = sorted(row["dE2000"] for row in of_part if row["error"] is None)
-        errors = [good[0], good[len(good) // 2], good[-1]] if good else [None] * 3
-        ranges.append((part.name, len(of_part), len(of_part) - len(good), *errors))
-    return Table(columns, ranges)
+        errors = ["–", "–", "–"]
+        if good:
+            errors = [f"{error:.2f}" for error in (good[0], good[len(good) // 2], good[-1])]
+        ranges.append((part.name, f"{len(of_part)}", f"{len(of_part) - len(good)}", *errors))
+    return Table.of(ranges)
 
 
 def summary(study: StudyFile, table: pa.Table, done: int) -> Iterator[str]:

@@ -14,6 +14,21 @@ from fotismos.reference.records import VERSION, Amount, Record
 from fotismos.reports.terminal.table import Column, Table, printed
 from fotismos.reports.terminal.words import yes_or_no
 
+EFFECTS = (
+    Column("effect", "name"),
+    Column("needed", "called_for", yes_or_no),
+    Column("rule", "rule"),
+    Column("evidence", "evidence"),
+    Column("cost", "cost"),
+)
+RULES = (
+    Column("pruning rule", "name"),
+    Column("applies", "applies", yes_or_no),
+    Column("premise that may fail", "premise"),
+    Column("evidence", "evidence"),
+)
+"""The tables of a plan."""
+
 
 class PlannedEffect(Record):
     """Whether a scene needs an effect, why, and what simulates it on either side."""
@@ -68,10 +83,10 @@ def _planned(decision: Decision) -> PlannedEffect:
 
 def plan_lines(plan: PlanReport) -> Iterator[str]:
     """Yield the lines of a plan: the table of effects, then the simulation."""
-    yield from printed(_effects(plan))
+    yield from printed(Table(EFFECTS, plan.effects))
     yield ""
     if plan.rules:
-        yield from printed(_rules(plan))
+        yield from printed(Table(RULES, plan.rules))
         yield ""
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
     reads = ", ".join(plan.heuristic_reads) or "nothing"
@@ -83,30 +98,3 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
     yield f"left out      {', '.join(plan.left_out) or 'nothing'}"
     yield f"samples       {plan.spp} per pixel in {plan.passes} passes, {plan.sampler}"
     yield f"planning      {plan.planning_s * 1e3:.0f} ms"
-
-
-def _effects(plan: PlanReport) -> Table:
-    columns = (
-        Column("effect"),
-        Column("needed", yes_or_no),
-        Column("rule"),
-        Column("evidence"),
-        Column("cost"),
-    )
-    rows = [
-        (effect.name, effect.called_for, effect.rule, effect.evidence, effect.cost)
-        for effect in plan.effects
-    ]
-    return Table(columns, rows)
-
-
-def _rules(plan: PlanReport) -> Table:
-    columns = (
-        Column("pruning rule"),
-        Column("applies", yes_or_no),
-        Column("premise that may fail"),
-        Column("evidence"),
-    )
-    return Table(
-        columns, [(rule.name, rule.applies, rule.premise, rule.evidence) for rule in plan.rules]
-    )

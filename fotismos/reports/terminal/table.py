@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from io import StringIO
+from operator import attrgetter, itemgetter
 from typing import Any, NamedTuple
 
 from rich.console import Console
@@ -34,13 +35,16 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class Column:
-    """A column: its heading with a detail, the form of its numbers, and on which side they stand.
+    """A column: its heading, what it shows ``of`` a row, and the form of numbers.
 
-    On a terminal, columns stand left unless they are to stand right. On a page, numbers stand
-    right, and texts left. The heading is a term of the glossary where it needs an explanation.
+    ``of`` is a function, or the name of an attribute such as ``ratio.value``. It gives a text, a
+    number, an interval, of which both ends are shown, or several of these. On a terminal, columns
+    stand left unless they are to stand right. On a page, numbers stand right, and texts left. The
+    heading is a term of the glossary where it needs an explanation; its ``detail`` is none.
     """
 
     heading: str
+    of: str | Callable[[Any], Any]
     form: Form | None = None
     detail: str = ""
     is_right: bool = False
@@ -60,49 +64,54 @@ class Column:
         """The glossary's sentence on it; empty if it needs none."""
         return meanings().get(self.heading, "")
 
-    def pieces(self, cell: Any) -> list[Piece]:
-        """Return what a cell shows: a text, a number, an interval's ends, or several of these."""
+    def cell(self, row: Any) -> Any:
+        """Return what it shows of a row."""
+        return attrgetter(self.of)(row) if isinstance(self.of, str) else self.of(row)
+
+    def pieces(self, row: Any) -> list[Piece]:
+        """Return the parts of a cell."""
+        return self._parts(self.cell(row))
+
+    def _parts(self, cell: Any) -> list[Piece]:
         if isinstance(cell, Piece):
             return [cell]
         if cell is None or isinstance(cell, str):
             return [Piece(None, "–" if cell is None else cell)]
         if isinstance(cell, tuple):
-            return [piece for part in cell for piece in self.pieces(part)]
+            return [piece for part in cell for piece in self._parts(part)]
         if isinstance(cell, (int, float)):
             text = (self.form or str)(cell)
             return [Piece(None if isinstance(cell, bool) else cell, text)]
-        return self.pieces((cell.low, " to ", cell.high))
+        return self._parts((cell.low, " to ", cell.high))
 
-    def text(self, cell: Any) -> str:
-        """Return what a cell shows as one text."""
-        return "".join(text for _, text in self.pieces(cell))
+    def text(self, row: Any) -> str:
+        """Return a cell as one text."""
+        return "".join(piece.text for piece in self.pieces(row))
 
 
 @dataclass(frozen=True)
 class Table:
-    """Columns, and rows with a cell for each."""
+    """Columns, and rows of which each shows something."""
 
     columns: Sequence[Column]
-    rows: Sequence[Sequence[Any]]
+    rows: Sequence[Any]
 
     @classmethod
-    def of(cls, rows: Iterable[Sequence[str]], right: int = 1) -> "Table":
-        """Return a table of texts; the first row has the headings.
+    def of(cls, rows: Iterable[Sequence[Any]], right: int = 1) -> "Table":
+        """Return a table of cells; the first row has the headings.
 
         Columns from number ``right`` are aligned right.
         """
         headings, *others = rows
         columns = [
-            Column(heading, is_right=number >= right) for number, heading in enumerate(headings)
+            Column(heading, itemgetter(number), is_right=number >= right)
+            for number, heading in enumerate(headings)
         ]
         return cls(columns, others)
 
     def texts(self) -> list[list[str]]:
         """Return the rows as texts, without the headings."""
-        return [
-            [column.text(cell) for column, cell in zip(self.columns, row, strict=True)]
-            for row in self.rows
-        ]
+        return [[column.text(row) for column in self.columns] for row in self.rows]
 
 
 def printed(table: Table) -> Iterator[str]:
@@ -120,11 +129,11 @@ def printed(table: Table) -> Iterator[str]:
     return (line.rstrip() for line in capture.get().splitlines())
 
 
-def markdown(table: Table) -> Iterator[str]:
-    """Yield the lines of a table in Markdown, whose cells may hold some."""
+def markdown(table: Table, texts: Sequence[Sequence[str]] | None = None) -> Iterator[str]:
+    """Yield the lines of a table in Markdown; ``texts`` stand for its rows, if given."""
     yield _row([column.title for column in table.columns])
     yield _row(["---:" if column.is_right else "---" for column in table.columns])
-    for row in table.texts():
+    for row in table.texts() if texts is None else texts:
         yield _row([cell.replace("|", "\\|") for cell in row])
 
 
@@ -145,9 +154,11 @@ def comma_separated(table: Table) -> str:
 
     Texts that a spreadsheet would compute as formulas begin with an apostrophe.
     """
-    rows = [[column.title for column in table.columns], *table.rows]
+    rows = [[column.cell(row) for column in table.columns] for row in table.rows]
     text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows([*map(_inert, row)] for row in rows)
+    csv.writer(text, lineterminator="\n").writerows(
+        [*map(_inert, row)] for row in ([column.title for column in table.columns], *rows)
+    )
     return text.getvalue()
 
 
