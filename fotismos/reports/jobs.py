@@ -5,12 +5,12 @@ import logging
 import os
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import click
 from msgspec import Meta
@@ -20,7 +20,7 @@ from fotismos.comparisons.processes.pool import CAN_SHARE, Pool, cores
 from fotismos.heuristic import llvm, program
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.terminal.parsing import FILE, OutputFolder, percentage
-from fotismos.reports.terminal.words import echo, level
+from fotismos.reports.terminal.words import echo, level, tell, tell_where
 
 
 class Terminal(Declaration, frozen=True, kw_only=True):
@@ -108,6 +108,17 @@ class Terminal(Declaration, frozen=True, kw_only=True):
         with self.pool(tasks) as pool:
             pool.start()
             yield pool
+
+    def show(self, record: Any, lines: Iterable[str], where: Path | None = None) -> None:
+        """Print a record, if that was requested, or else its lines and where its page is."""
+        if self.as_json:
+            from fotismos.reference.records import to_json  # loaded late: help needs no NumPy
+
+            click.echo(to_json(record), nl=False)
+            return
+        tell(lines)
+        if where is not None:
+            tell_where(where)
 
     def pool(self, tasks: int = 1) -> Pool:
         """Return processes or a cluster in which scenes are read and rendered.

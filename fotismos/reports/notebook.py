@@ -27,17 +27,13 @@ from fotismos.comparisons.audit.checks import Kind
 from fotismos.comparisons.audit.checks import audit as examined
 from fotismos.comparisons.case import RGB, open_case
 from fotismos.comparisons.comparison import Comparison
-from fotismos.comparisons.cost.cost import cost as study
 from fotismos.comparisons.cost.cost_record import Cost as CostRecord
 from fotismos.comparisons.cost.cost_record import Method
-from fotismos.comparisons.cost.engine import front_of_pictures
 from fotismos.comparisons.cost.engine_record import EngineCost
-from fotismos.comparisons.cost.measure import Effort
 from fotismos.comparisons.cost.methods import declare as declare_method
 from fotismos.comparisons.cost.timed_pictures import TimedPicture
 from fotismos.comparisons.departure.metrics import Metric
 from fotismos.comparisons.departure.metrics import declare as declare_metric
-from fotismos.comparisons.fit.fit import fit as fit_parameters
 from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.names import as_files, with_files
 from fotismos.comparisons.pixel_terms import PixelTerms
@@ -48,7 +44,6 @@ from fotismos.heuristic import user_shaders
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Heuristic
 from fotismos.heuristic.heuristics import declare as declare_heuristic
-from fotismos.heuristic.materials import FORMS
 from fotismos.heuristic.plugins import register
 from fotismos.heuristic.user_code import same_variant
 from fotismos.reference.records import Missing
@@ -246,20 +241,10 @@ def cost(asked: Cost) -> CostRecord | EngineCost:
     ``kernel_time`` are what their times are of, as in the command. With a ``reference``, no scene
     is needed. Other arguments and errors are those of :func:`compare`.
     """
-    times = asked.engine
-    if asked.scene is None and asked.reference and times:
+    if asked.scene is None and asked.reference and asked.engine:
         asked.require_no_scene()
-        return front_of_pictures(asked.options, times, asked.name or "pictures").record
-    case = open_case(asked.scene, asked.options, asked.name)
-    return study(
-        case.source,
-        case.options,
-        Effort() if asked.rounds is None else Effort(rounds=asked.rounds),
-        command=case.command("cost", **(times.as_options() if times else {})),
-        at=asked.at,
-        is_measured=asked.measure,
-        engine_times=times,
-    ).record
+        return asked.judge(asked.name or "pictures").record
+    return asked.study(open_case(asked.scene, asked.options, asked.name)).record
 
 
 @_asked_as(Fit)
@@ -269,10 +254,7 @@ def fit(asked: Fit) -> FitRecord:
     ``loss`` is ``perceptual``, the mean ΔE2000, or ``linear``, the squared difference of linear
     colours; ``form`` is that of the lobe. Other arguments and errors are those of :func:`compare`.
     """
-    case = open_case(asked.scene, with_files(asked.options), asked.name)
-    forms = FORMS if asked.form == "all" else (asked.form,)
-    command = case.command("fit")
-    return fit_parameters(case.source, case.options, asked.loss, forms, command=command).record
+    return asked.fit(asked.scene).record
 
 
 @_asked_as(Baseline)

@@ -8,12 +8,9 @@ import click
 
 from fotismos.comparisons.options import option
 from fotismos.comparisons.processes.pool import Task
-from fotismos.reference.records import to_json
 from fotismos.reports.command import Command
-from fotismos.reports.files.results import PAGE, hold_results
 from fotismos.reports.jobs import Terminal, command_line
 from fotismos.reports.terminal.parsing import parameter
-from fotismos.reports.terminal.words import tell, tell_where
 
 
 class Audit(Command, frozen=True):
@@ -66,19 +63,15 @@ class Audit(Command, frozen=True):
         kind = "heuristic" if self.heuristic else "bsdf"
         name = self.heuristic or self.bsdf or ""
         command = command_line()
-        with (
-            terminal.processes() as pool,
-            hold_results(terminal.output / "audit", [_folder_of(name)], command) as (folder,),
-        ):
+        with terminal.processes() as pool:
+            from fotismos.reports.files import results  # loaded late
             from fotismos.reports.run import audit_files  # loaded late
 
-            arguments = (kind, name, self.parameters, command, folder)
-            record = pool.do(Task(name, audit_files.audited, arguments))
-        if terminal.as_json:
-            click.echo(to_json(record), nl=False)
-        else:
-            tell(audit_files.lines(record))
-            tell_where(folder / PAGE)
+            folder = terminal.output / "audit"
+            with results.hold_results(folder, [_folder_of(name)], command) as (target,):
+                arguments = (kind, name, self.parameters, command, target)
+                record = pool.do(Task(name, audit_files.audited, arguments))
+        terminal.show(record, audit_files.lines(record), target / results.PAGE)
         return int(bool(record.faults))
 
 

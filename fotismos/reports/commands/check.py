@@ -16,17 +16,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import click
 from msgspec import Meta
 
 from fotismos.comparisons.atomic import file_name
-from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, checked_threshold
 from fotismos.comparisons.options import option
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.records import to_json
 from fotismos.reports.command import PROCESSES, SCENES, Command
-from fotismos.reports.files import results
 from fotismos.reports.jobs import Terminal, command_line
 from fotismos.reports.terminal.parsing import definition, percentage
 
@@ -165,12 +161,13 @@ class Check(Baseline, frozen=True):
                 record = checks.Checks(
                     passed=not code, significance=self.significance, checks=tuple(outcomes)
                 )
-                click.echo(to_json(record), nl=False)
+                terminal.show(record, ())
             return code
 
     def _examined(self, pool: Pool, output: Path) -> "tuple[list[CheckRecord], str]":
         """Check the baselines; return the outcomes, and the page if there is anything to see."""
         from fotismos.reports.ci import checks, summary  # loaded late
+        from fotismos.reports.files import results  # as late
 
         bounds = self.tolerance()
         with results.hold(output / "check", command_line(), ()) as folder:
@@ -220,6 +217,9 @@ class Check(Baseline, frozen=True):
         is_omitted = self.within is None and self.max_visible is None
         if is_omitted or self.update or not self.pictures:
             return None
+        # Loaded late: help needs no NumPy.
+        from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, checked_threshold
+
         return (
             checked_threshold(TOLERANCE if self.within is None else self.within),
             LIMIT if self.max_visible is None else self.max_visible,

@@ -1,5 +1,7 @@
 """``fotismos cost``: what each step of accuracy costs in time."""
 
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias
 
 import click
@@ -11,13 +13,17 @@ from fotismos.comparisons.names import matching, picture_parts
 from fotismos.comparisons.options import Side, option
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.records import to_json
 from fotismos.reports.command import PICTURES, SCENES, OnScene
-from fotismos.reports.files.results import PAGE
 from fotismos.reports.jobs import Terminal
-from fotismos.reports.terminal.words import tell, tell_where
 
-if TYPE_CHECKING:  # functions take a mapping for the words of the command line
+if TYPE_CHECKING:
+    from fotismos.comparisons.case import Case
+    from fotismos.comparisons.cost.cost_record import Cost as CostRecord
+    from fotismos.comparisons.cost.engine import Study
+    from fotismos.comparisons.cost.engine_record import EngineCost
+    from fotismos.reference.rendering.renderer import Progress
+
+    # Functions take a mapping for the words of the command line.
     Settings: TypeAlias = Any
 else:
     Settings = tuple[Any, ...]
@@ -114,33 +120,68 @@ class Cost(OnScene, frozen=True):
         folder = terminal.output / "cost"
         if self.scene is None:
             self.require_no_scene()
-            from fotismos.reports.run import cost_files, folders  # loaded late
+            from fotismos.reports.files import results  # loaded late
+            from fotismos.reports.run import cost_files, folders  # without Mitsuba
 
             path, _ = picture_parts(matching(self.reference)[0])
+            work = partial(self._judged, terminal.within)
             with Pool(0) as pool:  # pictures run no user's code
-                records = folders.results_of(
-                    pool,
-                    folder,
-                    scenes=[path.stem],
-                    work=cost_files.judged,
-                    arguments=(self.options, engine, terminal.within),
-                    files=[path],
-                )
+                records = folders.results_of(pool, folder, [path.stem], work, files=[path])
         else:
             with terminal.processes() as pool:
+                from fotismos.reports.files import results  # loaded late
                 from fotismos.reports.run import cost_files, folders  # loaded late
 
-                records = folders.results_of(
-                    pool,
-                    folder,
-                    scenes=[self.scene],
-                    work=cost_files.measured,
-                    arguments=(self.options, self.rounds, self.at, self.measure, engine),
-                )
+                records = folders.results_of(pool, folder, [self.scene], self._measured)
         ((target, record),) = records.items()
-        if terminal.as_json:
-            click.echo(to_json(record), nl=False)
-            return 0
-        tell(cost_files.lines(record, terminal.within))
-        tell_where(target / PAGE)
+        lines = cost_files.lines(record, terminal.within)
+        terminal.show(record, lines, target / results.PAGE)
         return 0
+
+    def study(self, case: "Case", progress: "Progress | None" = None) -> "Study[CostRecord]":
+        """Study what accuracy costs on a scene."""
+        from fotismos.comparisons.cost.cost import cost  # loaded late: pictures need no Mitsuba
+        from fotismos.comparisons.cost.measure import Effort  # as late
+
+        times = self.engine
+        given = times.as_options() if times else {}
+        size = self.at and "x".join(map(str, self.at))
+        return cost(
+            case.source,
+            case.options,
+            effort=Effort() if self.rounds is None else Effort(rounds=self.rounds),
+            progress=progress,
+            command=case.command(
+                "cost", rounds=self.rounds, at=size, measure=self.measure or None, **given
+            ),
+            at=self.at,
+            is_measured=self.measure,
+            engine_times=times,
+        )
+
+    def judge(self, name: str, within: float = TOLERANCE) -> "Study[EngineCost]":
+        """Judge settings without a scene."""
+        from fotismos.comparisons.cost.engine import front_of_pictures  # loaded late
+
+        times = self.engine
+        assert times is not None, "nothing else is judged without a scene"
+        chosen = None if within == TOLERANCE else f"{within:g}"
+        command = self.options.command("cost", "", **times.as_options(), within=chosen)
+        return front_of_pictures(self.options, times, name, command)
+
+    def _measured(self, scene: str, target: Path, progress: "Progress") -> "CostRecord":
+        """Study a scene, and write its files."""
+        from fotismos.comparisons.case import open_case  # loaded late, in a worker
+        from fotismos.reports.run import cost_files  # as late
+
+        study = self.study(open_case(scene, self.options), progress)
+        cost_files.write(target, study, cost_files.view(study))
+        return study.record
+
+    def _judged(self, within: float, name: str, target: Path, progress: object) -> "EngineCost":
+        """Judge settings, and write their files."""
+        from fotismos.reports.run import cost_files  # loaded late
+
+        study = self.judge(name, within)
+        cost_files.write(target, study, cost_files.view(study, within))
+        return study.record

@@ -1,5 +1,7 @@
 """``fotismos export``: a scene for another program."""
 
+from pathlib import Path
+
 from fotismos.reports.command import OnScene
 from fotismos.reports.jobs import Terminal
 from fotismos.reports.terminal.words import tell_where
@@ -28,15 +30,19 @@ class Export(OnScene, frozen=True):
     def run(self, terminal: Terminal) -> int:
         """Export the scene."""
         with terminal.processes() as pool:
-            from fotismos.reports.files import export_files  # loaded late
-            from fotismos.reports.run import folders
+            from fotismos.reports.run import folders  # loaded late
 
-            (folder,) = folders.results_of(
-                pool,
-                terminal.output / "export",
-                scenes=[self.scene],
-                work=export_files.exported,
-                arguments=[self.options],
-            )
+            below = terminal.output / "export"
+            (folder,) = folders.results_of(pool, below, [self.scene], self._exported)
         tell_where(folder)
         return 0
+
+    def _exported(self, scene: str, target: Path, progress: object) -> None:
+        """Write the files that another program needs to render a scene."""
+        from fotismos.comparisons.case import open_case  # loaded late, in a worker
+        from fotismos.comparisons.plain_scene import plain_scene  # as late
+        from fotismos.reports.files import export_files  # as late
+
+        case = open_case(scene, self.options)
+        found = plain_scene(case.source, case.options)
+        export_files.write(target, found, case.command(image="YOURS.exr"))

@@ -1,17 +1,19 @@
 """``fotismos fit``: the best heuristic parameters, and the error that remains."""
 
-import json
-from typing import Annotated, ClassVar, Literal
-
-import click
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from fotismos.comparisons.names import with_files
 from fotismos.comparisons.options import option
-from fotismos.reference.records import plain
 from fotismos.reports.command import PICTURES, SCENES, OnScene
-from fotismos.reports.files.results import PAGE
 from fotismos.reports.jobs import Terminal
-from fotismos.reports.terminal.words import tell, tell_where
+
+if TYPE_CHECKING:
+    from fotismos.comparisons.case import Scene
+    from fotismos.comparisons.fit.fit import Fit as Fitted
+    from fotismos.comparisons.fit.fit_record import FitRecord
+    from fotismos.reference.rendering.renderer import Progress
 
 
 class Fit(OnScene, frozen=True):
@@ -54,20 +56,31 @@ class Fit(OnScene, frozen=True):
         if not self.reference:
             self.refuse_reading("--reference")
         with terminal.processes() as pool:
+            from fotismos.reports.files import results  # loaded late
             from fotismos.reports.run import fit_files, folders  # loaded late
 
-            records = folders.results_of(
-                pool,
-                terminal.output / "fit",
-                scenes=terminal.scenes,
-                work=fit_files.fitted,
-                arguments=(with_files(self.options), self.loss, self.form),
-            )
-        if terminal.as_json:
-            click.echo(json.dumps(plain([*records.values()]), indent=2, ensure_ascii=False))
-            return 0
-        for record in records.values():
-            tell(fit_files.lines(record))
-        folder, *others = records
-        tell_where(folder.parent if others else folder / PAGE)
+            folder = terminal.output / "fit"
+            records = folders.results_of(pool, folder, terminal.scenes, self._fitted)
+        lines = chain.from_iterable(map(fit_files.lines, records.values()))
+        first, *others = records
+        terminal.show([*records.values()], lines, folder if others else first / results.PAGE)
         return 0
+
+    def fit(self, scene: "Scene", progress: "Progress | None" = None) -> "Fitted":
+        """Fit the heuristic to a scene."""
+        from fotismos.comparisons.case import open_case  # loaded late: help needs no Mitsuba
+        from fotismos.comparisons.fit.fit import fit  # as late
+        from fotismos.heuristic.materials import FORMS  # as late
+
+        case = open_case(scene, with_files(self.options), self.name)
+        command = case.command("fit", loss=self.loss, form=self.form)
+        forms = FORMS if self.form == "all" else (self.form,)
+        return fit(case.source, case.options, self.loss, forms, progress, command)
+
+    def _fitted(self, scene: str, target: Path, progress: "Progress") -> "FitRecord":
+        """Fit the heuristic to a scene, and write the fit's files."""
+        from fotismos.reports.run import fit_files  # loaded late, in a worker
+
+        result = self.fit(scene, progress)
+        fit_files.write(target, result)
+        return result.record

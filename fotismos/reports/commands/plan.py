@@ -37,4 +37,6 @@ class Plan(OnScene, frozen=True):
         with terminal.processes() as pool:
             from fotismos.reports.run import plan  # loaded late
 
-            return plan.show(pool, self.scene, self.options, self.within, terminal.as_json)
+            if self.within is None:
+                return plan.show(pool, self.scene, self.options, terminal)
+            return plan.show_fastest(pool, self.scene, self.options, self.within, terminal)

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fotismos.comparisons.case import open_case
-from fotismos.comparisons.options import Options
-from fotismos.comparisons.plain_scene import PlainScene, Triangles, plain_scene
+from fotismos.comparisons.plain_scene import PlainScene, Triangles
 from fotismos.reports.files import export_lights, images, results
 
 README = """# {name}, for another program
@@ -56,13 +54,6 @@ Write the picture as linear values with BT.709's primaries, without alpha, and c
 
     {command}
 """
-
-
-def exported(name: str, options: Options, target: Path, progress: Any) -> None:
-    """Write the files that another program needs to render a scene."""
-    case = open_case(name, options)
-    scene = plain_scene(case.source, case.options)
-    write(target, scene, case.command(image="YOURS.exr"))
 
 
 def write(folder: Path, scene: PlainScene, command: str) -> None:

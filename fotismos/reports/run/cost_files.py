@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from PIL.Image import Resampling
 
-from fotismos.comparisons.cost import engine as engines
 from fotismos.comparisons.cost.engine_record import EngineCost
-from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.departure.criterion import TOLERANCE
-from fotismos.comparisons.options import Options
 from fotismos.heuristic.convention import Floats
 from fotismos.reference import records
 from fotismos.reports import cost_tables, glossary
@@ -32,51 +29,6 @@ FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BS
 
 STRIP = 320
 """Pixels of the longer side of a page's pictures, at most."""
-
-
-def judged(
-    name: str, options: Options, engine: EngineTimes, within: float, target: Path, progress: Any
-) -> EngineCost:
-    """Judge the pictures of an engine's settings without a scene, and write the files."""
-    chosen = None if within == TOLERANCE else f"{within:g}"
-    command = options.command("cost", "", **engine.as_options(), within=chosen)
-    study = engines.front_of_pictures(options, engine, name, command)
-    write(target, study, view(study, within))
-    return study.record
-
-
-def measured(
-    name: str,
-    options: Options,
-    rounds: int | None,
-    at: tuple[int, int] | None,
-    is_measured: bool,
-    engine: EngineTimes | None,
-    target: Path,
-    progress: Any,
-) -> Cost:
-    """Study what each step of accuracy costs, and write its files."""
-    from fotismos.comparisons.case import open_case  # loaded late: pictures need no Mitsuba
-    from fotismos.comparisons.cost.cost import cost  # as late
-    from fotismos.comparisons.cost.measure import Effort  # as late
-
-    case = open_case(name, options)
-    effort = Effort() if rounds is None else Effort(rounds=rounds)
-    size = at and f"{at[0]}x{at[1]}"
-    given = {} if engine is None else engine.as_options()
-    repeated = case.command("cost", rounds=rounds, at=size, measure=is_measured or None, **given)
-    study = cost(
-        case.source,
-        case.options,
-        effort,
-        progress,
-        repeated,
-        at,
-        is_measured,
-        engine_times=engine,
-    )
-    write(target, study, view(study))
-    return study.record
 
 
 def documents(study: AnyStudy) -> dict[str, bytes]:

@@ -4,13 +4,9 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure.metrics import LEADING, drawn
 from fotismos.comparisons.fit.fit import Fit
-from fotismos.comparisons.fit.fit import fit as fit_parameters
 from fotismos.comparisons.fit.fit_record import FitRecord, FittedParameter, FormFit
-from fotismos.comparisons.options import Options
-from fotismos.heuristic.materials import FORMS
 from fotismos.reference.pairing.factors import alpha_of, exponent_of
 from fotismos.reference.records import to_json
 from fotismos.reports.files import images, results
@@ -18,18 +14,6 @@ from fotismos.reports.page.templating import head, rendered
 from fotismos.reports.sentences import judgement_of_fit, of_fit
 from fotismos.reports.terminal.table import Column, Table, printed
 from fotismos.reports.terminal.words import difference
-
-
-def fitted(
-    name: str, options: Options, loss: str, form: str, target: Path, progress: Any
-) -> FitRecord:
-    """Fit the heuristic to a scene, and write the fit's files."""
-    case = open_case(name, options)
-    command = case.command("fit", loss=loss, form=form)
-    forms = FORMS if form == "all" else (form,)
-    result = fit_parameters(case.source, case.options, loss, forms, progress, command)
-    write(target, result)
-    return result.record
 
 
 def write(folder: Path, fit: Fit) -> None:

@@ -16,10 +16,9 @@ def results_of(
     folder: Path,
     scenes: Sequence[str],
     work: Callable[..., Any],
-    arguments: Sequence[Any] = (),
     files: Sequence[Path] = (),
 ) -> dict[Path, Any]:
-    """Return what ``work(scene, *arguments, folder, progress)`` returns for each scene, by folder.
+    """Return what ``work(scene, folder, progress)`` returns for each scene, by folder.
 
     The scenes' folders are below ``folder``. With ``files``, which are pictures, ``scenes`` are
     only names.
@@ -35,7 +34,7 @@ def results_of(
             Task(
                 name=target.name,
                 function=work,
-                arguments=(scene, *arguments, target),
+                arguments=(scene, target),
                 progress=bar.of(target.name),
                 ends_process=not files and is_script(scene),
             )

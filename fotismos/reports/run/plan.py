@@ -1,9 +1,7 @@
 """Plans of scenes, and the price and fastest method of a scene within a tolerance."""
 
-from collections.abc import Iterable
 from typing import Any
 
-import click
 from msgspec import structs
 
 from fotismos.comparisons.case import open_case
@@ -16,47 +14,36 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.comparisons.steps import steps
-from fotismos.reference.records import Record, to_json
 from fotismos.reports import sentences
+from fotismos.reports.jobs import Terminal
 from fotismos.reports.terminal import plan_lines, progress
 from fotismos.reports.terminal.plan_lines import PlanReport, plan_report
-from fotismos.reports.terminal.words import tell
 
 LARGEST = 2**17
 """Pixels of a picture that is compared for its price; the width of a larger one is that of a study.
 """
 
 
-def show(pool: Pool, scene: str, options: Options, within: float | None, as_json: bool) -> int:
-    """Print a scene's plan, or its price and fastest method within a tolerance.
+def show(pool: Pool, scene: str, options: Options, terminal: Terminal) -> int:
+    """Print a scene's plan."""
+    report: PlanReport = pool.do(Task(scene, planned, (scene, options)))
+    terminal.show(report, plan_lines.plan_lines(report))
+    return 0
 
-    Returns the exit code.
-    """
-    code = 0
-    lines: Iterable[str]
-    result: Record
-    if within is None:
-        report: PlanReport = pool.do(Task(scene, planned, (scene, options)))
-        lines = plan_lines.plan_lines(report)
-        result = report
-    else:
-        with progress.shown() as bar:
-            of_scene = bar.of(scene)
-            record: ComparisonRecord = pool.do(
-                Task(scene, priced, (scene, options, within), progress=of_scene)
-            )
-            choice: Choice = pool.do(
-                Task(scene, chosen, (scene, options, within), progress=of_scene)
-            )
-        choice = structs.replace(choice, price=record.price)
-        lines = [*sentences.price_lines(record, within), *sentences.choice_lines(choice)]
-        code = int(choice.chosen is None)
-        result = choice
-    if as_json:
-        click.echo(to_json(result).rstrip())
-    else:
-        tell(lines)
-    return code
+
+def show_fastest(
+    pool: Pool, scene: str, options: Options, within: float, terminal: Terminal
+) -> int:
+    """Print a scene's price and fastest method within a tolerance; 1 if no method passes."""
+    arguments = (scene, options, within)
+    with progress.shown() as bar:
+        of_scene = bar.of(scene)
+        record: ComparisonRecord = pool.do(Task(scene, priced, arguments, progress=of_scene))
+        choice: Choice = pool.do(Task(scene, chosen, arguments, progress=of_scene))
+    choice = structs.replace(choice, price=record.price)
+    lines = [*sentences.price_lines(record, within), *sentences.choice_lines(choice)]
+    terminal.show(choice, lines)
+    return int(choice.chosen is None)
 
 
 def planned(name: str, options: Options) -> PlanReport:
