@@ -9,13 +9,29 @@ from msgspec import field
 
 from fotismos.comparisons.comparison import ComparisonRecord
 from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.reference.planning.effects import EFFECTS
 from fotismos.reference.records import Record
+from fotismos.reports import verdict
 from fotismos.reports.page.embedding import Embedded
 
 EFFECT_COLOURS = {effect.label: effect.colour for effect in EFFECTS if effect.colour}
 """Colours of effects in attributions: Okabe and Ito's seven for those that often come together, and
 four of Tol's muted scheme. Both suit the common colour deficiencies."""
+
+
+def parts(record: ComparisonRecord) -> list[tuple[str, str, float]]:
+    """Return what a scene's picture lacks: effects as nouns, with their colours and parts."""
+    return [
+        (verdict.noun(effect), EFFECT_COLOURS[effect], part)
+        for effect, part in verdict.missing(record).items()
+    ]
+
+
+def title_of(record: ComparisonRecord) -> str:
+    """Return what a built-in scene shows; empty for others."""
+    return SCENES[record.scene].title if record.scene in SCENES else ""
+
 
 EFFECTS_TITLE = "Effects"
 """Title of the map of dominant effects."""

@@ -22,7 +22,7 @@ from fotismos.reference.records import plain
 from fotismos.reports import verdict
 from fotismos.reports.files import images
 from fotismos.reports.files.results import PAGE
-from fotismos.reports.page.scene_view import EFFECT_COLOURS
+from fotismos.reports.page.scene_view import EFFECT_COLOURS, parts, title_of
 from fotismos.reports.tables import moved
 from fotismos.reports.terminal.words import (
     as_typed,
@@ -93,6 +93,10 @@ def environment() -> Environment:
     )
     environment.filters.update(
         FORMS,
+        cause=verdict.cause,
+        parts=parts,
+        title_of=title_of,
+        search=verdict.search,
         judged=verdict.judged,
         moved=moved,
         truth=verdict.truth,
@@ -107,7 +111,7 @@ def environment() -> Environment:
         effect_colour=EFFECT_COLOURS.__getitem__,
         webp_uri=images.webp_uri,
     )
-    environment.tests.update(finite=math.isfinite)
+    environment.tests.update(finite=math.isfinite, searched=verdict.is_searched)
     environment.globals.update(forms=FORMS, named=verdict.noun, cost_tables=_cost_tables)
     return environment
 
