@@ -119,8 +119,7 @@ class Options(
         ),
     ] = None
     resolution: Annotated[
-        tuple[Side, Side] | None,
-        option("Width and height.", default="the film's", metavar="WxH"),
+        tuple[Side, Side] | None, option("Width and height.", default="the film's", metavar="WxH")
     ] = None
     heuristic: Annotated[
         Shader,
@@ -195,8 +194,7 @@ class Options(
     transfer: Annotated[
         Literal["linear", "srgb"] | None,
         option(
-            "Transfer function of the pictures.",
-            default="the file's own: sRGB for .png and .jpg",
+            "Transfer function of the pictures.", default="the file's own: sRGB for .png and .jpg"
         ),
     ] = None
     over: Annotated[
@@ -211,8 +209,7 @@ class Options(
         ),
     ] = None
     pixels_per_degree: Annotated[
-        Density | None,
-        option("FLIP: pixels per degree of vision.", default="67", metavar="N"),
+        Density | None, option("FLIP: pixels per degree of vision.", default="67", metavar="N")
     ] = None
     colour_science: Annotated[
         bool, option("Compute all colour differences with colour-science, which takes longer.")

@@ -114,10 +114,7 @@ def click_command(kind: type[Command], name: str) -> click.Command:
         context.exit(_asked(kind, context, values))
 
     command = Configured(
-        name=name,
-        callback=call,
-        params=list(_parameters(kind)),
-        help=help_of(kind.__doc__),
+        name=name, callback=call, params=list(_parameters(kind)), help=help_of(kind.__doc__)
     )
     command.declared = kind
     return command

@@ -35,7 +35,6 @@ class Terminal(Declaration, frozen=True, kw_only=True):
             "Folder for the results",
             names=("-o", "--output"),
             type=OutputFolder(path_type=Path),
-            key="report",
         ),
     ] = Path("out")
     as_json: Annotated[bool, option("Print JSON.", names=("--json",))] = False
@@ -43,8 +42,7 @@ class Terminal(Declaration, frozen=True, kw_only=True):
         bool, option("Write figures for print, as SVG and PDF, to OUTPUT/figures.")
     ] = False
     fresh: Annotated[
-        bool,
-        option("Render all scenes again; without it, finished ones in OUTPUT are reused."),
+        bool, option("Render all scenes again; without it, finished ones in OUTPUT are reused.")
     ] = False
     is_opened: Annotated[
         bool, option("Open the page in a browser as soon as it exists.", names=("--open",))
@@ -52,8 +50,7 @@ class Terminal(Declaration, frozen=True, kw_only=True):
     within: Annotated[
         float,
         option(
-            "Pixels differ visibly if ΔE2000 is above this: 1 to 10 in steps of 0.25.",
-            metavar="DE",
+            "Pixels differ visibly if ΔE2000 is above this: 1 to 10 in steps of 0.25.", metavar="DE"
         ),
     ] = 2
     max_visible: Annotated[
@@ -92,8 +89,7 @@ class Terminal(Declaration, frozen=True, kw_only=True):
     scheduler: Annotated[
         str | None,
         option(
-            "Use the Dask cluster with this scheduler, such as tcp://host:8786.",
-            metavar="ADDRESS",
+            "Use the Dask cluster with this scheduler, such as tcp://host:8786.", metavar="ADDRESS"
         ),
     ] = None
     scenes: tuple[str, ...] = ()

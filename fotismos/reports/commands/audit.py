@@ -36,14 +36,12 @@ class Audit(Command, frozen=True):
     )  # fmt: skip
 
     heuristic: Annotated[
-        str | None,
-        option("What `compare --heuristic` takes.", metavar="NAME|FILE.py[:FUNCTION]"),
+        str | None, option("What `compare --heuristic` takes.", metavar="NAME|FILE.py[:FUNCTION]")
     ] = None
     bsdf: Annotated[
         str | None,
         option(
-            "A BSDF plugin of Mitsuba, or one that a file registers.",
-            metavar="TYPE|FILE.py:NAME",
+            "A BSDF plugin of Mitsuba, or one that a file registers.", metavar="TYPE|FILE.py:NAME"
         ),
     ] = None
     parameters: Annotated[

@@ -117,16 +117,14 @@ class Check(Baseline, frozen=True):
         float | None,
         option(
             "With --picture: judge by a tolerance in place of drift. Pixels differ visibly if"
-            " ΔE2000 is above this.",
-            default="2",
+            " ΔE2000 is above this.  [default: 2]",
             metavar="DE",
         ),
     ] = None
     max_visible: Annotated[
         float | None,
         option(
-            "The share of the pixels that may differ visibly.",
-            default="5%",
+            "The share of the pixels that may differ visibly.  [default: 5%]",
             metavar="P%",
             type=percentage,
         ),

@@ -62,8 +62,7 @@ class Cost(OnScene, frozen=True):
     }
 
     at: Annotated[
-        tuple[Side, Side] | None,
-        option("Predict the times at this size.", metavar="WxH"),
+        tuple[Side, Side] | None, option("Predict the times at this size.", metavar="WxH")
     ] = None
     measure: Annotated[bool, option("With --at: measure at it, too.")] = False
     pictures: Annotated[
@@ -79,12 +78,10 @@ class Cost(OnScene, frozen=True):
         None
     )
     kernel_time: Annotated[
-        str | None,
-        option("What the textbook kernel takes there, for ratios.", metavar="TIME"),
+        str | None, option("What the textbook kernel takes there, for ratios.", metavar="TIME")
     ] = None
     rounds: Annotated[
-        Annotated[int, Meta(ge=2)] | None,
-        option("Timed repeats of each method.", default="7"),
+        Annotated[int, Meta(ge=2)] | None, option("Timed repeats of each method.", default="7")
     ] = None
 
     @property

@@ -7,12 +7,7 @@ from typing import Any
 
 import altair as alt
 
-from fotismos.comparisons.audit.checks import (
-    Audit,
-    Kind,
-    audit_with_subject,
-    spheres,
-)
+from fotismos.comparisons.audit.checks import Audit, Kind, audit_with_subject, spheres
 from fotismos.comparisons.case import RGB
 from fotismos.heuristic import plugins
 from fotismos.heuristic.convention import Floats

@@ -26,10 +26,7 @@ def results_of(
     subjects: list[tuple[str, Path | None]] = list(zip(scenes, files, strict=False))
     if not files:
         subjects = [(name_of(scene), file_of(scene)) for scene in scenes]
-    with (
-        results.hold_results(folder, subjects, command_line()) as places,
-        progress.shown() as bar,
-    ):
+    with results.hold_results(folder, subjects, command_line()) as places, progress.shown() as bar:
         tasks = [
             Task(
                 name=target.name,
