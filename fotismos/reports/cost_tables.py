@@ -108,7 +108,7 @@ def times(record: Cost) -> Table:
         Column("interval", "ratio", "{:.2f}".format),
         Column("per sample", "per_sample_s.value", seconds),
         Column("overhead", "overhead_s.value", seconds),
-        Column("first image", _first, seconds, "(preparing)"),
+        Column("first image", _first, seconds, detail="(preparing)"),
     )
     return Table(columns, record.methods)
 
@@ -177,7 +177,7 @@ def settings(engine: Engine, within: float = TOLERANCE) -> Table:
         Column("time", "seconds.value", given_time),
         Column(f"mean {LEADING.label}", "error.value", number),
         Column("95 % interval", lambda one: one.error if one.has_noise else "unknown", number),
-        Column("above", lambda one: share(one).value, percent, f"{within:g}"),
+        Column("above", lambda one: share(one).value, percent, detail=f"{within:g}"),
         Column("95 % interval", ends, percent),
         Column(
             "passes at", lambda one: "none" if one.passes_at is None else one.passes_at, parameter
@@ -242,7 +242,9 @@ def attribution(record: Cost, named: Callable[[str], str] = str) -> Table:
         Column("95 % interval", "removes", "{:.3f}".format),
         Column("alone", "alone", "{:.3f}".format),
         Column("last", "last", "{:.3f}".format),
-        Column("adds", added, short_time, f"at {sized(whole.resolution)}, {whole.spp} samples"),
+        Column(
+            "adds", added, short_time, detail=f"at {sized(whole.resolution)}, {whole.spp} samples"
+        ),
         Column("95 % interval", "adds_s", short_time),
     )
     return Table(columns, whole.effects)

@@ -19,7 +19,7 @@ TABLE = Table(
     (
         Column("method", itemgetter(0)),
         Column("time", itemgetter(1), "{:.1f} s".format, is_right=True),
-        Column("interval", itemgetter(2), "{:.2f}".format, "(95 %)"),
+        Column("interval", itemgetter(2), "{:.2f}".format, detail="(95 %)"),
         Column("noted", itemgetter(3)),
     ),
     [
