@@ -16,15 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fotismos.comparisons import alignment
+from fotismos.comparisons import alignment, colour_spaces
 from fotismos.comparisons.departure.blocks import averaged, block_sums, shrunk
 from fotismos.comparisons.departure.colour import (
     BLACK,
-    BT709,
-    BT2020,
     Array,
     from_srgb,
-    rgb_to_xyz,
     to_srgb,
 )
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
@@ -302,11 +299,8 @@ def _percent(share: float) -> str:
 
 CHANNELS = ("red", "green", "blue")
 
-PRIMARIES = {
-    "BT.2020": BT2020,
-    "Display P3": ((0.680, 0.320), (0.265, 0.690), (0.150, 0.060), BT709[3]),
-}
-"""Primaries with the white of BT.709, whose values may have been read as those of BT.709."""
+PRIMARIES = ("BT.2020", "Display P3")
+"""Colour spaces with the white of BT.709, whose values may have been read as those of BT.709."""
 
 
 def _times(matrix: Floats, image: Array) -> Array:
@@ -328,10 +322,11 @@ MISREADINGS: dict[str, tuple[Mending, Mending]] = {
     },
     **{
         f"colours look like those of {name}": (
-            partial(_times, np.linalg.solve(rgb_to_xyz(BT709), rgb_to_xyz(primaries))),
-            partial(_times, np.linalg.solve(rgb_to_xyz(primaries), rgb_to_xyz(BT709))),
+            partial(_times, matrix),
+            partial(_times, np.linalg.inv(matrix)),
         )
-        for name, primaries in PRIMARIES.items()
+        for name in PRIMARIES
+        if (matrix := colour_spaces.of_primaries(colour_spaces.PRIMARIES[name]).matrix) is not None
     },
 }
 """Mistakes in encoding colours: their symptoms, what undoes them, and what makes them."""
@@ -443,8 +438,10 @@ def _turned(
 def _order_agreement(picture: Array, other: Array, counted: NDArray[np.bool_]) -> float:
     """Return Spearman's correlation of the brightness of small blocks; 1 if one is even."""
     blocks = Blocks.of(picture, other, counted)
-    ranks = [_ranks(colours.mean(axis=1)) for colours in (blocks.picture, blocks.other)]
-    first, second = (each - each.mean() for each in ranks)
+    first = _ranks(blocks.picture.mean(axis=1))
+    second = _ranks(blocks.other.mean(axis=1))
+    first = first - first.mean()
+    second = second - second.mean()
     size = float(np.sqrt((first**2).sum() * (second**2).sum()))
     return float((first * second).sum()) / size if size else 1.0
 
@@ -522,14 +519,17 @@ def _is_moved(picture: Array, other: Array, right: float, down: float) -> bool:
     (2 (on + back - 2 error))`` of the way back: 1 for a picture that is moved, 0 for a blurred one.
     Brightness counts by its rank, or a brighter one of two smooth pictures would look moved.
     """
-    alike, expected = (
-        _ranks(image.mean(axis=-1).ravel()).reshape(*image.shape[:2], 1)
-        for image in (picture, other)
-    )
+    alike = _image_of_ranks(picture)
+    expected = _image_of_ranks(other)
     error = np.mean((alike - expected) ** 2)
     back = np.mean((_shifted(alike, right=-right, down=-down) - expected) ** 2)
     on = np.mean((_shifted(alike, right=right, down=down) - expected) ** 2)
     return bool(on - back > 2 * MOVED * abs(on + back - 2 * error))
+
+
+def _image_of_ranks(image: Array) -> Array:
+    """Return the rank of each pixel's brightness, (H, W, 1)."""
+    return _ranks(image.mean(axis=-1).ravel()).reshape(*image.shape[:2], 1)
 
 
 def _in_pixels(shift: float, ahead: str, back: str) -> str:
@@ -627,14 +627,16 @@ def ratios(picture: Array, other: Array, counted: NDArray[np.bool_]) -> tuple[fl
         return 1.0, 1.0, 1.0
     level = float(np.median(shown.mean(axis=1) / truth.mean(axis=1)))
     least = LIT * float(np.median(truth.max(axis=1)))
-    red, green, blue = (
+
+    def of_channel(channel: int) -> float:
+        told = truth[:, channel] > least
+        if not told.any():
+            return level
         # Colours outside BT.709 have negative values.
-        float(np.median(np.maximum(shown[told, channel], 0.0) / truth[told, channel]))
-        if (told := truth[:, channel] > least).any()
-        else level
-        for channel in range(3)
-    )
-    return red, green, blue
+        shares = np.maximum(shown[told, channel], 0.0) / truth[told, channel]
+        return float(np.median(shares))
+
+    return of_channel(0), of_channel(1), of_channel(2)
 
 
 def _lit(blocks: Blocks) -> NDArray[np.bool_]:

@@ -221,7 +221,7 @@ def off(record: Cost) -> Table:
             "at",
             lambda point: forecast(point).error.value,
             "{:.3f}".format,
-            sized(record.resolution),
+            detail=sized(record.resolution),
         ),
     )
     return Table(columns, record.measured)
