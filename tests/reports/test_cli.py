@@ -120,7 +120,7 @@ def test_plan_prints_a_table_and_json(run):
     assert "box around a light" in shadows["premise"]
     assert "may stand between" in shadows["evidence"]
     data = json.loads(run("plan", "fig-8-9", "--json", "--everything")[1])
-    assert (data["integrator"], len(data["effects"])) == ("path", 15)
+    assert (data["integrator"], len(data["effects"])) == ("path", 16)
     assert all(effect["called_for"] for effect in data["effects"])
 
 
@@ -257,7 +257,7 @@ def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(monkey
         monkeypatch.setenv("NO_COLOR", "1")
 
 
-def work(number):
+def work(number, report=None):
     if number == 1:
         raise InputError("no")
     return number
@@ -265,12 +265,16 @@ def work(number):
 
 @pytest.mark.parametrize("count", [1, 3])
 def test_a_pipe_gets_a_line_for_each_task_of_several_and_a_terminal_a_bar(monkeypatch, count):
-    tasks = [Task(f"scene-{number}", work, (number,)) for number in range(count)]
     monkeypatch.setenv("TERM", "xterm-256color")
     for stream in (StringIO(), Terminal()):
         monkeypatch.setattr(sys, "stderr", stream)
         with Pool(0) as pool, progress.shown() as bar:
-            assert len([*bar.each(pool, tasks, "scenes")]) == count
+            tasks = [
+                Task(name, work, (number,), progress=bar.of(name))
+                for number, name in enumerate(f"scene-{number}" for number in range(count))
+            ]
+            uncounted = Task("hard cases", work, (2,))
+            assert len([*bar.each(pool, [*tasks, uncounted], "scenes")]) == count + 1
         shown = stream.getvalue()
         if stream.isatty():
             assert ("scenes, 3 of 3" in shown, "scenes" in shown) == (count == 3, count == 3)
