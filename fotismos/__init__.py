@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fotismos.comparisons.audit.checks import Audit
     from fotismos.comparisons.case import Scene
-    from fotismos.comparisons.comparison import Comparison, ComparisonRecord
-    from fotismos.comparisons.cost.cost_record import Cost, Method
-    from fotismos.comparisons.cost.engine_record import EngineCost
     from fotismos.comparisons.departure.metrics import Metric, Pixelwise
-    from fotismos.comparisons.fit.fit_record import FitRecord
     from fotismos.comparisons.options import Options
     from fotismos.comparisons.pixel_terms import PixelTerms
+    from fotismos.comparisons.records.comparison import Comparison, ComparisonRecord
+    from fotismos.comparisons.records.cost import Cost, Method
+    from fotismos.comparisons.records.engine import EngineCost
+    from fotismos.comparisons.records.fit import FitRecord
     from fotismos.heuristic.background import environment
     from fotismos.heuristic.errors import (
         FotismosError,
@@ -42,11 +42,11 @@ __version__ = heuristic.__version__
 NAMES = {
     "comparisons.audit.checks": ("Audit",),
     "comparisons.case": ("Scene",),
-    "comparisons.comparison": ("Comparison", "ComparisonRecord"),
-    "comparisons.cost.cost_record": ("Cost", "Method"),
-    "comparisons.cost.engine_record": ("EngineCost",),
+    "comparisons.records.comparison": ("Comparison", "ComparisonRecord"),
+    "comparisons.records.cost": ("Cost", "Method"),
+    "comparisons.records.engine": ("EngineCost",),
     "comparisons.departure.metrics": ("Metric", "Pixelwise"),
-    "comparisons.fit.fit_record": ("FitRecord",),
+    "comparisons.records.fit": ("FitRecord",),
     "comparisons.options": ("Options",),
     "comparisons.pixel_terms": ("PixelTerms",),
     "heuristic.errors": (

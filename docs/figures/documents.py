@@ -17,9 +17,9 @@ from PIL import Image
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import Step, compare
-from fotismos.comparisons.comparison import Comparison, Images
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.comparison import Comparison, Images
 from fotismos.reports.charts import figures
 from fotismos.reports.files import images
 

@@ -21,9 +21,7 @@ from docs.figures.documents import DOCS, draw, replace
 from docs.figures.model_figures import GROUND, STYLE
 from fotismos.comparisons import timing
 from fotismos.comparisons.case import Case, open_case
-from fotismos.comparisons.comparison import machine
 from fotismos.comparisons.cost import measure
-from fotismos.comparisons.cost.cost_record import Method
 from fotismos.comparisons.cost.methods import DIRECT, FULL_PLAN, Ladder
 from fotismos.comparisons.departure.colour import luminance
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
@@ -31,6 +29,8 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.scenes import plastic_spheres
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
+from fotismos.comparisons.records.comparison import machine
+from fotismos.comparisons.records.cost import Method
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.renderer import passes

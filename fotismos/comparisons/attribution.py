@@ -24,17 +24,6 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from fotismos.comparisons.comparison import (
-    CAUSES,
-    Attribution,
-    Causes,
-    Comparison,
-    ComparisonRecord,
-    Contribution,
-    Hybrid,
-    MeanError,
-    ObjectContribution,
-)
 from fotismos.comparisons.departure.blocks import ratio
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
@@ -52,6 +41,17 @@ from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.hybrids import HybridImages, HybridScenes, Pairs, labels
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
+from fotismos.comparisons.records.comparison import (
+    CAUSES,
+    Attribution,
+    Causes,
+    Comparison,
+    ComparisonRecord,
+    Contribution,
+    Hybrid,
+    MeanError,
+    ObjectContribution,
+)
 from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.planning.effects import Effect

@@ -19,7 +19,11 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons import timing
-from fotismos.comparisons.comparison import (
+from fotismos.comparisons.departure.metrics import METRICS, leading_distance
+from fotismos.comparisons.estimates import Estimates, PassSums, measure, metrics_for
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import Prepared, guarded
+from fotismos.comparisons.records.comparison import (
     Comparison,
     ComparisonRecord,
     Deviations,
@@ -27,11 +31,7 @@ from fotismos.comparisons.comparison import (
     TimeSpent,
     versions,
 )
-from fotismos.comparisons.departure.metrics import METRICS, leading_distance
-from fotismos.comparisons.estimates import Estimates, PassSums, measure, metrics_for
-from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import Prepared, guarded
-from fotismos.comparisons.price_record import Price
+from fotismos.comparisons.records.price import Price
 from fotismos.heuristic.errors import InstallationError
 from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.renderer import Progress, passes

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fotismos.comparisons.comparison import Images, Significant
 from fotismos.comparisons.departure import marks, regions, statistics
 from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.metrics import (
@@ -18,6 +17,7 @@ from fotismos.comparisons.departure.metrics import (
 )
 from fotismos.comparisons.departure.statistics import Summary
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.comparison import Images, Significant
 from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.sums import (
     DEVIATION,

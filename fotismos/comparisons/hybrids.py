@@ -20,10 +20,10 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from fotismos.comparisons.comparison import CAUSES
 from fotismos.comparisons.departure.blocks import averaged, ratio
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, pair_for, pair_options
+from fotismos.comparisons.records.comparison import CAUSES
 from fotismos.heuristic.convention import Floats, Scene
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.pairing import lights

@@ -18,7 +18,6 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons import alignment, picture_mistakes
-from fotismos.comparisons.comparison import Agreement, Comparison, Images, PictureFiles
 from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedReference
 from fotismos.comparisons.departure.marks import NoiseShown

@@ -24,14 +24,14 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS, Pixelwise
 from fotismos.comparisons.departure.noise import USUAL, VisibleShare, shares_above
 from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.prepared import Prepared
-from fotismos.comparisons.price_record import (
+from fotismos.comparisons.records.comparison import Comparison
+from fotismos.comparisons.records.price import (
     MOST_SPP,
     EffectsThatPass,
     Price,

@@ -13,7 +13,6 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons.compare import Step
-from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.metrics import LEADING, leading_distance
 from fotismos.comparisons.departure.regions import worst_pixel
@@ -21,6 +20,7 @@ from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.price import with_price
+from fotismos.comparisons.records.comparison import Comparison
 from fotismos.heuristic import heuristics
 from fotismos.reference.rendering.renderer import Progress, passes
 from fotismos.reference.rendering.sums import MEAN, Accumulator

@@ -6,17 +6,17 @@ from time import perf_counter
 from msgspec import structs
 
 from fotismos.comparisons import pictures
-from fotismos.comparisons.comparison import (
+from fotismos.comparisons.departure.criterion import caution, decide
+from fotismos.comparisons.departure.metrics import LEADING, METRICS, declared
+from fotismos.comparisons.estimates import Estimates, measure, summarised
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.comparison import (
     PICTURE_LIBRARIES,
     Comparison,
     ComparisonRecord,
     TimeSpent,
     versions,
 )
-from fotismos.comparisons.departure.criterion import caution, decide
-from fotismos.comparisons.departure.metrics import LEADING, METRICS, declared
-from fotismos.comparisons.estimates import Estimates, measure, summarised
-from fotismos.comparisons.options import Options
 from fotismos.heuristic.errors import InputError
 
 

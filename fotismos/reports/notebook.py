@@ -25,22 +25,22 @@ from fotismos.comparisons.audit.checks import Audit, Kind
 from fotismos.comparisons.audit.checks import audit as examined
 from fotismos.comparisons.case import RGB, Scene, open_case
 from fotismos.comparisons.check.moved import LEVEL
-from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.cost.cost import cost as study
-from fotismos.comparisons.cost.cost_record import Cost, Method
 from fotismos.comparisons.cost.engine import front_of_pictures
-from fotismos.comparisons.cost.engine_record import EngineCost
 from fotismos.comparisons.cost.methods import declare as declare_method
 from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
 from fotismos.comparisons.departure.metrics import Metric
 from fotismos.comparisons.departure.metrics import declare as declare_metric
 from fotismos.comparisons.fit.fit import fit as fit_parameters
-from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.names import as_files, with_files
 from fotismos.comparisons.options import Options, OptionValues
 from fotismos.comparisons.pictures import require_no_scene
 from fotismos.comparisons.pixel_terms import PixelTerms
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.records.comparison import Comparison
+from fotismos.comparisons.records.cost import Cost, Method
+from fotismos.comparisons.records.engine import EngineCost
+from fotismos.comparisons.records.fit import FitRecord
 from fotismos.comparisons.steps import steps
 from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic import user_shaders

@@ -11,16 +11,16 @@ import pytest
 from msgspec import structs
 
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.comparison import MeanError
 from fotismos.comparisons.cost import cost as studies
 from fotismos.comparisons.cost import measure, methods
 from fotismos.comparisons.cost.cost import cost
-from fotismos.comparisons.cost.cost_record import Cost, Method
 from fotismos.comparisons.cost.measure import WIDTH, Effort, measure_ladder, reduced
 from fotismos.comparisons.cost.methods import BUILT_IN, Ladder, declare
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.records.comparison import MeanError
+from fotismos.comparisons.records.cost import Cost, Method
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Source

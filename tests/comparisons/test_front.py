@@ -7,10 +7,10 @@ import pytest
 from msgspec import structs
 
 from fotismos.comparisons import timing
-from fotismos.comparisons.comparison import MeanError
-from fotismos.comparisons.cost.cost_record import Point
 from fotismos.comparisons.cost.front import beats, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import timed, tried
+from fotismos.comparisons.records.comparison import MeanError
+from fotismos.comparisons.records.cost import Point
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering.renderer import passes
 

@@ -10,13 +10,13 @@ import pytest
 from fotismos.comparisons import attribution
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.cost.cost_record import Method
 from fotismos.comparisons.cost.methods import Ladder
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.hybrids import HybridImages, HybridScenes
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded, prepare
+from fotismos.comparisons.records.cost import Method
 from fotismos.comparisons.steps import steps
 from fotismos.reference.planning.effects import (
     BUMPS,

@@ -13,7 +13,7 @@ from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
-from fotismos.comparisons.price_record import MOST_SPP
+from fotismos.comparisons.records.price import MOST_SPP
 from fotismos.comparisons.steps import steps
 from fotismos.reference.rendering.renderer import passes
 from fotismos.reference.rendering.transport import power_share

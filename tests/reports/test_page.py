@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fotismos.comparisons.comparison import machine
 from fotismos.comparisons.cost.methods import BUILT_IN
 from fotismos.comparisons.departure.metrics import METRICS, THRESHOLDS, drawn
+from fotismos.comparisons.records.comparison import machine
 from fotismos.reference.planning.effects import EFFECTS
 from fotismos.reference.records import Machine
 from fotismos.reports import glossary, verdict

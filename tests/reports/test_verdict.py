@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from fotismos.comparisons.comparison import MeanError
 from fotismos.comparisons.cost import cost_record
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
-from fotismos.comparisons.price_record import EffectsThatPass, Price, SamplesThatPass, Saving
 from fotismos.comparisons.processes.pool import Task
+from fotismos.comparisons.records.comparison import MeanError
+from fotismos.comparisons.records.price import EffectsThatPass, Price, SamplesThatPass, Saving
 from fotismos.heuristic.heuristics import HEURISTICS, Interpolation, Point
 from fotismos.reference.records import Interval
 from fotismos.reports import verdict

@@ -6,11 +6,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from fotismos.comparisons.comparison import Comparison, ComparisonRecord, Images
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.metrics import METRICS, RATIO, THRESHOLDS, drawn
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.departure.statistics import Summary
+from fotismos.comparisons.records.comparison import Comparison, ComparisonRecord, Images
 from fotismos.reference.records import plain
 from fotismos.reports.page.scene_view import SceneView
 

@@ -19,11 +19,11 @@ import numpy as np
 from fotismos.comparisons import attribution
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import Attribution
 from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.records.comparison import Attribution
 from fotismos.comparisons.steps import steps
 
 SEEDS = 8

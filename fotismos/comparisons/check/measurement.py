@@ -18,13 +18,13 @@ import numpy as np
 from msgspec import Meta, structs
 
 from fotismos.comparisons.case import Case
-from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.departure.colour import Array, Viewing
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, log2_luminance_ratio
 from fotismos.comparisons.departure.statistics import noise_floor
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
+from fotismos.comparisons.records.comparison import versions
 from fotismos.heuristic import program
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError

@@ -10,9 +10,7 @@ from msgspec import structs
 from fotismos.comparisons import timing
 from fotismos.comparisons.alignment import FINER, scene_edges
 from fotismos.comparisons.attribution import find
-from fotismos.comparisons.comparison import Causes, machine, versions
 from fotismos.comparisons.cost import engine
-from fotismos.comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
 from fotismos.comparisons.cost.engine import Study
 from fotismos.comparisons.cost.front import Reach, at_size, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import (
@@ -33,7 +31,9 @@ from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.pictures import TEMPLATE_SPP, GivenPictures, at_size_of_pictures
-from fotismos.comparisons.price_record import Price
+from fotismos.comparisons.records.comparison import Causes, machine, versions
+from fotismos.comparisons.records.cost import Cost, CostAttribution, EffectCost, Point
+from fotismos.comparisons.records.price import Price
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.plan_record import Guard

@@ -21,8 +21,6 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from fotismos.comparisons.comparison import PICTURE_LIBRARIES, Images, MeanError, versions
-from fotismos.comparisons.cost.engine_record import Engine, EngineCost, EngineSetting
 from fotismos.comparisons.cost.front import fronted
 from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
 from fotismos.comparisons.departure.colour import Viewing
@@ -46,6 +44,8 @@ from fotismos.comparisons.pictures import (
     same_files,
     unknown_noise,
 )
+from fotismos.comparisons.records.comparison import PICTURE_LIBRARIES, Images, MeanError, versions
+from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Interval, Pixels

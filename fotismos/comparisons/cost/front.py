@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, TypeVar
 
 from msgspec import structs
 
-from fotismos.comparisons.cost.engine_record import FrontPoint
+from fotismos.comparisons.records.engine import FrontPoint
 from fotismos.reference.records import Interval, Record
 
 if TYPE_CHECKING:  # pictures have no methods
-    from fotismos.comparisons.cost.cost_record import Point, TimedMethod
+    from fotismos.comparisons.records.cost import Point, TimedMethod
 
 OnFront = TypeVar("OnFront", bound=FrontPoint)
 

@@ -4,7 +4,7 @@ Each method first loses what the scene's plan leaves out. Methods that do not di
 then become equal, and are merged; the result keeps all their names. Methods from outside come
 before the full plan::
 
-    from fotismos.comparisons.cost.cost_record import Method
+    from fotismos.comparisons.records.cost import Method
     from fotismos.comparisons.cost.methods import declare
 
     declare(Method(name="no shadows", family="physical", without=("occlusion",), max_depth=2))
@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 from msgspec import structs
 
-from fotismos.comparisons.cost.cost_record import Method
 from fotismos.comparisons.hybrids import HybridScenes, Pairs
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
+from fotismos.comparisons.records.cost import Method
 from fotismos.heuristic.declared import Declared
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named

@@ -18,24 +18,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.metrics import LEADING, drawn, leading_distance
 from fotismos.comparisons.departure.statistics import Summary, noise_floor, summarise
 from fotismos.comparisons.fit import model
-from fotismos.comparisons.fit.fit_record import (
-    EXACT,
-    INVISIBLE,
-    FitDeparture,
-    FitRecord,
-    FittedMaterial,
-    FormFit,
-    Judgement,
-    parameter_record,
-    physical_materials,
-)
 from fotismos.comparisons.fit.model import OwnModel, PhongModel
 from fotismos.comparisons.fit.search import (
     LOSSES,
@@ -47,6 +35,18 @@ from fotismos.comparisons.fit.search import (
 )
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
+from fotismos.comparisons.records.comparison import versions
+from fotismos.comparisons.records.fit import (
+    EXACT,
+    INVISIBLE,
+    FitDeparture,
+    FitRecord,
+    FittedMaterial,
+    FormFit,
+    Judgement,
+    parameter_record,
+    physical_materials,
+)
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named

@@ -15,10 +15,10 @@ import numpy as np
 from msgspec.structs import replace
 
 from fotismos.comparisons.atomic import require_regular
-from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.departure import statistics
 from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO
+from fotismos.comparisons.records.comparison import versions
 from fotismos.comparisons.study.design import OWN, StudyFile
 from fotismos.comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
 from fotismos.heuristic.errors import InputError, InstallationError, unknown

@@ -21,10 +21,10 @@ import numpy as np
 
 from fotismos.comparisons.atomic import Entry
 from fotismos.comparisons.case import RGB, open_case
-from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.names import is_script
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.comparisons.records.comparison import versions
 from fotismos.comparisons.study import dataset, scenes, sheet
 from fotismos.comparisons.study.dataset import STEPS, Row, measure
 from fotismos.comparisons.study.design import OWN, StudyFile, StudyPart

@@ -16,11 +16,11 @@ from fotismos.comparisons.atomic import content, require_regular
 from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.check.measurement import HALVES, Baseline, laid_out, read_baseline
 from fotismos.comparisons.check.pictures import PictureBaseline, Repeats, colour, means
-from fotismos.comparisons.comparison import PictureFiles
 from fotismos.comparisons.departure.blocks import averaged, shrunk
 from fotismos.comparisons.names import SUFFIXES, file_of, is_script, matching
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import read_file
+from fotismos.comparisons.records.comparison import PictureFiles
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import in_file

@@ -27,11 +27,11 @@ from fotismos.comparisons.check.pictures import (
     picture_gate,
 )
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import PictureFiles, versions
 from fotismos.comparisons.departure.blocks import averaged
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.comparisons.records.comparison import PictureFiles, versions
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import FotismosError, InputError

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.comparison import ComparisonRecord
 from fotismos.comparisons.departure.criterion import TOLERANCE, Verdict
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.comparisons.records.comparison import ComparisonRecord
 from fotismos.heuristic.errors import FotismosError, InputError, OutputError
 from fotismos.reports import verdict
 from fotismos.reports.terminal.tables import escaped, markdown, printed

@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons.comparison import machine
 from fotismos.comparisons.departure.colour import BT709, rgb_to_xyz
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
 from fotismos.comparisons.departure.metrics import (
@@ -33,6 +32,7 @@ from fotismos.comparisons.departure.metrics import (
     declared,
 )
 from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.records.comparison import machine
 from fotismos.reference.records import plain
 from fotismos.reports import glossary, verdict
 from fotismos.reports.files import images
@@ -49,8 +49,8 @@ from fotismos.reports.page.templating import HELP, identifier, rendered
 from fotismos.reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
-    from fotismos.comparisons.comparison import Attribution, ComparisonRecord
     from fotismos.comparisons.hard_cases import HardCases
+    from fotismos.comparisons.records.comparison import Attribution, ComparisonRecord
 
 TITLE = "Textbook shading against physically based rendering"
 PICTURES_TITLE = "A picture against a reference"

@@ -7,7 +7,7 @@ from typing import Any
 
 from msgspec import field
 
-from fotismos.comparisons.comparison import ComparisonRecord
+from fotismos.comparisons.records.comparison import ComparisonRecord
 from fotismos.reference.planning.effects import EFFECTS
 from fotismos.reference.records import Record, plain
 from fotismos.reports.page.embedding import Embedded
@@ -104,7 +104,7 @@ class EngineView(Record):
 class CostView(Record):
     """A page's data of a study.
 
-    ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, whose type few pages need
+    ``record`` is a :class:`fotismos.comparisons.records.cost.Cost`, whose type few pages need
     to load. ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are
     sentences on its sums and on the machine, ``answer`` one on the cheapest method that looks
     right; ``colours`` are those of the effects; ``left_out`` are sentences on methods. ``engine``

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from PIL.Image import Resampling
 
-from fotismos.comparisons.cost.engine_record import Engine, EngineCost
 from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
+from fotismos.comparisons.records.engine import Engine, EngineCost
 from fotismos.heuristic.convention import Floats
 from fotismos.reference import records
 from fotismos.reports import glossary
@@ -34,8 +34,8 @@ from fotismos.reports.terminal.cost_tables import (
 from fotismos.reports.terminal.words import as_typed
 
 if TYPE_CHECKING:  # pictures without a scene need no Mitsuba
-    from fotismos.comparisons.cost.cost_record import Cost
     from fotismos.comparisons.cost.engine import Study
+    from fotismos.comparisons.records.cost import Cost
 
     AnyStudy = Study[Cost] | Study[EngineCost]
 

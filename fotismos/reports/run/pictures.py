@@ -5,9 +5,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from fotismos.comparisons.comparison import PICTURE_LIBRARIES
 from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.comparison import PICTURE_LIBRARIES
 from fotismos.comparisons.two_pictures import finish, look
 from fotismos.reports.jobs import Job
 from fotismos.reports.page.scene_view import SceneView

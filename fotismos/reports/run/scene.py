@@ -9,10 +9,10 @@ from typing import Any
 
 from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.compare import compare as compare_scene
-from fotismos.comparisons.comparison import CAUSES, ComparisonRecord, versions
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.names import file_of, name_of, picture_parts
 from fotismos.comparisons.processes.pool import Turn
+from fotismos.comparisons.records.comparison import CAUSES, ComparisonRecord, versions
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic import program
 from fotismos.heuristic.heuristics import named

@@ -14,8 +14,8 @@ from fotismos.reports.terminal.words import given_time, number, parameter, perce
 
 if TYPE_CHECKING:
     from fotismos.comparisons.cost.cost import Choice
-    from fotismos.comparisons.cost.cost_record import Cost, Point
-    from fotismos.comparisons.cost.engine_record import Engine, EngineCost, EngineSetting
+    from fotismos.comparisons.records.cost import Cost, Point
+    from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting
     from fotismos.reference.records import Interval
 
 Rows: TypeAlias = Iterator[Sequence[str]]

@@ -11,10 +11,15 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from fotismos.comparisons.comparison import Agreement, ComparisonRecord, NoiseTarget, PictureFiles
 from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.comparison import (
+    Agreement,
+    ComparisonRecord,
+    NoiseTarget,
+    PictureFiles,
+)
 from fotismos.reference.pairing.pairing_record import Pairing
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.records import plain

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fotismos.comparisons.cost import engine as engines
-from fotismos.comparisons.cost.engine_record import EngineCost
 from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.criterion import TOLERANCE, checked_threshold
 from fotismos.comparisons.names import matching, picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.pictures import require_no_scene
 from fotismos.comparisons.processes.pool import Pool
+from fotismos.comparisons.records.engine import EngineCost
 from fotismos.reference.records import to_json
 from fotismos.reports.files.results import PAGE
 from fotismos.reports.run import cost_files
@@ -23,7 +23,7 @@ from fotismos.reports.terminal.words import tell, tell_where
 from fotismos.reports.work.folders import results_of
 
 if TYPE_CHECKING:  # pictures without a scene need no Mitsuba
-    from fotismos.comparisons.cost.cost_record import Cost
+    from fotismos.comparisons.records.cost import Cost
 
 Size = tuple[int, int]
 

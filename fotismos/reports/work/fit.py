@@ -9,10 +9,10 @@ import click
 
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.fit.fit import fit
-from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.names import with_files
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool
+from fotismos.comparisons.records.fit import FitRecord
 from fotismos.heuristic.materials import FORMS
 from fotismos.reference.records import plain
 from fotismos.reports.files.results import PAGE

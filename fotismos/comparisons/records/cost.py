@@ -4,9 +4,9 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from fotismos.comparisons.comparison import Contribution, MeanError
-from fotismos.comparisons.cost.engine_record import Engine, FrontPoint
 from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.records.comparison import Contribution, MeanError
+from fotismos.comparisons.records.engine import Engine, FrontPoint
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import (

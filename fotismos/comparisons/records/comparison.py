@@ -18,8 +18,8 @@ from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.departure.regions import ObjectShare, Region
 from fotismos.comparisons.departure.statistics import RatioSummary, Summary
-from fotismos.comparisons.price_record import Price
 from fotismos.comparisons.processes.pool import cores
+from fotismos.comparisons.records.price import Price
 from fotismos.heuristic import __version__
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.pairing.pairing_record import Override, Pairing, Unrepresentable
