@@ -19,7 +19,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import Step, compare
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.records.comparison import Comparison, Images
+from fotismos.comparisons.records.images import Comparison, Images
 from fotismos.reports.charts import figures
 from fotismos.reports.files import images
 

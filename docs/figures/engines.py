@@ -29,8 +29,8 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.scenes import plastic_spheres
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
-from fotismos.comparisons.records.comparison import machine
 from fotismos.comparisons.records.cost import Method
+from fotismos.comparisons.versions import machine
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.renderer import passes

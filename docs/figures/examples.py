@@ -12,7 +12,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.records.comparison import Comparison
+from fotismos.comparisons.records.images import Comparison
 from fotismos.reference.scene.source import Source
 from fotismos.reports.terminal.tables import markdown
 

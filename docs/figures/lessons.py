@@ -11,8 +11,7 @@ from PIL import Image, ImageDraw
 
 from docs.figures.documents import DOCS, compared, panels, read_table, replace
 from fotismos.comparisons import atomic
-from fotismos.comparisons.pixel_terms import LightTerms, PixelTerms
-from fotismos.comparisons.records.comparison import Comparison, Images
+from fotismos.comparisons.records.images import Comparison, Images, LightTerms, PixelTerms
 from fotismos.comparisons.steps import with_terms
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Missing

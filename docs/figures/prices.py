@@ -18,8 +18,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.records.comparison import ComparisonRecord
-from fotismos.comparisons.records.price import Price
+from fotismos.comparisons.records.comparison import ComparisonRecord, Price
 from fotismos.comparisons.steps import steps
 from fotismos.reports import verdict
 from fotismos.reports.terminal.words import number, percent, seconds

@@ -25,18 +25,16 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.blocks import ratio
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
 from fotismos.comparisons.departure.noise import (
     USUAL,
     Halves,
-    VisibleShare,
     contrasts,
     distances_between,
     visible_shares,
     without_noise,
 )
-from fotismos.comparisons.departure.regions import Region, find_objects
+from fotismos.comparisons.departure.regions import find_objects
 from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.hybrids import HybridImages, HybridScenes, Pairs, labels
 from fotismos.comparisons.options import Options
@@ -44,14 +42,14 @@ from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.records.comparison import (
     CAUSES,
     Attribution,
-    Causes,
-    Comparison,
     ComparisonRecord,
     Contribution,
     Hybrid,
     MeanError,
     ObjectContribution,
 )
+from fotismos.comparisons.records.departure import Region, Viewing, VisibleShare
+from fotismos.comparisons.records.images import Causes, Comparison
 from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.planning.effects import Effect

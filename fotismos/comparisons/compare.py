@@ -24,14 +24,14 @@ from fotismos.comparisons.estimates import Estimates, PassSums, measure, metrics
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
 from fotismos.comparisons.records.comparison import (
-    Comparison,
     ComparisonRecord,
     Deviations,
     NoiseTarget,
+    Price,
     TimeSpent,
-    versions,
 )
-from fotismos.comparisons.records.price import Price
+from fotismos.comparisons.records.images import Comparison
+from fotismos.comparisons.versions import versions
 from fotismos.heuristic.errors import InstallationError
 from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.renderer import Progress, passes

@@ -15,9 +15,9 @@ from fotismos.comparisons.departure.metrics import (
     Metric,
     leading_distance,
 )
-from fotismos.comparisons.departure.statistics import Summary
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.records.comparison import Images, Significant
+from fotismos.comparisons.records.departure import Significant, Summary
+from fotismos.comparisons.records.images import Images
 from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.sums import (
     DEVIATION,
@@ -29,7 +29,7 @@ from fotismos.reference.rendering.sums import (
 )
 
 if TYPE_CHECKING:  # two pictures have no scene, and few pictures a tone map
-    from fotismos.comparisons.departure.tone_maps import Light
+    from fotismos.comparisons.records.images import Light
     from fotismos.reference.rendering.gbuffer import GBuffer
 
 PERCENTILE = 95

@@ -22,11 +22,12 @@ from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedReference
 from fotismos.comparisons.departure.marks import NoiseShown
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light, ToneMap
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS, ToneMap
 from fotismos.comparisons.estimates import Estimates, PassSums
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.comparisons.picture_mistakes import Mending, Names, NoisyImage
+from fotismos.comparisons.records.images import Comparison, Images, Light
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Times
 

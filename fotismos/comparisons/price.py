@@ -24,20 +24,20 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS, Pixelwise
-from fotismos.comparisons.departure.noise import USUAL, VisibleShare, shares_above
+from fotismos.comparisons.departure.noise import USUAL, shares_above
 from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.prepared import Prepared
-from fotismos.comparisons.records.comparison import Comparison
-from fotismos.comparisons.records.price import (
+from fotismos.comparisons.records.comparison import (
     MOST_SPP,
     EffectsThatPass,
     Price,
     SamplesThatPass,
     Saving,
 )
+from fotismos.comparisons.records.departure import Viewing, VisibleShare
+from fotismos.comparisons.records.images import Comparison
 from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import gbuffer, image_size, resize, size_of_width

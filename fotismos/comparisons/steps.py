@@ -20,7 +20,7 @@ from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.price import with_price
-from fotismos.comparisons.records.comparison import Comparison
+from fotismos.comparisons.records.images import Comparison
 from fotismos.heuristic import heuristics
 from fotismos.reference.rendering.renderer import Progress, passes
 from fotismos.reference.rendering.sums import MEAN, Accumulator

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fotismos.comparisons.records.price import FEWEST_SPP, Price
+from fotismos.comparisons.records.comparison import FEWEST_SPP, Price
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Interval, Missing
 from fotismos.reference.rendering.gbuffer import image_size, resize, size_of_width

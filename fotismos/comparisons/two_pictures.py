@@ -10,13 +10,9 @@ from fotismos.comparisons.departure.criterion import caution, decide
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, declared
 from fotismos.comparisons.estimates import Estimates, measure, summarised
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.records.comparison import (
-    PICTURE_LIBRARIES,
-    Comparison,
-    ComparisonRecord,
-    TimeSpent,
-    versions,
-)
+from fotismos.comparisons.records.comparison import ComparisonRecord, TimeSpent
+from fotismos.comparisons.records.images import Comparison
+from fotismos.comparisons.versions import PICTURE_LIBRARIES, versions
 from fotismos.heuristic.errors import InputError
 
 

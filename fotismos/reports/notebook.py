@@ -35,12 +35,12 @@ from fotismos.comparisons.fit.fit import fit as fit_parameters
 from fotismos.comparisons.names import as_files, with_files
 from fotismos.comparisons.options import Options, OptionValues
 from fotismos.comparisons.pictures import require_no_scene
-from fotismos.comparisons.pixel_terms import PixelTerms
 from fotismos.comparisons.prepared import prepare
-from fotismos.comparisons.records.comparison import Comparison
+from fotismos.comparisons.records.check import CheckRecord
 from fotismos.comparisons.records.cost import Cost, Method
 from fotismos.comparisons.records.engine import EngineCost
 from fotismos.comparisons.records.fit import FitRecord
+from fotismos.comparisons.records.images import Comparison, PixelTerms
 from fotismos.comparisons.steps import steps
 from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic import user_shaders
@@ -54,7 +54,6 @@ from fotismos.reference.scene.graph import set_variant
 from fotismos.reports import verdict
 from fotismos.reports.charts import figures
 from fotismos.reports.ci import baselines, checks
-from fotismos.reports.ci.checks import CheckRecord
 from fotismos.reports.page import page
 from fotismos.reports.run.scene_files import view_of
 from fotismos.reports.terminal.plan_lines import PlanReport, plan_report

@@ -15,12 +15,11 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
-from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, Verdict, decide, share_above
+from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, decide, share_above
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.comparisons.records.comparison import ComparisonRecord
-from fotismos.comparisons.records.price import MOST_SPP, Price
+from fotismos.comparisons.records.comparison import MOST_SPP, ComparisonRecord, Price
+from fotismos.comparisons.records.departure import Verdict, VisibleShare
 from fotismos.heuristic import program
 from fotismos.reference.planning.effects import EFFECTS, MICROFACETS
 from fotismos.reports.terminal.words import number, parameter, percent, seconds

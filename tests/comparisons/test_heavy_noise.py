@@ -9,11 +9,11 @@ import pytest
 from fotismos.comparisons import attribution
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure import criterion, marks, statistics
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING, leading_distance
 from fotismos.comparisons.departure.noise import debiased
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.comparisons.steps import steps
 from fotismos.reference.scene.source import Source
 from tests.shared import noisy

@@ -8,6 +8,7 @@ import pytest
 
 from fotismos.comparisons import pixel_terms
 from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.records.images import TermMaterial
 from fotismos.reference.records import Missing
 from fotismos.reference.rendering.renderer import passes, variant
 from fotismos.reports.files import results
@@ -82,7 +83,7 @@ def total_of(view):
     material = planes["material"]
     image = np.zeros((*material.shape, 3))
     for number, shown in enumerate(view.materials, 1):
-        found = pixel_terms.TermMaterial(**shown)
+        found = TermMaterial(**shown)
         here = (material == number)[..., None]
         k_d, k_s = map(np.array, (found.k_d, found.k_s))
         value = np.add(found.k_i, np.multiply(found.ambient, found.k_a))

@@ -7,13 +7,12 @@ import pytest
 from fotismos.comparisons import price, timing
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS
-from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
-from fotismos.comparisons.records.price import MOST_SPP
+from fotismos.comparisons.records.comparison import MOST_SPP
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING, VisibleShare
 from fotismos.comparisons.steps import steps
 from fotismos.reference.rendering.renderer import passes
 from fotismos.reference.rendering.transport import power_share

@@ -16,12 +16,12 @@ from fotismos.comparisons.check.measurement import measure_scene
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.departure import criterion
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.criterion import TOLERANCE, caution
 from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.fit.fit import fit
 from fotismos.comparisons.options import LARGEST_SPP, Options
 from fotismos.comparisons.prepared import Prepared
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.comparisons.study import design
 from fotismos.heuristic.errors import FotismosError, InputError, NonFiniteError
 from fotismos.reference.rendering.renderer import LARGEST_PASS

@@ -12,7 +12,7 @@ from PIL import Image
 
 from fotismos.comparisons.cost.methods import BUILT_IN
 from fotismos.comparisons.departure.metrics import METRICS, THRESHOLDS, drawn
-from fotismos.comparisons.records.comparison import machine
+from fotismos.comparisons.versions import machine
 from fotismos.reference.planning.effects import EFFECTS
 from fotismos.reference.records import Machine
 from fotismos.reports import glossary, verdict

@@ -17,7 +17,7 @@ from fotismos.comparisons.audit.subjects import (
     ShadingSubject,
     Subject,
 )
-from fotismos.comparisons.records.comparison import versions
+from fotismos.comparisons.versions import versions
 from fotismos.heuristic import heuristics
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import FotismosError, InputError

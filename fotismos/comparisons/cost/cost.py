@@ -12,7 +12,7 @@ from fotismos.comparisons.alignment import FINER, scene_edges
 from fotismos.comparisons.attribution import find
 from fotismos.comparisons.cost import engine
 from fotismos.comparisons.cost.engine import Study
-from fotismos.comparisons.cost.front import Reach, at_size, fronted, reach, sufficient
+from fotismos.comparisons.cost.front import at_size, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import (
     LARGEST_CERTAIN,
     QUICK,
@@ -31,13 +31,13 @@ from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.pictures import TEMPLATE_SPP, GivenPictures, at_size_of_pictures
-from fotismos.comparisons.records.comparison import Causes, machine, versions
-from fotismos.comparisons.records.cost import Cost, CostAttribution, EffectCost, Point
-from fotismos.comparisons.records.price import Price
+from fotismos.comparisons.records.cost import Choice, Cost, CostAttribution, EffectCost
+from fotismos.comparisons.records.images import Causes
+from fotismos.comparisons.versions import machine, versions
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.plan_record import Guard
-from fotismos.reference.records import VERSION, Pixels, Positive, Record, Resolution
+from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
 from fotismos.reference.scene.source import Source
 
@@ -222,42 +222,6 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
         resolution=found.size,
         spp=SPP,
     )
-
-
-class Choice(Record):
-    """The answer of ``fotismos plan --within``.
-
-    Attributes
-    ----------
-    resolution, measured
-        Size of the times, and of the images in which errors were measured.
-    within
-        The tolerance, ΔE2000.
-    chosen
-        The fastest point that passes; None if none does.
-    best
-        The one that passes at the smallest tolerance.
-    full
-        The full plan with the fewest samples that pass, else with the most samples.
-    left_out
-        Methods that the scene cannot have, and why.
-    reach
-        If none passes: what more samples would do, if known.
-    price
-        What it takes to look right without these methods.
-    """
-
-    scene: str
-    resolution: Resolution
-    measured: Resolution
-    within: Positive
-    chosen: Point | None
-    best: Point
-    full: Point
-    left_out: dict[str, str]
-    reach: Reach | None = None
-    price: Price | None = None
-    record_version: int = VERSION
 
 
 def choose(

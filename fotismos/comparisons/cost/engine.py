@@ -23,13 +23,11 @@ from numpy.typing import NDArray
 
 from fotismos.comparisons.cost.front import fronted
 from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import caution, decide
 from fotismos.comparisons.departure.mapped_sums import MappedReference
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.noise import VisibleShare
-from fotismos.comparisons.departure.statistics import Summary, noise_floor, summarise
-from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light
+from fotismos.comparisons.departure.statistics import noise_floor, summarise
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS
 from fotismos.comparisons.names import matching, with_files
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_mistakes import Names
@@ -44,8 +42,11 @@ from fotismos.comparisons.pictures import (
     same_files,
     unknown_noise,
 )
-from fotismos.comparisons.records.comparison import PICTURE_LIBRARIES, Images, MeanError, versions
+from fotismos.comparisons.records.comparison import MeanError
+from fotismos.comparisons.records.departure import Summary, Viewing, VisibleShare
 from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting
+from fotismos.comparisons.records.images import Images, Light
+from fotismos.comparisons.versions import PICTURE_LIBRARIES, versions
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Interval, Pixels

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, TypeVar
 
 from msgspec import structs
 
+from fotismos.comparisons.records.cost import Reach
 from fotismos.comparisons.records.engine import FrontPoint
-from fotismos.reference.records import Interval, Record
+from fotismos.reference.records import Interval
 
 if TYPE_CHECKING:  # pictures have no methods
     from fotismos.comparisons.records.cost import Point, TimedMethod
@@ -84,22 +85,6 @@ def at_size(
         structs.replace(point, seconds=known[point.method].seconds(point.spp * samples))
         for point in points
     ]
-
-
-class Reach(Record):
-    """How near a method comes to the reference with any number of samples.
-
-    Attributes
-    ----------
-    left
-        ΔE2000 that 5 % of the pixels exceed without noise.
-    spp
-        Samples per pixel with which it should pass at a tolerance; None if too much is left.
-    """
-
-    method: str
-    left: float
-    spp: int | None = None
 
 
 def reach(points: Sequence[Point], tolerance: float) -> Reach | None:

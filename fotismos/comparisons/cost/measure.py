@@ -21,13 +21,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons import timing
 from fotismos.comparisons.cost.methods import Ladder, Step
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
 from fotismos.comparisons.records.comparison import MeanError
 from fotismos.comparisons.records.cost import Converged, Method, Point, TimedMethod
+from fotismos.comparisons.records.departure import Viewing
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size

@@ -19,10 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fotismos.comparisons.departure import marks
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.metrics import LEADING, drawn, leading_distance
-from fotismos.comparisons.departure.statistics import Summary, noise_floor, summarise
+from fotismos.comparisons.departure.statistics import noise_floor, summarise
 from fotismos.comparisons.fit import model
 from fotismos.comparisons.fit.model import OwnModel, PhongModel
 from fotismos.comparisons.fit.search import (
@@ -31,11 +30,13 @@ from fotismos.comparisons.fit.search import (
     Objective,
     bounded_minimum,
     identify,
+    parameter_record,
+    physical_materials,
     search,
 )
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
-from fotismos.comparisons.records.comparison import versions
+from fotismos.comparisons.records.departure import Summary, Viewing
 from fotismos.comparisons.records.fit import (
     EXACT,
     INVISIBLE,
@@ -44,9 +45,8 @@ from fotismos.comparisons.records.fit import (
     FittedMaterial,
     FormFit,
     Judgement,
-    parameter_record,
-    physical_materials,
 )
+from fotismos.comparisons.versions import versions
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named

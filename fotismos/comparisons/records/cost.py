@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.records.comparison import Contribution, MeanError
+from fotismos.comparisons.records.comparison import Contribution, MeanError, Price
+from fotismos.comparisons.records.departure import Viewing
 from fotismos.comparisons.records.engine import Engine, FrontPoint
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.planning.plan_record import Guard
@@ -233,3 +233,55 @@ class Cost(Record):
 
 LEAST_SHARE = 0.85
 """Share of the threads' processor time: less tells of a busy machine."""
+
+
+class Reach(Record):
+    """How near a method comes to the reference with any number of samples.
+
+    Attributes
+    ----------
+    left
+        ΔE2000 that 5 % of the pixels exceed without noise.
+    spp
+        Samples per pixel with which it should pass at a tolerance; None if too much is left.
+    """
+
+    method: str
+    left: float
+    spp: int | None = None
+
+
+class Choice(Record):
+    """The answer of ``fotismos plan --within``.
+
+    Attributes
+    ----------
+    resolution, measured
+        Size of the times, and of the images in which errors were measured.
+    within
+        The tolerance, ΔE2000.
+    chosen
+        The fastest point that passes; None if none does.
+    best
+        The one that passes at the smallest tolerance.
+    full
+        The full plan with the fewest samples that pass, else with the most samples.
+    left_out
+        Methods that the scene cannot have, and why.
+    reach
+        If none passes: what more samples would do, if known.
+    price
+        What it takes to look right without these methods.
+    """
+
+    scene: str
+    resolution: Resolution
+    measured: Resolution
+    within: Positive
+    chosen: Point | None
+    best: Point
+    full: Point
+    left_out: dict[str, str]
+    reach: Reach | None = None
+    price: Price | None = None
+    record_version: int = VERSION

@@ -4,9 +4,8 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.records.comparison import Agreement, MeanError, PictureFiles
+from fotismos.comparisons.records.departure import Viewing, VisibleShare
 from fotismos.reference.records import (
     VERSION,
     Amount,

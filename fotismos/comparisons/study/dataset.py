@@ -16,11 +16,11 @@ from msgspec.structs import replace
 
 from fotismos.comparisons.atomic import require_regular
 from fotismos.comparisons.departure import statistics
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO
-from fotismos.comparisons.records.comparison import versions
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.comparisons.study.design import OWN, StudyFile
 from fotismos.comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
+from fotismos.comparisons.versions import versions
 from fotismos.heuristic.errors import InputError, InstallationError, unknown
 from fotismos.heuristic.program import installation
 from fotismos.reference.planning.effects import PRUNED

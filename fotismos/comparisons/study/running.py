@@ -24,11 +24,11 @@ from fotismos.comparisons.case import RGB, open_case
 from fotismos.comparisons.names import is_script
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.processes.pool import Pool, Task
-from fotismos.comparisons.records.comparison import versions
 from fotismos.comparisons.study import dataset, scenes, sheet
 from fotismos.comparisons.study.dataset import STEPS, Row, measure
 from fotismos.comparisons.study.design import OWN, StudyFile, StudyPart
 from fotismos.comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, largest_miss
+from fotismos.comparisons.versions import versions
 from fotismos.heuristic import plugins
 from fotismos.heuristic.errors import FotismosError, InputError, unknown
 from fotismos.heuristic.heuristics import named

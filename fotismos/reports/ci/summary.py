@@ -11,17 +11,17 @@ from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.departure.criterion import TOLERANCE, Verdict
+from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.records.comparison import ComparisonRecord
+from fotismos.comparisons.records.departure import Verdict, VisibleShare
 from fotismos.heuristic.errors import FotismosError, InputError, OutputError
 from fotismos.reports import verdict
 from fotismos.reports.terminal.tables import escaped, markdown, printed
 from fotismos.reports.terminal.words import number, percent, visible
 
 if TYPE_CHECKING:
-    from fotismos.reports.ci.checks import CheckRecord
+    from fotismos.comparisons.records.check import CheckRecord
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 """The variable with the file whose Markdown GitHub, Forgejo and Gitea show."""

@@ -21,7 +21,7 @@ from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.departure.colour import CHROMATICITIES, to_srgb
 from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING, RATIO, drawn
-from fotismos.comparisons.records.comparison import Images
+from fotismos.comparisons.records.images import Images
 
 Bytes = NDArray[np.uint8]
 

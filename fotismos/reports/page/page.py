@@ -32,7 +32,7 @@ from fotismos.comparisons.departure.metrics import (
     declared,
 )
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.comparisons.records.comparison import machine
+from fotismos.comparisons.versions import machine
 from fotismos.reference.records import plain
 from fotismos.reports import glossary, verdict
 from fotismos.reports.files import images

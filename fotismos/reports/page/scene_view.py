@@ -78,7 +78,7 @@ class LiveView(TermsView):
     """The page's data of the points that it can shade again; ``missing`` says why there are none.
 
     ``grid`` has planes as differences to the row above, and ``tops`` their largest sizes; ``rays``
-    are those of :class:`fotismos.comparisons.pixel_terms.LivePoints`. ``fit`` is the mean ΔE2000
+    are those of :class:`fotismos.comparisons.records.images.LivePoints`. ``fit`` is the mean ΔE2000
     that a fit of the scene reached, with its width and height.
     """
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from fotismos.comparisons.attribution import dominating
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
-from fotismos.comparisons.records.comparison import Comparison
+from fotismos.comparisons.records.images import Comparison, LivePoints, TermGrid
 from fotismos.reference.records import Missing
 from fotismos.reports.page.embedding import COUNTED, encode, packed
 from fotismos.reports.page.scene_view import (

@@ -17,7 +17,7 @@ from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.names import is_script, picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
-from fotismos.comparisons.records.comparison import LIBRARIES, machine, versions
+from fotismos.comparisons.versions import LIBRARIES, machine, versions
 from fotismos.heuristic.errors import FotismosError, InputError, InstallationError, OutputError
 from fotismos.reference.records import to_json
 from fotismos.reports import verdict

@@ -7,8 +7,8 @@ from typing import Any
 
 from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.records.comparison import PICTURE_LIBRARIES
 from fotismos.comparisons.two_pictures import finish, look
+from fotismos.comparisons.versions import PICTURE_LIBRARIES
 from fotismos.reports.jobs import Job
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files

@@ -12,8 +12,9 @@ from fotismos.comparisons.compare import compare as compare_scene
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.names import file_of, name_of, picture_parts
 from fotismos.comparisons.processes.pool import Turn
-from fotismos.comparisons.records.comparison import CAUSES, ComparisonRecord, versions
+from fotismos.comparisons.records.comparison import CAUSES, ComparisonRecord
 from fotismos.comparisons.steps import steps
+from fotismos.comparisons.versions import versions
 from fotismos.heuristic import program
 from fotismos.heuristic.heuristics import named
 from fotismos.reference.records import VERSION, plain

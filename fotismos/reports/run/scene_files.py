@@ -11,7 +11,8 @@ from msgspec import structs
 from fotismos.comparisons import atomic
 from fotismos.comparisons.departure.metrics import LEADING, drawn
 from fotismos.comparisons.departure.regions import worst_pixel
-from fotismos.comparisons.records.comparison import Comparison, ComparisonRecord, Images
+from fotismos.comparisons.records.comparison import ComparisonRecord
+from fotismos.comparisons.records.images import Comparison, Images
 from fotismos.reference.records import Missing, Record, plain, to_json
 from fotismos.reports.files import images, results
 from fotismos.reports.page import embedding

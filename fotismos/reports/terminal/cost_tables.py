@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
-from fotismos.comparisons.cost.front import Reach, beats, is_below, reach, sufficient
+from fotismos.comparisons.cost.front import beats, is_below, reach, sufficient
 from fotismos.comparisons.departure.criterion import TOLERANCE, decide, share_above
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.records.cost import Reach
 from fotismos.reports.glossary import meanings
 from fotismos.reports.terminal.tables import printed
 from fotismos.reports.terminal.words import given_time, number, parameter, percent, seconds
 
 if TYPE_CHECKING:
-    from fotismos.comparisons.cost.cost import Choice
-    from fotismos.comparisons.records.cost import Cost, Point
+    from fotismos.comparisons.records.cost import Choice, Cost, Point
     from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting
     from fotismos.reference.records import Interval
 

@@ -8,9 +8,10 @@ import click
 
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, checked_threshold
 from fotismos.comparisons.processes.pool import Pool
+from fotismos.comparisons.records.check import CheckRecord, Checks
 from fotismos.reference.records import to_json
 from fotismos.reports.ci import checks, summary
-from fotismos.reports.ci.checks import CheckRecord, Tolerance
+from fotismos.reports.ci.checks import Tolerance
 from fotismos.reports.files import results
 from fotismos.reports.jobs import command_line
 from fotismos.reports.terminal.words import echo, is_quiet, tell
@@ -65,7 +66,7 @@ def run(
     # 2, could not be checked, outweighs 1, moved.
     code = max(outcome.exit_code for outcome in outcomes)
     if as_json:
-        record = checks.Checks(passed=not code, significance=significance, checks=tuple(outcomes))
+        record = Checks(passed=not code, significance=significance, checks=tuple(outcomes))
         click.echo(to_json(record), nl=False)
     elif not is_quiet():
         tell(summary.lines(outcomes, significance))

@@ -8,7 +8,7 @@ from msgspec import structs
 
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.cost.cost import Choice, choose
+from fotismos.comparisons.cost.cost import choose
 from fotismos.comparisons.cost.measure import WIDTH, reduced, requested
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.departure.metrics import LEADING
@@ -16,6 +16,7 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.comparisons.records.comparison import ComparisonRecord
+from fotismos.comparisons.records.cost import Choice
 from fotismos.comparisons.steps import steps
 from fotismos.reference.records import Record, to_json
 from fotismos.reports import verdict
