@@ -33,7 +33,7 @@ from fotismos.comparisons.records.cost import Method
 from fotismos.comparisons.versions import machine
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.rendering.gbuffer import image_size
-from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.passes import passes
 from fotismos.reference.rendering.sums import Accumulator
 from fotismos.reports.files import images
 from fotismos.reports.terminal.tables import markdown

@@ -20,7 +20,8 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.heuristic.heuristics import Interpolation
-from fotismos.reference.rendering.renderer import Renderer, passes, warm
+from fotismos.reference.rendering.passes import passes
+from fotismos.reference.rendering.renderer import Renderer, warm
 from fotismos.reference.scene.source import Source
 from fotismos.reports.terminal.words import number
 

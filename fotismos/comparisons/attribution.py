@@ -57,12 +57,10 @@ from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import (
     ObjectIds,
     gbuffer,
-    image_size,
     require_surface,
-    resize,
     size_of_width,
 )
-from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, passes
+from fotismos.reference.rendering.passes import Progress, Stream, passes
 from fotismos.reference.rendering.sums import Grouped, block_numbers, jackknifed
 from fotismos.reference.scene.source import Source
 
@@ -158,55 +156,48 @@ def find(
             f"{source.name} has participating media ({', '.join(media)}), which no image of some"
             " effects can hold. The other numbers do not need them."
         )
-    width, height = image_size(ready.scene)
+    width, height = ready.size
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
     most = most or (NARROW if is_large else WIDTH)
-    size = size_of_width(ready.scene, min(most, width))
+    size = size_of_width(ready.scene, ready.size, min(most, width))
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
     surface = gbuffer(ready.scene, size)
     require_surface(surface.hit, source.name)
     leading: Any = metrics_for(ready.options)[LEADING.name]
     pairs = Pairs(source, options, ready)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
-    reference = Renderer(
-        ready.scene, ready.reference.integrator, pass_spp=spp, label="physical picture", size=size
-    )
-    try:
-        while True:
-            # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
-            loop = passes(
-                [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
-                progress=progress, stage="reference",
-            )  # fmt: skip
-            groups = np.stack([np.array(rendered.images[0]) for rendered in loop])
-            meter = ErrorMeter(groups, surface.hit, options.viewing, leading)
-            images = HybridImages(
-                pairs,
-                scenes,
-                replicates=REPLICATES,
-                replicate_spp=reference.pass_spp,
-                seed=options.seed,
-                size=size,
-                progress=progress,
-            )
-            found = attribute(
-                images,
-                meter,
-                shapes=surface.shape,
-                seed=options.seed,
-                clean=clean,
-                whole=width * height,
-            )
-            more = MORE * reference.pass_spp
-            count = len(found.record.hybrids) * REPLICATES
-            is_enough = count * more * size[0] * size[1] > limit
-            if is_closed(found.record) or is_enough:
-                break
-            reference = reference.sampled(more)
-    finally:
-        # The scene is the comparison's: it gets its size back.
-        resize(ready.scene, (width, height))
-    return found
+    reference = ready.reference.sampled(spp)
+    while True:
+        # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
+        loop = passes(
+            [reference], options.seed, REPLICATES, size=size, stream=Stream.OTHER_SIDE,
+            progress=progress, stage="reference",
+        )  # fmt: skip
+        groups = np.stack([np.array(rendered.images[0]) for rendered in loop])
+        meter = ErrorMeter(groups, surface.hit, options.viewing, leading)
+        images = HybridImages(
+            pairs,
+            scenes,
+            replicates=REPLICATES,
+            replicate_spp=reference.pass_spp,
+            seed=options.seed,
+            size=size,
+            progress=progress,
+        )
+        found = attribute(
+            images,
+            meter,
+            shapes=surface.shape,
+            seed=options.seed,
+            clean=clean,
+            whole=width * height,
+        )
+        more = MORE * reference.pass_spp
+        count = len(found.record.hybrids) * REPLICATES
+        is_enough = count * more * size[0] * size[1] > limit
+        if is_closed(found.record) or is_enough:
+            return found
+        reference = reference.sampled(more)
 
 
 def is_closed(record: Attribution) -> bool:

@@ -33,8 +33,7 @@ from fotismos.comparisons.records.comparison import (
 from fotismos.comparisons.records.images import Comparison
 from fotismos.comparisons.versions import versions
 from fotismos.heuristic.errors import InstallationError
-from fotismos.reference.rendering.gbuffer import image_size
-from fotismos.reference.rendering.renderer import Progress, passes
+from fotismos.reference.rendering.passes import Progress, passes
 from fotismos.reference.scene.source import Source, collect_messages, count_messages
 
 Step = Callable[[Comparison, Prepared, Progress | None], Comparison]
@@ -199,7 +198,7 @@ def _price(ready: Prepared, alone: AbstractContextManager[Any] | None) -> Price 
             seed=ready.options.seed,
             alone=alone,
         )
-    width, height = image_size(reference.scene)
+    width, height = reference.size
     pixels = width * height
     return Price(
         ratio=None,

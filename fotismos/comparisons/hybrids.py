@@ -43,8 +43,8 @@ from fotismos.reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
 from fotismos.reference.planning.plan import physical_integrator
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.rendering import direct
-from fotismos.reference.rendering.gbuffer import image_size, resize
-from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, passes, variant
+from fotismos.reference.rendering.passes import Progress, Stream, passes
+from fotismos.reference.rendering.renderer import Renderer, variant
 from fotismos.reference.rendering.sampler import with_sampler
 from fotismos.reference.rendering.transport import Transport
 from fotismos.reference.scene.graph import properties
@@ -366,22 +366,18 @@ class HybridImages:
     def _passes(
         self, renderer: Renderer, count: int = 1, progress: Progress | None = None
     ) -> list[Floats]:
-        """Render the replicates on a film of the preview's size, then restore the film's.
+        """Render the replicates on a film of the preview's size.
 
         The channels of a pass are those of ``count`` images.
         """
         width, height = self.size
-        whole = image_size(renderer.scene)
-        renderer.size = self.finer * width, self.finer * height
-        try:
-            loop = passes(
-                [renderer], self._seed, self.replicates, stream=Stream.REPLICATES,
-                progress=progress, stage=CAUSES,
-            )  # fmt: skip
-            # (R, f H, f W, 3 count): the channels of an image are neighbours.
-            made = np.stack([np.array(rendered.images[0]) for rendered in loop])
-        finally:
-            resize(renderer.scene, whole)
+        size = self.finer * width, self.finer * height
+        loop = passes(
+            [renderer], self._seed, self.replicates, size=size, stream=Stream.REPLICATES,
+            progress=progress, stage=CAUSES,
+        )  # fmt: skip
+        # (R, f H, f W, 3 count): the channels of an image are neighbours.
+        made = np.stack([np.array(rendered.images[0]) for rendered in loop])
         # An image in grey has one channel.
         return [
             np.broadcast_to(image, (*image.shape[:3], 3)) for image in np.split(made, count, axis=3)

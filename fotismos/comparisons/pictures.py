@@ -6,6 +6,7 @@ They are read by :mod:`fotismos.comparisons.picture_files`, placed by
 """
 
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import repeat
@@ -27,9 +28,11 @@ from fotismos.comparisons.estimates import Estimates, PassSums
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.comparisons.picture_mistakes import Mending, Names, NoisyImage
+from fotismos.comparisons.records.comparison import Agreement, PictureFiles
 from fotismos.comparisons.records.images import Comparison, Images, Light
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Times
+from fotismos.reference.rendering.passes import Size, Stream
 
 FEWEST = 2
 """Passes of single pictures, which are equal."""
@@ -132,12 +135,24 @@ class PictureHalf:
         count = min(passes, len(images))
         self._means = [np.mean(images[number::count], axis=0) for number in range(count)]
 
-    def render(self, seed: int) -> np.ndarray:
-        """Return the next pass (H, W, 3); the seed is ignored."""
-        begin = perf_counter()
-        image: np.ndarray = self._means[len(self.times) % len(self._means)]
-        self.times.append(perf_counter() - begin)
-        return image
+    @property
+    def size(self) -> Size:
+        """Width and height in pixels."""
+        return self.pictures.size
+
+    def active(self) -> AbstractContextManager[None]:
+        """Return a context that does nothing."""
+        return nullcontext()
+
+    def passes(
+        self, count: int, size: Size | None = None, stream: Stream = Stream.COMPARED, seed: int = 0
+    ) -> Iterator[np.ndarray]:
+        """Yield ``count`` passes (H, W, 3), which are the same for all streams and seeds."""
+        for number in range(count):
+            begin = perf_counter()
+            image: np.ndarray = self._means[number % len(self._means)]
+            self.times.append(perf_counter() - begin)
+            yield image
 
     def pass_times(self) -> Times:
         """Return the times of the passes, which are read already."""

@@ -30,8 +30,9 @@ from fotismos.heuristic.kernel import LightContribution
 from fotismos.heuristic.lights import lamps
 from fotismos.heuristic.materials import COEFFICIENTS, FORMS, Material
 from fotismos.reference.records import Missing
-from fotismos.reference.rendering.gbuffer import centre_rays, image_size, pixel_rays
-from fotismos.reference.rendering.renderer import Renderer, pass_seed, variant
+from fotismos.reference.rendering.gbuffer import centre_rays, pixel_rays
+from fotismos.reference.rendering.passes import pass_seed
+from fotismos.reference.rendering.renderer import Renderer, variant
 
 SIDE = 64
 """Points along the longer side of the grid, at most."""
@@ -76,7 +77,7 @@ def trace(
     with variant(half.variant):
         if reason := _without(half, options, Interpolation.PHONG):
             return Missing(reason)
-        return _traced(half.scene, half.integrator, pixel)
+        return _traced(half, pixel)
 
 
 def live(half: Renderer, options: Options) -> LivePoints | Missing:
@@ -125,7 +126,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | Missing:
         return Missing(f"There are more than {LIVE_LIGHTS} lights.")
     if not isinstance(sensor, mi.ProjectiveCamera):
         return Missing(f"The camera, {sensor.class_name()}, has no plane film.")
-    size = shrunk(image_size(scene), LIVE_SIDE)
+    size = shrunk(half.size, LIVE_SIDE)
     ray = centre_rays(scene, size)
     ahead = sensor.world_transform() @ mi.Vector3f(0, 0, 1)
     # Directions that end on a plane are linear over the film: three corners give all others.
@@ -168,15 +169,15 @@ def _live(half: Renderer, options: Options) -> LivePoints | Missing:
     )
 
 
-def _traced(scene: Scene, integrator: Any, pixel: tuple[int, int] | None) -> TermGrid | Missing:
-    emitters = lamps(scene)
-    resolution = image_size(scene)
+def _traced(half: Renderer, pixel: tuple[int, int] | None) -> TermGrid | Missing:
+    emitters = lamps(half.scene)
+    resolution = half.size
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
     if pixel:
         columns[pixel[0] * len(columns) // resolution[0]] = pixel[0]
         rows[pixel[1] * len(rows) // resolution[1]] = pixel[1]
     x, y = np.meshgrid(columns, rows)
-    points = _Points(scene, integrator, pixel_rays(scene, resolution, x=x, y=y))
+    points = _Points(half.scene, half.integrator, pixel_rays(half.scene, resolution, x=x, y=y))
     materials, places = points.materials()
     if len(materials) > MATERIALS:
         return TOO_MANY_MATERIALS

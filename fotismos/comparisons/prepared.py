@@ -36,6 +36,7 @@ from fotismos.reference.rendering.gbuffer import (
     require_surface,
 )
 from fotismos.reference.rendering.integrators import SAMPLER, STOCK_SAMPLER
+from fotismos.reference.rendering.passes import Size
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
 from fotismos.reference.rendering.sampler import with_sampler
 from fotismos.reference.scene.checks import require_frames
@@ -99,12 +100,18 @@ class Prepared:
     guard: Guard | None = None
     given: "GivenPictures | None" = None
 
+    @property
+    def size(self) -> Size:
+        """Width and height of both halves, in pixels."""
+        width, height = self.reference.size
+        return width, height
+
     def traced(self, finer: int = 1) -> GBuffer:
         """Return what each pixel sees; traced at each call, since it takes much memory.
 
         Each side of a pixel has ``finer`` rays.
         """
-        width, height = image_size(self.scene)
+        width, height = self.size
         surface = gbuffer(self.scene, (finer * width, finer * height))
         dr.flush_malloc_cache()
         return surface
@@ -131,7 +138,9 @@ class Prepared:
             return None
         integrator = physical_integrator(whole, self.scene, self.pair.hide_emitters)
         spp = self.reference.pass_spp
-        return Renderer(self.scene, integrator, pass_spp=spp, label="everything simulated")
+        return Renderer(
+            self.scene, integrator, pass_spp=spp, label="everything simulated", size=self.size
+        )
 
     @cached_property
     def counted(self) -> np.ndarray:
@@ -178,7 +187,7 @@ class Prepared:
                 )
         if not (self.pair.hide_emitters and self.plan.integrator in ("volpath", "volpathmis")):
             return ""
-        rays = centre_rays(self.scene, image_size(self.scene))
+        rays = centre_rays(self.scene, self.size)
         count = int(np.sum(is_behind_two_lamps(self.scene, rays)))
         if not count:
             return ""
@@ -316,7 +325,7 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
     options = options or Options()
     ready = prepare(source, options)
     if not options.reference:  # else no plan is followed
-        width, height = image_size(ready.scene)
+        width, height = ready.size
         found = examine_plan(
             ready.plan,
             ready.scene,

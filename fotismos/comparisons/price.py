@@ -40,8 +40,9 @@ from fotismos.comparisons.records.departure import Viewing, VisibleShare
 from fotismos.comparisons.records.images import Comparison
 from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.reference.records import Interval
-from fotismos.reference.rendering.gbuffer import gbuffer, image_size, resize, size_of_width
-from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, pass_seed, passes
+from fotismos.reference.rendering.gbuffer import gbuffer, size_of_width
+from fotismos.reference.rendering.passes import Progress, Stream, pass_seed, passes
+from fotismos.reference.rendering.renderer import Renderer
 
 WIDTH = 128
 NARROWEST = 24
@@ -162,17 +163,12 @@ def samples_that_pass(ready: Prepared, metric: Pixelwise) -> tuple[SamplesThatPa
 
 def _noisy_pictures(ready: Prepared, metric: Pixelwise) -> NoisyPictures | None:
     """Render passes, and pictures with fewer samples; None if no pixel counts."""
-    size = size_of_width(ready.scene, _width(ready))
-    film = image_size(ready.scene)
-    try:
-        counted = gbuffer(ready.scene, size).hit
-        if not counted.any():
-            return None
-        pictures, long = _deviating(ready, size, PASS, PASSES, counted)
-        short = {spp: _deviating(ready, size, spp, PICTURES, counted)[1] for spp in SINGLE}
-    finally:
-        for half in _halves(ready):
-            resize(half.scene, film)
+    size = size_of_width(ready.scene, ready.size, _width(ready))
+    counted = gbuffer(ready.scene, size).hit
+    if not counted.any():
+        return None
+    pictures, long = _deviating(ready, size, PASS, PASSES, counted)
+    short = {spp: _deviating(ready, size, spp, PICTURES, counted)[1] for spp in SINGLE}
     middle = long.mean(axis=0)
     deviations = {spp: images - middle for spp, images in short.items()}
     deviations |= {size * PASS: _means_apart(long, size) for size in GROUPS}
@@ -191,7 +187,7 @@ def _halves(ready: Prepared) -> list[Renderer]:
 
 def _width(ready: Prepared) -> int:
     """Return the width of the pictures, for which the samples suffice."""
-    columns, rows = image_size(ready.scene)
+    columns, rows = ready.size
     of_a_pixel = PASS * PASSES + PICTURES * sum(SINGLE)
     affordable = np.sqrt(SAMPLES / of_a_pixel * columns / rows)
     return int(np.clip(affordable, min(NARROWEST, columns), min(WIDTH, columns)))
@@ -204,10 +200,10 @@ def _deviating(
 
     Both (K, N, 3), of the counted pixels. A picture in place of the textbook half has no rays.
     """
-    renderers = [half.sampled(spp, size) for half in _halves(ready)]
+    renderers = [half.sampled(spp) for half in _halves(ready)]
     # Each count has its own passes.
     seed = pass_seed(ready.options.seed, spp, Stream.PRICE)
-    loop = passes(renderers, seed, count, stream=Stream.PRICE)
+    loop = passes(renderers, seed, count, size=size, stream=Stream.PRICE)
     pictures = np.array(
         [[np.array(image, float)[counted] for image in rendered.images] for rendered in loop]
     )
@@ -289,15 +285,10 @@ def saving(ready: Prepared, price: Price) -> Saving | None:
     whole = ready.unpruned
     if whole is None or not price.everything_s or not price.reference_s:
         return None
-    size = size_of_width(ready.scene, _width(ready))
-    film = image_size(ready.scene)
-    renderers = [half.sampled(PASS, size) for half in (*_halves(ready), whole)]
-    try:
-        loop = passes(renderers, ready.options.seed, 2, stream=Stream.PRICE)
-        first, second = [np.array(rendered.images, float) for rendered in loop]
-    finally:
-        for half in _halves(ready):
-            resize(half.scene, film)
+    size = size_of_width(ready.scene, ready.size, _width(ready))
+    renderers = [half.sampled(PASS) for half in (*_halves(ready), whole)]
+    loop = passes(renderers, ready.options.seed, 2, size=size, stream=Stream.PRICE)
+    first, second = [np.array(rendered.images, float) for rendered in loop]
     # The difference from the textbook half, whose rays are the same, has no noise of edges.
     heuristic, plan, everything = first - second
     noise = float(np.sqrt(np.mean((plan - heuristic) ** 2)))

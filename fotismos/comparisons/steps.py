@@ -22,7 +22,7 @@ from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.price import with_price
 from fotismos.comparisons.records.images import Comparison
 from fotismos.heuristic import heuristics
-from fotismos.reference.rendering.renderer import Progress, passes
+from fotismos.reference.rendering.passes import Progress, passes
 from fotismos.reference.rendering.sums import MEAN, Accumulator
 
 

@@ -14,6 +14,7 @@ from fotismos.comparisons.records.comparison import ComparisonRecord, TimeSpent
 from fotismos.comparisons.records.images import Comparison
 from fotismos.comparisons.versions import PICTURE_LIBRARIES, versions
 from fotismos.heuristic.errors import InputError
+from fotismos.reference.rendering.passes import passes
 
 
 @dataclass(frozen=True)
@@ -51,12 +52,12 @@ def look(options: Options, name: str, command: str = "") -> FirstLook:
 
     begin = perf_counter()
     counted = given.where()
-    passes = given.passes or pictures.FEWEST
-    first = pictures.PictureHalf(given.image, passes)
-    second = pictures.PictureHalf(given.reference, passes)
+    count = given.passes or pictures.FEWEST
+    first = pictures.PictureHalf(given.image, count)
+    second = pictures.PictureHalf(given.reference, count)
     sums = given.pass_sums(counted)
-    for number in range(passes):
-        sums.add(first.render(number), second.render(number))
+    for images_of_pass in passes((first, second), options.seed, count):
+        sums.add(*images_of_pass.images)
     estimates = sums.estimates()
     numbers, images = measure(
         estimates,

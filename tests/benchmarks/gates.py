@@ -21,7 +21,7 @@ from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.departure.flip import ldr_flip
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.records.departure import DEFAULT_VIEWING
-from fotismos.reference.rendering.renderer import pass_seed
+from fotismos.reference.rendering.passes import pass_seed
 
 HEIGHT, WIDTH, BATCH, LEVEL, FACTOR = 48, 64, 25, 0.01, 1.01322
 SHAPE, COUNTS, AXES = (HEIGHT, WIDTH, 1, BATCH), (2, 4, 8), (0, 1, 2)

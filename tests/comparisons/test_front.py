@@ -12,7 +12,7 @@ from fotismos.comparisons.cost.measure import timed, tried
 from fotismos.comparisons.records.comparison import MeanError
 from fotismos.comparisons.records.cost import Point
 from fotismos.reference.records import Interval
-from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.passes import passes
 
 PIXELS = 64 * 64
 KERNEL = 15e-9

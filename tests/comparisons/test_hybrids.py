@@ -25,7 +25,7 @@ from fotismos.reference.planning.effects import (
     OCCLUSION,
     labelled,
 )
-from fotismos.reference.rendering.renderer import Stream, passes
+from fotismos.reference.rendering.passes import Stream, passes
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Source
 from tests.shared import noisy_scenes
@@ -321,8 +321,8 @@ def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
         assert image.shape == (3, 48, 48, 3)
         corner = hybrids.pixels(image)[:, 1, 2]
         np.testing.assert_allclose(corner, image[:, 2:4, 4:6].mean(axis=(1, 2)), rtol=1e-5)
-    for rendered in (found.ready.scene, found.ready.heuristic.scene):
-        assert tuple(rendered.sensors()[0].film().size()) == (24, 24)
+    for half in (found.ready.reference, found.ready.heuristic):
+        assert half.render(0).shape[:2] == (24, 24)
     shadows = Method(name="shadows", family="kernel", shadows=True)
     loop = passes([found.renderer(shadows, 4, (48, 48))], 0, 3, stream=Stream.REPLICATES)
     expected = np.mean([np.array(one.images[0]) for one in loop], axis=0)

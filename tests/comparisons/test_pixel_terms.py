@@ -10,7 +10,8 @@ from fotismos.comparisons import pixel_terms
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.records.images import TermMaterial
 from fotismos.reference.records import Missing
-from fotismos.reference.rendering.renderer import passes, variant
+from fotismos.reference.rendering.passes import passes
+from fotismos.reference.rendering.renderer import variant
 from fotismos.reports.files import results
 from fotismos.reports.page import page
 from fotismos.reports.page.why_view import terms_view

@@ -14,7 +14,7 @@ from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.records.comparison import MOST_SPP
 from fotismos.comparisons.records.departure import DEFAULT_VIEWING, VisibleShare
 from fotismos.comparisons.steps import steps
-from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.passes import passes
 from fotismos.reference.rendering.transport import power_share
 from tests.shared import noisy_scenes
 from tests.shared.misplanned import DIFFUSE, scene

@@ -148,7 +148,7 @@ def test_every_repeat_counts_in_the_mean():
     given = pictures.Pictures(names=("a", "b", "c"), files=files)
     for count in (2, 3):
         half = pictures.PictureHalf(given, count)
-        passes = [half.render(number)[0, 0, 0] for number in range(count)]
+        passes = [image[0, 0, 0] for image in half.passes(count)]
         parts = [images[number::count] for number in range(count)]
         assert passes == pytest.approx([np.mean([i[0, 0, 0] for i in part]) for part in parts])
 

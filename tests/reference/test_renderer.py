@@ -8,7 +8,7 @@ from scipy import stats
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.reference.pairing import halves
 from fotismos.reference.rendering import renderer, sums
-from fotismos.reference.rendering.renderer import pass_seed
+from fotismos.reference.rendering.passes import Stream, pass_seed
 from tests.shared.parts import camera, look_at, moved
 
 GLOSSY = {"type": "roughplastic", "alpha": 0.3, "diffuse_reflectance": 0.4}
@@ -69,7 +69,7 @@ def test_camera_rays_coincide_in_both_halves(rgb, name, integrator):
 
 def test_no_two_runs_have_a_pass_in_common():
     """Seeds of runs next to each other, of 64 passes each and of every stream."""
-    streams = list(renderer.Stream)
+    streams = list(Stream)
     seeds = [
         pass_seed(seed, number, stream)
         for seed in range(50)

@@ -14,7 +14,8 @@ from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.reference.rendering.renderer import Renderer, Stream, pass_seed, passes
+from fotismos.reference.rendering.passes import Stream, pass_seed, passes
+from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.rendering.sampler import with_sampler
 from fotismos.reference.rendering.sums import DEVIATION, Accumulator, DifferenceSums, add_difference
 from fotismos.reference.scene.source import Source

@@ -10,7 +10,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.passes import passes
 from tests.shared import parts
 from tests.witnesses import radiance, stage
 from tests.witnesses.witness import BLOCKS, CHANCE, ROUNDING, means

@@ -15,7 +15,7 @@ from scipy import stats
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.passes import passes
 
 BLOCKS = 4
 """Blocks along each side of the image, whose means are looked at too: the shape counts."""

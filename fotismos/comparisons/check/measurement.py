@@ -31,7 +31,7 @@ from fotismos.heuristic.errors import InputError
 from fotismos.reference import records
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.records import VERSION
-from fotismos.reference.rendering.renderer import Progress, passes
+from fotismos.reference.rendering.passes import Progress, passes
 from fotismos.reference.rendering.sums import jackknife_error
 from fotismos.reference.scene.source import Source
 

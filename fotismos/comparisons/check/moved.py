@@ -16,7 +16,7 @@ from fotismos.comparisons.departure.metrics import METRICS, RATIO
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.check import HALVES, READERS, Measurement, Move
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.rendering.renderer import Progress
+from fotismos.reference.rendering.passes import Progress
 from fotismos.reference.scene.source import Source
 
 LEVEL = 0.01

@@ -38,7 +38,8 @@ from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import Pixels
-from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
+from fotismos.reference.rendering.passes import Progress
+from fotismos.reference.rendering.renderer import LARGEST_PASS, require_memory
 from fotismos.reference.scene.source import Source
 
 SPP = 64

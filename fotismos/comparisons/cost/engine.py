@@ -129,10 +129,10 @@ def _truth(reference: Pictures, counted: NDArray[np.bool_], options: Options) ->
         sums = DifferenceSums(counted)
     else:
         sums = MappedReference(counted, TONE_MAPS[options.tone_map])
-    passes = reference.passes or FEWEST
-    half = PictureHalf(reference, passes)
-    for number in range(passes):
-        sums.add(half.render(number))
+    count = reference.passes or FEWEST
+    half = PictureHalf(reference, count)
+    for picture in half.passes(count):
+        sums.add(picture)
     return Truth(
         reference=sums.estimate(),
         counted=counted,

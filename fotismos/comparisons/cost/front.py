@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from msgspec import structs
 
-from fotismos.comparisons.records.cost import Reach
-from fotismos.comparisons.records.engine import FrontPoint
+from fotismos.comparisons.records.engine import FrontPoint, Reach
 from fotismos.reference.records import Interval
 
 if TYPE_CHECKING:  # pictures have no methods

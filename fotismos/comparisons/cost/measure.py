@@ -32,15 +32,9 @@ from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.records import Interval
-from fotismos.reference.rendering.gbuffer import gbuffer, image_size, resize
-from fotismos.reference.rendering.renderer import (
-    LARGEST_PASS,
-    Progress,
-    Renderer,
-    Stream,
-    passes,
-    warm,
-)
+from fotismos.reference.rendering.gbuffer import gbuffer
+from fotismos.reference.rendering.passes import Progress, Stream, passes
+from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, warm
 from fotismos.reference.rendering.sums import (
     Accumulator,
     DifferenceEstimate,
@@ -184,7 +178,7 @@ def measure_ladder(
     reference = total.estimate()
     judge = judge_by(reference, ready.counted, options.viewing)
     ladder = Ladder(source, options, ready=ready, is_short=effort.is_short)
-    size = image_size(ready.scene)
+    size = ready.size
     gc.collect()  # release scenes that pairing left behind
     # Steps also need methods that are not on the ladder: they are timed, not judged.
     steps = tuple(ladder.steps())
@@ -256,14 +250,13 @@ def converged(
     total: Accumulator | None = None,
 ) -> Estimate:
     """Render the reference into a sum, with seeds that no method has."""
-    integrator = ready.reference.integrator
-    spp = _reference_spp(size or image_size(ready.scene))
-    renderer = Renderer(ready.scene, integrator, pass_spp=spp, label="reference image", size=size)
+    size = size or ready.size
+    renderer = ready.reference.sampled(_reference_spp(size))
     total = total or Accumulator()
     count = max(REFERENCE_PASSES, ready.plan.passes)
     stream = Stream.OTHER_SIDE
     for rendered in passes(
-        [renderer], seed, count, stream=stream, progress=progress, stage="reference"
+        [renderer], seed, count, size=size, stream=stream, progress=progress, stage="reference"
     ):
         total.add(rendered.images[0])
     return total.estimate()
@@ -390,8 +383,6 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
     errors, _ = rendered(
         renderers, judge, renderers, MEASURED_ROUNDS, options.seed, progress, "measuring"
     )
-    # The scene is shared: it gets back the size of the study.
-    resize(scene, found.size)
     points = []
     for (name, spp), renderer in renderers.items():
         took = renderer.times[-MEASURED_ROUNDS:]

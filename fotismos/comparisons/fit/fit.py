@@ -52,7 +52,8 @@ from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named
 from fotismos.heuristic.materials import FORMS
 from fotismos.reference.records import Interval, Pixels
-from fotismos.reference.rendering.renderer import Progress, pass_seed, passes, variant
+from fotismos.reference.rendering.passes import Progress, pass_seed, passes
+from fotismos.reference.rendering.renderer import variant
 from fotismos.reference.rendering.sums import (
     Accumulator,
     DifferenceEstimate,

@@ -6,7 +6,7 @@ from msgspec import Meta
 
 from fotismos.comparisons.records.comparison import Contribution, MeanError, Price
 from fotismos.comparisons.records.departure import Viewing
-from fotismos.comparisons.records.engine import Engine, FrontPoint
+from fotismos.comparisons.records.engine import Engine, FrontPoint, Reach
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import (
@@ -233,22 +233,6 @@ class Cost(Record):
 
 LEAST_SHARE = 0.85
 """Share of the threads' processor time: less tells of a busy machine."""
-
-
-class Reach(Record):
-    """How near a method comes to the reference with any number of samples.
-
-    Attributes
-    ----------
-    left
-        ΔE2000 that 5 % of the pixels exceed without noise.
-    spp
-        Samples per pixel with which it should pass at a tolerance; None if too much is left.
-    """
-
-    method: str
-    left: float
-    spp: int | None = None
 
 
 class Choice(Record):

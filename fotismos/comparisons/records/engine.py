@@ -43,6 +43,22 @@ class FrontPoint(Record):
     ties: tuple[str, ...] = ()
 
 
+class Reach(Record):
+    """How near a method comes to the reference with any number of samples.
+
+    Attributes
+    ----------
+    left
+        ΔE2000 that 5 % of the pixels exceed without noise.
+    spp
+        Samples per pixel with which it should pass at a tolerance; None if too much is left.
+    """
+
+    method: str
+    left: float
+    spp: int | None = None
+
+
 class EngineSetting(FrontPoint):
     """A setting of another renderer, whose picture and time are given.
 

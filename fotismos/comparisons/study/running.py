@@ -37,7 +37,8 @@ from fotismos.reference.planning.effects import EFFECTS, PRUNED
 from fotismos.reference.planning.plan import physical_integrator
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.rendering import direct
-from fotismos.reference.rendering.renderer import Progress, Renderer, passes
+from fotismos.reference.rendering.passes import Progress, passes
+from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.rendering.sums import Accumulator
 from fotismos.reference.scene.graph import Graph, set_variant
 from fotismos.reference.scene.source import Source, digest

@@ -84,13 +84,13 @@ def image_size(scene: Scene) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def size_of_width(scene: Scene, width: int) -> tuple[int, int]:
+def size_of_width(scene: Scene, size: tuple[int, int], width: int) -> tuple[int, int]:
     """Return the size of a scene's images, scaled to a width in pixels.
 
     A crop keeps its size: another one would lie elsewhere, by parts of a pixel.
     """
-    columns, rows = image_size(scene)
-    if tuple(scene.sensors()[0].film().size()) != (columns, rows):
+    columns, rows = size
+    if tuple(scene.sensors()[0].film().size()) != image_size(scene):
         return columns, rows
     return width, max(1, round(rows * width / columns))
 

@@ -40,7 +40,7 @@ from fotismos.comparisons.steps import steps
 from fotismos.comparisons.versions import versions
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.records import to_json
-from fotismos.reference.rendering.renderer import Progress
+from fotismos.reference.rendering.passes import Progress
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines
 from fotismos.reports.ci.baselines import BaselineFile

@@ -46,7 +46,7 @@ def load(folder: Path, key: str | None) -> SceneView | None:
             return None
         view = found.view
         if view.cost:
-            from fotismos.comparisons.records.cost import Cost
+            from fotismos.comparisons.records.cost import Cost  # loaded late: few scenes have costs
 
             record = msgspec.convert(view.cost.record, Cost, builtin_types=())
             view = structs.replace(view, cost=structs.replace(view.cost, record=record))

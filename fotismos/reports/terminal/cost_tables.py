@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from fotismos.comparisons.cost.front import beats, is_below, reach, sufficient
 from fotismos.comparisons.departure.criterion import TOLERANCE, decide, share_above
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.records.cost import Reach
+from fotismos.comparisons.records.engine import Reach
 from fotismos.reports.glossary import meanings
 from fotismos.reports.terminal.tables import printed
 from fotismos.reports.terminal.words import given_time, number, parameter, percent, seconds
