@@ -359,7 +359,10 @@ def layers(half: Renderer, options: Options, whole: Floats) -> dict[str, Floats]
                 integrator.shares = {k: dr.opaque(mi.Float, k == kept) for k in COEFFICIENTS}
                 integrator.hide_emitters = hides = hidden or name != "emission"
                 renderer = renderers.setdefault(
-                    hides, Renderer(scene, integrator, pass_spp=half.pass_spp, label="terms")
+                    hides,
+                    Renderer(
+                        scene, integrator, pass_spp=half.pass_spp, label="terms", size=half.size
+                    ),
                 )
                 images[name] = np.array(renderer.render(pass_seed(options.seed, 0)))
         finally:

@@ -252,7 +252,10 @@ def _rendered(point: StudyPoint) -> tuple[Row, sheet.Pictures]:
     plans = _plans(ready.plan)
     for stage in plans.values():
         integrator = physical_integrator(stage, scene, ready.pair.hide_emitters)
-        renderers.append(Renderer(scene, integrator, pass_spp=spp, label="physical picture"))
+        renderer = Renderer(
+            scene, integrator, pass_spp=spp, label="physical picture", size=ready.size
+        )
+        renderers.append(renderer)
     sums = [Accumulator() for _ in renderers]
     difference = Accumulator()
     for rendered in passes(renderers, part.options.seed, PASSES):
