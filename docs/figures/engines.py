@@ -30,8 +30,8 @@ from fotismos.comparisons.gallery.scenes import plastic_spheres
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.records.cost import Method
-from fotismos.comparisons.versions import machine
 from fotismos.heuristic.convention import Floats
+from fotismos.reference.records import Machine
 from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.passes import passes
 from fotismos.reference.rendering.sums import Accumulator
@@ -174,7 +174,7 @@ def _rendered(case: Case, method: Method) -> Rendered:
     total = Accumulator()
     renderer = firsts[method.name].sampled(measure.REFERENCE_SPP)
     for one in passes([renderer], options.seed, measure.REFERENCE_PASSES):
-        total.add(one.images[0])
+        total.add(one[0])
     return Rendered(
         picture=total.mean(),
         time=timing.ratio(lines[method.name], lines[KERNEL.name]).value,
@@ -241,7 +241,7 @@ def table(rows: Sequence[Measured]) -> Iterator[str]:
     yield ""
     yield (
         f"Pictures are {WIDTH} pixels wide. Times are from {ROUNDS} rounds on"
-        f" {machine().processor}, {machine().cores} cores."
+        f" {Machine.here().processor}, {Machine.here().cores} cores."
     )
 
 

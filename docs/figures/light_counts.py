@@ -85,7 +85,7 @@ def _of_count(count: int) -> Iterator[ShadingCost]:
     for renderer in renderers:
         warm(renderer)
     *_, last = passes(renderers, options.seed, ROUNDS)
-    exact, *images = map(np.array, last.images)
+    exact, *images = map(np.array, last)
     distances = LEADING.against(exact, sphere.counted, options.viewing)
     for (shading, n, faces), renderer, image in zip(meshes, renderers[1:], images, strict=True):
         yield ShadingCost(

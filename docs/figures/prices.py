@@ -66,7 +66,7 @@ def measured() -> list[ComparisonRecord]:
     records = []
     for name in (*SCENES, *map(str, LARGER)):
         case = open_case(name, Options(resolution=SIZE))
-        then = steps(case.options, why=True)
+        then = steps(why=True)
         made = compare(case.source, case.options, command=case.command(), then=then)
         records.append(made.record)
         print(name, flush=True)

@@ -113,9 +113,7 @@ Player = TypeVar("Player", bound=Hashable)
 """An effect; in tests of the sums, any name."""
 
 
-def with_causes(
-    comparison: Comparison, ready: Prepared, progress: Progress | None = None
-) -> Comparison:
+def with_causes(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
     """Return a comparison with its causes, found with its own scenes and plan at a small size.
 
     If they cannot be found, a warning says why.
@@ -161,7 +159,7 @@ def find(
     most = most or (NARROW if is_large else WIDTH)
     size = size_of_width(ready.scene, ready.size, min(most, width))
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
-    surface = gbuffer(ready.scene, size)
+    surface = gbuffer(ready.scene, size, film=ready.size)
     require_surface(surface.hit, source.name)
     leading: Any = metrics_for(ready.options)[LEADING.name]
     pairs = Pairs(source, options, ready)
@@ -173,7 +171,7 @@ def find(
             [reference], options.seed, REPLICATES, size=size, stream=Stream.OTHER_SIDE,
             progress=progress, stage="reference",
         )  # fmt: skip
-        groups = np.stack([np.array(rendered.images[0]) for rendered in loop])
+        groups = np.stack([np.array(rendered[0]) for rendered in loop])
         meter = ErrorMeter(groups, surface.hit, options.viewing, leading)
         images = HybridImages(
             pairs,

@@ -1,24 +1,17 @@
-"""Both halves as sums of passes, and the numbers and maps that follow from them."""
+"""Both halves as sums of passes."""
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fotismos.comparisons.departure import marks, regions, statistics
 from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.metrics import (
-    LEADING,
     METRICS,
-    RATIO,
     Metric,
-    leading_distance,
 )
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.records.departure import Significant, Summary
-from fotismos.comparisons.records.images import Images
-from fotismos.reference.records import Pixels
 from fotismos.reference.rendering.sums import (
     DEVIATION,
     MEAN,
@@ -30,7 +23,6 @@ from fotismos.reference.rendering.sums import (
 
 if TYPE_CHECKING:  # two pictures have no scene, and few pictures a tone map
     from fotismos.comparisons.records.images import Light
-    from fotismos.reference.rendering.gbuffer import GBuffer
 
 PERCENTILE = 95
 """A noise target is for this percentile of the noise over the counted pixels."""
@@ -113,86 +105,3 @@ def metrics_for(options: Options) -> Mapping[str, Metric]:
     from fotismos.comparisons.departure import definitions  # loaded late: it takes a second
 
     return definitions.metrics()
-
-
-def summarised(
-    estimates: Estimates, counted: np.ndarray, options: Options, names: Iterable[str]
-) -> tuple[dict[str, Summary], dict[str, np.ndarray]]:
-    """Return the summaries of metrics over the pixels that count, and the maps of the drawn."""
-    metrics = metrics_for(options)
-    summaries = {}
-    maps = {}
-    for name in names:
-        summaries[name], distances = statistics.summarise(
-            metrics[name],
-            estimates.heuristic,
-            reference=estimates.reference,
-            mask=counted,
-            viewing=options.viewing,
-            noise=estimates.difference.noise,
-            grouped=estimates.difference.grouped,
-        )
-        if metrics[name].drawn:
-            maps[name] = distances
-    return summaries, maps
-
-
-def measure(
-    estimates: Estimates,
-    counted: np.ndarray,
-    options: Options,
-    surface: "GBuffer | None" = None,
-    exact: bool = False,
-    noise_shown: marks.NoiseShown = "all",
-    names: Iterable[str] = METRICS,
-) -> tuple[dict[str, Any], Images]:
-    """Return fields of the record, and maps over the pixels that count, (H, W).
-
-    ``surface`` is what they see; two pictures have none. ``exact`` says that the difference has no
-    noise, and ``noise_shown`` whose noise the passes show
-    (:func:`fotismos.comparisons.departure.marks.find`). ``names`` are those of the metrics, among
-    them the leading one.
-    """
-    test = estimates.heuristic
-    reference = estimates.reference
-    viewing = options.viewing
-    metrics = metrics_for(options)
-    summaries, maps = summarised(estimates, counted, options, names)
-    ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(test, reference, counted)
-    distance = leading_distance(viewing, metrics)
-    found = marks.find(
-        estimates.difference, test, counted, distance, exact=exact, noise_shown=noise_shown
-    )
-    error = maps[LEADING.name]
-    images = Images(
-        heuristic=test,
-        reference=reference,
-        reference_stderr=estimates.standard_error,
-        maps=maps,
-        significant=found.image,
-        counted=counted,
-        light=estimates.light,
-    )
-    numbers = {
-        "viewing": viewing,
-        "metrics": summaries,
-        "log2_luminance": ratio,
-        "significant": Significant(
-            fraction=statistics.share(found.image[counted] == marks.MARKED),
-            undetermined=statistics.share(found.image[counted] == marks.UNDETERMINED),
-            level=marks.LEVEL,
-            certain=found.is_certain,
-        ),
-        "pixels": Pixels(counted=int(counted.sum()), total=counted.size),
-        "regions": regions.find(error, counted),
-    }
-    if surface is None:
-        return numbers, images
-    shapes, seen = regions.find_objects(
-        error, counted, owners=surface.shape, materials=surface.bsdf
-    )
-    materials, made_of = regions.find_objects(error, counted, surface.bsdf)
-    images = replace(
-        images, position=surface.position, normal=surface.normal, objects=seen, materials=made_of
-    )
-    return numbers | {"objects": shapes, "materials": materials}, images

@@ -377,7 +377,7 @@ class HybridImages:
             progress=progress, stage=CAUSES,
         )  # fmt: skip
         # (R, f H, f W, 3 count): the channels of an image are neighbours.
-        made = np.stack([np.array(rendered.images[0]) for rendered in loop])
+        made = np.stack([np.array(rendered[0]) for rendered in loop])
         # An image in grey has one channel.
         return [
             np.broadcast_to(image, (*image.shape[:3], 3)) for image in np.split(made, count, axis=3)

@@ -191,11 +191,6 @@ class Options(
         return program.command(*arguments)
 
     @property
-    def has_pictures(self) -> bool:
-        """Whether pictures of other renderers replace a half."""
-        return bool(self.image or self.reference)
-
-    @property
     def picture_files(self) -> tuple[str, ...]:
         """The files of pictures and of the mask."""
         return (*self.image, *self.reference, *((self.mask,) if self.mask else ()))

@@ -109,8 +109,6 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
 
 def _without_sum(half: Renderer, options: Options) -> str:
     """Return why a half has no terms in any form; empty if it has."""
-    if options.image:
-        return "The textbook half is a picture, which has no terms."
     if options.heuristic not in MODELS:
         return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
     if len(half.scene.emitters()) > MOST_LIGHTS:
@@ -127,7 +125,7 @@ def _live(half: Renderer, options: Options) -> LivePoints | Missing:
     if not isinstance(sensor, mi.ProjectiveCamera):
         return Missing(f"The camera, {sensor.class_name()}, has no plane film.")
     size = shrunk(half.size, LIVE_SIDE)
-    ray = centre_rays(scene, size)
+    ray = centre_rays(scene, size, film=half.size)
     ahead = sensor.world_transform() @ mi.Vector3f(0, 0, 1)
     # Directions that end on a plane are linear over the film: three corners give all others.
     film = (ray.o, ray.d / dr.dot(ray.d, ahead))
@@ -177,7 +175,9 @@ def _traced(half: Renderer, pixel: tuple[int, int] | None) -> TermGrid | Missing
         columns[pixel[0] * len(columns) // resolution[0]] = pixel[0]
         rows[pixel[1] * len(rows) // resolution[1]] = pixel[1]
     x, y = np.meshgrid(columns, rows)
-    points = _Points(half.scene, half.integrator, pixel_rays(half.scene, resolution, x=x, y=y))
+    points = _Points(
+        half.scene, half.integrator, pixel_rays(half.scene, resolution, x=x, y=y, film=resolution)
+    )
     materials, places = points.materials()
     if len(materials) > MATERIALS:
         return TOO_MANY_MATERIALS

@@ -42,7 +42,6 @@ from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import gbuffer, size_of_width
 from fotismos.reference.rendering.passes import Progress, Stream, pass_seed, passes
-from fotismos.reference.rendering.renderer import Renderer
 
 WIDTH = 128
 NARROWEST = 24
@@ -77,8 +76,7 @@ def with_price(comparison: Comparison, ready: Prepared, progress: Progress | Non
     begin = perf_counter()
     record = comparison.record
     price = record.price
-    if price is None:  # of a reference that is a picture
-        return comparison
+    assert price is not None, "the physical half was rendered"
     leading: Any = metrics_for(ready.options)[LEADING.name]
     causes = comparison.causes
     price = structs.replace(
@@ -164,7 +162,7 @@ def samples_that_pass(ready: Prepared, metric: Pixelwise) -> tuple[SamplesThatPa
 def _noisy_pictures(ready: Prepared, metric: Pixelwise) -> NoisyPictures | None:
     """Render passes, and pictures with fewer samples; None if no pixel counts."""
     size = size_of_width(ready.scene, ready.size, _width(ready))
-    counted = gbuffer(ready.scene, size).hit
+    counted = gbuffer(ready.scene, size, film=ready.size).hit
     if not counted.any():
         return None
     pictures, long = _deviating(ready, size, PASS, PASSES, counted)
@@ -178,11 +176,6 @@ def _noisy_pictures(ready: Prepared, metric: Pixelwise) -> NoisyPictures | None:
         metric=metric,
         viewing=ready.options.viewing,
     )
-
-
-def _halves(ready: Prepared) -> list[Renderer]:
-    """Return the renderers of both halves; a picture in place of one has none."""
-    return [ready.reference] if ready.options.image else [ready.heuristic, ready.reference]
 
 
 def _width(ready: Prepared) -> int:
@@ -200,12 +193,12 @@ def _deviating(
 
     Both (K, N, 3), of the counted pixels. A picture in place of the textbook half has no rays.
     """
-    renderers = [half.sampled(spp) for half in _halves(ready)]
+    renderers = [half.sampled(spp) for half in ready.rendered]
     # Each count has its own passes.
     seed = pass_seed(ready.options.seed, spp, Stream.PRICE)
     loop = passes(renderers, seed, count, size=size, stream=Stream.PRICE)
     pictures = np.array(
-        [[np.array(image, float)[counted] for image in rendered.images] for rendered in loop]
+        [[np.array(image, float)[counted] for image in rendered] for rendered in loop]
     )
     reference = pictures[:, -1]
     return reference, reference if len(renderers) == 1 else reference - pictures[:, 0]
@@ -286,9 +279,9 @@ def saving(ready: Prepared, price: Price) -> Saving | None:
     if whole is None or not price.everything_s or not price.reference_s:
         return None
     size = size_of_width(ready.scene, ready.size, _width(ready))
-    renderers = [half.sampled(PASS) for half in (*_halves(ready), whole)]
+    renderers = [half.sampled(PASS) for half in (*ready.rendered, whole)]
     loop = passes(renderers, ready.options.seed, 2, size=size, stream=Stream.PRICE)
-    first, second = [np.array(rendered.images, float) for rendered in loop]
+    first, second = [np.array(rendered, float) for rendered in loop]
     # The difference from the textbook half, whose rays are the same, has no noise of edges.
     heuristic, plan, everything = first - second
     noise = float(np.sqrt(np.mean((plan - heuristic) ** 2)))

@@ -195,6 +195,19 @@ def measure(
     )
 
 
+def untimed(reference: Renderer) -> Price:
+    """Return the price of a physical half beside a picture, whose time is not known."""
+    width, height = reference.size
+    pixels = width * height
+    return Price(
+        ratio=None,
+        reason=NOT_TIMED.reason,
+        heuristic_s=None,
+        reference_s=min(reference.times) / (reference.pass_spp * pixels),
+        pixels=pixels,
+    )
+
+
 def _of_pairs(
     pairs: Mapping[str, tuple[Renderer, Renderer]], size: Size, seed: int
 ) -> tuple[dict[str, Line], Interval]:

@@ -6,8 +6,10 @@ in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, 
 """
 
 import json
+import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
 from typing import Annotated, Any, TypeVar, dataclass_transform
 
@@ -16,6 +18,7 @@ import numpy as np
 from msgspec import Meta
 
 from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.program import cores
 
 VERSION = 4
 """Version of all records. Records of fotismos 0.1 have none."""
@@ -71,6 +74,21 @@ class Machine(Record):
     processor: str
     cores: Size
     system: str
+
+    @classmethod
+    def here(cls) -> "Machine":
+        """Return the machine that this process runs on."""
+        try:
+            lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        except OSError:
+            lines = []
+        names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+        processor = names[0] if names else platform.processor() or platform.machine()
+        return cls(
+            processor=processor,
+            cores=cores(),
+            system=f"{platform.system()} {platform.machine()}",
+        )
 
 
 class Times(Record):

@@ -20,9 +20,10 @@ from msgspec import inspect
 
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.processes.pool import CAN_SHARE, Pool, cores
+from fotismos.comparisons.processes.pool import CAN_SHARE, Pool
 from fotismos.heuristic import llvm, program
 from fotismos.heuristic.errors import InputError, unknown
+from fotismos.heuristic.program import cores
 from fotismos.reports.terminal.words import as_typed, echo, level, quiet_option, verbose_option
 
 Decorator: TypeAlias = Callable[[Any], Any]

@@ -25,6 +25,7 @@ from fotismos.comparisons.audit.checks import Audit, Kind
 from fotismos.comparisons.audit.checks import audit as examined
 from fotismos.comparisons.case import RGB, Scene, open_case
 from fotismos.comparisons.check.moved import LEVEL
+from fotismos.comparisons.compare import compare_pictures
 from fotismos.comparisons.cost.cost import cost as study
 from fotismos.comparisons.cost.engine import front_of_pictures
 from fotismos.comparisons.cost.methods import declare as declare_method
@@ -42,7 +43,6 @@ from fotismos.comparisons.records.engine import EngineCost
 from fotismos.comparisons.records.fit import FitRecord
 from fotismos.comparisons.records.images import Comparison, PixelTerms
 from fotismos.comparisons.steps import steps
-from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic import user_shaders
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Heuristic
@@ -152,7 +152,7 @@ def compare(
         else:
             case = open_case(scene, chosen, name)
             comparison = fotismos.comparisons.compare.compare(
-                case.source, case.options, command=case.command(), then=steps(case.options, why)
+                case.source, case.options, command=case.command(), then=steps(why=why)
             )
     return Shown(comparison, page.render([view_of(comparison)]))
 

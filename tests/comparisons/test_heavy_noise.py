@@ -115,7 +115,7 @@ def test_a_noisy_picture_of_the_scene_itself_is_not_said_to_be_shifted(rgb, tmp_
         path = str(tmp_path / f"{seed}.exr")
         mi.util.write_bitmap(path, mi.render(made, spp=16, seed=50 + seed), write_async=False)
         options = Options(image=path, seed=seed)
-        record = compare(Source("a ball", caustic()), options, then=steps(options, False)).record
+        record = compare(Source("a ball", caustic()), options, then=steps(why=False)).record
         said = " ".join(record.warnings)
         assert "shifted" not in said
         assert "misread" not in said

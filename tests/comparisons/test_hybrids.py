@@ -124,7 +124,7 @@ def test_a_clamped_fall_off_is_a_cause(rgb):
 def test_in_fog_the_causes_are_said_to_be_unknown(rgb):
     """No image of some effects holds a medium: its light would be missing from all of them."""
     case = open_case(noisy_scenes.fog, Options(resolution=(8, 8), spp=16))
-    record = compare(case.source, case.options, then=steps(case.options, why=True)).record
+    record = compare(case.source, case.options, then=steps(why=True)).record
     assert record.why is None
     assert any("participating media (interior)" in warning for warning in record.warnings)
 
@@ -325,7 +325,7 @@ def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
         assert half.render(0).shape[:2] == (24, 24)
     shadows = Method(name="shadows", family="kernel", shadows=True)
     loop = passes([found.renderer(shadows, 4, (48, 48))], 0, 3, stream=Stream.REPLICATES)
-    expected = np.mean([np.array(one.images[0]) for one in loop], axis=0)
+    expected = np.mean([np.array(one[0]) for one in loop], axis=0)
     np.testing.assert_allclose(image.mean(axis=0), expected, rtol=1e-3, atol=1e-4)
     assert abs(image - hybrids.simulating(())).max() > 0.05
 
@@ -358,6 +358,6 @@ def test_a_crop_keeps_its_place_in_finer_pixels(rgb):
     crop = {"crop_width": 24, "crop_height": 32, "crop_offset_x": 21, "crop_offset_y": 17}
     parts["sensor"]["film"] |= crop
     case = open_case(parts, Options(), "cropped")
-    record = compare(case.source, case.options, then=steps(case.options, True)).record
+    record = compare(case.source, case.options, then=steps(why=True)).record
     assert abs(record.why.closure.value) < 0.05 < record.why.departure
     assert record.why.departure == pytest.approx(record.metrics["dE2000"].mean, rel=0.1)

@@ -21,7 +21,7 @@ from tests.shared.parts import CENTRE, RADIUS, moved, shadowed
 @pytest.fixture(scope="module")
 def compared():
     case = open_case(shadowed(), Options.of({"resolution": (48, 48)}), "shadowed")
-    found = compare(case.source, case.options, then=steps(case.options, True))
+    found = compare(case.source, case.options, then=steps(why=True))
     return SimpleNamespace(found=found, record=found.record)
 
 

@@ -165,7 +165,7 @@ def test_other_shading_has_no_terms_and_says_why():
 
 def textbook(ready, count=1):
     """Return the mean of passes of the heuristic half, (H, W, 3)."""
-    return np.mean([np.array(one.images[0]) for one in passes([ready.heuristic], 0, count)], axis=0)
+    return np.mean([np.array(one[0]) for one in passes([ready.heuristic], 0, count)], axis=0)
 
 
 def images(scene, **options):

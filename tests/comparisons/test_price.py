@@ -27,7 +27,7 @@ GREY = 0.3
 def priced(make, why=False, **options):
     """Return the price of a scene."""
     case = open_case(make, Options(**options))
-    then = steps(case.options, why)
+    then = steps(why=why)
     return compare(case.source, case.options, then=then).record.price
 
 
@@ -92,7 +92,7 @@ def test_a_scene_passes_with_the_samples_of_its_price(name, rgb):
     def differences(spp, seed, count):
         """Return differences of the halves, and pictures of the reference, (count, N, 3)."""
         halves = [half.sampled(spp) for half in (ready.heuristic, ready.reference)]
-        images = np.array([np.array(each.images, float) for each in passes(halves, seed, count)])
+        images = np.array([np.array(each, float) for each in passes(halves, seed, count)])
         images = images[:, :, counted]
         return images[:, 1] - images[:, 0], images[:, 1]
 

@@ -59,7 +59,7 @@ def verify(source, options=None):
     )
     own, apart = (Accumulator(DEVIATION), Accumulator(DEVIATION)), DifferenceSums(counted)
     for both in zip(*streams, strict=True):
-        add_difference((*own, apart), [one.images[0] for one in both])
+        add_difference((*own, apart), [one[0] for one in both])
     mean = sum(total.mean() for total in own) / 2
     distance = leading_distance(options.viewing)
     marked = marks.find(apart.estimate(), mean, counted, distance, level=LEVEL)

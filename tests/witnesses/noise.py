@@ -89,7 +89,7 @@ def measured(make) -> SceneMeasured:
     kernels = []
     for seed in range(SEEDS):
         case = open_case(make, Options(seed=seed))
-        comparison = compare(case.source, case.options, then=steps(case.options, why=True))
+        comparison = compare(case.source, case.options, then=steps(why=True))
         record = comparison.record
         kernels.append(comparison.images.heuristic)
         for number, low, high in _intervals(record):

@@ -57,7 +57,7 @@ def reference(make):
     """Return what is rendered, and passes (P, H, W, 3)."""
     case = open_case(make, Options(resolution=(SIZE, SIZE), spp=SPP), "a scene")
     ready = prepare(case.source, case.options)
-    images = [one.images[0] for one in passes((ready.reference,), 0, ready.passes)]
+    images = [one[0] for one in passes((ready.reference,), 0, ready.passes)]
     return ready, np.array(images, float)
 
 

@@ -24,10 +24,10 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.records.check import HALVES, Baseline, Half, Measurement, MetricAmount
 from fotismos.comparisons.records.departure import Viewing
-from fotismos.comparisons.versions import versions
 from fotismos.heuristic import program
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.program import versions
 from fotismos.reference import records
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.records import VERSION
@@ -73,13 +73,11 @@ def measure_scene(
     """
     options.require_model("a check of a scene")
     ready = guarded(source, options)
-    spp = options.spp or ready.reference.pass_spp * ready.passes
+    spp = options.spp or ready.spp
     pass_spp = max(1, spp // count)
     halves = ready.heuristic.sampled(pass_spp), ready.reference.sampled(pass_spp)
     loop = passes(halves, options.seed, count, progress=progress)
-    images = np.array(
-        [[np.array(image) for image in rendered.images] for rendered in loop], np.float64
-    )
+    images = np.array([[np.array(image) for image in rendered] for rendered in loop], np.float64)
     numbers = measurement(images, ready.counted, options.viewing)
     heuristic, reference = images.mean(axis=0)
     caution = ready.require_light(heuristic, reference)

@@ -30,14 +30,15 @@ from fotismos.comparisons.cost.methods import FULL_PLAN, all_methods
 from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.pictures import TEMPLATE_SPP, GivenPictures, at_size_of_pictures
+from fotismos.comparisons.pictures import GivenPictures
+from fotismos.comparisons.prepared import TEMPLATE_SPP
 from fotismos.comparisons.records.cost import Choice, Cost, CostAttribution, EffectCost
 from fotismos.comparisons.records.images import Causes
-from fotismos.comparisons.versions import machine, versions
 from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.program import versions
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.plan_record import Guard
-from fotismos.reference.records import Pixels
+from fotismos.reference.records import Machine, Pixels
 from fotismos.reference.rendering.passes import Progress
 from fotismos.reference.rendering.renderer import LARGEST_PASS, require_memory
 from fotismos.reference.scene.source import Source
@@ -82,7 +83,7 @@ def cost(
     if engine_times:
         require_other_names(engine_times)
         given = engine.read(engine_times, options)
-        options = at_size_of_pictures(film_size(source.parse(), options.sensor), given, options)
+        options = given.sized(film_size(source.parse(), options.sensor), options)
     if at:
         size = options.resolution or reduced(source, options.changed(resolution=at), WIDTH)
         require(source.name, at, size, is_measured)
@@ -115,7 +116,7 @@ def cost(
         closure=known.record.closure,
         viewing=options.viewing,
         pixels=Pixels(counted=int(counted.sum()), total=counted.size),
-        machine=machine(),
+        machine=Machine.here(),
         versions=versions(),
         command=command,
         guard=ready.guard or Guard(),

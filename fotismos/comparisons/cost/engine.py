@@ -34,7 +34,6 @@ from fotismos.comparisons.picture_mistakes import Names
 from fotismos.comparisons.pictures import (
     FEWEST,
     GivenPictures,
-    PictureHalf,
     Pictures,
     agreement,
     read_all,
@@ -46,9 +45,9 @@ from fotismos.comparisons.records.comparison import MeanError
 from fotismos.comparisons.records.departure import Summary, Viewing, VisibleShare
 from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting
 from fotismos.comparisons.records.images import Images, Light
-from fotismos.comparisons.versions import PICTURE_LIBRARIES, versions
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.program import PICTURE_LIBRARIES, versions
 from fotismos.reference.records import Interval, Pixels
 from fotismos.reference.rendering.sums import DifferenceEstimate, DifferenceSums, student
 
@@ -103,7 +102,7 @@ def front_of_pictures(
     engine = judged(given, times, truth, options.allow_empty)
     estimate = truth.reference
     floor = None
-    if reference.passes is not None:
+    if reference.most_passes is not None:
         floor = noise_floor(
             LEADING, estimate.mean, estimate.noise, mask=truth.counted, viewing=truth.viewing
         )
@@ -129,9 +128,8 @@ def _truth(reference: Pictures, counted: NDArray[np.bool_], options: Options) ->
         sums = DifferenceSums(counted)
     else:
         sums = MappedReference(counted, TONE_MAPS[options.tone_map])
-    count = reference.passes or FEWEST
-    half = PictureHalf(reference, count)
-    for picture in half.passes(count):
+    count = reference.most_passes or FEWEST
+    for picture in reference.passes(count):
         sums.add(picture)
     return Truth(
         reference=sums.estimate(),

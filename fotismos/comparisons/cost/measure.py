@@ -258,7 +258,7 @@ def converged(
     for rendered in passes(
         [renderer], seed, count, size=size, stream=stream, progress=progress, stage="reference"
     ):
-        total.add(rendered.images[0])
+        total.add(rendered[0])
     return total.estimate()
 
 
@@ -318,7 +318,7 @@ def rendered(
     images: dict[Key, Floats] = {}
     loop = passes([*renderers.values()], seed, rounds, progress=progress, stage=stage)
     for images_of_pass in loop:
-        for key, image in zip(renderers, images_of_pass.images, strict=True):
+        for key, image in zip(renderers, images_of_pass, strict=True):
             if key in judged:
                 images[key] = np.array(image)
                 errors[key].append(judge(images[key]))
@@ -372,7 +372,7 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
     scene = found.ready.scene
     options = found.options
     reference = converged(found.ready, options.seed, progress=progress, size=size)
-    judge = judge_by(reference, gbuffer(scene, size).hit, options.viewing)
+    judge = judge_by(reference, gbuffer(scene, size, film=size).hit, options.viewing)
     renderers = {
         (method.name, spp): found.ladder.renderer(method, spp, size)
         for method in found.methods

@@ -46,11 +46,11 @@ from fotismos.comparisons.records.fit import (
     FormFit,
     Judgement,
 )
-from fotismos.comparisons.versions import versions
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named
 from fotismos.heuristic.materials import FORMS
+from fotismos.heuristic.program import versions
 from fotismos.reference.records import Interval, Pixels
 from fotismos.reference.rendering.passes import Progress, pass_seed, passes
 from fotismos.reference.rendering.renderer import variant
@@ -158,7 +158,7 @@ def fit(
         variant=ready.reference.variant,
         seed=options.seed,
         resolution=rendered.counted.shape[::-1],
-        spp=ready.reference.pass_spp * ready.passes,
+        spp=ready.spp,
         passes=ready.passes,
         viewing=options.viewing,
         pairing=options.pairing,
@@ -237,9 +237,9 @@ def render(ready: Prepared, progress: Progress | None) -> RenderedHalves:
         )
     difference_sums = DifferenceSums(ready.counted)
     sums = [Accumulator(), Accumulator(), difference_sums]
-    halves = (ready.heuristic, ready.reference)
+    halves = (ready.first, ready.second)
     for rendered in passes(halves, options.seed, ready.passes, progress=progress):
-        add_difference(sums, rendered.images)
+        add_difference(sums, rendered)
     before = sums[0].estimate()
     reference = sums[1].estimate()
     return RenderedHalves(

@@ -20,9 +20,8 @@ from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO
 from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.comparisons.study.design import OWN, StudyFile
 from fotismos.comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
-from fotismos.comparisons.versions import versions
 from fotismos.heuristic.errors import InputError, InstallationError, unknown
-from fotismos.heuristic.program import installation
+from fotismos.heuristic.program import installation, versions
 from fotismos.reference.planning.effects import PRUNED
 
 if TYPE_CHECKING:

@@ -28,10 +28,10 @@ from fotismos.comparisons.study import dataset, scenes, sheet
 from fotismos.comparisons.study.dataset import STEPS, Row, measure
 from fotismos.comparisons.study.design import OWN, StudyFile, StudyPart
 from fotismos.comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, largest_miss
-from fotismos.comparisons.versions import versions
 from fotismos.heuristic import plugins
 from fotismos.heuristic.errors import FotismosError, InputError, unknown
 from fotismos.heuristic.heuristics import named
+from fotismos.heuristic.program import versions
 from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.planning.effects import EFFECTS, PRUNED
 from fotismos.reference.planning.plan import physical_integrator
@@ -259,9 +259,9 @@ def _rendered(point: StudyPoint) -> tuple[Row, sheet.Pictures]:
     sums = [Accumulator() for _ in renderers]
     difference = Accumulator()
     for rendered in passes(renderers, part.options.seed, PASSES):
-        for total, image in zip(sums, rendered.images, strict=True):
+        for total, image in zip(sums, rendered, strict=True):
             total.add(image)
-        difference.add(rendered.images[0] - rendered.images[-1])
+        difference.add(rendered[0] - rendered[-1])
     images = [total.estimate().mean for total in sums]
     result = measure(images[0], images[-1], ready.counted, difference.estimate().noise)
     # Steps that change nothing have no image, and keep 0.

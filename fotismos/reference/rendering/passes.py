@@ -7,7 +7,6 @@ both. Passes are independent, and give the standard errors.
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any, Protocol
 
@@ -33,18 +32,23 @@ class Stream(IntEnum):
 
 
 class PassSource(Protocol):
-    """A source of passes: independent images of one half, each (H, W, 3), linear.
+    """A source of passes: independent images of one half, each (H, W, 3), linear."""
 
-    ``variant`` is the Mitsuba variant in which it renders, empty if it does not; ``size`` that of
-    its images, unless another is asked for; ``times`` are the seconds of the passes so far.
-    """
-
-    variant: str
-    times: list[float]
+    @property
+    def variant(self) -> str:
+        """The Mitsuba variant in which it renders, empty if it does not."""
 
     @property
     def size(self) -> Size:
-        """Width and height of its images in pixels."""
+        """Width and height of its passes in pixels, unless another size is asked for."""
+
+    @property
+    def times(self) -> list[float]:
+        """The seconds of the passes so far."""
+
+    @property
+    def preparation(self) -> float:
+        """The seconds in which it was prepared, which are not of a pass."""
 
     def active(self) -> AbstractContextManager[None]:
         """Return a context in which its passes need no other preparation."""
@@ -67,14 +71,6 @@ def pass_seed(seed: int, number: int, stream: Stream = Stream.COMPARED) -> int:
     return int(sequence.generate_state(1)[0])
 
 
-@dataclass(frozen=True)
-class Pass:
-    """One pass: its number from 0, and an image (H, W, 3) of each source."""
-
-    number: int
-    images: tuple[Any, ...]
-
-
 def passes(
     sources: Sequence[PassSource],
     seed: int,
@@ -84,8 +80,8 @@ def passes(
     stream: Stream = Stream.COMPARED,
     progress: Progress | None = None,
     stage: str = "rendering",
-) -> Generator[Pass, None, None]:
-    """Yield ``count`` passes of all sources, each as it is done; see :class:`PassSource`.
+) -> Generator[tuple[Any, ...], None, None]:
+    """Yield ``count`` passes of all sources, each as it is done: an image of each source.
 
     The order of the sources alternates, so that none always pays for a pause before a pass.
     ``progress`` is called before each pass, and once more when all are done or the caller stops.
@@ -96,10 +92,10 @@ def passes(
         for number in range(count):
             if progress:
                 progress(stage, number, count)
-            result = Pass(number, _images(sources, streams, backwards=number % 2 == 1))
+            images = _images(sources, streams, backwards=number % 2 == 1)
             done = number + 1
-            yield result
-            del result  # else its images would stay alongside the next ones
+            yield images
+            del images  # else they would stay alongside the next ones
     finally:
         if progress:
             progress(stage, done, done)

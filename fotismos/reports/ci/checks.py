@@ -37,8 +37,8 @@ from fotismos.comparisons.records.check import (
 )
 from fotismos.comparisons.records.comparison import PictureFiles
 from fotismos.comparisons.steps import steps
-from fotismos.comparisons.versions import versions
 from fotismos.heuristic.errors import FotismosError, InputError
+from fotismos.heuristic.program import versions
 from fotismos.reference.records import to_json
 from fotismos.reference.rendering.passes import Progress
 from fotismos.reference.scene.graph import set_variant
@@ -98,7 +98,7 @@ def examine(
     if folder is None:
         return made, None
     # Checks usually pass, so a failure alone is compared in full.
-    added = steps(case.options, why=False)
+    added = steps(why=False)
     comparison = compare(case.source, case.options, progress, case.command(), then=added)
     folder.parent.mkdir(parents=True, exist_ok=True)
     view = scene_files.write(folder.parent, folder.name, comparison)

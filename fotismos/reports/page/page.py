@@ -32,8 +32,7 @@ from fotismos.comparisons.departure.metrics import (
     declared,
 )
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.comparisons.versions import machine
-from fotismos.reference.records import plain
+from fotismos.reference.records import Machine, plain
 from fotismos.reports import glossary, verdict
 from fotismos.reports.files import images
 from fotismos.reports.files.results import DETAILS, Failure, RunRecord
@@ -214,7 +213,7 @@ def _settings(records: Sequence[ComparisonRecord]) -> str:
     samples = dict.fromkeys(sorted(record.plan.spp for record in records if record.plan))
     variants = dict.fromkeys(record.variant for record in records if record.variant)
     versions = records[0].versions.items()
-    computer = machine()
+    computer = Machine.here()
     parts = (
         f"{', '.join(sizes)} pixels",
         f"{', '.join(map(str, samples))} samples per pixel" if samples else "",

@@ -17,9 +17,9 @@ from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.names import is_script, picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
-from fotismos.comparisons.versions import LIBRARIES, machine, versions
 from fotismos.heuristic.errors import FotismosError, InputError, InstallationError, OutputError
-from fotismos.reference.records import to_json
+from fotismos.heuristic.program import LIBRARIES, versions
+from fotismos.reference.records import Machine, to_json
 from fotismos.reports import verdict
 from fotismos.reports.files import results
 from fotismos.reports.files.results import FIGURES, START, TABLES, Failure, RunRecord
@@ -86,7 +86,7 @@ class Batch:
             command=self.command,
             stages=dict(self.stages) | {"other": max(0.0, other)},
             failures=tuple(self.failures()),
-            machine=machine(),
+            machine=Machine.here(),
             versions=versions(self.libraries),
         )
 

@@ -5,10 +5,11 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from fotismos.comparisons.compare import finish, look
 from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.two_pictures import finish, look
-from fotismos.comparisons.versions import PICTURE_LIBRARIES
+from fotismos.comparisons.pictures import two_pictures
+from fotismos.heuristic.program import PICTURE_LIBRARIES
 from fotismos.reports.jobs import Job
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files
@@ -40,7 +41,7 @@ def compare(
     ``show`` puts them on the page before the slow part.
     """
     begin = perf_counter()
-    first = look(job.options, name=word, command=job.options.command("compare", ""))
+    first = look(two_pictures(job.options, word), job.options.command("compare", ""))
     view = scene_files.view_of(first.comparison)
     seconds = {"pictures": perf_counter() - begin}
     show(target, view)

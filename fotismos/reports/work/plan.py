@@ -76,7 +76,7 @@ def priced(name: str, options: Options, within: float, progress: Any) -> Compari
     width, height = requested(source, options)
     if width * height > LARGEST:
         options = options.changed(resolution=reduced(source, options, WIDTH))
-    return compare(source, options, progress, then=steps(options, why=True)).record
+    return compare(source, options, progress, then=steps(why=True)).record
 
 
 def price_lines(record: ComparisonRecord, within: float) -> Iterator[str]:
