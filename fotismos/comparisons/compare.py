@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from threading import Thread
@@ -26,7 +26,7 @@ from fotismos.comparisons.departure.metrics import (
     declared,
     leading_distance,
 )
-from fotismos.comparisons.estimates import Estimates, metrics_for
+from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.halves import Halves, Step
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.comparison import (
@@ -53,32 +53,6 @@ DEVIATION_ALLOWED = 1e-3
 """Deviation from colour-science above which a record warns."""
 
 
-@dataclass(frozen=True)
-class FirstLook:
-    """Halves that were rendered, of which only what a page shows first is measured.
-
-    ``comparison`` has the leading metric and the declared ones.
-    """
-
-    halves: Halves
-    estimates: Estimates
-    comparison: Comparison
-
-    def whole(self) -> Comparison:
-        """Return the comparison with all metrics."""
-        begin = perf_counter()
-        record = self.comparison.record
-        images = self.comparison.images
-        rest = [name for name in METRICS if name not in record.metrics]
-        summaries, maps = summarised(self.halves, self.estimates, rest)
-        summaries |= record.metrics
-        maps |= images.maps
-        record = structs.replace(record, metrics={name: summaries[name] for name in METRICS})
-        drawn = {name: maps[name] for name in (*METRICS, RATIO.name) if name in maps}
-        whole = Comparison(record=record, images=replace(images, maps=drawn))
-        return whole.timed("metrics", record.time.stages["metrics"] + perf_counter() - begin)
-
-
 def compare(
     source: Source,
     options: Options | None = None,
@@ -102,10 +76,10 @@ def compare(
     _require_colour_science()
     printed: list[str] = []
     with collect_messages(printed):
-        first = look(guarded(source, options), command, progress, alone)
-        comparison = first.whole()
+        halves = guarded(source, options)
+        comparison = look(halves, command, progress, alone)
     comparison = comparison.warned(count_messages([*source.messages, *printed]))
-    return _with_steps(comparison, first.halves, then, progress)
+    return finish(comparison, halves, then, progress)
 
 
 def compare_pictures(options: Options, name: str, command: str = "") -> Comparison:
@@ -117,7 +91,8 @@ def compare_pictures(options: Options, name: str, command: str = "") -> Comparis
     """
     from fotismos.comparisons.pictures import two_pictures  # loaded late: scenes have none
 
-    return finish(look(two_pictures(options, name), command))
+    halves = two_pictures(options, name)
+    return finish(look(halves, command), halves, steps(why=False))
 
 
 def look(
@@ -125,8 +100,11 @@ def look(
     command: str = "",
     progress: Progress | None = None,
     alone: AbstractContextManager[Any] | None = None,
-) -> FirstLook:
-    """Take the passes of both halves, and measure what a page shows first; see :func:`compare`."""
+) -> Comparison:
+    """Take the passes of both halves, and measure what a page shows first; see :func:`compare`.
+
+    These are the leading metric and the declared ones; :func:`finish` adds the others.
+    """
     stages = dict(halves.seconds)
     begin = perf_counter()
 
@@ -140,7 +118,9 @@ def look(
     # The passes, and their times.
     first = halves.first
     second = halves.second
-    estimates, noise_target = render(halves, progress)
+    images, noise_target = render(halves, progress)
+    difference = images.difference
+    assert difference is not None, "nothing is measured yet"
     done("sums of passes", sum(first.times) + sum(second.times))
     if first.preparation:
         stages["preparation"] = first.preparation
@@ -151,27 +131,19 @@ def look(
     if COMPUTED_TWICE.needs <= halves.has:
         _load()  # not beside the passes, whose times are compared
     counted = halves.counted
-    summaries, maps = summarised(halves, estimates, (LEADING.name, *declared()))
+    summaries, maps = _summarised(halves, images, (LEADING.name, *declared()))
     ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(
-        estimates.heuristic, estimates.reference, counted
+        images.heuristic, images.reference, counted
     )
     marked = marks.find(
-        estimates.difference,
-        estimates.heuristic,
+        difference,
+        images.heuristic,
         counted,
         leading_distance(halves.options.viewing, metrics_for(halves.options)),
         exact=halves.is_exact,
         noise_shown=halves.noise_shown,
     )
-    images = Images(
-        heuristic=estimates.heuristic,
-        reference=estimates.reference,
-        reference_stderr=estimates.standard_error,
-        maps=maps,
-        significant=marked.image,
-        counted=counted,
-        light=estimates.light,
-    )
+    images = replace(images, maps=maps, significant=marked.image)
     objects, images = halves.with_objects(images)
     caution = halves.caution(images.heuristic, images.reference)
     done("metrics")
@@ -198,39 +170,12 @@ def look(
         caution=caution,
         noise_target=noise_target,
         **objects,
-        **halves.fields(estimates.passes),
+        **halves.fields(difference.passes),
     )
-    return FirstLook(halves, estimates, Comparison(record=record, images=images))
+    return Comparison(record=record, images=images)
 
 
-def summarised(
-    halves: Halves, estimates: Estimates, names: Iterable[str]
-) -> tuple[dict[str, Summary], dict[str, np.ndarray]]:
-    """Return the summaries of metrics over the pixels that count, and the maps of the drawn."""
-    metrics = metrics_for(halves.options)
-    summaries = {}
-    maps = {}
-    for name in names:
-        summaries[name], distances = statistics.summarise(
-            metrics[name],
-            estimates.heuristic,
-            reference=estimates.reference,
-            mask=halves.counted,
-            viewing=halves.options.viewing,
-            noise=estimates.difference.noise,
-            grouped=estimates.difference.grouped,
-        )
-        if metrics[name].drawn:
-            maps[name] = distances
-    return summaries, maps
-
-
-def finish(first: FirstLook) -> Comparison:
-    """Return the whole comparison of two pictures: all metrics, and what is odd about them."""
-    return _with_steps(first.whole(), first.halves, steps(why=False))
-
-
-def _with_steps(
+def finish(
     comparison: Comparison,
     halves: Halves,
     then: Sequence[Step],
@@ -238,10 +183,53 @@ def _with_steps(
 ) -> Comparison:
     """Return a comparison with what the steps add, as far as the halves have what they need."""
     # Last, since colour-science is loaded in the meantime.
-    for step in (*then, COMPUTED_TWICE):
+    for step in (OTHER_METRICS, *then, COMPUTED_TWICE):
         if step.needs <= halves.has:
             comparison = step.add(comparison, halves, progress)
     return comparison
+
+
+def _summarised(
+    halves: Halves, images: Images, names: Iterable[str]
+) -> tuple[dict[str, Summary], dict[str, np.ndarray]]:
+    """Return the summaries of metrics over the pixels that count, and the maps of the drawn."""
+    assert images.difference is not None, "not all is measured yet"
+    metrics = metrics_for(halves.options)
+    summaries = {}
+    maps = {}
+    for name in names:
+        summaries[name], distances = statistics.summarise(
+            metrics[name],
+            images.heuristic,
+            reference=images.reference,
+            mask=images.counted,
+            viewing=halves.options.viewing,
+            noise=images.difference.noise,
+            grouped=images.difference.grouped,
+        )
+        if metrics[name].drawn:
+            maps[name] = distances
+    return summaries, maps
+
+
+def _with_other_metrics(
+    comparison: Comparison, halves: Halves, progress: Progress | None
+) -> Comparison:
+    """Return a comparison with all metrics."""
+    begin = perf_counter()
+    record = comparison.record
+    images = comparison.images
+    rest = [name for name in METRICS if name not in record.metrics]
+    summaries, maps = _summarised(halves, images, rest)
+    summaries |= record.metrics
+    maps |= images.maps
+    record = structs.replace(record, metrics={name: summaries[name] for name in METRICS})
+    drawn = {name: maps[name] for name in (*METRICS, RATIO.name) if name in maps}
+    whole = replace(comparison, record=record, images=replace(images, maps=drawn, difference=None))
+    return whole.timed("metrics", record.time.stages["metrics"] + perf_counter() - begin)
+
+
+OTHER_METRICS = Step(needs=frozenset(), add=_with_other_metrics)
 
 
 def _require_colour_science() -> None:
@@ -289,7 +277,7 @@ def _with_deviations(
 COMPUTED_TWICE = Step(needs=frozenset({"scene"}), add=_with_deviations)
 
 
-def render(halves: Halves, progress: Progress | None) -> tuple[Estimates, NoiseTarget | None]:
+def render(halves: Halves, progress: Progress | None) -> tuple[Images, NoiseTarget | None]:
     """Take the passes of both halves in turn: a drift of the machine then affects both.
 
     Return also where a run with a noise target ended.
@@ -310,9 +298,9 @@ def render(halves: Halves, progress: Progress | None) -> tuple[Estimates, NoiseT
                 break
     loop.close()
     if options.noise is None:
-        return sums.estimates(), None
+        return sums.images(), None
     assert reached is not None, "the noise is checked after the last pass"
-    return sums.estimates(), NoiseTarget(
+    return sums.images(), NoiseTarget(
         target=options.noise,
         reached=reached,
         stopped_by="target" if reached <= options.noise else "samples",

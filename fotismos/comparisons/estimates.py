@@ -1,50 +1,24 @@
 """Both halves as sums of passes."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fotismos.comparisons.departure.blocks import bands
-from fotismos.comparisons.departure.metrics import (
-    METRICS,
-    Metric,
-)
+from fotismos.comparisons.departure.metrics import METRICS, Metric
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.images import Images
 from fotismos.reference.rendering.sums import (
     DEVIATION,
     MEAN,
     Accumulator,
-    DifferenceEstimate,
     DifferenceSums,
     add_difference,
 )
 
-if TYPE_CHECKING:  # two pictures have no scene, and few pictures a tone map
-    from fotismos.comparisons.records.images import Light
-
 PERCENTILE = 95
 """A noise target is for this percentile of the noise over the counted pixels."""
-
-
-# --- Sums --------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Estimates:
-    """The passes of both halves, and of their difference.
-
-    The halves have only means (H, W, 3) and the reference's standard error: the relevant
-    uncertainty is the difference's. ``light`` is the reference before its tone map, if it has one.
-    """
-
-    heuristic: np.ndarray
-    reference: np.ndarray
-    standard_error: np.ndarray
-    difference: DifferenceEstimate
-    passes: int
-    light: "Light | None" = None
 
 
 class PassSums:
@@ -83,19 +57,18 @@ class PassSums:
             distances.append(distance(truth + noise[rows][counted[rows]], truth))
         return float(np.percentile(np.concatenate(distances), PERCENTILE))
 
-    def estimates(self) -> Estimates:
-        """Return the estimates so far, in single precision, like the files."""
+    def images(self) -> Images:
+        """Return the means so far, in single precision, like the files; nothing is marked yet."""
         reference = self._reference
-        return Estimates(
+        return Images(
             heuristic=self._heuristic.mean(np.float32),
             reference=reference.mean(np.float32),
-            standard_error=reference.standard_error(np.float32),
+            reference_stderr=reference.standard_error(np.float32),
             difference=self._difference.estimate(np.float32),
-            passes=self.passes,
+            maps={},
+            significant=np.zeros(self.counted.shape),
+            counted=self.counted,
         )
-
-
-# --- Numbers -----------------------------------------------------------------------------------
 
 
 def metrics_for(options: Options) -> Mapping[str, Metric]:

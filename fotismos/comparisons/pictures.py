@@ -24,7 +24,7 @@ from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedR
 from fotismos.comparisons.departure.marks import NoiseShown
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.tone_maps import TONE_MAPS, ToneMap
-from fotismos.comparisons.estimates import Estimates, PassSums
+from fotismos.comparisons.estimates import PassSums
 from fotismos.comparisons.halves import Halves
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
@@ -148,9 +148,9 @@ class MappedPassSums(PassSums):
         self._reference = self._mapped
         self._difference = MappedDifference(counted, self._mapped)
 
-    def estimates(self) -> Estimates:
-        """Return the estimates so far, in single precision, like the files."""
-        return replace(super().estimates(), light=self._mapped.light())
+    def images(self) -> Images:
+        """Return the means so far, in single precision, like the files; nothing is marked yet."""
+        return replace(super().images(), light=self._mapped.light())
 
 
 # --- Reading -----------------------------------------------------------------------------------

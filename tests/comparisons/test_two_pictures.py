@@ -91,9 +91,9 @@ def two(tmp_path, monkeypatch):
 def test_the_first_page_has_the_verdict_and_reloads_into_the_whole(run, two, monkeypatch):
     pages = []
 
-    def finish(first):
+    def finish(*first):
         pages.append(Path("out/index.html").read_text())
-        return compare.finish(first)
+        return compare.finish(*first)
 
     monkeypatch.setattr("fotismos.reports.run.pictures.finish", finish)
     assert run(*two)[0] == 0
@@ -116,7 +116,7 @@ def test_the_first_page_has_the_verdict_and_reloads_into_the_whole(run, two, mon
 
 @pytest.mark.parametrize(("fault", "code"), [(InputError("late"), 2), (KeyboardInterrupt(), 130)])
 def test_a_first_page_does_not_outlive_its_command(run, two, monkeypatch, fault, code):
-    def finish(first):
+    def finish(*first):
         assert Path("out/index.html").is_file()
         raise fault
 

@@ -398,7 +398,16 @@ class ComparisonRecord(Record):
     record_version: int = VERSION
 
     @property
+    def given(self) -> tuple[PictureFiles, ...]:
+        """The pictures that replace halves."""
+        return tuple(half for half in (self.picture, self.reference_picture) if half is not None)
+
+    @property
     def is_noise_known(self) -> bool:
         """Whether passes or repeats show the noise: two single pictures do not."""
-        halves = (self.picture, self.reference_picture)
-        return any(half is None or half.repeats > 1 for half in halves)
+        return len(self.given) < 2 or any(half.repeats > 1 for half in self.given)
+
+    @property
+    def picture_mistakes(self) -> tuple[str, ...]:
+        """The mistakes that pictures seem to have, in words."""
+        return self.agreement.mistakes if self.agreement else ()

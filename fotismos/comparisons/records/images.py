@@ -13,6 +13,7 @@ from fotismos.comparisons.records.departure import Colour, VisibleShare
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Missing
+from fotismos.reference.rendering.sums import DifferenceEstimate
 
 Whole = NDArray[np.int64]
 
@@ -210,7 +211,8 @@ class Images:
     ``materials`` hold the index in the record of what each pixel sees, -1 for uncounted pixels.
     Two pictures without a scene have neither these nor ``position`` and ``normal``. ``light`` is
     the reference before its tone map, if it has one.
-    ``terms`` are those of 8.10 in the textbook half, by layer, if it has any.
+    ``terms`` are those of 8.10 in the textbook half, by layer, if it has any. ``difference`` is
+    that of the halves with its noise, until all is measured: it takes much memory.
     """
 
     heuristic: np.ndarray
@@ -225,6 +227,7 @@ class Images:
     materials: np.ndarray | None = None
     terms: dict[str, np.ndarray] = field(default_factory=dict)
     light: Light | None = None
+    difference: DifferenceEstimate | None = None
 
 
 NO_TERMS = Missing("Terms are traced with the causes, which were not asked for.")
