@@ -165,7 +165,7 @@ def _rendered(case: Case, method: Method) -> Rendered:
     """Render an approximation, and time it in turn with the kernel in the same scene."""
     options = case.options.changed(heuristic=method.heuristic or "phong")
     ready = guarded(case.source, options)
-    ladder = Ladder(case.source, options, ready)
+    ladder = Ladder(ready)
     firsts = {one.name: ladder.renderer(one, 4) for one in (KERNEL, method)}
     width, height = image_size(ready.scene)
     renderers = measure.tried(firsts, dict.fromkeys(firsts, (4,)), width * height)

@@ -37,7 +37,6 @@ from fotismos.comparisons.departure.noise import (
 from fotismos.comparisons.departure.regions import find_objects
 from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.hybrids import HybridImages, HybridScenes, Pairs, labels
-from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.records.comparison import (
     CAUSES,
@@ -62,7 +61,6 @@ from fotismos.reference.rendering.gbuffer import (
 )
 from fotismos.reference.rendering.passes import Progress, Stream, passes
 from fotismos.reference.rendering.sums import Grouped, block_numbers, jackknifed
-from fotismos.reference.scene.source import Source
 
 WIDTH = 48
 NARROW = 32
@@ -125,7 +123,7 @@ def with_causes(comparison: Comparison, ready: Prepared, progress: Progress | No
         assert plan is not None, "the reference was rendered"
         both_halves = 2 * plan.spp * comparison.images.counted.size
         most_samples = max(PATIENCE * both_halves, AFFORDABLE)
-        causes = find(ready, ready.source, ready.options, progress, clean, limit=most_samples)
+        causes = find(ready, progress, clean, limit=most_samples)
     except FotismosError as error:
         return comparison.warned([f"The causes are unknown: {error}"])
     record = structs.replace(with_effects_named(comparison, causes.maps), why=causes.record)
@@ -135,8 +133,6 @@ def with_causes(comparison: Comparison, ready: Prepared, progress: Progress | No
 
 def find(
     ready: Prepared,
-    source: Source,
-    options: Options,
     progress: Progress | None = None,
     clean: tuple[Floats, Floats] | None = None,
     most: int | None = None,
@@ -151,7 +147,7 @@ def find(
     """
     if media := sorted(name for name, _ in ready.pair.media):
         raise InputError(
-            f"{source.name} has participating media ({', '.join(media)}), which no image of some"
+            f"{ready.name} has participating media ({', '.join(media)}), which no image of some"
             " effects can hold. The other numbers do not need them."
         )
     width, height = ready.size
@@ -160,25 +156,25 @@ def find(
     size = size_of_width(ready.scene, ready.size, min(most, width))
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
     surface = gbuffer(ready.scene, size, film=ready.size)
-    require_surface(surface.hit, source.name)
+    require_surface(surface.hit, ready.name)
     leading: Any = metrics_for(ready.options)[LEADING.name]
-    pairs = Pairs(source, options, ready)
+    pairs = Pairs(ready, ready.options)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
     reference = ready.reference.sampled(spp)
     while True:
         # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
         loop = passes(
-            [reference], options.seed, REPLICATES, size=size, stream=Stream.OTHER_SIDE,
+            [reference], ready.options.seed, REPLICATES, size=size, stream=Stream.OTHER_SIDE,
             progress=progress, stage="reference",
         )  # fmt: skip
         groups = np.stack([np.array(rendered[0]) for rendered in loop])
-        meter = ErrorMeter(groups, surface.hit, options.viewing, leading)
+        meter = ErrorMeter(groups, surface.hit, ready.options.viewing, leading)
         images = HybridImages(
             pairs,
             scenes,
             replicates=REPLICATES,
             replicate_spp=reference.pass_spp,
-            seed=options.seed,
+            seed=ready.options.seed,
             size=size,
             progress=progress,
         )
@@ -186,7 +182,7 @@ def find(
             images,
             meter,
             shapes=surface.shape,
-            seed=options.seed,
+            seed=ready.options.seed,
             clean=clean,
             whole=width * height,
         )

@@ -48,7 +48,6 @@ from fotismos.reference.rendering.renderer import Renderer, variant
 from fotismos.reference.rendering.sampler import with_sampler
 from fotismos.reference.rendering.transport import Transport
 from fotismos.reference.scene.graph import properties
-from fotismos.reference.scene.source import Source
 
 REPLACED = tuple(effect for effect in EFFECTS if isinstance(effect, ReplacedEffect))
 IN_SCENE: frozenset[Effect] = frozenset(REPLACED)
@@ -81,11 +80,10 @@ class Pairs:
     The pair of ``ready``, which is prepared with the same options, is the first of them.
     """
 
-    def __init__(self, source: Source, options: Options, ready: Prepared) -> None:
+    def __init__(self, ready: Prepared, options: Options) -> None:
         self.options = options
         self.ready = ready
         self.heuristic_variant = options.heuristic_variant or ready.reference.variant
-        self._source = source
         self._known = {(ready.reference.variant, pair_options(options)): ready.pair}
 
     def of(self, interpolation: Interpolation) -> Pair:
@@ -117,7 +115,7 @@ class Pairs:
     def _of(self, options: Options) -> Pair:
         key = mi.variant(), pair_options(options)
         if key not in self._known:
-            self._known[key] = pair_for(self._source, options)
+            self._known[key] = pair_for(self.ready.source, options)
         return self._known[key]
 
 

@@ -88,7 +88,7 @@ def declared(monkeypatch):
 
 def ladder(source, **options):
     chosen = Options(**{"resolution": (12, 12)} | options)
-    return Ladder(source, chosen, prepare(source, chosen))
+    return Ladder(prepare(source, chosen))
 
 
 @pytest.mark.parametrize(
@@ -109,13 +109,13 @@ def test_merged_methods_are_equal_images(rgb, name):
         source = SCENES[name].source()
     chosen = Options(resolution=(24, 24))
     ready = prepare(source, chosen)
-    found = Ladder(source, chosen, ready)
+    found = Ladder(ready)
     merged = [method for method in found.methods if len(method.names) > 1]
     assert merged
     # A plan that calls for all tells all methods apart.
     effects = tuple(structs.replace(one, called_for=True) for one in ready.plan.effects)
     plan = structs.replace(ready.plan, effects=effects)
-    telling = Ladder(source, chosen, replace(ready, plan=plan))
+    telling = Ladder(replace(ready, plan=plan))
     apart = {method.name: method for method in BUILT_IN}
     for method in merged:
         expected = whole(found.renderer(method, 16))

@@ -101,8 +101,8 @@ def test_causes_of_a_caustic_take_more_samples_and_their_closure_holds_zero(rgb,
     source = Source("a ball", caustic())
     options = Options(seed=seed)
     ready = guarded(source, options)
-    few = attribution.find(ready, source, options).record
-    more = attribution.find(ready, source, options, limit=2**26).record
+    few = attribution.find(ready).record
+    more = attribution.find(ready, limit=2**26).record
     assert few.spp < more.spp
     for record in (few, more):
         assert record.closure.low <= 0 <= record.closure.high

@@ -97,7 +97,7 @@ def found(request):
     """The causes of one small scene, and its kernel and reference, rendered anew."""
     case = open_case(request.param, Options(resolution=(24, 24)))
     ready = guarded(case.source, case.options)
-    causes = attribution.find(ready, case.source, case.options)
+    causes = attribution.find(ready)
     images = [whole(half).mean for half in (ready.heuristic, ready.reference)]
     yield SimpleNamespace(name=request.param, causes=causes, images=images)
     set_variant("llvm_ad_rgb")
@@ -114,7 +114,7 @@ def test_a_clamped_fall_off_is_a_cause(rgb):
     }
     source = Source("clamped", description)
     ready = guarded(source, Options())
-    record = attribution.find(ready, source, Options()).record
+    record = attribution.find(ready).record
     assert record.departure > 0.5
     assert [entry.effect for entry in record.effects] == ["distance attenuation"]
     assert abs(record.closure.value) < 0.01 * record.departure
@@ -134,7 +134,7 @@ def test_a_pane_counts_as_an_obstacle(rgb):
     """As docs/reading.md says, with numbers."""
     case = open_case(ROOT / "docs/scenes/pane.xml", Options())
     ready = guarded(case.source, case.options)
-    record = attribution.find(ready, case.source, case.options).record
+    record = attribution.find(ready).record
     removed = {entry.effect: entry.removes.value for entry in record.effects}
     expected = {"occlusion": -11, "interreflection": 6, "extended lights": 6, "transmission": 0}
     assert removed == pytest.approx(expected, abs=2)
@@ -171,7 +171,7 @@ def test_the_departure_is_that_of_the_kernel_rendered_anew(found):
 
 def removes(options):
     source = SCENES["cornell-box"].source()
-    return attribution.find(guarded(source, options), source, options).record
+    return attribution.find(guarded(source, options)).record
 
 
 @pytest.mark.slow
@@ -252,7 +252,7 @@ def test_without_effects_clear_surfaces_are_looked_through_as_by_the_kernel(rgb)
     }
     case = open_case(scene, Options(resolution=(24, 24), spp=16))
     ready = guarded(case.source, case.options)
-    record = attribution.find(ready, case.source, case.options).record
+    record = attribution.find(ready).record
     assert {"interreflection", "transmission"} <= {one.effect for one in record.effects}
     assert record.implementation < 1e-3
 
@@ -314,7 +314,7 @@ def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
     scene = shadowed(24)
     scene["sensor"]["film"]["rfilter"] = {"type": "box"}
     case = open_case(scene, Options.of({"resolution": (24, 24)}), "shadowed")
-    found = Ladder(case.source, case.options, guarded(case.source, case.options))
+    found = Ladder(guarded(case.source, case.options))
     hybrids = HybridImages(found.pairs, found.scenes, 3, 16, 0, (24, 24))
     for effects in ((), ("occlusion",)):
         image = hybrids.simulating({labelled(effect) for effect in effects})
@@ -337,7 +337,7 @@ def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
 def test_a_clean_reference_takes_noise_out_of_previews(rgb):
     """By two runs that share nothing but the scene; the means stay."""
     case = open_case("cornell-box", Options(resolution=(48, 48)))
-    ladder = Ladder(case.source, case.options, guarded(case.source, case.options))
+    ladder = Ladder(guarded(case.source, case.options))
     ladder.ready.reference.pass_spp = 256
     total = whole(ladder.ready.reference)
     clean = total.mean, total.standard_error

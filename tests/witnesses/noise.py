@@ -136,7 +136,7 @@ def _true_effects(make) -> dict[str, float]:
     ready = prepare(case.source, case.options)
     more = {name: FINER * getattr(attribution, name) for name in ("SPP", "FEW_SPP", "EXACT_SPP")}
     with mock.patch.multiple(attribution, **more, EXACT_EFFECTS=MOST):
-        record: Attribution = attribution.find(ready, case.source, case.options).record
+        record: Attribution = attribution.find(ready).record
     return {item.effect: item.removes.value for item in record.effects}
 
 

@@ -96,7 +96,7 @@ def cost(
     measured = measure_at(found, at, progress) if at and is_measured else ()
     ladder.forget()  # its scenes would slow later work
     judged = engine.judged(given, engine_times, truth(found)) if engine_times else None
-    known = causes or find(ready, source, options, progress, most=found.size[0])
+    known = causes or find(ready, progress, most=found.size[0])
     made = Cost(
         scene=source.name,
         variant=ready.reference.variant,

@@ -177,7 +177,7 @@ def measure_ladder(
     converged(ready, options.seed, progress, total=total)
     reference = total.estimate()
     judge = judge_by(reference, ready.counted, options.viewing)
-    ladder = Ladder(source, options, ready=ready, is_short=effort.is_short)
+    ladder = Ladder(ready, is_short=effort.is_short)
     size = ready.size
     gc.collect()  # release scenes that pairing left behind
     # Steps also need methods that are not on the ladder: they are timed, not judged.
