@@ -35,7 +35,6 @@ from fotismos.comparisons.departure.noise import (
     without_noise,
 )
 from fotismos.comparisons.departure.regions import find_objects
-from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.hybrids import HybridImages, HybridScenes, Pairs, labels
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.records.comparison import (
@@ -157,7 +156,7 @@ def find(
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
     surface = gbuffer(ready.scene, size, film=ready.size)
     require_surface(surface.hit, ready.name)
-    leading: Any = metrics_for(ready.options)[LEADING.name]
+    leading: Any = ready.metrics[LEADING.name]
     pairs = Pairs(ready, ready.options)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
     reference = ready.reference.sampled(spp)

@@ -24,9 +24,7 @@ from fotismos.comparisons.departure.metrics import (
     METRICS,
     RATIO,
     declared,
-    leading_distance,
 )
-from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.halves import Halves, Step
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.comparison import (
@@ -139,7 +137,7 @@ def look(
         difference,
         images.heuristic,
         counted,
-        leading_distance(halves.options.viewing, metrics_for(halves.options)),
+        halves.distance,
         exact=halves.is_exact,
         noise_shown=halves.noise_shown,
     )
@@ -194,7 +192,7 @@ def _summarised(
 ) -> tuple[dict[str, Summary], dict[str, np.ndarray]]:
     """Return the summaries of metrics over the pixels that count, and the maps of the drawn."""
     assert images.difference is not None, "not all is measured yet"
-    metrics = metrics_for(halves.options)
+    metrics = halves.metrics
     summaries = {}
     maps = {}
     for name in names:
@@ -283,7 +281,6 @@ def render(halves: Halves, progress: Progress | None) -> tuple[Images, NoiseTarg
     Return also where a run with a noise target ended.
     """
     options = halves.options
-    distance = leading_distance(options.viewing, metrics_for(options))
     sums = halves.sums(halves.counted)
     reached = None
     sources = (halves.first, halves.second)
@@ -293,7 +290,7 @@ def render(halves: Halves, progress: Progress | None) -> tuple[Images, NoiseTarg
         # Else the images of this pass stay alongside the next ones.
         del rendered
         if options.noise is not None and is_checked(sums.passes, halves.passes):
-            reached = sums.noise_percentile(distance)
+            reached = sums.noise_percentile(halves.distance)
             if reached <= options.noise:
                 break
     loop.close()

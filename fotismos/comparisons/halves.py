@@ -17,21 +17,82 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fotismos.comparisons.departure import criterion
+from fotismos.comparisons.departure.blocks import bands
+from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.marks import NoiseShown
-from fotismos.comparisons.estimates import PassSums
+from fotismos.comparisons.departure.metrics import METRICS, Metric, leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.comparison import PictureFiles, Price
 from fotismos.comparisons.records.images import Comparison, Images
 from fotismos.heuristic.program import PICTURE_LIBRARIES
 from fotismos.reference.rendering.passes import PassSource, Progress
+from fotismos.reference.rendering.sums import (
+    DEVIATION,
+    MEAN,
+    Accumulator,
+    DifferenceSums,
+    add_difference,
+)
+
+PERCENTILE = 95
+"""A noise target is for this percentile of the noise over the counted pixels."""
 
 Part = Literal["scene", "textbook", "physical", "shader", "pictures"]
 """What halves may have: a scene, a textbook and a physical half that it renders, a shader of the
 user's that shades the textbook half, and pictures that were given."""
 
-
 Judge = Callable[[Comparison, Sequence[np.ndarray], np.ndarray | None], Comparison]
 """Adds what is odd about pictures to a comparison; given what :meth:`Halves.template` returns."""
+
+
+class PassSums:
+    """Running sums of the passes of both halves, and of their difference.
+
+    ``counted`` (H, W) are the pixels whose noise counts.
+    """
+
+    def __init__(self, counted: np.ndarray) -> None:
+        self.counted = counted
+        self.passes = 0
+        self._heuristic = Accumulator(MEAN)
+        self._reference = Accumulator(DEVIATION)
+        self._difference = DifferenceSums(counted)
+
+    def add(self, heuristic: Any, reference: Any) -> None:
+        """Add a pass of each half, (H, W, 3)."""
+        sums = (self._heuristic, self._reference, self._difference)
+        add_difference(sums, (heuristic, reference))
+        self.passes += 1
+
+    def noise_percentile(self, distance: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> float:
+        """Predict the noise: 95th percentile of ΔE2000 between the reference, and it with noise.
+
+        The noise is that of the difference of the halves, in which shared noise cancels.
+        ``distance`` is the leading metric's.
+        """
+        counted = self.counted
+        reference = self._reference.mean(np.float32)
+        noise = self._difference.noise(np.float32)
+        if not noise[counted].any():
+            return 0.0
+        distances = []
+        for rows in bands(len(counted)):
+            truth = reference[rows][counted[rows]].astype(np.float64)
+            distances.append(distance(truth + noise[rows][counted[rows]], truth))
+        return float(np.percentile(np.concatenate(distances), PERCENTILE))
+
+    def images(self) -> Images:
+        """Return the means so far, in single precision, like the files; nothing is marked yet."""
+        reference = self._reference
+        return Images(
+            heuristic=self._heuristic.mean(np.float32),
+            reference=reference.mean(np.float32),
+            reference_stderr=reference.standard_error(np.float32),
+            difference=self._difference.estimate(np.float32),
+            maps={},
+            significant=np.zeros(self.counted.shape),
+            counted=self.counted,
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +133,20 @@ class Halves:
         """The pixels (H, W) that count."""
         assert self.where is not None, "pictures say where they are opaque"
         return self.where
+
+    @property
+    def metrics(self) -> Mapping[str, Metric]:
+        """The metrics, computed by colour-science if the options say so."""
+        if not self.options.colour_science:
+            return METRICS
+        from fotismos.comparisons.departure import definitions  # loaded late: it takes a second
+
+        return definitions.metrics()
+
+    @property
+    def distance(self) -> Callable[[Array, Array], Array]:
+        """The leading metric, ``(test, reference) -> (N,)``, for colours (N, 3)."""
+        return leading_distance(self.options.viewing, self.metrics)
 
     def with_objects(self, images: Images) -> tuple[dict[str, Any], Images]:
         """Return the fields of the record on what pixels see, and the images with it, if known."""

@@ -24,8 +24,7 @@ from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedR
 from fotismos.comparisons.departure.marks import NoiseShown
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.tone_maps import TONE_MAPS, ToneMap
-from fotismos.comparisons.estimates import PassSums
-from fotismos.comparisons.halves import Halves
+from fotismos.comparisons.halves import Halves, PassSums
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.comparisons.picture_mistakes import Mending, Names, NoisyImage

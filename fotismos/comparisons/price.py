@@ -27,7 +27,6 @@ from msgspec import structs
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS, Pixelwise
 from fotismos.comparisons.departure.noise import USUAL, shares_above
-from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.records.comparison import (
     MOST_SPP,
@@ -77,7 +76,7 @@ def with_price(comparison: Comparison, ready: Prepared, progress: Progress | Non
     record = comparison.record
     price = record.price
     assert price is not None, "the physical half was rendered"
-    leading: Any = metrics_for(ready.options)[LEADING.name]
+    leading: Any = ready.metrics[LEADING.name]
     causes = comparison.causes
     price = structs.replace(
         price,

@@ -15,9 +15,8 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons.departure.blocks import bands
-from fotismos.comparisons.departure.metrics import LEADING, leading_distance
+from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.regions import worst_pixel
-from fotismos.comparisons.estimates import metrics_for
 from fotismos.comparisons.halves import Halves, Step
 from fotismos.comparisons.records.images import Comparison
 from fotismos.reference.records import Missing
@@ -63,10 +62,9 @@ def with_textbook(comparison: Comparison, ready: Prepared, progress: Progress | 
     ):
         sums.add(rendered[0])
     shown = sums.mean(np.float32)
-    distance = leading_distance(record.viewing, metrics_for(ready.options))
     counted = images.counted
     total = sum(
-        distance(shown[rows][counted[rows]], images.reference[rows][counted[rows]]).sum()
+        ready.distance(shown[rows][counted[rows]], images.reference[rows][counted[rows]]).sum()
         for rows in bands(len(counted))
     )
     record = structs.replace(record, textbook=float(total / max(counted.sum(), 1)))
