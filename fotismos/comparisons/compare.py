@@ -19,6 +19,7 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons.departure import marks, regions, statistics
+from fotismos.comparisons.departure.criterion import decide
 from fotismos.comparisons.departure.metrics import (
     LEADING,
     METRICS,
@@ -35,7 +36,7 @@ from fotismos.comparisons.records.comparison import (
 )
 from fotismos.comparisons.records.departure import Significant, Summary
 from fotismos.comparisons.records.images import Comparison, Images
-from fotismos.comparisons.steps import steps
+from fotismos.comparisons.steps import PICTURES, steps
 from fotismos.heuristic.errors import InstallationError
 from fotismos.heuristic.program import versions
 from fotismos.reference.records import Pixels
@@ -170,7 +171,14 @@ def look(
         **objects,
         **halves.fields(difference.passes),
     )
-    return Comparison(record=record, images=images)
+    comparison = Comparison(record=record, images=images)
+    shares = summaries[LEADING.name].visible
+    undecided = decide(shares, is_certain=marked.is_certain) == "undecided"
+    if undecided and halves.has == PICTURES.needs:
+        # A mistake may decide, and what a page shows first should stay.
+        judged = PICTURES.add(comparison, halves, progress).record
+        record = structs.replace(record, significant=judged.significant)
+    return replace(comparison, record=record)
 
 
 def finish(
