@@ -68,7 +68,7 @@ def test_shadows_of_bumps_are_the_cause_where_only_they_differ(rgb):
     source = Source("bumps", bumpy())
     options = Options(spp=16)
     ready = guarded(source, options)
-    found = attribution.find(ready, source, options)
+    found = attribution.find(ready)
     removes = {part.effect: part.removes.value for part in found.record.effects}
     assert max(removes, key=removes.get) == BUMPS.label
     assert removes[BUMPS.label] > 2
