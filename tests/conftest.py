@@ -17,7 +17,7 @@ from fotismos.comparisons.processes.pool import Pool
 from fotismos.heuristic import plugins
 from fotismos.reference.rendering import direct
 from fotismos.reports import jobs
-from fotismos.reports.commands.compare import compare
+from fotismos.reports.cli import cli
 from tests.shared import small_baselines
 from tests.shared.programs import command_line
 from tests.shared.small_scene import SCENE
@@ -52,7 +52,7 @@ def computed_by(request, monkeypatch):
     return request.param
 
 
-WHY = next(option for option in compare.params if option.name == "with_causes")
+WHY = next(option for option in cli.get_command(None, "compare").params if option.name == "why")
 """Whether `compare` finds causes, which takes nine tenths of a small run."""
 
 # In tests, commands render in this process, which has loaded all that they need, without causes.

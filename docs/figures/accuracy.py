@@ -20,8 +20,8 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.cost import Cost, Point
 from fotismos.reports.charts import vega
 from fotismos.reports.charts.cost_charts import titled
-from fotismos.reports.terminal.cost_tables import busy
-from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.sentences import busy
+from fotismos.reports.terminal.table import Table, markdown
 from fotismos.reports.terminal.words import number, parameter
 
 LARGER = tuple(
@@ -148,7 +148,7 @@ def attribution(records: Sequence[Cost]) -> Iterator[str]:
         if len(found) >= FEW
     ]
     head = "Effect", "scenes", "removes, mean ΔE2000", "adds, in times of the kernel"
-    yield from markdown([head, *rows], right=1)
+    yield from markdown(Table.of([head, *rows]))
 
 
 def findings(records: Sequence[Cost]) -> Iterator[str]:

@@ -14,7 +14,7 @@ from fotismos.comparisons.audit.furnace import single_scattering
 from fotismos.heuristic import plugins
 from fotismos.reports.charts import vega
 from fotismos.reports.run import audit_files
-from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.table import Table, markdown
 from fotismos.reports.terminal.words import number
 
 SHADERS = DOCS / "shaders"
@@ -63,7 +63,7 @@ def write() -> None:
          *(_cell(record.named(check)) for check in ARGUED))
         for name, record in engines.items()
     ]  # fmt: skip
-    replace("audit.md", "engines", markdown([("Form", *ARGUED), *rows]))
+    replace("audit.md", "engines", markdown(Table.of([("Form", *ARGUED), *rows])))
     write_table("lobes", _lobes(engines | bsdfs))
     head = "roughness", "N.V", "one reflection", "before", "after"
     cases = ((*case, *(f"{shown:.2f}" for shown in _three_js(*case))) for case in CASES)

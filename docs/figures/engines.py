@@ -36,7 +36,7 @@ from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.passes import passes
 from fotismos.reference.rendering.sums import Accumulator
 from fotismos.reports.files import images
-from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.table import Table, markdown
 from fotismos.reports.terminal.words import number, percent, seconds
 
 WIDTH = 192
@@ -237,7 +237,9 @@ def table(rows: Sequence[Measured]) -> Iterator[str]:
         time = median(one.time for one in own.values())
         prepare = median(one.prepare_s for one in own.values())
         lines.append((method.name, *cells, f"{time:.2f}", seconds(prepare) if prepare else "–"))
-    yield from markdown([("Approximation", *SCENES, "time", "preparation"), *lines], right=1)
+    yield from markdown(
+        Table.of([("Approximation", *SCENES, "time", "preparation"), *lines], right=1)
+    )
     yield ""
     yield (
         f"Pictures are {WIDTH} pixels wide. Times are from {ROUNDS} rounds on"
@@ -251,7 +253,7 @@ def bias(rows: Sequence[Measured]) -> Iterator[str]:
     for method in filter(lambda one: one.is_kernel, APPROXIMATIONS):
         own = {one.scene: one for one in rows if one.approximation == method.name}
         lines.append((method.name, *(_stops_of(own.get(scene)) for scene in SCENES)))
-    yield from markdown([("Approximation", *SCENES), *lines], right=1)
+    yield from markdown(Table.of([("Approximation", *SCENES), *lines]))
 
 
 def _stops_of(one: Measured | None) -> str:

@@ -14,7 +14,7 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.images import Comparison
 from fotismos.reference.scene.source import Source
-from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.table import Table, markdown
 
 SHADERS = DOCS / "shaders"
 NAMES = ("phong", "wrapped", "oren_nayar", "toon", "cook_torrance")
@@ -58,7 +58,7 @@ def _write_comparisons() -> None:
             if scene == PICTURED:
                 shown.append(comparison.images)
         rows.append(row)
-    replace("shaders.md", "shaders", markdown([("Shader", *SCENES), *rows]))
+    replace("shaders.md", "shaders", markdown(Table.of([("Shader", *SCENES), *rows])))
     row_of_pictures = [*(one.heuristic for one in shown), shown[0].reference]
     draw("shaders.png", pictures([*NAMES, "reference"], [row_of_pictures]))
 
@@ -110,7 +110,7 @@ def _write_spheres() -> None:
         rmse = record.metrics["rmse"].mean
         rows.append((link(name), light, *(f"{mean:.2f}" for mean in means), f"{rmse:.3f}"))
     head = "Shader", "Light", "all", "plastic", "gold", "RMSE"
-    replace("shaders.md", "spheres", markdown([head, *rows], right=2))
+    replace("shaders.md", "spheres", markdown(Table.of([head, *rows], right=2)))
     titles = "shader", "reference", LEADING.label
     labels = [*SPHERES.values()]
     drawn = sheet(titles, shown, labels, size=(2.88, 1.16), maps=len(shown))

@@ -41,7 +41,7 @@ def write() -> None:
     job = Job(Options(), with_causes=True)
     with TemporaryDirectory() as folder:
         Path(folder, TABLES).mkdir()  # where processes of a command wait for their turn
-        view, _ = scene.compare(SCENE, Path(folder), SCENE, job, lambda *_: None)
+        view, _ = scene.compared(SCENE, Path(folder), SCENE, job, lambda *_: None)
         files = {name: Path(folder, SCENE, f"{name}.png") for name in PANELS}
         pictures = {name: Image.open(file).convert("RGB") for name, file in files.items()}
     record = view.record

@@ -17,7 +17,7 @@ from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.records.departure import Verdict
 from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reports import verdict
-from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.table import Table, markdown
 from fotismos.reports.terminal.words import number, percent
 
 SCENE = "plastic-spheres"
@@ -115,7 +115,7 @@ def _lines(found: Sequence[Answers]) -> Iterator[str]:
     """Yield the table and what it shows."""
     head = "Pair", "fotismos: verdict, share, mistake", "FLIP, mean", "idiff, RMS"
     rows = [(one.pair, _said(one), number(one.flip), number(one.rms)) for one in found]
-    yield from markdown([head, *rows], right=2)
+    yield from markdown(Table.of([head, *rows], right=2))
     passed = [one for one in found if one.verdict == "pass"]
     named = [one for one in found if one.named]
     unnamed = [one.pair for one in found if one.verdict == "fail" and not one.named]

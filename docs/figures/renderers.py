@@ -10,7 +10,7 @@ from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.plain_scene import plain_scene
-from fotismos.reports.terminal.tables import markdown
+from fotismos.reports.terminal.table import Table, markdown
 
 SCENES = ("fig-8-9", "fig-8-8c", "lambert-sphere", "plastic-spheres")
 SIDE, SAMPLES = 192, 256
@@ -24,7 +24,11 @@ def write() -> None:
     for scene in SCENES:
         found[scene], cells = _rendered(scene)
         rows.append((scene, *cells))
-    replace("renderers.md", "renderers", markdown([("Scene", KERNEL, POVRAY, THREE), *rows]))
+    replace(
+        "renderers.md",
+        "renderers",
+        markdown(Table.of([("Scene", KERNEL, POVRAY, THREE), *rows])),
+    )
     programs = (KERNEL, POVRAY, THREE, MITSUBA)
     shown = [[found[scene][program] for scene in SCENES] for program in programs]
     draw("renderers.png", pictures(SCENES, shown))

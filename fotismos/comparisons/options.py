@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral, Real
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypedDict
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
 import msgspec
 from msgspec import Meta, inspect, structs
@@ -18,6 +18,15 @@ from fotismos.heuristic.errors import InputError, unknown
 if TYPE_CHECKING:  # the command line reads options without loading Dr.Jit
     from fotismos.comparisons.records.departure import Viewing
     from fotismos.heuristic.heuristics import Interpolation  # loaded late: help needs no Mitsuba
+
+    # Options take more than they keep: functions, mappings, arrays, a single name.
+    Shader: TypeAlias = Any
+    Definitions: TypeAlias = Any
+    Pictures: TypeAlias = Any
+else:
+    Shader = str
+    Definitions = dict[str, str]
+    Pictures = tuple[str, ...]
 
 LARGEST_SPP = 2**20
 """Samples per pixel: the noise is a thousandth of one sample's, and an image takes days."""
@@ -34,13 +43,46 @@ Density = Annotated[float, Meta(ge=1, le=1000)]  # records.departure.MOST_PIXELS
 ToneMapName = Literal["reinhard", "aces", "agx", "neutral"]  # departure.tone_maps.TONE_MAPS
 
 
-def _help(description: str, default: str = "") -> Meta:
-    """Describe an option; ``default`` is what None stands for."""
-    return Meta(description=description, extra={"default": default} if default else None)
+def option(description: str, **more: Any) -> Meta:
+    """Describe a field of a declaration, from which an option of a command derives.
+
+    ``default`` says what None stands for. On the command line the option has the ``names``, by
+    default the field's own; its value is a ``metavar``, of click's ``type``.
+    """
+    return Meta(description=description, extra=more)
+
+
+class Declaration(msgspec.Struct, frozen=True, kw_only=True):
+    """A type whose fields carry their help and bounds.
+
+    Options of commands, arguments of functions and tables of files derive from it. A value that is
+    not allowed raises :class:`InputError`.
+    """
+
+    def __post_init__(self) -> None:
+        for field in structs.fields(self):
+            if field.type is Any:
+                continue
+            value = _plain(field.name, getattr(self, field.name))
+            try:
+                value = msgspec.convert(value, field.type, dec_hook=_built)
+            except msgspec.ValidationError:
+                raise _refusal(field.name, value, field.type) from None
+            structs.force_setattr(self, field.name, value)
+
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Self:
+        """Return the declaration with the values of a mapping, in which None means the default.
+
+        An unknown name, or a value that is not allowed, raises :class:`InputError`.
+        """
+        if others := sorted(set(given) - set(cls.__struct_fields__)):
+            raise unknown("option", others[0], sorted(cls.__struct_fields__))
+        return cls(**{name: value for name, value in given.items() if value is not None})
 
 
 class Options(
-    msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True
+    Declaration, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True
 ):
     """The options of a comparison, as the command line names them; None leaves one to the scene.
 
@@ -51,116 +93,134 @@ class Options(
 
     variant: Annotated[
         Variant | None,
-        _help("Mitsuba variant.", "llvm_ad_rgb, or llvm_ad_spectral for a scene with tabulated"
-              " spectra"),
-    ] = None  # fmt: skip
+        option(
+            "Mitsuba variant.",
+            default="llvm_ad_rgb, or llvm_ad_spectral for a scene with tabulated spectra",
+            names=("-m", "--variant"),
+        ),
+    ] = None
     heuristic_variant: Annotated[
         Variant | None,
-        _help("Variant of the textbook half, such as RGB shading of a spectral scene.",
-              "the scene's own, else `variant`"),
-    ] = None  # fmt: skip
-    seed: Annotated[Seed, _help("Seed of the run, from which each pass derives its own.")] = 0
+        option(
+            "Variant of the textbook half, such as RGB shading of a spectral scene.",
+            default="the scene's own, else `variant`",
+        ),
+    ] = None
+    seed: Annotated[Seed, option("Seed of the run, from which each pass derives its own.")] = 0
     spp: Annotated[
-        Samples | None,
-        _help("Samples per pixel, over all passes.", "the plan's"),
+        Samples | None, option("Samples per pixel, over all passes.", default="the plan's")
     ] = None
     noise: Annotated[
         Error | None,
-        _help("Continue until 95 % of pixels have noise under this ΔE2000, up to `spp` samples per"
-              " pixel, or 4096."),
-    ] = None  # fmt: skip
-    resolution: Annotated[tuple[Side, Side] | None, _help("Width and height.", "the film's")] = None
+        option(
+            "Continue until 95 % of pixels have noise under this ΔE2000, up to `spp` samples per"
+            " pixel, or 4096.",
+            metavar="DE",
+        ),
+    ] = None
+    resolution: Annotated[
+        tuple[Side, Side] | None, option("Width and height.", default="the film's", metavar="WxH")
+    ] = None
     heuristic: Annotated[
-        str,
-        _help("The textbook shading: phong, blinn, one that engines use (such as shadow-map), one"
-              " that a package declares, or a function shade(point) in a file."),
-    ] = "phong"  # fmt: skip
+        Shader,
+        option(
+            "The textbook shading: phong, blinn, one that engines use (such as shadow-map), one"
+            " that a package declares, or a function shade(point) in a file.",
+            metavar="NAME|FILE.py[:FUNCTION]|FILE.glsl",
+        ),
+    ] = "phong"
     interpolation: Annotated[
         Literal["flat", "gouraud", "phong"] | None,
-        _help("Shading of polygons in the textbook half.", "the scene's own, else phong"),
+        option("Shading of polygons in the textbook half.", default="the scene's own, else phong"),
     ] = None
     tessellation: Annotated[
         Fineness | None,
-        _help("Mesh the shapes of the textbook half: N edges per quarter turn or straight side.",
-              "the scene's own, else 16 for flat and gouraud"),
-    ] = None  # fmt: skip
+        option(
+            "Mesh the shapes of the textbook half: N edges per quarter turn or straight side.",
+            default="the scene's own, else 16 for flat and gouraud",
+            metavar="N",
+        ),
+    ] = None
     vertex_weights: Annotated[
         VertexWeights | None,
-        _help("How much a face counts in its vertices' normals (6.32 to 6.34); the shapes of the"
-              " textbook half become meshes with such normals.",
-              "the scene's own, else a mesh's normals, or angle if it has none"),
-    ] = None  # fmt: skip
-    everything: Annotated[bool, _help("Simulate every effect, and leave out nothing.")] = False
+        option(
+            "How much a face counts in its vertices' normals (6.32 to 6.34); the shapes of the"
+            " textbook half become meshes with such normals.",
+            default="the scene's own, else a mesh's normals, or angle if it has none",
+        ),
+    ] = None
+    everything: Annotated[bool, option("Simulate every effect, and leave out nothing.")] = False
     pairing: Annotated[
-        Literal["literal", "matched"], _help("How roughplastic and phong are paired.")
+        Literal["literal", "matched"], option("How roughplastic and phong are paired.")
     ] = "matched"
     define: Annotated[
-        dict[str, str],
-        _help(
-            "Values of a scene file's placeholders $NAME, or of the arguments of a script's scene."
+        Definitions,
+        option(
+            "Values of a scene file's placeholders $NAME, or of the arguments of a script's scene.",
+            metavar="NAME=VALUE",
+            names=("-D",),
         ),
     ] = {}
-    sensor: Annotated[Sensor, _help("Which sensor of the scene, from 0.")] = 0
+    sensor: Annotated[Sensor, option("Which sensor of the scene, from 0.", metavar="N")] = 0
     allow_empty: Annotated[
-        bool, _help("Accept pictures in which no pixel sees a surface, or none sees light.")
+        bool, option("Accept pictures in which no pixel sees a surface, or none sees light.")
     ] = False
     image: Annotated[
-        tuple[str, ...],
-        _help("A picture of the scene (.exr, FILE.exr:LAYER, .png, .jpg, .hdr, .pfm, .npy) that"
-              " replaces the textbook half, or a pattern of several in quotes: repeats, which show"
-              " its noise."),
-    ] = ()  # fmt: skip
+        Pictures,
+        option(
+            "A picture of the scene (.exr, FILE.exr:LAYER, .png, .jpg, .hdr, .pfm, .npy) that"
+            " replaces the textbook half, or a pattern of several in quotes: repeats, which show"
+            " its noise.",
+            metavar="FILE",
+            names=("-t", "--image"),
+        ),
+    ] = ()
     reference: Annotated[
-        tuple[str, ...],
-        _help("A picture in place of the physical half, such as of another path tracer, or a"
-              " pattern of repeats."),
-    ] = ()  # fmt: skip
+        Pictures,
+        option(
+            "A picture in place of the physical half, such as of another path tracer, or a"
+            " pattern of repeats.",
+            metavar="FILE",
+            names=("-r", "--reference"),
+        ),
+    ] = ()
     mask: Annotated[
         str | None,
-        _help("A picture that says which pixels count: those that are not black in it."),
+        option(
+            "A picture that says which pixels count: those that are not black in it.",
+            metavar="FILE",
+        ),
     ] = None
     transfer: Annotated[
         Literal["linear", "srgb"] | None,
-        _help("Transfer function of the pictures.", "the file's own: sRGB for .png and .jpg"),
+        option(
+            "Transfer function of the pictures.", default="the file's own: sRGB for .png and .jpg"
+        ),
     ] = None
     over: Annotated[
         str | None,
-        _help("What lies behind a picture with alpha: black, white, or R,G,B in linear numbers."),
+        option("What lies behind a picture with alpha: black, white, or R,G,B in linear numbers."),
     ] = None
     tone_map: Annotated[
         ToneMapName | None,
-        _help("The curve by which the picture was tone-mapped; the reference is shown by it, too.",
-              "none: the picture is linear light"),
-    ] = None  # fmt: skip
+        option(
+            "The curve by which the picture was tone-mapped; the reference is shown by it, too.",
+            default="none: the picture is linear light",
+        ),
+    ] = None
     pixels_per_degree: Annotated[
-        Density | None, _help("FLIP: pixels per degree of vision.", "67")
+        Density | None, option("FLIP: pixels per degree of vision.", default="67", metavar="N")
     ] = None
     colour_science: Annotated[
-        bool, _help("Compute all colour differences with colour-science, which takes longer.")
+        bool, option("Compute all colour differences with colour-science, which takes longer.")
     ] = False
 
     def __post_init__(self) -> None:
-        for field in structs.fields(self):
-            value = _plain(field.name, getattr(self, field.name))
-            try:
-                value = msgspec.convert(value, field.type)
-            except msgspec.ValidationError:
-                raise _refusal(field.name, value, field.type) from None
-            structs.force_setattr(self, field.name, value)
+        super().__post_init__()
         if self.image and self.heuristic != "phong":
             raise InputError(
                 f"heuristic {self.heuristic} and image {self.image[0]}: give one of them."
             )
-
-    @classmethod
-    def of(cls, given: Mapping[str, Any]) -> Options:
-        """Return the options in a mapping, in which None means the default.
-
-        An unknown name, or a value that is not allowed, raises :class:`InputError`.
-        """
-        if others := sorted(set(given) - set(cls.__struct_fields__)):
-            raise unknown("option", others[0], sorted(cls.__struct_fields__))
-        return cls(**{name: value for name, value in given.items() if value is not None})
 
     def changed(self, **changes: Any) -> Options:
         """Return the options with some of them changed."""
@@ -224,36 +284,9 @@ class Options(
                 raise InputError(f"{what} renders what {files[0]} would replace. Omit `{name}`.")
 
 
-class OptionValues(TypedDict, total=False):
-    """What :class:`Options` takes, so that editors complete it; each option says what it means.
-
-    ``heuristic`` may also be a function of a point, or a ``Heuristic``. ``image`` and ``reference``
-    may be a name, a NumPy array (H, W, 3) of linear colours, or several of them.
-    """
-
-    variant: Variant | None
-    heuristic_variant: Variant | None
-    seed: int
-    spp: int | None
-    noise: float | None
-    resolution: tuple[int, int] | None
-    heuristic: Any
-    interpolation: Literal["flat", "gouraud", "phong"] | None
-    tessellation: int | None
-    vertex_weights: VertexWeights | None
-    everything: bool
-    pairing: Literal["literal", "matched"]
-    define: Mapping[str, str]
-    sensor: int
-    allow_empty: bool
-    image: Any
-    reference: Any
-    mask: str | None
-    transfer: Literal["linear", "srgb"] | None
-    over: str | None
-    tone_map: ToneMapName | None
-    pixels_per_degree: float | None
-    colour_science: bool
+def _built(kind: type, value: Any) -> Any:
+    """Return a value as a type that JSON has not, such as a path."""
+    return kind(value)
 
 
 def _plain(name: str, value: Any) -> Any:
@@ -286,8 +319,9 @@ def _refusal(name: str, value: object, kind: Any) -> InputError:
         case inspect.IntType():
             give = f"a whole number from {allowed.ge} to {allowed.le}"
         case inspect.FloatType():
-            low = "above 0" if allowed.ge is None else f"from {allowed.ge}"
-            give = f"a number {low} to {allowed.le}"
+            low = f"above {allowed.gt}" if allowed.ge is None else f"from {allowed.ge}"
+            high = f"to {allowed.le}" if allowed.lt is None else f"and below {allowed.lt}"
+            give = f"a number {low} {high}"
         case inspect.TupleType():
             give = "width and height, whole numbers of at least 1"
         case inspect.BoolType():

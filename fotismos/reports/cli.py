@@ -10,7 +10,7 @@ import signal
 import sys
 from importlib import import_module
 from itertools import chain
-from typing import Any, cast
+from typing import Any, ClassVar, Literal
 
 import click
 from click.shell_completion import get_completion_class
@@ -20,7 +20,8 @@ from fotismos.comparisons.processes import interruption
 from fotismos.heuristic import llvm
 from fotismos.heuristic.errors import FotismosError, InstallationError, suggestion
 from fotismos.heuristic.program import __version__, program
-from fotismos.reports import jobs
+from fotismos.reports.command import Command, Helped, click_command, help_of
+from fotismos.reports.jobs import Terminal
 from fotismos.reports.terminal.words import echo
 
 COMMANDS = {
@@ -31,60 +32,54 @@ COMMANDS = {
 }
 """The commands by groups of the help; most are a module of `fotismos.reports.commands`."""
 
-DOCTOR_TIMEOUT_S = 300
-"""Seconds for a test rendering, which takes about ten if no kernel is compiled yet."""
-
 COMPLETION = "_FOTISMOS_COMPLETE"
 """Environment variable with which a shell requests completions."""
 
 
-@jobs.command()
-def scenes() -> None:
+class Scenes(Command, frozen=True):
     """List the built-in scenes, each with a sentence.
 
-    \b
-    Examples:
+    Examples
+    --------
       fotismos scenes
       fotismos scenes | grep sphere
-    """  # noqa: D301 click reads the \b as: keep these lines
-    width = max(map(len, SCENES))
-    for scene in SCENES.values():
-        click.echo(f"{scene.name:<{width}}  {scene.title}")
+    """
+
+    def run(self, terminal: Terminal) -> int:
+        """Print the scenes."""
+        width = max(map(len, SCENES))
+        for scene in SCENES.values():
+            click.echo(f"{scene.name:<{width}}  {scene.title}")
+        return 0
 
 
-@jobs.command()
-@click.argument("shell", type=click.Choice(("bash", "zsh", "fish")))
-@click.pass_context
-def completion(context: click.Context, shell: str) -> None:
+class Completion(Command, frozen=True):
     """Print a script with which a shell completes commands, options and scenes.
 
-    \b
     Examples, for this session or a shell's start file:
       source <(fotismos completion bash)
       fotismos completion fish | source
     In bash, for the run script of a copy of the project, from its folder:
       source <(./run completion bash); complete -o nosort -F _fotismos_completion ./run
-    """  # noqa: D301 click reads the \b as: keep these lines
-    completer = get_completion_class(shell)
-    assert completer is not None, "click knows these shells"
-    script = completer(context.find_root().command, {}, "fotismos", COMPLETION)
-    # Not .source(), which starts a bash to look at its version.
-    click.echo(script.source_template % script.source_vars())
+    """
+
+    argument = "{bash|zsh|fish}"
+    shell: Literal["bash", "zsh", "fish"]
+
+    def run(self, terminal: Terminal) -> int:
+        """Print the script."""
+        completer = get_completion_class(self.shell)
+        assert completer is not None, "click knows these shells"
+        script = completer(cli, {}, "fotismos", COMPLETION)
+        # Not .source(), which starts a bash to look at its version.
+        click.echo(script.source_template % script.source_vars())
+        return 0
 
 
-@jobs.command()
-def doctor() -> None:
-    """Check the installation: versions, LLVM, OpenGL, a rendering in each variant, metrics.
-
-    \b
-    Examples:
-      fotismos doctor
-    """  # noqa: D301 click reads the \b as: keep these lines
-    jobs.work("doctor", jobs.pool(DOCTOR_TIMEOUT_S))
-
-
-class Group(jobs.Helped, click.Group):
+class Group(Helped, click.Group):
     """The commands in groups; a module is imported when its command is looked up."""
+
+    own: ClassVar[dict[str, type[Command]]] = {"scenes": Scenes, "completion": Completion}
 
     def list_commands(self, context: click.Context) -> list[str]:
         """Return the names in the order of the groups."""
@@ -95,9 +90,12 @@ class Group(jobs.Helped, click.Group):
         # Only a name in COMMANDS may reach the import: other words come from the user.
         if name not in self.list_commands(context) or name in self.commands:
             return self.commands.get(name)
-        return cast(
-            click.Command, getattr(import_module(f"fotismos.reports.commands.{name}"), name)
-        )
+        kind = self.own.get(name)
+        if kind is None:
+            module = import_module(f"fotismos.reports.commands.{name}")
+            kind = getattr(module, name.capitalize())
+        self.commands[name] = click_command(kind, name)
+        return self.commands[name]
 
     def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the options, and the commands with their whole summaries."""
@@ -119,17 +117,11 @@ class Group(jobs.Helped, click.Group):
         return super().resolve_command(context, arguments)
 
 
-@click.group(
-    cls=Group,
-    commands=[scenes, completion, doctor],
-    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-)
-@click.version_option(__version__, prog_name="fotismos")
-def cli() -> None:
+def _start() -> None:
     """Textbook shading against physically based rendering, scene by scene.
 
-    \b
-    Examples:
+    Examples
+    --------
       fotismos compare fig-8-9              how far, where, and is it more than noise?
       fotismos compare my_scene.xml         the same for your own Mitsuba scene
       fotismos plan cornell-box             which effects does it need?
@@ -138,13 +130,21 @@ def cli() -> None:
       fotismos report                       all built-in scenes in one page
 
     Colours and bars appear only on terminals; NO_COLOR=1 switches colours off.
-    """  # noqa: D301 click reads the \b as: keep these lines
+    """
     llvm.require_libraries()
     if sys.flags.optimize > 1:
         raise InstallationError(
             f"Python is at level {sys.flags.optimize} of optimisation, without the docstrings that"
             " Altair needs for charts. Unset PYTHONOPTIMIZE and omit -OO; level 1 is allowed."
         )
+
+
+cli = Group(
+    callback=_start,
+    help=help_of(_start.__doc__),
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+click.version_option(__version__, prog_name="fotismos")(cli)
 
 
 def main() -> None:

@@ -75,18 +75,21 @@ COSTS: Terms = {
     ("per sample",): "The time that each further sample per pixel adds to an image.",
     ("method",): "A way to render the scene, from flat shading to all light transport.",
     ("samples",): "Samples per pixel: camera rays whose mean is the pixel’s colour.",
-    ("of the kernel’s per sample",): (
+    ("x kernel", "x kernel there"): (
         "The time of a sample over that of one of the textbook kernel’s: about the same on any"
         " machine, even a busy one."
     ),
     ("overhead",): "The part of an image’s time that does not depend on its samples.",
     ("first image",): "It also traces and compiles the program.",
     ("passes at",): "The ΔE2000 that 5 % of the pixels exceed: the method passes from there on.",
-    ("too close to call",): "Other methods of the front whose time and error may be the same.",
+    ("front",): (
+        "No other method is both faster and better. Too close to call: methods of the front whose"
+        " time and error may be the same."
+    ),
     ("error against time",): (
         "Each point is a method with a number of samples. Further left is faster, lower is better."
     ),
-    ("what each effect removes", "what each effect removes and adds", "removes"): (
+    ("what each effect removes", "what each effect removes and adds", "removed"): (
         "The mean ΔE2000 that simulating the effect removes: a Shapley value, the mean over all"
         " orders of adding the effects."
     ),
@@ -94,11 +97,8 @@ COSTS: Terms = {
         "The extra time that an image’s samples take with the effect: by kernels, or by plans that"
         " add the effects in this order and in the reverse one."
     ),
-    ("first",): "ΔE2000 removed if the effect is added before all others.",
+    ("alone",): "ΔE2000 removed if the effect is added before all others.",
     ("last",): "ΔE2000 removed if the effect is added after all others.",
-    ("left", "left with all"): (
-        "ΔE2000 that remains with all effects: 0 apart from noise, or some effect is missing."
-    ),
     ("compilation",): "Time to turn the rendering program into machine code.",
     ("per pass, median",): "A pass is one image with a part of the samples.",
 }

@@ -10,35 +10,32 @@ Programs use the same functions, which return records. One runs at a time, other
 threads. Each leaves Mitsuba's variant as it was.
 """
 
+import inspect
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import wraps
 from html import escape
 from pathlib import Path
 from threading import RLock
-from typing import Any, ParamSpec, TypeVar, Unpack
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
 import fotismos.comparisons.compare
-from fotismos.comparisons.audit.checks import Audit, Kind
+from fotismos.comparisons.audit.checks import Audit as AuditRecord
+from fotismos.comparisons.audit.checks import Kind
 from fotismos.comparisons.audit.checks import audit as examined
-from fotismos.comparisons.case import RGB, Scene, open_case
-from fotismos.comparisons.check.moved import LEVEL
+from fotismos.comparisons.case import RGB, open_case
 from fotismos.comparisons.compare import compare_pictures
-from fotismos.comparisons.cost.cost import cost as study
-from fotismos.comparisons.cost.engine import front_of_pictures
 from fotismos.comparisons.cost.methods import declare as declare_method
-from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
+from fotismos.comparisons.cost.timed_pictures import TimedPicture
 from fotismos.comparisons.departure.metrics import Metric
 from fotismos.comparisons.departure.metrics import declare as declare_metric
-from fotismos.comparisons.fit.fit import fit as fit_parameters
 from fotismos.comparisons.names import as_files, with_files
-from fotismos.comparisons.options import Options, OptionValues
-from fotismos.comparisons.pictures import require_no_scene
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.records.check import CheckRecord
-from fotismos.comparisons.records.cost import Cost, Method
+from fotismos.comparisons.records.cost import Cost as CostRecord
+from fotismos.comparisons.records.cost import Method
 from fotismos.comparisons.records.engine import EngineCost
 from fotismos.comparisons.records.fit import FitRecord
 from fotismos.comparisons.records.images import Comparison, PixelTerms
@@ -54,6 +51,11 @@ from fotismos.reference.scene.graph import set_variant
 from fotismos.reports import verdict
 from fotismos.reports.charts import figures
 from fotismos.reports.ci import baselines, checks
+from fotismos.reports.command import OnScene
+from fotismos.reports.commands.check import Baseline
+from fotismos.reports.commands.compare import Compare
+from fotismos.reports.commands.cost import Cost
+from fotismos.reports.commands.fit import Fit
 from fotismos.reports.page import page
 from fotismos.reports.run.scene_files import view_of
 from fotismos.reports.terminal.plan_lines import PlanReport, plan_report
@@ -72,6 +74,7 @@ DENSITY = 130
 _running = RLock()
 
 Arguments = ParamSpec("Arguments")
+Asked = TypeVar("Asked")
 Result = TypeVar("Result")
 
 
@@ -85,6 +88,34 @@ def _alone(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]
             return function(*arguments, **options)
 
     return call
+
+
+def _asked_as(
+    kind: Callable[Arguments, Asked],
+) -> Callable[[Callable[[Asked], Result]], Callable[Arguments, Result]]:
+    """Let a function of a command take what the command's declaration takes.
+
+    Pictures may be arrays (H, W, 3) of linear colours, too.
+    """
+    declaration: Any = kind
+    declared = inspect.signature(declaration)
+
+    def decorated(function: Callable[[Asked], Result]) -> Callable[Arguments, Result]:
+        def call(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
+            given = dict(declared.bind_partial(*arguments).arguments)
+            values, arrays = _with_names(given | options, PICTURED)
+            if isinstance(values.get("pictures"), Mapping):
+                values["pictures"], more = _settings(values["pictures"])
+                arrays |= more
+            with as_files(arrays):
+                return function(declaration.of(values))
+
+        returned = inspect.signature(function).return_annotation
+        shown: Any = wraps(function)(call)
+        shown.__signature__ = declared.replace(return_annotation=returned)
+        return _alone(shown)
+
+    return decorated
 
 
 @dataclass(frozen=True)
@@ -124,13 +155,8 @@ class Shown:
         return terms
 
 
-@_alone
-def compare(
-    scene: Any = None,
-    name: str | None = None,
-    why: bool = True,
-    **options: Unpack[OptionValues],
-) -> Shown:
+@_asked_as(Compare)
+def compare(asked: Compare) -> Shown:
     """Compare a scene as ``fotismos compare`` does.
 
     ``scene`` is a built-in name, the path of a file (.xml, .py), a dictionary for
@@ -144,16 +170,14 @@ def compare(
     `InputError` for a scene or an option that is not allowed, `NonFiniteError` for a NaN or an
     infinity in a rendering, and `InstallationError` if a library is missing.
     """
-    values, arrays = _with_names(options, PICTURED)
-    with as_files(arrays):
-        chosen = with_files(Options.of(values))
-        if scene is None and chosen.image and chosen.reference:
-            comparison = compare_pictures(chosen, name or "picture")
-        else:
-            case = open_case(scene, chosen, name)
-            comparison = fotismos.comparisons.compare.compare(
-                case.source, case.options, command=case.command(), then=steps(why=why)
-            )
+    chosen = with_files(asked.options)
+    if asked.scene is None and chosen.image and chosen.reference:
+        comparison = compare_pictures(chosen, asked.name or "picture")
+    else:
+        case = open_case(asked.scene, chosen, asked.name)
+        comparison = fotismos.comparisons.compare.compare(
+            case.source, case.options, command=case.command(), then=steps(why=asked.why)
+        )
     return Shown(comparison, page.render([view_of(comparison)]))
 
 
@@ -178,54 +202,13 @@ def _with_names(
     return values, arrays
 
 
-@_alone
-def plan(scene: Scene, name: str | None = None, **options: Unpack[OptionValues]) -> PlanReport:
-    """Return which effects a scene needs, and what will be simulated.
-
-    Arguments and errors are those of :func:`compare`; only the plan's probe is rendered.
-    """
-    case = open_case(scene, Options.of(options), name)
-    return plan_report(case.name, prepare(case.source, case.options), case.variant)
-
-
-@_alone
-def cost(
-    scene: Any = None,
-    name: str | None = None,
-    at: tuple[int, int] | None = None,
-    measure: bool = False,
-    pictures: Mapping[str, Any] | None = None,
-    machine: str = "",
-    kernel_time: str | None = None,
-    **options: Unpack[OptionValues],
-) -> Cost | EngineCost:
-    """Return what each step of accuracy costs: seconds and ΔE2000 by method and samples.
-
-    ``at`` is a width and height in pixels to predict for, where ``measure`` also measures. ``spp``
-    is the largest number of samples. It takes about a minute. ``pictures`` are settings of another
-    renderer, ``{"name @ 1.2ms": picture}``: a file, a pattern, an array (H, W, 3) of linear
-    colours, or several of them. ``machine`` and ``kernel_time`` are what their times are of, as in
-    the command. With a ``reference``, no scene is needed. Other arguments and errors are those of
-    :func:`compare`.
-    """
-    values, arrays = _with_names(options, PICTURED)
+def _settings(words: Mapping[str, Any]) -> tuple[list[TimedPicture], dict[str, Any]]:
+    """Return settings, ``NAME @ TIME`` with a picture or several, and the arrays by their names."""
     # Names of settings may be anything: arrays are called by their numbers.
-    words = pictures or {}
     shots = {f"picture {number}": shot for number, shot in enumerate(words.values(), start=1)}
-    shots, more = _with_names(shots, tuple(shots))
+    shots, arrays = _with_names(shots, tuple(shots))
     settings = [_setting(word, shot) for word, shot in zip(words, shots.values(), strict=True)]
-    times = EngineTimes.given(settings, machine, kernel_time)
-    with as_files(arrays | more):
-        chosen = Options.of(values)
-        if scene is None and chosen.reference and times:
-            of_scenes = {"at": at, "measure": measure, "kernel_time": kernel_time}
-            require_no_scene(chosen, [word for word, value in of_scenes.items() if value])
-            return front_of_pictures(chosen, times, name or "pictures").record
-        case = open_case(scene, chosen, name)
-        command = case.command("cost", **(times.as_options() if times else {}))
-        return study(
-            case.source, case.options, None, None, command, at, measure, engine_times=times
-        ).record
+    return settings, arrays
 
 
 def _setting(word: str, picture: str | Path | list[str]) -> TimedPicture:
@@ -236,41 +219,57 @@ def _setting(word: str, picture: str | Path | list[str]) -> TimedPicture:
     return replace(TimedPicture.of(f"{word}={names[0]}"), patterns=tuple(names))
 
 
-@_alone
-def fit(
-    scene: Scene, name: str | None = None, loss: str = "perceptual", **options: Unpack[OptionValues]
-) -> FitRecord:
+@_asked_as(OnScene)
+def plan(asked: OnScene) -> PlanReport:
+    """Return which effects a scene needs, and what will be simulated.
+
+    Arguments and errors are those of :func:`compare`; only the plan's probe is rendered.
+    """
+    case = open_case(asked.scene, asked.options, asked.name)
+    return plan_report(case.name, prepare(case.source, case.options), case.variant)
+
+
+@_asked_as(Cost)
+def cost(asked: Cost) -> CostRecord | EngineCost:
+    """Return what each step of accuracy costs: seconds and ΔE2000 by method and samples.
+
+    ``at`` is a width and height in pixels to predict for, where ``measure`` also measures. ``spp``
+    is the largest number of samples, ``rounds`` how often each method is timed. It takes about a
+    minute. ``pictures`` are settings of another renderer, ``{"name @ 1.2ms": picture}``: a file, a
+    pattern, an array (H, W, 3) of linear colours, or several of them. ``machine`` and
+    ``kernel_time`` are what their times are of, as in the command. With a ``reference``, no scene
+    is needed. Other arguments and errors are those of :func:`compare`.
+    """
+    if asked.scene is None and asked.reference and asked.engine:
+        asked.require_no_scene()
+        return asked.judge(asked.name or "pictures").record
+    return asked.study(open_case(asked.scene, asked.options, asked.name)).record
+
+
+@_asked_as(Fit)
+def fit(asked: Fit) -> FitRecord:
     """Return the best heuristic parameters, and the error that remains.
 
     ``loss`` is ``perceptual``, the mean ΔE2000, or ``linear``, the squared difference of linear
-    colours. Other arguments and errors are those of :func:`compare`.
+    colours; ``form`` is that of the lobe. Other arguments and errors are those of :func:`compare`.
     """
-    values, arrays = _with_names(options, PICTURED)
-    with as_files(arrays):
-        case = open_case(scene, with_files(Options.of(values)), name)
-        command = case.command("fit")
-        return fit_parameters(case.source, case.options, loss, command=command).record
+    return asked.fit(asked.scene).record
 
 
-@_alone
-def check(baseline: str | Path, significance: float = LEVEL) -> CheckRecord:
+@_asked_as(Baseline)
+def check(asked: Baseline) -> CheckRecord:
     """Return whether the scene of a baseline's file moved from what was measured before.
 
     ``significance`` is the chance of a false alarm, above 0 and below 1. Raises `InputError` if the
     baseline or its scene cannot be read.
     """
-    if not isinstance(significance, (int, float)) or not 0 < significance < 1:
-        raise InputError(
-            f"significance = {significance!r} is not allowed. Give the chance of a false alarm: a"
-            f" number above 0 and below 1, such as {LEVEL:g}."
-        )
-    file = baselines.read(Path(baseline))
-    result, _ = checks.examine(file, file.open(), significance)
+    file = baselines.read(asked.baseline)
+    result, _ = checks.examine(file, file.open(), asked.significance)
     return result
 
 
 @_alone
-def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: Any) -> Audit:
+def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: Any) -> AuditRecord:
     """Return the checks of a heuristic, or of a type of BSDF, by itself.
 
     ``parameters`` are its own. Raises `InputError` for an unknown name or parameter.

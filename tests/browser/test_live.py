@@ -114,7 +114,13 @@ def test_the_page_shades_as_the_kernel_does(run, name):
     half = ready.heuristic
     points = pixel_terms.live(half, options)
     view = live_view(points)
-    start = plain({"materials": view.materials, "lights": view.lights, "is_flat": view.is_flat})
+    start = plain(
+        {
+            "materials": view.data["materials"],
+            "lights": view.data["lights"],
+            "is_flat": view.data["is_flat"],
+        }
+    )
     rng = np.random.default_rng(3)
     settings = [start, *(changed(rng, start) for _ in range(4)), start | {"is_flat": True}]
     data = {"live": view.manifest(), "text": view.grid.data, "settings": settings}
@@ -184,7 +190,7 @@ def test_sliders_lead_to_the_picture_of_a_scene_with_their_numbers(run):
     before, half, options = image_of(beam())
     points = pixel_terms.live(half, options)
     view = live_view(points)
-    owners = view.materials, view.lights
+    owners = view.data["materials"], view.data["lights"]
     names = [list(dict.fromkeys(one["name"] for one in several)) for several in owners]
     places = {name: place for each in names for place, name in enumerate(each)}
     texts = [

@@ -11,7 +11,7 @@ from fotismos.comparisons.study import design, running
 from fotismos.reports.page import page
 from fotismos.reports.page.page import Failure
 from fotismos.reports.run import audit_files, fit_files
-from fotismos.reports.work import study as work
+from fotismos.reports.run import study as work
 from tests.browser.conftest import Visitor, violations
 
 STUDY = """title = "Gloss"
@@ -31,7 +31,7 @@ BEYOND = "all => all.map((e) => e.getBoundingClientRect().right - innerWidth)"
 def audited(folder):
     file = folder / "index.html"
     sphere = {"rough metal": np.full((8, 8, 3), 0.5)}
-    file.write_text(audit_files.render(audit("bsdf", "roughconductor", {}), spheres=sphere))
+    file.write_text(audit_files.render(audit("bsdf", "roughconductor", {}), pictures=sphere))
     return file
 
 

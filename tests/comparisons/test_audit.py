@@ -23,6 +23,7 @@ from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import HEURISTICS
 from fotismos.heuristic.user_shaders import of_function
 from fotismos.reference.pairing import albedo, factors
+from fotismos.reports import sentences
 from fotismos.reports.run import audit_files
 from tests.shared.opengl import opengl
 from tests.shared.quadrature import dot, integral
@@ -394,13 +395,13 @@ def grey():
 
 
 def test_the_headline_and_the_page_name_every_failure(grey):
-    assert audit_files.headline(grey) == "diffuse, reflectance 0.5: white furnace does not hold"
+    assert sentences.of_audit(grey) == "diffuse, reflectance 0.5: white furnace does not hold"
     failed = [structs.replace(check, verdict="does not hold", value=2.0) for check in grey.checks]
     wrong = structs.replace(grey, checks=tuple(failed), faults=("nan (<i>)", "nan (there)"))
     html = audit_files.render(wrong)
     for check in grey.checks:
-        assert check.name in audit_files.headline(wrong)
-        assert f"{check.name.capitalize()}</th>" in html
+        assert check.name in sentences.of_audit(wrong)
+        assert f"{check.name}</span></th>" in html
     assert "nan (&lt;i&gt;)" in html
     assert "<i>" not in html
     assert "<script" not in html

@@ -24,8 +24,8 @@ from fotismos.comparisons.records.cost import Cost, Method
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Source
+from fotismos.reports import cost_tables
 from fotismos.reports.run import cost_files
-from fotismos.reports.terminal import cost_tables
 from fotismos.reports.terminal.words import as_typed
 from tests.shared.misplanned import scene as described
 from tests.shared.noisy import require_equal, whole

@@ -14,8 +14,8 @@ from fotismos.comparisons.departure.metrics import LEADING, METRICS
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.comparison import Deviations
 from fotismos.comparisons.records.departure import DEFAULT_VIEWING
+from fotismos.reports import tables
 from fotismos.reports.page import page
-from fotismos.reports.terminal import tables
 from tests.shared import records
 from tests.shared.misplanned import SKY, scene, sphere
 

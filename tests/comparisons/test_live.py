@@ -9,7 +9,7 @@ import pytest
 from fotismos.comparisons import pixel_terms
 from fotismos.reference.rendering.gbuffer import image_size, pixel_rays
 from fotismos.reference.rendering.renderer import variant
-from fotismos.reports.page.scene_view import LiveView
+from fotismos.reports.page.scene_view import PointsView
 from fotismos.reports.page.why_view import live_view
 from fotismos.reports.run import scene_files
 from tests.shared import records
@@ -63,7 +63,7 @@ def test_a_texture_of_many_colours_gives_factors(rgb):
     assert len(np.unique(k_d[seen])) > pixel_terms.MATERIALS
     view = live_view(points)
     stored = codes(view.grid)["k_d.x"].cumsum(axis=0, dtype=np.uint16) / 16383
-    found = view.tops["k_d.x"] * (2 * stored - 1)
+    found = view.data["tops"]["k_d.x"] * (2 * stored - 1)
     np.testing.assert_allclose(found[seen], k_d[seen], atol=1e-4)
 
 
@@ -93,10 +93,10 @@ def test_a_page_of_a_large_scene_stays_small():
 
 
 def test_what_a_fit_reached_stands_beside(tmp_path):
-    view = records.view(records.data(), live=LiveView())
+    view = records.view(records.data(), live=PointsView())
     fits = [{"departure": {"dE2000": {"after": mean}}} for mean in (3.0, 2.5)]
     fit = {"scene": "fig-8-9", "best": 1, "fits": fits, "resolution": [96, 48]}
-    assert scene_files.with_fit(view, tmp_path).live.fit is None
+    assert scene_files.with_fit(view, tmp_path).live.data.get("fit") is None
     for content, expected in (
         (fit, (2.5, 96, 48)),
         (fit | {"scene": "another"}, None),
@@ -104,6 +104,6 @@ def test_what_a_fit_reached_stands_beside(tmp_path):
         ([], None),
     ):
         (tmp_path / "fit.json").write_text(json.dumps(content))
-        assert scene_files.with_fit(view, tmp_path).live.fit == expected
+        assert scene_files.with_fit(view, tmp_path).live.data.get("fit") == expected
     (tmp_path / "fit.json").write_text("{")
-    assert scene_files.with_fit(view, tmp_path).live.fit is None
+    assert scene_files.with_fit(view, tmp_path).live.data.get("fit") is None

@@ -25,7 +25,7 @@ from fotismos.comparisons.records.departure import Viewing
 from fotismos.heuristic.errors import InputError, InstallationError, NonFiniteError
 from fotismos.reference.records import plain
 from fotismos.reference.rendering.finite import require_finite
-from fotismos.reports.work import doctor
+from fotismos.reports.run import doctor
 
 pytestmark = pytest.mark.usefixtures("computed_by")
 ALL = pytest.mark.parametrize("metric", METRICS.values(), ids=METRICS.keys())

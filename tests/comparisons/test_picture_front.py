@@ -98,7 +98,7 @@ def test_a_threshold_decides_what_looks_right(run, files):
     assert "Fastest that looks right: RTAO" in said
     assert "above 10" in said
     shown = (files / "out/cost/truth_0/index.html").read_text()
-    assert "above 10" in shown
+    assert "above <small>10</small>" in shown
     assert "--within 10<" in shown
     np.save("rtao.npy", darkened(view(), 0.2))
     assert run(*ALL)[1].startswith("No setting is sure to look right (at most 5 % of the pixels")

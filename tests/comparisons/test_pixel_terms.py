@@ -8,7 +8,6 @@ import pytest
 
 from fotismos.comparisons import pixel_terms
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.comparisons.records.images import TermMaterial
 from fotismos.reference.records import Missing
 from fotismos.reference.rendering.passes import passes
 from fotismos.reference.rendering.renderer import variant
@@ -80,15 +79,15 @@ def sum_of(grid):
 
 def total_of(view):
     """Add up the terms that the page holds, as its script does."""
-    planes = unpacked(view.grid, view.tops)
+    planes = unpacked(view.grid, view.data["tops"])
     material = planes["material"]
     image = np.zeros((*material.shape, 3))
-    for number, shown in enumerate(view.materials, 1):
-        found = TermMaterial(**shown)
+    for number, shown in enumerate(view.data["materials"], 1):
+        found = pixel_terms.TermMaterial(**shown)
         here = (material == number)[..., None]
         k_d, k_s = map(np.array, (found.k_d, found.k_s))
         value = np.add(found.k_i, np.multiply(found.ambient, found.k_a))
-        for place, light in enumerate(view.lights):
+        for place, light in enumerate(view.data["lights"]):
             of = {name: planes[f"{place}.{name}"][..., None] for name in
                   ("attenuation", "cos_incidence", "lobe")}  # fmt: skip
             diffuse = light["intensity"] * k_d * np.maximum(of["cos_incidence"], 0)

@@ -335,7 +335,7 @@ def test_the_command_writes_dataset_and_figures(run, tmp_path):
     code, printed, messages = run("study", file, "-o", out)
     assert (code, messages.splitlines()[-1]) == (0, "small: 4 of 4 points")
     assert dataset.read(out / "study/small/small.parquet").num_rows == 4
-    assert "least ΔE2000" in (out / "study/small/index.html").read_text(encoding="utf-8")
+    assert "mean ΔE2000: least" in (out / "study/small/index.html").read_text(encoding="utf-8")
     assert "<svg" in (out / "study/small/figures/lobe.svg").read_text()
     assert "4       0" in printed
     code, printed, _ = run("study", file, "-o", out)

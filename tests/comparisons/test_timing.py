@@ -11,7 +11,7 @@ from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
 from fotismos.reference.records import plain
 from fotismos.reference.scene.source import Source
-from fotismos.reports.terminal import tables
+from fotismos.reports import tables
 from fotismos.reports.terminal.words import number
 from tests.shared.misplanned import DIFFUSE, lamp, scene
 from tests.shared.parts import moved

@@ -17,7 +17,7 @@ from fotismos.comparisons.prepared import prepare
 from fotismos.heuristic import glsl, program, user_shaders
 from fotismos.heuristic.errors import InputError, InstallationError
 from fotismos.heuristic.heuristics import INPUTS, Heuristic, named
-from fotismos.reports.work import doctor
+from fotismos.reports.run import doctor
 from tests.shared.opengl import opengl
 from tests.shared.parts import camera
 from tests.shared.wrong_shaders import SHADERS, SMALL, image, require_sizes

@@ -1,11 +1,9 @@
 """The public door: `import fotismos`."""
 
 import shutil
-from typing import get_type_hints
 
 import pytest
 
-from fotismos.comparisons.options import Options, OptionValues
 from tests.shared.programs import ROOT, python
 
 LAZY = """
@@ -58,15 +56,6 @@ def test_a_changed_source_changes_the_digest_that_decides_on_reuse(file, tmp_pat
     after = python("-c", DIGEST, PYTHONPATH=str(tmp_path)).stdout
     assert len(before) == len(after) == 65
     assert before != after
-
-
-def test_editors_complete_the_options_that_there_are():
-    """All but what becomes another type as it is read: functions, mappings, single names."""
-    values = get_type_hints(OptionValues)
-    assert list(values) == list(Options.__struct_fields__)
-    for name, kind in get_type_hints(Options).items():
-        if name not in {"heuristic", "define", "image", "reference"}:
-            assert values[name] == kind, name
 
 
 def test_the_door_is_lazy_and_has_all_its_names():

@@ -11,7 +11,7 @@ from fotismos.heuristic import mitsuba_version
 from fotismos.heuristic.errors import InstallationError
 from fotismos.heuristic.program import __version__
 from fotismos.reports.ci import summary
-from fotismos.reports.work import doctor
+from fotismos.reports.run import doctor
 from tests.shared.programs import ROOT, command_line
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]

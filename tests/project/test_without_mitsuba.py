@@ -13,7 +13,8 @@ ROOTS = (
     "fotismos.comparisons.departure.definitions",
     "fotismos.reports.cli",
     "fotismos.reports.run.pictures",
-    "fotismos.reports.work.cost",
+    "fotismos.reports.commands.cost",
+    "fotismos.reports.run.cost_files",
 )
 """They import the others."""
 
@@ -62,7 +63,7 @@ from fotismos.reference.records import plain, to_json
 from fotismos.reports import verdict
 from fotismos.reports.files import images
 from fotismos.reports.page import embedding, page
-from fotismos.reports.terminal import tables
+from fotismos.reports import tables
 from tests.shared import records
 from tests.shared.two_pictures import measured, passes
 

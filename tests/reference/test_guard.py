@@ -9,9 +9,9 @@ from fotismos.comparisons.prepared import guarded
 from fotismos.reference.planning import guard
 from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.scene.source import Source
+from fotismos.reports import tables
 from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView
-from fotismos.reports.terminal import tables
 from tests.shared.misplanned import SCENES, SKY, lamp, prune_blindly, scene, sphere
 
 SLIGHTLY_WRONG = {"an anisotropic sphere"}

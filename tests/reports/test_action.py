@@ -6,8 +6,7 @@ import subprocess
 import pytest
 import yaml
 
-from fotismos.reports.commands.check import check
-from fotismos.reports.commands.compare import compare
+from fotismos.reports.cli import cli
 from tests.shared.programs import ROOT
 
 ACTION = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
@@ -64,8 +63,9 @@ def test_arguments_become_words_and_nothing_in_them_is_executed(run_step, tmp_pa
 def test_its_defaults_are_those_of_the_commands(run_step, tmp_path):
     code, said, _ = run_step(STEPS[1], ARGUMENTS="baselines")
     assert (code, said) == (3, ["check", "baselines", "-o", "out", "PYTHON="])
-    for command in (check, compare):
-        assert "-o" in {word for option in command.params for word in option.opts}
+    for name in ("check", "compare"):
+        params = cli.get_command(None, name).params
+        assert "-o" in {word for option in params for word in option.opts}
     assert run_step(STEPS[0])[0] == 0
     venv, key = (tmp_path / "outputs").read_text().splitlines()
     assert venv == f"venv={tmp_path / 'copy'}/.venv"

@@ -16,13 +16,12 @@ from msgspec import structs
 from fotismos.comparisons.check.measurement import MeasuredScene, measurement
 from fotismos.comparisons.check.moved import Check, differences, moved
 from fotismos.comparisons.departure.metrics import METRICS
-from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.check import HALVES, Move
 from fotismos.comparisons.records.departure import DEFAULT_VIEWING, VisibleShare
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.ci import checks, summary
-from fotismos.reports.jobs import Job
-from fotismos.reports.work import compare as work
+from fotismos.reports.commands.compare import Compare
+from fotismos.reports.jobs import Terminal
 from tests.shared import records
 from tests.shared.programs import command_line
 from tests.shared.schemas import schema
@@ -388,6 +387,6 @@ def test_a_junit_path_that_cannot_be_written_is_named_by_its_option(tmp_path):
 def test_files_for_ci_never_replace_a_picture_whatever_its_name_and_layer(tmp_path, layer):
     picture = tmp_path / "a:b.exr"
     picture.touch()
-    job = Job(options=Options(image=(f"{picture}{layer}",)))
+    command = Compare(image=f"{picture}{layer}", reference="theirs.exr")
     with pytest.raises(InputError, match="is an input of the same command"):
-        work.run(None, [], tmp_path, job, 5.0, picture, None, is_opened=False)
+        command.run(Terminal(output=tmp_path, junit=picture))

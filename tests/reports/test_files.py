@@ -12,8 +12,8 @@ from PIL import Image
 from fotismos.comparisons.departure import colour
 from fotismos.comparisons.departure.metrics import METRICS, RATIO, drawn
 from fotismos.reference.records import plain
+from fotismos.reports import tables
 from fotismos.reports.files import images
-from fotismos.reports.terminal import tables
 from tests.shared import records
 
 CONTRACT = {

@@ -3,8 +3,8 @@
 import pytest
 
 from fotismos.heuristic.errors import InputError
-from fotismos.reports.commands import check as commands
-from fotismos.reports.work import check
+from fotismos.reports.cli import cli
+from fotismos.reports.commands.check import Check
 from tests.shared.programs import command_line
 
 TABLE = """\
@@ -20,12 +20,15 @@ PICTURES = ("--picture", "hall=*.exr")
 
 @pytest.fixture
 def asked(tmp_path, monkeypatch):
-    """A function that runs ``check`` below a folder with a table; it returns what was asked."""
+    """A function that runs ``check`` below a folder with a table; it returns what was asked.
+
+    That is the command, and what its terminal has.
+    """
     below = tmp_path / "tests/scenes"
     below.mkdir(parents=True)
     monkeypatch.chdir(below)
     made = []
-    monkeypatch.setattr(check, "run", lambda pool, **arguments: made.append(arguments) or 0)
+    monkeypatch.setattr(Check, "run", lambda *asked: made.append(asked) or 0)
 
     def ask(table, *words):
         (tmp_path / "pyproject.toml").write_text(table)
@@ -37,25 +40,25 @@ def asked(tmp_path, monkeypatch):
 
 
 def test_the_table_sets_what_the_command_line_leaves_open(asked):
-    made = asked(TABLE, *PICTURES)
-    assert made["baseline"].as_posix() == "../../kept"
-    assert made["output"].as_posix() == "../../made"
-    assert (made["significance"], made["within"], made["max_visible"]) == (0.001, 3, 0.07)
+    made, terminal = asked(TABLE, *PICTURES)
+    assert made.baseline.as_posix() == "../../kept"
+    assert terminal.output.as_posix() == "../../made"
+    assert (made.significance, made.tolerance()) == (0.001, (3, 0.07))
     words = ("other", "-o", "out", "--significance", 0.1, "--within", 4, "--max-visible", "1%")
-    made = asked(TABLE, *words, *PICTURES)
-    assert (made["baseline"].name, made["output"].name) == ("other", "out")
-    assert (made["significance"], made["within"], made["max_visible"]) == (0.1, 4, 0.01)
+    made, terminal = asked(TABLE, *words, *PICTURES)
+    assert (made.baseline.name, terminal.output.name) == ("other", "out")
+    assert (made.significance, made.tolerance()) == (0.1, (4, 0.01))
 
 
 def test_a_tolerance_of_the_table_is_for_pictures_alone(asked):
-    made = asked(TABLE)
-    assert (made["within"], made["max_visible"]) == (None, None)
+    made, _ = asked(TABLE)
+    assert made.tolerance() is None
 
 
 @pytest.mark.parametrize("nearer", ["[tool.other]\nbaselines = 'no'", "tool = 3"])
 def test_nearer_files_without_the_table_are_passed_over(asked, tmp_path, nearer):
     (tmp_path / "tests/pyproject.toml").write_text(nearer)
-    assert asked(TABLE)["baseline"].name == "kept"
+    assert asked(TABLE)[0].baseline.name == "kept"
 
 
 @pytest.mark.parametrize(
@@ -74,7 +77,7 @@ def test_what_is_wrong_in_the_table_is_named_with_its_file(table, message, tmp_p
     monkeypatch.chdir(tmp_path)
     (tmp_path / "pyproject.toml").write_text(f"[tool.fotismos]\n{table}\n")
     with pytest.raises(InputError, match=message) as caught:
-        commands.check.make_context("check", ["kept"])
+        cli.get_command(None, "check").make_context("check", ["kept"])
     assert str(tmp_path / "pyproject.toml") in str(caught.value)
     assert command_line("check", "--help")[0] == 0
 

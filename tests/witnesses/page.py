@@ -7,7 +7,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.reports.terminal import tables
+from fotismos.reports.terminal.table import Table, markdown
 from tests.witnesses import test_closed_forms, test_povray, test_radiance
 from tests.witnesses.witness import deviation
 
@@ -39,7 +39,7 @@ def whole_scenes() -> Iterator[str]:
         spots = np.argmax(np.abs(found[0])), found[0].size + np.argmax(np.abs(found[1:]))
         cells = (f"{found.flat[spot]:+.3f}±{1.96 * error.flat[spot]:.3f}" for spot in spots)
         rows.append((name, *cells))
-    yield from tables.markdown(rows)
+    yield from markdown(Table.of(rows))
 
 
 def _figure(name: str) -> tuple[int, int, float]:

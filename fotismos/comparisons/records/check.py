@@ -220,17 +220,6 @@ class Move(Record):
         change = self.after - self.before
         return f"{100 * change / abs(self.before):+.2g} %" if self.before else f"{change:+.2g}"
 
-    def cells(self) -> tuple[str, ...]:
-        """Return cells of a table: name, from, to, standard errors and p-value."""
-        errors = self.standard_errors
-        return (
-            self.name,
-            f"{self.before:.6g}",
-            f"{self.after:.6g}",
-            "no noise" if errors is None else f"{errors:+.1f}",
-            f"{self.p_corrected:.1g}",
-        )
-
 
 class SmallestChanges(Record):
     """The smallest changes that a check catches with the chance `power`, in linear R, G, B.

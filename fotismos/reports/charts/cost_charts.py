@@ -13,7 +13,7 @@ from scipy.optimize import isotonic_regression
 from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.records.engine import Engine, EngineCost
 from fotismos.reports.charts.vega import FAINT, Spec, specification
-from fotismos.reports.terminal.cost_tables import OWN_FRONT, stated
+from fotismos.reports.sentences import OWN_FRONT, stated
 from fotismos.reports.terminal.words import number
 
 if TYPE_CHECKING:  # pictures without a scene need no Mitsuba

@@ -197,13 +197,8 @@ def _before(made: CheckRecord, before: baselines.Kept, after: baselines.Kept) ->
         error = f"{caption}, {LEADING.label} between them, 0 to {LARGEST_ERROR:g}"
         shown[error] = images.error_map(errors[name], LARGEST_ERROR)
     return Before(
-        name=made.name,
-        headline=made.headline,
-        sentences=tuple(filter(None, (*made.causes, made.versions_line))),
-        moved=tuple(move.cells() for move in made.moved or ()),
-        tested=made.tested or 0,
+        check=made,
         pictures={name: images.webp(picture, lossless=True) for name, picture in shown.items()},
-        command=made.update_command,
     )
 
 

@@ -7,8 +7,10 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import click
 
 from fotismos.comparisons import atomic
 from fotismos.comparisons.departure.criterion import TOLERANCE
@@ -17,20 +19,20 @@ from fotismos.comparisons.records.comparison import ComparisonRecord
 from fotismos.comparisons.records.departure import Verdict, VisibleShare
 from fotismos.heuristic.errors import FotismosError, InputError, OutputError
 from fotismos.reports import verdict
-from fotismos.reports.terminal.tables import escaped, markdown, printed
-from fotismos.reports.terminal.words import number, percent, visible
+from fotismos.reports.tables import SHOWN, certainty, moved
+from fotismos.reports.terminal.table import Column, Table, escaped, markdown, printed
+from fotismos.reports.terminal.words import echo, is_quiet, number, percent, tell, visible
 
 if TYPE_CHECKING:
-    from fotismos.comparisons.records.check import CheckRecord
+    from fotismos.comparisons.records.check import CheckRecord, Move
+    from fotismos.reports.jobs import Terminal
+    from fotismos.reports.page.scene_view import SceneView
 
 STEP_SUMMARY = "GITHUB_STEP_SUMMARY"
 """The variable with the file whose Markdown GitHub, Forgejo and Gitea show."""
 
 JUNIT_HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"fotismos "
 """How JUnit files of fotismos begin."""
-
-SHOWN = 12
-"""Quantities of a scene that are listed; all are in the record."""
 
 # XML 1.0 forbids all other characters, even as references; a lone surrogate is no UTF-8 either.
 NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -48,20 +50,23 @@ class Gate:
     found: VisibleShare
     state: Verdict
 
-    def cells(self) -> tuple[str, ...]:
-        """Return its row of a table: scene, at most, share, from, to, result."""
-        numbers = self.bound, self.found.value, self.found.low, self.found.high
-        return self.scene, *map(percent, numbers), self.state
-
     def __str__(self) -> str:
-        _, bound, share, low, high, state = self.cells()
         return (
-            f"{share} of the pixels ({low} to {high}) differ by more than {LEADING.label}"
-            f" {self.found.threshold:g}, at most {bound} may: {state}"
+            f"{percent(self.found.value)} of the pixels ({percent(self.found.low)} to"
+            f" {percent(self.found.high)}) differ by more than {LEADING.label}"
+            f" {self.found.threshold:g}, at most {percent(self.bound)} may: {self.state}"
         )
 
 
-GATE_HEADINGS = ("scene", "at most", "pixels that differ", "from", "to", "result")
+GATES = (
+    Column("scene", "scene"),
+    Column("at most", "bound", percent, is_right=True),
+    Column("pixels that differ", "found.value", percent, is_right=True),
+    Column("from", "found.low", percent, is_right=True),
+    Column("to", "found.high", percent, is_right=True),
+    Column("result", "state", is_right=True),
+)
+"""The table of gates."""
 
 
 def gates(
@@ -84,7 +89,7 @@ def gates(
 def gate_lines(gates: Sequence[Gate]) -> Iterator[str]:
     """Yield the lines on the gates of a run."""
     yield ""
-    yield from printed([GATE_HEADINGS, *(gate.cells() for gate in gates)], right=1)
+    yield from printed(Table(GATES, gates))
     yield gate_outcome(gates)
 
 
@@ -100,6 +105,52 @@ def gate_outcome(gates: Sequence[Gate]) -> str:
 
 
 # --- Files -----------------------------------------------------------------------------------
+
+
+def conclude(
+    terminal: Terminal,
+    folder: Path,
+    views: Sequence[SceneView],
+    errors: Mapping[str, FotismosError],
+) -> int:
+    """Print the gates of a comparison, write its files for CI, and return the exit code."""
+    require_free(terminal.junit, terminal.summary, [])  # nor what this command wrote
+    studied = [view.studied for view in views]
+    found = gates([record for record, _ in studied], terminal.max_visible, terminal.within)
+    code = int(any(gate.state != "pass" for gate in found))
+    for line in gate_lines(found) if found else ():
+        if code or not is_quiet():  # the reason of a failure is never lost
+            echo(line, err=is_quiet())
+    write_junit(terminal.junit, lambda: junit_of_gates(found, errors))
+    page = str(folder / "index.html") if views else ""
+    append(
+        terminal.summary,
+        lambda: of_comparison(studied, found, errors=errors, page=page, threshold=terminal.within),
+    )
+    return code
+
+
+def conclude_checks(
+    outcomes: Sequence[CheckRecord], terminal: Terminal, significance: float, page: str
+) -> int:
+    """Print what checks or updates found, unless as JSON, and write files for CI.
+
+    Returns the exit code.
+    """
+    for made in outcomes:
+        if made.status == "error":
+            echo(f"fotismos: error: {made.message}", err=True)
+    write_junit(terminal.junit, lambda: junit_of_checks(outcomes))
+    append(terminal.summary, lambda: of_checks(outcomes, significance, page))
+    # 2, could not be checked, outweighs 1, moved.
+    code = max(made.exit_code for made in outcomes)
+    if not (is_quiet() or terminal.as_json):
+        tell(lines(outcomes, significance))
+        if page:
+            click.echo(f"page: {page}")
+    elif code and not terminal.as_json:
+        click.echo(outcome(outcomes, significance))
+    return code
 
 
 def require_free(junit: Path | None, summary: Path | None, inputs: Iterable[str | Path]) -> None:
@@ -227,24 +278,21 @@ def of_comparison(
     threshold: float = TOLERANCE,
 ) -> str:
     """Return the summary of a run: verdict, a row for each scene, gates, and errors."""
-    headings = ("Scene", "Pixels that differ", f"Mean {LEADING.label}", "What makes it look right")
-    rows: list[tuple[str, ...]] = []
+    rows: list[tuple[str, ...]] = [
+        ("Scene", "Pixels that differ", f"Mean {LEADING.label}", "What makes it look right")
+    ]
     for record, cost in scenes:
-        numbers = (
-            percent(verdict.share(record, threshold).value),
-            number(record.metrics[LEADING.name].mean),
-        )
         wanted = (verdict.cause(record), verdict.sentence(record, cost, threshold))
         sentences = " ".join(filter(None, (*record.mistakes, *wanted)))
-        rows.append((record.scene, *numbers, sentences))
+        share = percent(verdict.share(record, threshold).value)
+        rows.append((record.scene, share, number(record.metrics[LEADING.name].mean), sentences))
     records = [record for record, _ in scenes]
     first = verdict.headline(records, threshold)
     second = verdict.most_missing(records, threshold)
     parts = ["### fotismos compare", escaped(f"{first} {second}".strip())]
-    parts.append(_marked_down([headings, *rows]))
+    parts.append(_marked_down(Table.of(rows)))
     if gates:
-        rows = [gate.cells() for gate in gates]
-        parts += [_marked_down([GATE_HEADINGS, *rows]), gate_outcome(gates)]
+        parts += [_marked_down(Table(GATES, gates)), gate_outcome(gates)]
     parts += [escaped(f"{name}: {error}") for name, error in errors.items()]
     parts += [_where(page)] if page else []
     # The next summary may be appended to the same file.
@@ -253,22 +301,18 @@ def of_comparison(
 
 def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
     """Return the summary of checks; ``page`` is empty if none was written."""
-    rows: list[tuple[str, ...]] = [
-        ("Baseline", "Result", "What moved most", "Baseline", "Now", "Standard errors", "p")
+    parts = [
+        "### fotismos check",
+        outcome(checks, level),
+        _marked_down(Table(_most_moved(), checks)),
     ]
-    for made in checks:
-        cells: tuple[str, ...] = (made.message, "", "", "", "")
-        if made.moved and (most := made.largest):
-            what, *numbers = most.cells()
-            cells = (f"{what}, {most.change} ({len(made.moved)} in all)", *numbers)
-        rows.append((made.name, made.status, *cells))
-    parts = ["### fotismos check", outcome(checks, level), _marked_down(rows, right=3)]
     parts += [escaped(f"{made.name}: {' '.join(made.causes)}") for made in checks if made.causes]
     return "\n\n".join([*parts, *([_where(page)] if page else ())]) + "\n\n"
 
 
-def _marked_down(rows: Sequence[Sequence[str]], right: int = 1) -> str:
-    return "\n".join(markdown([[*map(escaped, row)] for row in rows], right))
+def _marked_down(table: Table) -> str:
+    rows = [[escaped(cell) for cell in row] for row in table.texts()]
+    return "\n".join(markdown(table, rows))
 
 
 def _where(page: str) -> str:
@@ -284,7 +328,7 @@ def lines(checks: Sequence[CheckRecord], level: float) -> Iterator[str]:
     for made in checks:
         yield from _details(made)
     if len(checks) > 1:
-        yield from printed(_table(checks), right=2)
+        yield from printed(Table(_checked(), checks))
         yield ""
     yield from dict.fromkeys(filter(None, (made.other_mitsuba for made in checks)))
     yield outcome(checks, level)
@@ -311,16 +355,10 @@ def outcome(checks: Sequence[CheckRecord], level: float) -> str:
 
 def moved_lines(made: CheckRecord) -> Iterator[str]:
     """Yield the table of what moved: from, to, by how many standard errors, p-value; and causes."""
-    moved = made.moved or ()
-    rows: list[tuple[str, ...]] = [
-        ("what moved", "baseline", "now", "change", "standard errors", "p")
-    ]
-    for move in moved[:SHOWN]:
-        name, before, now, *certainty = move.cells()
-        rows.append((name, before, now, move.change, *certainty))
-    yield from printed(rows, right=2)
-    if len(moved) > SHOWN:
-        yield f"and {len(moved) - SHOWN} more; {made.tested} quantities were tested"
+    moves = made.moved or ()
+    yield from printed(moved(moves))
+    if len(moves) > SHOWN:
+        yield f"and {len(moves) - SHOWN} more; {made.tested} quantities were tested"
     yield from made.causes
 
 
@@ -340,13 +378,43 @@ def _details(made: CheckRecord) -> Iterator[str]:
     yield ""
 
 
-def _table(checks: Sequence[CheckRecord]) -> Iterator[Sequence[str]]:
-    yield "baseline", "result", "moved", "of", "mean ΔE2000", "now", "time"
-    for made in checks:
-        cells = [""] * 4
-        if made.tested is not None:
-            cells[:2] = f"{len(made.moved or ())}", f"{made.tested}"
-        if made.metrics is not None:
-            lead = made.metrics["dE2000"]
-            cells[2:] = f"{lead.before:.3f}", f"{lead.after:.3f}"
-        yield made.name, made.status, *cells, f"{made.seconds:.1f} s"
+def _checked() -> tuple[Column, ...]:
+    """Return the columns of checks on a terminal."""
+
+    def lead(end: str) -> Callable[[CheckRecord], float | str]:
+        return lambda made: "" if made.metrics is None else getattr(made.metrics["dE2000"], end)
+
+    def counted(made: CheckRecord) -> int | str:
+        return "" if made.tested is None else len(made.moved or ())
+
+    return (
+        Column("baseline", "name"),
+        Column("result", "status"),
+        Column("moved", counted, is_right=True),
+        Column("of", lambda made: "" if made.tested is None else made.tested, is_right=True),
+        Column("mean ΔE2000", lead("before"), "{:.3f}".format, is_right=True),
+        Column("now", lead("after"), "{:.3f}".format, is_right=True),
+        Column("time", "seconds", "{:.1f} s".format, is_right=True),
+    )
+
+
+def _most_moved() -> tuple[Column, ...]:
+    """Return the columns of checks in a summary, with what moved most."""
+
+    def what(made: CheckRecord) -> str:
+        if not made.moved or (most := made.largest) is None:
+            return made.message
+        return f"{most.name}, {most.change} ({len(made.moved)} in all)"
+
+    def of(value: Callable[[Move], Any]) -> Callable[[CheckRecord], Any]:
+        return lambda made: "" if made.largest is None else value(made.largest)
+
+    return (
+        Column("Baseline", "name"),
+        Column("Result", "status"),
+        Column("What moved most", what),
+        Column("Baseline", of(lambda move: move.before), "{:.6g}".format, is_right=True),
+        Column("Now", of(lambda move: move.after), "{:.6g}".format, is_right=True),
+        Column("Standard errors", of(certainty), "{:+.1f}".format, is_right=True),
+        Column("p", of(lambda move: move.p_corrected), "{:.1g}".format, is_right=True),
+    )

@@ -34,8 +34,8 @@ from fotismos.reference.rendering.sums import student
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines, checks, summary
 from fotismos.reports.files import images, results
-from fotismos.reports.jobs import share_of
 from fotismos.reports.page.scene_view import Before, SceneView
+from fotismos.reports.terminal.parsing import share_of
 
 Pictures = np.ndarray | Sequence[np.ndarray] | str | Path
 """A linear picture (H, W, 3), several that differ by noise, a file, or a pattern of files."""
@@ -233,7 +233,7 @@ class Fotismos:
             found = found or check_pictures(before, after, level)
             made = checks.of_pictures(path, name, status="failed", found=found, begin=begin)
             _, section = checks.picture_section(made, before, found)
-            section = structs.replace(section, headline=fault, command="pytest --fotismos-update")
+            section = structs.replace(section, fault=fault, approval="pytest --fotismos-update")
             page = _page(folder, f"{name} differs", moved=[section])
             raise AssertionError(f"{path}: {fault}\npage: {page}")
         return True

@@ -1,62 +1,21 @@
 """``fotismos compare``: how far textbook shading is from physics."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated
 
 import click
 
-from fotismos.comparisons.names import PICTURES
+from fotismos.comparisons.names import PICTURES as SUFFIXES
+from fotismos.comparisons.names import picture_parts, with_files
+from fotismos.comparisons.options import Options, option
 from fotismos.comparisons.processes.pool import Pool
-from fotismos.reports import jobs
+from fotismos.reports.command import PICTURES, PROCESSES, SCENES, OnScene
+from fotismos.reports.jobs import Job, Terminal
 
 
-@jobs.command()
-@jobs.scenes_or_pictures_argument
-@jobs.output_option("out")
-@jobs.figures_option
-@jobs.fresh_option
-@jobs.process_options
-@jobs.scene_options
-@jobs.option("image")
-@jobs.picture_options
-@jobs.option("tone_map")
-@jobs.verbosity_options
-@jobs.option("noise")
-@jobs.option("colour_science")
-@click.option(
-    "--why/--no-why",
-    "with_causes",
-    default=True,
-    help="Find which effects are missing, at a small size; not for pictures. [default: why]",
-)
-@jobs.open_option
-@jobs.within_option
-@click.option(
-    "--max-visible",
-    type=jobs.percentage,
-    metavar="P%",
-    help="Exit code 1 unless at most this share of each scene's pixels differs visibly.",
-)
-@jobs.ci_options
-@click.pass_context
-def compare(
-    context: click.Context,
-    /,
-    scenes: tuple[str, ...],
-    output: Path,
-    figures: bool,
-    fresh: bool,
-    with_causes: bool,
-    timeout: float,
-    workers: int | None,
-    scheduler: str | None,
-    is_opened: bool,
-    within: float,
-    max_visible: float | None,
-    junit: Path | None,
-    summary: Path | None,
-    **rendering: Any,
-) -> None:
+class Compare(OnScene, frozen=True):
     """Measure how far textbook shading is from physics, where, and whether it is more than noise.
 
     SCENE is a built-in name (`fotismos scenes`), a Mitsuba file (.xml), or a Python file (.py) in
@@ -67,8 +26,8 @@ def compare(
     comparison.exr and pictures. If one scene fails, the others are still compared. An interrupted
     run keeps its finished scenes: the same command resumes it.
 
-    \b
-    Examples:
+    Examples
+    --------
       fotismos compare fig-8-9
       fotismos compare my_scene.xml cornell-box --resolution 640x480 -o results
       fotismos compare cornell-box --noise 0.5 --spp 2048
@@ -81,39 +40,68 @@ def compare(
       fotismos compare my_scene.xml --reference 'cycles_*.exr'
       fotismos compare --reference 'theirs_*.exr' --image 'mine_*.exr' --max-visible 5%
       fotismos compare my_scenes/*.xml --max-visible 5% --summary summary.md
-    """  # noqa: D301 click reads the \b as: keep these lines
-    if not (rendering["image"] or rendering["reference"]):
-        jobs.refuse_reading(rendering, "--image or --reference")
-    are_pictures = bool(rendering["image"] and rendering["reference"])
-    if not scenes and not are_pictures:
-        raise click.UsageError(
-            "Missing argument 'SCENE...': give a scene, or two pictures, --reference and --image."
+    """
+
+    argument = "[SCENE...]"
+    options_shown = (
+        "why", SCENES, "image", PICTURES, "tone_map", "noise", "colour_science",
+        "output", "figures", "fresh", "quiet", "verbose", "is_opened",
+        "within", "max_visible", "junit", "summary", PROCESSES,
+    )  # fmt: skip
+
+    why: Annotated[
+        bool,
+        option("Find which effects are missing, at a small size; not for pictures.", default="why"),
+    ] = True
+
+    def run(self, terminal: Terminal) -> int:
+        """Compare the scenes, or the two pictures."""
+        self._require_halves(terminal.scenes)
+        job = Job(
+            options=with_files(self.options),
+            figures=terminal.figures,
+            with_causes=self.why,
+            fresh=terminal.fresh,
+            within=terminal.within,
         )
-    for option in ("image", "reference"):
-        if rendering[option] and len(scenes) > 1:
-            are_files = any(Path(word).suffix.lower() in PICTURES for word in scenes)
-            if are_files:
-                raise click.UsageError(f"Put a pattern in quotes: --{option} 'name_*.exr'.")
-            raise click.UsageError(f"--{option} goes with one scene.")
-    if scenes:
-        processes = jobs.pool(timeout, len(scenes), workers=workers, scheduler=scheduler)
-    else:
-        processes = Pool(0)  # two pictures run no user's code
-    code = jobs.work(
-        "compare",
-        processes,
-        scenes=scenes,
-        output=output,
-        job=jobs.Job(
-            options=jobs.chosen_options(rendering),
-            figures=figures,
-            with_causes=with_causes,
-            fresh=fresh,
-            within=within,
-        ),
-        max_visible=max_visible,
-        junit=junit,
-        summary_file=summary,
-        is_opened=is_opened,
-    )
-    context.exit(code)
+        if terminal.scenes:
+            with terminal.processes(len(terminal.scenes)) as pool:
+                from fotismos.reports.run import batch, scene  # loaded late, as Command says
+
+                subjects = scene.subjects(terminal.scenes)
+                finish = _finish(job.options, terminal)
+                return batch.compare_all(pool, subjects, job, terminal, finish=finish)
+        from fotismos.reports.run import batch, pictures  # without Mitsuba
+
+        with Pool(0) as pool:  # two pictures run no user's code
+            subjects = pictures.subjects(job.options)
+            finish = _finish(job.options, terminal)
+            return batch.compare_all(pool, subjects, job, terminal, finish=finish)
+
+    def _require_halves(self, scenes: tuple[str, ...]) -> None:
+        """Refuse what is too little or too much: scenes, pictures, words about pictures."""
+        if not (self.image or self.reference):
+            self.refuse_reading("--image or --reference")
+        if not scenes and not (self.image and self.reference):
+            raise click.UsageError(
+                "Missing argument 'SCENE...': give a scene, or two pictures, --reference and"
+                " --image."
+            )
+        for name in ("image", "reference"):
+            if getattr(self, name) and len(scenes) > 1:
+                are_files = any(Path(word).suffix.lower() in SUFFIXES for word in scenes)
+                if are_files:
+                    raise click.UsageError(f"Put a pattern in quotes: --{name} 'name_*.exr'.")
+                raise click.UsageError(f"--{name} goes with one scene.")
+
+
+def _finish(options: Options, terminal: Terminal) -> Callable[..., int] | None:
+    """Return what prints gates and writes files for CI; None if the user wants neither."""
+    if terminal.max_visible is None and not (terminal.junit or terminal.summary):
+        return None
+    from fotismos.reports.ci import summary  # loaded late: most comparisons need no CI
+
+    shader = options.heuristic.partition(":")[0]  # FILE:NAME, or a name alone
+    pictures = [picture_parts(word)[0] for word in options.picture_files]
+    summary.require_free(terminal.junit, terminal.summary, [*terminal.scenes, shader, *pictures])
+    return partial(summary.conclude, terminal)

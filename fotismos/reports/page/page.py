@@ -31,8 +31,7 @@ from fotismos.comparisons.departure.metrics import (
     THRESHOLDS,
     declared,
 )
-from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.reference.records import Machine, plain
+from fotismos.reference.records import Machine
 from fotismos.reports import glossary, verdict
 from fotismos.reports.files import images
 from fotismos.reports.files.results import DETAILS, Failure, RunRecord
@@ -43,6 +42,7 @@ from fotismos.reports.page.scene_view import (
     Before,
     SceneView,
     WhyView,
+    parts,
 )
 from fotismos.reports.page.templating import HELP, identifier, rendered
 from fotismos.reports.terminal.words import difference
@@ -78,23 +78,10 @@ Runs = list[tuple[int, str]]
 
 
 class PageScene(SceneView):
-    """A scene in the page: its name in the address, and ``(effect, colour, part)`` of its error.
-
-    ``title`` says what a built-in scene shows.
-
-    ``prices`` are by threshold (:func:`fotismos.reports.verdict.price_at`); ``command`` finds the
-    cheapest method; empty if the record has none to derive it from.
-    """
+    """A scene in the page: its name in the address, and what the page's ``script`` has of it."""
 
     id: str
-    title: str
-    parts: tuple[tuple[str, str, float], ...]
-    shares: tuple[float, ...]
-    verdicts: str
-    cause: str
-    advice: Runs
-    prices: tuple[float | None, ...]
-    command: str
+    script: dict[str, Any]
 
 
 def render(
@@ -116,17 +103,17 @@ def render(
     taken: set[str] = set()
     usual = THRESHOLDS.index(threshold)
     records = [view.record for view in views]
-    scenes = [_scene(view, taken, threshold) for view in views]
-    scenes.sort(key=lambda scene: -scene.shares[usual])
+    scenes = [_scene(view, taken) for view in views]
+    scenes.sort(key=lambda scene: -scene.script["shares"][usual])
     failed = {identifier(failure.scene, taken): failure for failure in failures}
     # On the page of a check, what moved takes the place of the verdict.
     since = [*(view.before for view in views if view.before), *moved]
     headline = " ".join(
-        [title, *(f"{check.name}: {check.headline}" for check in since[:FIRST_MOVED])]
+        [title, *(f"{one.check.name}: {one.headline}" for one in since[:FIRST_MOVED])]
     )
     data = {
         "scenes": [
-            *map(_scene_data, scenes),
+            *(scene.script for scene in scenes),
             *({"id": id, "name": failure.scene, "failed": True} for id, failure in failed.items()),
         ],
         "written": round(1000 * time()) if reloads else None,
@@ -147,7 +134,7 @@ def render(
         data=data,
         scenes=scenes,
         worst=_worst(scenes),
-        legend=dict(sorted({part[:2] for scene in scenes for part in scene.parts})),
+        legend=dict(sorted({part[:2] for view in views for part in parts(view.record)})),
         settings=_settings(records) if records else "",
         failures=failed,
         usual=usual,
@@ -231,25 +218,9 @@ def _runs(text: Callable[[float], str]) -> Runs:
     return [(i, text) for i, text in enumerate(texts) if i == 0 or text != texts[i - 1]]
 
 
-def _scene(view: SceneView, taken: set[str], usual: float) -> PageScene:
-    record, cost = view.studied
-    visible = record.metrics[LEADING.name].visible
-    return PageScene(
-        **structs.asdict(view),
-        id=identifier(record.scene, taken),
-        title=SCENES[record.scene].title if record.scene in SCENES else "",
-        parts=tuple(
-            (verdict.noun(effect), EFFECT_COLOURS[effect], part)
-            for effect, part in verdict.missing(record).items()
-        ),
-        shares=tuple(round(share.value, 5) for share in visible),
-        # A letter for each threshold: "p", "f" or "u".
-        verdicts="".join(verdict.decision(record, threshold)[0] for threshold in THRESHOLDS),
-        cause=verdict.cause(record),
-        advice=_runs(lambda t: verdict.sentence(record, cost, t)),
-        prices=tuple(_digits(verdict.price_at(record, threshold)) for threshold in THRESHOLDS),
-        command=verdict.search(record, usual) if verdict.is_searched(record) else "",
-    )
+def _scene(view: SceneView, taken: set[str]) -> PageScene:
+    name = identifier(view.record.scene, taken)
+    return PageScene(**structs.asdict(view), id=name, script=_script_data(name, view))
 
 
 def _digits(price: float | None) -> float | None:
@@ -259,17 +230,23 @@ def _digits(price: float | None) -> float | None:
 
 def _axis(scenes: Sequence[PageScene]) -> dict[str, Any]:
     """Return the ends of the chart of prices, and its marks: powers of ten."""
-    prices = [price for scene in scenes for price in scene.prices if price]
+    prices = [price for scene in scenes for price in scene.script["prices"] if price]
     low = math.floor(math.log10(min(prices, default=1.0)))
     high = max(math.ceil(math.log10(max(prices, default=1.0))), low + 1)
     return {"low": low, "high": high, "marks": [10.0**power for power in range(low, high + 1)]}
 
 
-def _scene_data(scene: PageScene) -> dict[str, Any]:
-    record = scene.record
+def _script_data(name: str, scene: SceneView) -> dict[str, Any]:
+    """Return what the page's script has of a scene, as plain data.
+
+    ``shares``, ``verdicts`` and ``prices`` are by threshold, ``verdicts`` with a letter for each:
+    "p", "f" or "u" (:func:`fotismos.reports.verdict.price_at`).
+    """
+    record, cost = scene.studied
+    visible = record.metrics[LEADING.name].visible
     why = scene.why
     return {
-        "id": scene.id,
+        "id": name,
         "name": record.scene,
         "width": record.resolution[0],
         "height": record.resolution[1],
@@ -280,22 +257,33 @@ def _scene_data(scene: PageScene) -> dict[str, Any]:
         "isNoiseKnown": record.is_noise_known,
         "mean": difference(record.metrics[LEADING.name].mean),
         "worst": {"pixel": scene.worst, "error": difference(record.metrics[LEADING.name].max)},
-        "shares": scene.shares,
-        "verdicts": scene.verdicts,
-        "advice": scene.advice,
-        "prices": scene.prices,
+        "shares": [round(share.value, 5) for share in visible],
+        "verdicts": "".join(verdict.decision(record, t)[0] for t in THRESHOLDS),
+        "advice": _runs(lambda t: verdict.sentence(record, cost, t)),
+        "prices": [_digits(verdict.price_at(record, t)) for t in THRESHOLDS],
         "regions": [
             {key: getattr(region, key) for key in ("x", "y", "width", "height")}
             | {"effect": region.effect and verdict.noun(region.effect)}
             for region in record.regions
         ],
         "images": scene.embedded.manifest() if scene.embedded else None,
-        "effects": plain(why.effects) | {"names": list(map(verdict.noun, why.effects.names))}
-        if why
-        else None,
+        "effects": _effects(why),
         "board": _board(why, record.why),
         "terms": scene.terms.manifest() if scene.terms else None,
         "live": scene.live.manifest() if scene.live else None,
+    }
+
+
+def _effects(why: WhyView | None) -> dict[str, Any] | None:
+    """Return where each effect dominates, with the effects' names and colours."""
+    if not why:
+        return None
+    return {
+        "width": why.width,
+        "height": why.height,
+        "map": why.map,
+        "names": [verdict.noun(name) for name in why.names],
+        "colours": [EFFECT_COLOURS[name] for name in why.names],
     }
 
 
@@ -307,7 +295,7 @@ def _board(why: WhyView | None, found: Attribution | None) -> dict[str, Any] | N
         "images": why.pictures.manifest(),
         "hybrids": [
             {
-                "on": [why.effects.names.index(effect) for effect in hybrid.effects],
+                "on": [why.names.index(effect) for effect in hybrid.effects],
                 "mean": difference(max(hybrid.error, 0.0)),
             }
             for hybrid in found.hybrids

@@ -7,14 +7,31 @@ from typing import Any
 
 from msgspec import field
 
+from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.records.comparison import ComparisonRecord
 from fotismos.reference.planning.effects import EFFECTS
-from fotismos.reference.records import Record, plain
+from fotismos.reference.records import Record
+from fotismos.reports import verdict
 from fotismos.reports.page.embedding import Embedded
 
 EFFECT_COLOURS = {effect.label: effect.colour for effect in EFFECTS if effect.colour}
 """Colours of effects in attributions: Okabe and Ito's seven for those that often come together, and
 four of Tol's muted scheme. Both suit the common colour deficiencies."""
+
+
+def parts(record: ComparisonRecord) -> list[tuple[str, str, float]]:
+    """Return what a scene's picture lacks: effects as nouns, with their colours and parts."""
+    return [
+        (verdict.noun(effect), EFFECT_COLOURS[effect], part)
+        for effect, part in verdict.missing(record).items()
+    ]
+
+
+def title_of(record: ComparisonRecord) -> str:
+    """Return what a built-in scene shows; empty for others."""
+    return SCENES[record.scene].title if record.scene in SCENES else ""
+
 
 EFFECTS_TITLE = "Effects"
 """Title of the map of dominant effects."""
@@ -32,112 +49,74 @@ class Figure:
     svg: str
 
 
-class EffectMap(Record):
-    """The dominating effect of each pixel: a letter per pixel, row after row."""
-
-    width: int
-    height: int
-    names: tuple[str, ...]
-    colours: tuple[str, ...]
-    map: str
-
-
 class WhyView(Record):
-    """A page's data of causes.
+    """A page's data of causes, beside the record's.
 
+    ``map`` has a letter for each pixel, row after row: that of ``names`` which dominates there.
     ``pictures`` has a plane of each channel of the record's hybrids, in their order, and of the
     error that each leaves, such as ``0.R`` and ``0.dE2000``; None for fewer than two hybrids.
     """
 
-    effects: EffectMap
+    width: int
+    height: int
+    names: tuple[str, ...]
+    map: str
     pictures: Embedded | None = None
 
 
-class TermsView(Record):
-    """The page's data of the terms of a scene.
+class PointsView(Record):
+    """The page's data of points: their planes in a ``grid``, and what its script reads beside it.
 
-    ``grid`` has planes over the grid of pixels in ``columns`` and ``rows``, and ``tops`` those of
-    its values ≥ 0; lights have a name, ``L_d`` and ``L_s``. ``missing`` says why there are none.
+    ``missing`` says why there are none.
     """
 
     grid: Embedded | None = None
-    columns: list[int] = field(default_factory=list)
-    rows: list[int] = field(default_factory=list)
-    tops: dict[str, float] = field(default_factory=dict)
-    materials: tuple[dict[str, Any], ...] = ()
-    lights: tuple[dict[str, Any], ...] = ()
+    data: dict[str, Any] = field(default_factory=dict)
     missing: str = ""
 
     def manifest(self) -> dict[str, Any]:
         """The data of the page's script, except the grid's planes, as plain data."""
-        shown: dict[str, Any] = plain(self)
-        return shown | {"grid": self.grid.manifest() if self.grid else None}
-
-
-class LiveView(TermsView):
-    """The page's data of the points that it can shade again; ``missing`` says why there are none.
-
-    ``grid`` has planes as differences to the row above, and ``tops`` their largest sizes; ``rays``
-    are those of :class:`fotismos.comparisons.records.images.LivePoints`. ``fit`` is the mean ΔE2000
-    that a fit of the scene reached, with its width and height.
-    """
-
-    rays: list[Any] = field(default_factory=list)
-    is_flat: bool = False
-    fit: tuple[float, int, int] | None = None
-
-
-class EngineView(Record):
-    """A page's sentences on an engine's settings, and their shares above the usual threshold.
-
-    ``judgements`` are one for each, ``stated`` says what their times are of, and ``odd`` what is
-    odd about the pictures. ``shares`` are those of the pixels above the ΔE2000 ``within``.
-    """
-
-    judgements: tuple[str, ...]
-    stated: str
-    odd: tuple[str, ...]
-    within: float
-    shares: tuple[Any, ...]
+        grid = self.grid.manifest() if self.grid else None
+        return self.data | {"grid": grid, "missing": self.missing}
 
 
 class CostView(Record):
     """A page's data of a study.
 
-    ``record`` is a :class:`fotismos.comparisons.records.cost.Cost`, whose type few pages need
-    to load. ``images`` are small WebP files by the methods' names; ``said`` and ``busy`` are
-    sentences on its sums and on the machine, ``answer`` one on the cheapest method that looks
-    right; ``colours`` are those of the effects; ``left_out`` are sentences on methods. ``engine``
-    is None without given pictures; ``reference`` is a small WebP file. Without a scene, ``judged``
-    says by which reference, and ``record`` is an ``EngineCost``.
+    ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, or an ``EngineCost``
+    without a scene, whose types few pages need to load. ``images`` are small WebP files by the
+    methods' names, ``reference`` is one. Pixels of given pictures differ visibly above the ΔE2000
+    ``within``.
     """
 
     record: Any
     images: dict[str, bytes]
-    answer: str
-    said: str = ""
-    busy: str = ""
-    colours: tuple[str, ...] = ()
-    engine: EngineView | None = None
-    left_out: tuple[str, ...] = ()
-    reference: bytes | None = None
-    judged: str = ""
+    reference: bytes
+    within: float = TOLERANCE
 
 
 class Before(Record):
     """What moved in a scene or picture since its baseline.
 
-    ``headline`` says what moved most; ``moved`` has a name, before, now, standard errors and p.
-    ``pictures`` are WebP files by their captions: how it was, and maps of the change.
+    ``check`` is a :class:`fotismos.reports.ci.checks.CheckRecord`, which only checks need to load.
+    ``pictures`` are WebP files by their captions: how it was, and maps of the change. A test has a
+    ``fault`` in place of the check's headline, and an ``approval`` in place of its command.
     """
 
-    name: str
-    headline: str
-    sentences: tuple[str, ...]
-    moved: tuple[tuple[str, ...], ...]
-    tested: int
+    check: Any
     pictures: dict[str, bytes]
-    command: str
+    fault: str = ""
+    approval: str = ""
+
+    @property
+    def headline(self) -> str:
+        """What moved most."""
+        return self.fault or str(self.check.headline)
+
+    @property
+    def command(self) -> str:
+        """The command after which the change counts as intended."""
+        return self.approval or str(self.check.update_command)
 
 
 class SceneView(Record):
@@ -146,7 +125,8 @@ class SceneView(Record):
     ``thumbnails`` are small named WebP files of both halves, the leading metric's map and terms;
     without ``embedded`` images, the scene has only these. ``worst`` is column and row of the pixel
     with the largest error. ``files`` are labels, and paths relative to the page. ``before`` is what
-    moved since a baseline, on the page of a check.
+    moved since a baseline, on the page of a check. ``terms`` are those of 8.10 at pixels, ``live``
+    the points that the page can shade again (:mod:`fotismos.reports.page.why_view`).
     """
 
     record: ComparisonRecord
@@ -156,8 +136,8 @@ class SceneView(Record):
     files: dict[str, str] = field(default_factory=dict)
     chart: Figure | None = None
     cost: CostView | None = None
-    terms: TermsView | None = None
-    live: LiveView | None = None
+    terms: PointsView | None = None
+    live: PointsView | None = None
     before: Before | None = None
     why: WhyView | None = None
 

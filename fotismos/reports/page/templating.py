@@ -5,10 +5,12 @@ from __future__ import annotations
 import base64
 import hashlib
 import math
+import re
 from collections.abc import Sequence
 from datetime import date
 from functools import lru_cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -20,7 +22,10 @@ from fotismos.reference.records import plain
 from fotismos.reports import verdict
 from fotismos.reports.files import images
 from fotismos.reports.files.results import PAGE
+from fotismos.reports.page.scene_view import EFFECT_COLOURS, parts, title_of
+from fotismos.reports.tables import moved
 from fotismos.reports.terminal.words import (
+    as_typed,
     difference,
     given_time,
     number,
@@ -88,7 +93,12 @@ def environment() -> Environment:
     )
     environment.filters.update(
         FORMS,
+        cause=verdict.cause,
+        parts=parts,
+        title_of=title_of,
+        search=verdict.search,
         judged=verdict.judged,
+        moved=moved,
         truth=verdict.truth,
         saving=verdict.saving,
         region_view=region_view,
@@ -96,11 +106,26 @@ def environment() -> Environment:
         ink=ink,
         noun=verdict.noun,
         plain=plain,
+        typed=as_typed,
+        minus=minus,
+        effect_colour=EFFECT_COLOURS.__getitem__,
         webp_uri=images.webp_uri,
     )
-    environment.tests.update(finite=math.isfinite)
-    environment.globals.update(forms=FORMS)
+    environment.tests.update(finite=math.isfinite, searched=verdict.is_searched)
+    environment.globals.update(forms=FORMS, named=verdict.noun, cost_tables=_cost_tables)
     return environment
+
+
+def _cost_tables() -> ModuleType:
+    """Return the tables and sentences of studies."""
+    from fotismos.reports import cost_tables  # loaded late: few pages have a study
+
+    return cost_tables
+
+
+def minus(text: str) -> str:
+    """Return a sentence in which a minus sign stands before numbers below 0."""
+    return re.sub(r"(?<!\d)-(?=\d)", "−", text)
 
 
 def region_view(region: Region) -> str:

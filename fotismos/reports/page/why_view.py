@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+from msgspec import structs
 
 from fotismos.comparisons.attribution import dominating
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.records.images import Comparison, LivePoints, TermGrid
-from fotismos.reference.records import Missing
+from fotismos.reference.records import Missing, plain
 from fotismos.reports.page.embedding import COUNTED, encode, packed
-from fotismos.reports.page.scene_view import (
-    EFFECT_COLOURS,
-    EffectMap,
-    LiveView,
-    TermsView,
-    WhyView,
-)
+from fotismos.reports.page.scene_view import PointsView, WhyView
 
 LETTERS = {-1: ".", -2: "-"} | dict(enumerate("0123456789a"))
 """Codes of the map: no effect, a pixel that does not count, and the effects' places."""
@@ -40,16 +35,14 @@ def causes_view(comparison: Comparison) -> WhyView | None:
     # The last has all effects; the sides of all are a multiple of the maps'.
     previews = [causes.previews[hybrid.effects] for hybrid in causes.record.hybrids]
     places = dominating(causes.maps, counted)
-    names = tuple(causes.maps)
-    found = EffectMap(
+    found = WhyView(
         width=places.shape[1],
         height=places.shape[0],
-        names=names,
-        colours=tuple(EFFECT_COLOURS[name] for name in names),
+        names=tuple(causes.maps),
         map="".join(LETTERS[int(index)] for index in places.ravel()),
     )
     if len(previews) < 2:
-        return WhyView(effects=found)
+        return found
     # The maps' pixels, repeated to the size of the previews.
     times = len(previews[0]) // len(counted)
     planes = {"flags": np.uint16(COUNTED) * counted.repeat(times, axis=0).repeat(times, axis=1)}
@@ -57,19 +50,20 @@ def causes_view(comparison: Comparison) -> WhyView | None:
         layers = {c: preview[..., i] for i, c in enumerate("RGB")}
         layers[LEADING.name] = LEADING(preview, previews[-1], viewing)
         planes |= {f"{index}.{c}": encode(values, ROUNDED) for c, values in layers.items()}
-    return WhyView(effects=found, pictures=packed(planes))
+    return structs.replace(found, pictures=packed(planes))
 
 
-def terms_view(grid: TermGrid | Missing) -> TermsView:
+def terms_view(grid: TermGrid | Missing) -> PointsView:
     """Return the page's data of a grid of terms, 16-bit codes of their factors; or why not.
 
     A cosine ``c`` has the code ``65535 (1 + c) / 2``; a value ``v`` ≥ 0 has
     ``65535 sqrt(v / top)``, with the plane's ``top``, and is off by at most ``top`` / 65000. The
     planes are packed like those of images (:mod:`fotismos.reports.page.embedding`).
-    ``templates/viewer/terms.js`` reads them.
+    ``templates/viewer/terms.js`` reads them, with the ``columns`` and ``rows`` of the grid's
+    pixels; lights have a name, ``L_d`` and ``L_s``.
     """
     if isinstance(grid, Missing):
-        return TermsView(missing=grid.reason)
+        return PointsView(missing=grid.reason)
     seen = grid.material >= 0
     # Material -1, where no surface is seen, reads the False at the end.
     shiny = np.array([any(material.k_s) for material in grid.materials] + [False])[grid.material]
@@ -95,31 +89,29 @@ def terms_view(grid: TermGrid | Missing) -> TermsView:
     for name, values in amounts.items():
         code = np.rint(LARGEST_CODE * np.sqrt(np.maximum(values, 0) / tops[name]))
         planes[name] = code.astype(np.uint16)
-    return TermsView(
-        grid=packed(planes),
-        columns=grid.columns.tolist(),
-        rows=grid.rows.tolist(),
-        tops=tops,
-        materials=tuple(vars(material) for material in grid.materials),
-        lights=tuple(
-            {
-                "name": lamp.name,
-                "intensity": lamp.intensity,
-                "specular_intensity": lamp.specular_intensity,
-            }
+    data = {
+        "columns": grid.columns.tolist(),
+        "rows": grid.rows.tolist(),
+        "tops": tops,
+        "materials": grid.materials,
+        "lights": [
+            {name: getattr(lamp, name) for name in ("name", "intensity", "specular_intensity")}
             for lamp in grid.lights
-        ),
-    )
+        ],
+    }
+    return PointsView(grid=packed(planes), data=plain(data))
 
 
-def live_view(points: LivePoints | Missing) -> LiveView:
+def live_view(points: LivePoints | Missing) -> PointsView:
     """Return the page's data of the points that it can shade again; or why it cannot.
 
     A value ``v`` has the code ``16383 (1 + v / top) / 2``, with the plane's ``top``.
-    ``templates/viewer/shading.js`` reads them.
+    ``templates/viewer/shading.js`` reads them. ``rays`` are those of
+    :class:`fotismos.comparisons.pixel_terms.LivePoints`; ``fit`` is the mean ΔE2000 that a fit of
+    the scene reached, with its width and height.
     """
     if isinstance(points, Missing):
-        return LiveView(missing=points.reason)
+        return PointsView(missing=points.reason)
     tops = {}
     rows = {}
     for name, plane in points.planes.items():
@@ -129,11 +121,12 @@ def live_view(points: LivePoints | Missing) -> LiveView:
         codes = np.rint(LIVE_CODE * (1 + plane / tops[name]) / 2).astype(np.uint16)
         # Differences wrap modulo 2^16, and the page's sums wrap back.
         rows[name] = np.diff(codes, axis=0, prepend=np.uint16(0))
-    return LiveView(
-        grid=packed(rows),
-        tops=tops,
-        materials=tuple(map(vars, points.materials)),
-        lights=points.lights,
-        rays=points.rays,
-        is_flat=points.is_flat,
-    )
+    data = {
+        "tops": tops,
+        "materials": points.materials,
+        "lights": points.lights,
+        "rays": points.rays,
+        "is_flat": points.is_flat,
+        "fit": None,
+    }
+    return PointsView(grid=packed(rows), data=plain(data))

@@ -7,16 +7,19 @@ from typing import Any
 
 import altair as alt
 
-from fotismos.comparisons.audit.checks import Audit, Checked
+from fotismos.comparisons.audit.checks import Audit, Kind, audit_with_subject, spheres
+from fotismos.comparisons.case import RGB
+from fotismos.heuristic import plugins
 from fotismos.heuristic.convention import Floats
-from fotismos.heuristic.heuristics import in_file
 from fotismos.reference import records
+from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.charts import vega
 from fotismos.reports.charts.vega import FAINT, Spec
 from fotismos.reports.files import results
 from fotismos.reports.files.images import tonemap, webp
 from fotismos.reports.page.templating import head, rendered
-from fotismos.reports.terminal import tables
+from fotismos.reports.sentences import of_audit
+from fotismos.reports.terminal.table import Column, Table, printed
 from fotismos.reports.terminal.words import number
 
 WIDTH = 270
@@ -31,6 +34,16 @@ SHOWN = (0.0, 60.0, 80.0, 120.0, 180.0)
 
 Rows = list[dict[str, Any]]
 """Points of lines, in their order: ``x``, ``y`` and what the line is ``of``."""
+
+
+def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, target: Path) -> Audit:
+    """Audit a heuristic or a BSDF, and write the audit's files."""
+    set_variant(RGB)
+    plugins.register()
+    record, subject = audit_with_subject(kind, name, parameters=parameters, command=command)
+    shown = [curve.material for curve in record.curves if curve.lobes]
+    write(target, record, spheres(subject, shown))
+    return record
 
 
 def furnace(record: Audit) -> Spec:
@@ -108,25 +121,25 @@ def _chart(rows: Rows, faint: Rows, of: str, x: alt.X, y: alt.Y) -> alt.LayerCha
     return alt.LayerChart(layer=[below, above], width=WIDTH, height=WIDTH // 2)
 
 
-def write(folder: Path, record: Audit, spheres: Mapping[str, Floats]) -> None:
+def write(folder: Path, record: Audit, pictures: Mapping[str, Floats]) -> None:
     """Write ``audit.svg``, ``index.html`` and ``audit.json`` to a folder; the record comes last."""
     results.own(folder)
     results.write(folder / "audit.svg", vega.paper(lobes(record)))
-    results.write(folder / results.PAGE, render(record, folder, spheres))
+    results.write(folder / results.PAGE, render(record, folder, pictures))
     results.write(folder / "audit.json", records.to_json(record))
 
 
 def render(
-    record: Audit, folder: Path | None = None, spheres: Mapping[str, Floats] | None = None
+    record: Audit, folder: Path | None = None, pictures: Mapping[str, Floats] | None = None
 ) -> str:
     """Return the page of an audit in a folder, with linear pictures by material; no scripts."""
     return rendered(
         "audit.html.j2",
-        title=headline(record),
+        title=of_audit(record),
         head=head("audit", folder),
         record=record,
-        found=value_of,
-        spheres={name: webp(tonemap(picture)) for name, picture in (spheres or {}).items()},
+        checks=Table(CHECKS, record.checks),
+        spheres={name: webp(tonemap(picture)) for name, picture in (pictures or {}).items()},
         lobes=vega.figure("Lobes", lobes(record)),
         furnace=vega.figure("White furnace", furnace(record)),
     )
@@ -135,33 +148,25 @@ def render(
 # --- On a terminal ---------------------------------------------------------------------------
 
 
-def headline(record: Audit) -> str:
-    """Return the subject with its parameters, and which checks failed."""
-    name = record.subject
-    if located := in_file(name):
-        file = Path(located[0]).name
-        name = f"{located[1]} ({file})" if located[1] else file
-    title = ", ".join([name, *(f"{key} {value}" for key, value in record.parameters.items())])
-    failed = [check.name for check in record.checks if check.verdict == "does not hold"]
-    if not failed:
-        return f"{title}: all checks hold"
-    return f"{title}: {', '.join(failed)} {'does' if len(failed) == 1 else 'do'} not hold"
-
-
-def value_of(check: Checked) -> str:
+def _counted(value: float) -> str:
     """Return the value of a check; a count has no decimals."""
-    value = check.value
-    return f"{value:g}" if value is not None and value == int(value) else number(value)
+    return f"{value:g}" if value == int(value) else number(value)
+
+
+CHECKS = (
+    Column("check", "name"),
+    Column("verdict", "verdict"),
+    Column("found", "value", _counted),
+    Column("expected", "expected"),
+    Column("worst case", "worst"),
+)
+"""The table of checks."""
 
 
 def lines(record: Audit) -> Iterator[str]:
     """Yield the lines of an audit."""
-    yield headline(record)
+    yield of_audit(record)
     yield ""
-    rows = [
-        (check.name, check.verdict, value_of(check), check.expected, check.worst)
-        for check in record.checks
-    ]
-    yield from tables.printed([("check", "verdict", "found", "expected", "worst case"), *rows])
+    yield from printed(Table(CHECKS, record.checks))
     if record.mistakes:
         yield from ("", *record.mistakes)

@@ -8,6 +8,7 @@ them may kill. The page is written again after each scene.
 import os
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
@@ -20,15 +21,14 @@ from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import FotismosError, InputError, InstallationError, OutputError
 from fotismos.heuristic.program import LIBRARIES, versions
 from fotismos.reference.records import Machine, to_json
-from fotismos.reports import verdict
+from fotismos.reports import jobs, tables, verdict
 from fotismos.reports.files import results
 from fotismos.reports.files.results import FIGURES, START, TABLES, Failure, RunRecord
-from fotismos.reports.jobs import Job, command_line
+from fotismos.reports.jobs import Job, Terminal, command_line
 from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files
-from fotismos.reports.terminal import progress, tables
-from fotismos.reports.terminal.progress import Bar
+from fotismos.reports.terminal import progress
 from fotismos.reports.terminal.words import as_typed, remark, tell, tell_where
 
 if TYPE_CHECKING:  # a comparison has no hard cases
@@ -132,6 +132,21 @@ class Batch:
             self.first_views.clear()
             results.clear(self.folder, (results.PAGE, results.DETAILS))
 
+    def take(self, target: str, outcome: Future[Any]) -> None:
+        """Take the view of a scene, or its error, and show it on the page."""
+        try:
+            view, spent = outcome.result()
+        except InstallationError:
+            raise
+        except FotismosError as error:
+            self.errors[target] = error
+        else:
+            self.views[target] = scene_files.with_fit(view, self.folder / "fit" / target)
+            for stage, seconds in spent.items():
+                self.stages[stage] += seconds
+            remark(tables.details(view.record))
+        self.grow_page()
+
     def grow_page(self) -> None:
         """Write the page of an unfinished run, unless that took long just now."""
         if self.done < len(self.places) and perf_counter() >= self.next_page:
@@ -143,6 +158,13 @@ class Batch:
 
 Comparing = Callable[..., tuple[SceneView, dict[str, float]]]
 """A function that compares what a word names, and writes it to a place in a folder."""
+
+
+Finish = Callable[[Path, Sequence[SceneView], Mapping[str, FotismosError]], int]
+"""A function of the output folder, the views of compared scenes and the errors of the others.
+
+It returns the exit code.
+"""
 
 
 @dataclass(frozen=True)
@@ -161,50 +183,65 @@ class Subjects:
     are_shown_early: bool = False
 
 
-def run(
+def compare_all(
     pool: Pool,
     subjects: Subjects,
-    folder: Path,
     job: Job,
+    terminal: Terminal,
     hard_cases: Task | None = None,
-    on_page: Callable[[Path], object] | None = None,
-    finish: Callable[[Path, Sequence[SceneView], Mapping[str, FotismosError]], None] | None = None,
-) -> None:
-    """Compare subjects in a pool, and write the results of each, then the page and tables of all.
+    finish: Finish | None = None,
+) -> int:
+    """Compare subjects in a pool, and return the exit code.
 
-    The task ``hard_cases`` returns them for the details, and the seconds that it took. ``on_page``
-    is called with the page's path once it exists; ``finish`` at the end with the output folder, the
-    views of the compared scenes and the errors of the others. The gravest error is raised at last.
+    Writes the results of each, then the page and tables of all. The task ``hard_cases`` returns
+    them for the details, and the seconds that it took. The gravest error is raised at last.
     """
     checked_threshold(job.within)
     # Before anything is written, since a placeholder may be unknown.
-    scenes = subjects.words
-    options_by_scene = dict(zip(scenes, _options_for(job.options, scenes), strict=True))
+    words = subjects.words
+    options_by_scene = dict(zip(words, _options_for(job.options, words), strict=True))
     command = command_line()
-    with results.hold(folder, command) as folder:
-        places = dict(zip(results.assigned(folder, subjects.files), scenes, strict=True))
+    with results.hold(terminal.output, command) as folder:
+        places = dict(zip(results.assigned(folder, subjects.files), words, strict=True))
         _require_inputs_apart(job.options, [folder / target for target in places])
         for name in (TABLES, FIGURES) if job.figures else (TABLES,):
             results.own(folder / name)
         batch = Batch(
             folder=folder,
             places=places,
-            on_page=on_page,
+            on_page=jobs.open_page if terminal.is_opened else None,
             command=command,
             within=job.within,
             libraries=subjects.libraries,
         )
         batch.stages["start-up"] = perf_counter() - START
-        calls: dict[str, tuple[Any, ...]] = {
-            target: (word, folder, target, replace(job, options=options_by_scene[word]))
-            for target, word in places.items()
-        }
-        if subjects.are_shown_early:
-            calls = {target: (*call, batch.show) for target, call in calls.items()}
+        stages = ("rendering", "causes") if job.with_causes else ("rendering",)
+        shows = (batch.show,) if subjects.are_shown_early else ()
         try:
             with progress.shown() as bar:
-                stages = ("rendering", "causes") if job.with_causes else ("rendering",)
-                _compare(pool, batch, subjects.compare, calls, bar, hard_cases, stages)
+                tasks = [
+                    Task(
+                        name=target,
+                        function=subjects.compare,
+                        arguments=(
+                            word,
+                            folder,
+                            target,
+                            replace(job, options=options_by_scene[word]),
+                            *shows,
+                        ),
+                        progress=bar.of(target, stages),
+                        ends_process=is_script(word),
+                    )
+                    for target, word in places.items()
+                ]
+                if hard_cases:
+                    tasks.append(hard_cases)
+                for task, outcome in bar.each(pool, tasks, "scenes"):
+                    if task is hard_cases:
+                        batch.hard_cases, batch.stages[task.name] = outcome.result()
+                    else:
+                        batch.take(task.name, outcome)
         except KeyboardInterrupt:
             # No process may write while the results are put together.
             pool.end()
@@ -216,14 +253,14 @@ def run(
         # A single scene that failed leaves no page.
         if batch.views or len(places) > 1:
             _write(batch)
-        if finish is not None:
-            finish(folder, batch.ordered, batch.errors)
+        code = finish(folder, batch.ordered, batch.errors) if finish else 0
     if batch.errors and len(places) == 1:
         raise batch.errors.popitem()[1]
     if batch.errors:
         error = max(batch.errors.values(), key=lambda error: error.exit_code)
         count = f"{len(batch.errors)} of {len(places)} scenes failed, "
         raise type(error)(f"{count}among them: {error}") from error
+    return code
 
 
 def _options_for(whole: Options, scenes: Sequence[str]) -> list[Options]:
@@ -242,46 +279,6 @@ def _options_for(whole: Options, scenes: Sequence[str]) -> list[Options]:
             " scene file, or leave the option out."
         )
     return [whole.changed(define=define) for define in by_scene]
-
-
-def _compare(
-    pool: Pool,
-    batch: Batch,
-    compare: Comparing,
-    calls: Mapping[str, tuple[Any, ...]],
-    bar: Bar,
-    hard_cases: Task | None,
-    stages: tuple[str, ...],
-) -> None:
-    """Collect the views and errors of scenes, and the hard cases."""
-    tasks = [
-        Task(
-            name=target,
-            function=compare,
-            arguments=call,
-            progress=bar.of(target, stages),
-            ends_process=is_script(call[0]),
-        )
-        for target, call in calls.items()
-    ]
-    if hard_cases:
-        tasks.append(hard_cases)
-    for task, outcome in bar.each(pool, tasks, "scenes"):
-        if task is hard_cases:
-            batch.hard_cases, batch.stages[task.name] = outcome.result()
-            continue
-        try:
-            view, spent = outcome.result()
-        except InstallationError:
-            raise
-        except FotismosError as error:
-            batch.errors[task.name] = error
-        else:
-            batch.views[task.name] = scene_files.with_fit(view, batch.folder / "fit" / task.name)
-            for stage, seconds in spent.items():
-                batch.stages[stage] += seconds
-            remark(tables.details(view.record))
-        batch.grow_page()
 
 
 def _require_inputs_apart(options: Options, places: Sequence[Path]) -> None:

@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PIL.Image import Resampling
 
 from fotismos.comparisons.departure.blocks import shrunk
-from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
-from fotismos.comparisons.records.engine import Engine, EngineCost
+from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.records.engine import EngineCost
 from fotismos.heuristic.convention import Floats
 from fotismos.reference import records
-from fotismos.reports import glossary
+from fotismos.reports import cost_tables, glossary
 from fotismos.reports.charts import cost_charts, vega
 from fotismos.reports.files import images, results
-from fotismos.reports.page.scene_view import EFFECT_COLOURS, CostView, EngineView, Figure
+from fotismos.reports.page.scene_view import CostView, Figure
 from fotismos.reports.page.templating import HELP, head, rendered
-from fotismos.reports.terminal.cost_tables import (
-    OWN_FRONT,
-    answer,
-    answer_of_pictures,
-    busy,
-    closure,
-    judgements,
-    left_out,
-    oddities,
-    reference_of,
-    stated,
-    together,
-)
-from fotismos.reports.terminal.words import as_typed
 
 if TYPE_CHECKING:  # pictures without a scene need no Mitsuba
     from fotismos.comparisons.cost.engine import Study
@@ -71,7 +57,7 @@ def write(folder: Path, study: AnyStudy, shown: CostView) -> None:
     """
     results.own(folder)
     made = documents(study)
-    by = ", judged by" if shown.judged else " on"
+    by = ", judged by" if isinstance(study.record, EngineCost) else " on"
     page = rendered(
         "cost_page.html.j2",
         HELP,
@@ -87,6 +73,13 @@ def write(folder: Path, study: AnyStudy, shown: CostView) -> None:
         results.write(folder / name, content)
 
 
+def lines(record: Cost | EngineCost, within: float) -> Iterator[str]:
+    """Yield the lines of a study of a scene, or of pictures without one."""
+    if isinstance(record, EngineCost):
+        return cost_tables.lines_of_pictures(record, within)
+    return cost_tables.lines(record)
+
+
 def figure(record: Cost | EngineCost) -> Figure:
     """Return the chart of a study: error against time."""
     families = [] if isinstance(record, EngineCost) else [FAMILIES]
@@ -99,54 +92,19 @@ def _plain(name: str) -> str:
     return "".join(c if c.isalnum() else "-" for c in name.lower()).replace("--", "-")
 
 
-def view_of_pictures(study: Study[EngineCost], within: float) -> CostView:
-    """Return the view of settings without a scene; pixels differ visibly above a ΔE2000."""
-    record = study.record
-    return CostView(
-        record=record,
-        images=_strip(study),
-        engine=_engine(record.engine, within),
-        answer=answer_of_pictures(record, within),
-        reference=_small(study.reference, record.viewing.exposure),
-        judged=reference_of(record),
-    )
-
-
-def _strip(study: AnyStudy) -> dict[str, bytes]:
+def view(study: AnyStudy, within: float = TOLERANCE) -> CostView:
+    """Return the :class:`CostView` of a study; pixels differ visibly above a ΔE2000."""
     exposure = study.record.viewing.exposure
     named = {**study.methods, **study.settings}
-    return {name: _small(image, exposure) for name, image in named.items()}
+    return CostView(
+        record=study.record,
+        images={name: _small(image, exposure) for name, image in named.items()},
+        reference=_small(study.reference, exposure),
+        within=within,
+    )
 
 
 def _small(image: Floats, exposure: float) -> bytes:
     """Return an image (H, W, 3) as a WebP file for a strip."""
     picture = images.tonemap(image, exposure)
     return images.webp(picture.resize(shrunk(picture.size, STRIP), Resampling.BOX))
-
-
-def _engine(engine: Engine, within: float = TOLERANCE, more: str = "") -> EngineView:
-    return EngineView(
-        judgements=tuple(judgements(engine)),
-        stated=stated(engine) + more,
-        odd=tuple(oddities(engine)),
-        within=within,
-        shares=tuple(share_above(one.visible, within) for one in engine.settings),
-    )
-
-
-def view(study: Study[Cost]) -> CostView:
-    """Return the :class:`CostView` of a study of a scene."""
-    record = study.record
-    effects = record.attribution.effects
-    said = [together(record), closure(record)] if effects else []
-    return CostView(
-        record=record,
-        images=_strip(study),
-        engine=_engine(record.engine, more=OWN_FRONT) if record.engine else None,
-        said=re.sub(r"(?<!\d)-(?=\d)", "−", " ".join(said)),
-        busy=busy(record) if record.is_busy else "",
-        answer=as_typed(answer(record)),
-        left_out=tuple(map(as_typed, left_out(record))),
-        reference=_small(study.reference, record.viewing.exposure),
-        colours=tuple(EFFECT_COLOURS[effect.effect] for effect in effects),
-    )

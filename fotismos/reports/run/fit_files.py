@@ -1,10 +1,9 @@
 """The page and record of one fit, and its tables."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from fotismos.comparisons.departure.criterion import TOLERANCE, decide
 from fotismos.comparisons.departure.metrics import LEADING, drawn
 from fotismos.comparisons.fit.fit import Fit
 from fotismos.comparisons.records.fit import FitRecord, FittedParameter, FormFit
@@ -12,12 +11,9 @@ from fotismos.reference.pairing.factors import alpha_of, exponent_of
 from fotismos.reference.records import to_json
 from fotismos.reports.files import images, results
 from fotismos.reports.page.templating import head, rendered
-from fotismos.reports.terminal import tables
-from fotismos.reports.terminal.words import difference, percent
-from fotismos.reports.verdict import EXACT
-
-Cells = Sequence[str]
-"""One row of a table."""
+from fotismos.reports.sentences import judgement_of_fit, of_fit
+from fotismos.reports.terminal.table import Column, Table, printed
+from fotismos.reports.terminal.words import difference
 
 
 def write(folder: Path, fit: Fit) -> None:
@@ -50,55 +46,26 @@ def page(fit: Fit, folder: Path | None = None) -> str:
     }
     return rendered(
         "fit_page.html.j2",
-        title=headline(record),
+        title=of_fit(record),
         head=head("fit", folder, record.scene),
-        judgement=judgement(record),
+        judgement=judgement_of_fit(record),
         r=record,
         pictures={name: images.webp(picture, lossless=True) for name, picture in shown.items()},
-        errors=list(_errors(record)),
-        parameters=list(_parameters(best)),
+        errors=_errors(record),
+        parameters=_parameters(best),
         sentences=list(_notes(best)),
-    )
-
-
-def headline(record: FitRecord) -> str:
-    """Return how much of the error that was minimised better parameters remove."""
-    best = record.nearest
-    if best.departure[LEADING.name].before <= EXACT:
-        return f"{record.scene}: the paired parameters show no visible difference"
-    removed = percent(best.parameter_error / (best.loss + best.parameter_error))
-    return f"{record.scene}: the best parameters remove {removed} of the error"
-
-
-def judgement(record: FitRecord) -> str:
-    """Return whether the paired and the fitted parameters pass the criterion."""
-    before, after = record.nearest.differ
-    paired = f"{percent(before.value)} ({decide([before])})"
-    fitted = f"{percent(after.value)} ({decide([after])})"
-    best = record.nearest
-    left = f"{difference(best.left.low)} to {difference(best.left.high)}"
-    model = {
-        "wrong": f"The model is wrong: mean {LEADING.label} {left} is left beyond noise.",
-        "right within noise": f"The model is right within noise: mean {LEADING.label} {left} is"
-        " left.",
-        "undecided": f"Noise hides whether the model is right: mean {LEADING.label} {left} is left."
-        " More samples decide.",
-    }
-    return (
-        f"{model[best.judgement]} At most 5 % of the pixels may differ by more than {LEADING.label}"
-        f" {TOLERANCE:g}: paired {paired}, fitted {fitted}."
     )
 
 
 def lines(record: FitRecord) -> Iterator[str]:
     """Yield the lines of a fit: errors by form, then the parameters of the best form."""
     best = record.nearest
-    yield f"{headline(record)}; {best.form} comes nearest"
-    yield judgement(record)
+    yield f"{of_fit(record)}; {best.form} comes nearest"
+    yield judgement_of_fit(record)
     yield ""
-    yield from tables.printed(_errors(record))
+    yield from printed(_errors(record))
     yield ""
-    yield from tables.printed(_parameters(best))
+    yield from printed(_parameters(best))
     yield from _notes(best)
     yield ""
 
@@ -119,51 +86,57 @@ def _notes(fit: FormFit) -> Iterator[str]:
             yield f"physical {material.name}: {described(material.reference)}"
 
 
-def _errors(record: FitRecord) -> Iterator[Cells]:
-    def row(name: str, form: FormFit, field: str, loss: float | str = "") -> Cells:
-        means = [f"{getattr(form.departure[metric], field):.3f}" for metric in drawn()]
-        unsigned = (mean.replace("-0.000", "0.000") for mean in means)
-        return name, *unsigned, loss if isinstance(loss, str) else f"{loss:.4g}"
+def _errors(record: FitRecord) -> Table:
+    """Return the errors of the paired and the fitted parameters, by form."""
+    metrics = drawn()
 
-    yield (
-        "mean error",
-        *(metric.label for metric in drawn().values()),
-        f"minimised: {record.loss['unit']}",
-    )
+    def row(name: str, form: FormFit, field: str, loss: float | None = None) -> list[str]:
+        means = [f"{getattr(form.departure[metric], field):z.3f}" for metric in metrics]
+        return [name, *means, "" if loss is None else f"{loss:.4g}"]
+
+    labels = [metric.label for metric in metrics.values()]
     nearest = record.nearest
     first = record.fits[0]
-    yield row("paired", first, "before", nearest.loss + nearest.parameter_error)
-    for fit in record.fits:
-        yield row(fit.form, fit, "after", fit.loss)
-    yield row("noise alone", first, "noise_floor")
-    blank = [""] * len(drawn())
-    yield "parameter error", *blank, f"{nearest.parameter_error:.4g}"
-    yield "model error", *blank, f"{nearest.loss:.4g}"
+    blank = [""] * len(metrics)
+    rows = [
+        ["mean error", *labels, f"minimised: {record.loss['unit']}"],
+        row("paired", first, "before", nearest.loss + nearest.parameter_error),
+        *(row(form.form, form, "after", form.loss) for form in record.fits),
+        row("noise alone", first, "noise_floor"),
+        ["parameter error", *blank, f"{nearest.parameter_error:.4g}"],
+        ["model error", *blank, f"{nearest.loss:.4g}"],
+    ]
+    return Table.of(rows, right=len(rows[0]))
 
 
-def _parameters(fit: FormFit) -> Iterator[Cells]:
-    yield "material", "parameter", "paired", "fitted", "95 %, by noise alone", "note"
+def _parameters(fit: FormFit) -> Table:
+    """Return the parameters before and after, and how certain they are."""
+    columns = (
+        Column("material", lambda row: row[0]),
+        Column("parameter", lambda row: _called(row[1])),
+        Column("paired", lambda row: row[1].paired, "{:.4g}".format),
+        Column("fitted", lambda row: row[1].fitted, "{:.4g}".format),
+        Column("95 %, by noise alone", lambda row: _interval(row[1])),
+        Column("note", lambda row: _note(row[1])),
+    )
     owned = [
         (material.name, parameter)
         for material in fit.materials
         for parameter in material.parameters
     ]
-    for owner, parameter in owned:
-        name = f"{parameter.name} {parameter.channel}".strip()
-        if parameter.is_factor:
-            name += " (factor)"
-        note = "at its bound" if parameter.at_bound else ""
-        if parameter.reason:
-            partners = f" ({', '.join(parameter.partners)})" if parameter.partners else ""
-            note = f"not identifiable: {parameter.reason}{partners}"
-        yield (
-            owner,
-            name,
-            f"{parameter.paired:.4g}",
-            "–" if parameter.fitted is None else f"{parameter.fitted:.4g}",
-            _interval(parameter),
-            note,
-        )
+    return Table(columns, owned)
+
+
+def _called(parameter: FittedParameter) -> str:
+    name = f"{parameter.name} {parameter.channel}".strip()
+    return f"{name} (factor)" if parameter.is_factor else name
+
+
+def _note(parameter: FittedParameter) -> str:
+    if parameter.reason:
+        partners = f" ({', '.join(parameter.partners)})" if parameter.partners else ""
+        return f"not identifiable: {parameter.reason}{partners}"
+    return "at its bound" if parameter.at_bound else ""
 
 
 def _interval(parameter: FittedParameter) -> str:

@@ -23,13 +23,13 @@ def subjects(options: Options) -> Subjects:
     return Subjects(
         words=(path.stem,),
         files=((path.stem, path),),
-        compare=compare,
+        compare=compared,
         libraries=PICTURE_LIBRARIES,
         are_shown_early=True,
     )
 
 
-def compare(
+def compared(
     word: str,
     folder: Path,
     target: str,

@@ -5,10 +5,10 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fotismos.comparisons.case import Case, open_case
-from fotismos.comparisons.compare import compare as compare_scene
+from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.names import file_of, name_of, picture_parts
 from fotismos.comparisons.processes.pool import Turn
@@ -25,6 +25,9 @@ from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files
 from fotismos.reports.run.batch import Subjects
 
+if TYPE_CHECKING:  # only a report has hard cases
+    from fotismos.comparisons.hard_cases import HardCases
+
 Seconds = dict[str, float]
 """Wall time by stage of a run."""
 
@@ -32,10 +35,10 @@ Seconds = dict[str, float]
 def subjects(scenes: Sequence[str]) -> Subjects:
     """Return what a command compares: scenes, as the user named them."""
     files = tuple((name_of(word), file_of(word)) for word in scenes)
-    return Subjects(words=tuple(scenes), files=files, compare=compare)
+    return Subjects(words=tuple(scenes), files=files, compare=compared)
 
 
-def compare(
+def compared(
     name: str, folder: Path, target: str, job: Job, progress: Any
 ) -> tuple[SceneView, Seconds]:
     """Compare a scene and write its files to ``folder/place``, unless it is finished there."""
@@ -58,7 +61,7 @@ def compare(
         begin = perf_counter()
         source = case.source
         options = case.options
-        comparison = compare_scene(
+        comparison = compare(
             source,
             options,
             in_turn,
@@ -105,6 +108,15 @@ def _stages(record: ComparisonRecord, seconds: float) -> Seconds:
         CAUSES: stages.get(CAUSES, 0.0),
     }
     return spent | {"metrics": seconds - sum(spent.values())}
+
+
+def hard_cases(folder: Path) -> "tuple[HardCases, float]":
+    """Evaluate the hard cases; return them, and the seconds that it took in its turn."""
+    from fotismos.comparisons.hard_cases import collect  # loaded late: only for a report
+
+    with Turn(folder, folder / results.TABLES):
+        begin = perf_counter()
+        return collect(), perf_counter() - begin
 
 
 # --- Finished scenes -------------------------------------------------------------------------

@@ -16,7 +16,7 @@ from fotismos.comparisons.records.images import Comparison, Images
 from fotismos.reference.records import Missing, Record, plain, to_json
 from fotismos.reports.files import images, results
 from fotismos.reports.page import embedding
-from fotismos.reports.page.scene_view import LiveView, SceneView, TermsView
+from fotismos.reports.page.scene_view import PointsView, SceneView
 
 if TYPE_CHECKING:  # few scenes have one
     from fotismos.comparisons.cost.engine import Study
@@ -133,7 +133,9 @@ def view_of(comparison: Comparison) -> SceneView:
         return view
     if isinstance(terms, Missing) and isinstance(live, Missing) and comparison.causes is None:
         return structs.replace(
-            view, terms=TermsView(missing=terms.reason), live=LiveView(missing=live.reason)
+            view,
+            terms=PointsView(missing=terms.reason),
+            live=PointsView(missing=live.reason),
         )
     from fotismos.reports.page import why_view  # loaded late: --no-why has none
 
@@ -155,7 +157,8 @@ def with_fit(view: SceneView, folder: Path) -> SceneView:
     except (OSError, ValueError, LookupError, TypeError):
         return view
     if view.live and is_same:
-        return structs.replace(view, live=structs.replace(view.live, fit=found))
+        live = structs.replace(view.live, data=view.live.data | {"fit": found})
+        return structs.replace(view, live=live)
     return view
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from msgspec.structs import asdict
 
@@ -11,7 +11,23 @@ from fotismos.reference.planning.decisions import Decision
 from fotismos.reference.planning.effects import labelled
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.records import VERSION, Amount, Record
-from fotismos.reports.terminal.tables import printed
+from fotismos.reports.terminal.table import Column, Table, printed
+from fotismos.reports.terminal.words import yes_or_no
+
+EFFECTS = (
+    Column("effect", "name"),
+    Column("needed", "called_for", yes_or_no),
+    Column("rule", "rule"),
+    Column("evidence", "evidence"),
+    Column("cost", "cost"),
+)
+RULES = (
+    Column("pruning rule", "name"),
+    Column("applies", "applies", yes_or_no),
+    Column("premise that may fail", "premise"),
+    Column("evidence", "evidence"),
+)
+"""The tables of a plan."""
 
 
 class PlannedEffect(Record):
@@ -67,15 +83,10 @@ def _planned(decision: Decision) -> PlannedEffect:
 
 def plan_lines(plan: PlanReport) -> Iterator[str]:
     """Yield the lines of a plan: the table of effects, then the simulation."""
-    yield from printed(_effects(plan))
+    yield from printed(Table(EFFECTS, plan.effects))
     yield ""
     if plan.rules:
-        headings = "pruning rule", "applies", "premise that may fail", "evidence"
-        rules = [
-            (rule.name, "yes" if rule.applies else "no", rule.premise, rule.evidence)
-            for rule in plan.rules
-        ]
-        yield from printed([headings, *rules])
+        yield from printed(Table(RULES, plan.rules))
         yield ""
     depth = "no limit" if plan.max_depth < 0 else plan.max_depth
     reads = ", ".join(plan.heuristic_reads) or "nothing"
@@ -87,10 +98,3 @@ def plan_lines(plan: PlanReport) -> Iterator[str]:
     yield f"left out      {', '.join(plan.left_out) or 'nothing'}"
     yield f"samples       {plan.spp} per pixel in {plan.passes} passes, {plan.sampler}"
     yield f"planning      {plan.planning_s * 1e3:.0f} ms"
-
-
-def _effects(plan: PlanReport) -> Iterator[Sequence[str]]:
-    yield "effect", "needed", "rule", "evidence", "cost"
-    for effect in plan.effects:
-        called = "yes" if effect.called_for else "no"
-        yield effect.name, called, effect.rule, effect.evidence, effect.cost

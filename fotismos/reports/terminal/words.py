@@ -10,7 +10,6 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -26,16 +25,22 @@ def _remember(context: click.Context, parameter: click.Parameter, is_set: bool) 
         context.meta[LEVEL] = -1 if parameter.name == "quiet" else 1
 
 
-def _option(letter: str, name: str, help: str) -> Callable[[Any], Any]:
-    return click.option(
-        letter, name, is_flag=True, expose_value=False, callback=_remember, help=help
+VERBOSITY = {
+    "quiet": "Print only where the results are, no progress or tables.",
+    "verbose": "Also print the simulation, the pairing of lights, warnings, and times.",
+}
+"""The options that set the level, and their help."""
+
+
+def verbosity_option(name: str) -> click.Option:
+    """Return one of the options that set the level."""
+    return click.Option(
+        [f"-{name[0]}", f"--{name}"],
+        is_flag=True,
+        expose_value=False,
+        callback=_remember,
+        help=VERBOSITY[name],
     )
-
-
-quiet_option = _option("-q", "--quiet", "Print only where the results are, no progress or tables.")
-verbose_option = _option(
-    "-v", "--verbose", "Also print the simulation, the pairing of lights, warnings, and times."
-)
 
 
 def level() -> int:
@@ -167,6 +172,11 @@ def given_time(value: float) -> str:
 def percent(value: float) -> str:
     """A fraction as a percentage."""
     return f"{number(100 * value)} %"
+
+
+def yes_or_no(is_so: bool) -> str:
+    """A truth value."""
+    return "yes" if is_so else "no"
 
 
 def _minus(digits: str) -> str:

@@ -1,9 +1,9 @@
-"""The work of ``fotismos study``."""
+"""A study: its points rendered, its dataset, figures and page."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,9 +18,10 @@ from fotismos.comparisons.study.sheet import sheet_of
 from fotismos.reports.charts import study_charts, vega
 from fotismos.reports.files import results
 from fotismos.reports.files.results import PAGE, hold_results, own
-from fotismos.reports.jobs import command_line
+from fotismos.reports.jobs import Terminal, command_line
 from fotismos.reports.page.templating import head, rendered
-from fotismos.reports.terminal import progress, tables
+from fotismos.reports.terminal import progress
+from fotismos.reports.terminal.table import Table, printed
 from fotismos.reports.terminal.words import tell
 
 if TYPE_CHECKING:
@@ -29,22 +30,24 @@ if TYPE_CHECKING:
 FIGURES = "figures"
 
 
-def run(pool: Pool, file: Path, output: Path, many: Callable[[int], Pool]) -> None:
+def show(pool: Pool, file: Path, terminal: Terminal) -> None:
     """Render the points of a study, and write its dataset and figures.
 
-    ``pool`` lists the points, since scenes are read for that; ``many(tasks)`` renders them.
+    ``pool`` lists the points, since scenes are read for that; others then render them.
     """
     dataset.arrow()  # before anything is rendered
     chosen = design.read(file)
     dataset.check_figures(chosen)
-    with hold_results(output / "study", [(chosen.name, file)], command_line()) as (folder,):
+    with hold_results(terminal.output / "study", [(chosen.name, file)], command_line()) as (
+        folder,
+    ):
         points = pool.do(Task(chosen.name, running.all_points, (chosen,)))
         # Its work is done, and the renderers get the cores and the memory.
         pool.end()
         tasks = len(points) // running.WORTH_A_PROCESS + 1
         for part in (folder / FIGURES, folder / running.POINTS):
             own(part)  # a study replaces only its own results
-        with many(tasks) as renderers, progress.shown("points") as bar:
+        with terminal.pool(tasks) as renderers, progress.shown("points") as bar:
             table, done = running.run(chosen, folder, renderers, bar.of(chosen.name), points)
         written = write(chosen, table, points, folder)
     tell([*summary(chosen, table, done), ""])
@@ -77,7 +80,7 @@ def write(
         "study.html.j2",
         title=study.title,
         head=head("study", folder),
-        ranges=[_range(part.name, rows) for part in study.parts],
+        ranges=_ranges(study, rows),
         sheets=sheets,
         figures=figures,
         command=command_line(),
@@ -86,22 +89,25 @@ def write(
     return data, folder / FIGURES, folder / PAGE
 
 
-def _range(part: str, rows: Sequence[Row]) -> tuple[str, ...]:
-    """Return the row of a part: name, points, failed ones, least, median and most error."""
-    of_part = [row for row in rows if row["part"] == part]
-    good = sorted(row["dE2000"] for row in of_part if row["error"] is None)
-    errors = ["–", "–", "–"]
-    if good:
-        errors = [f"{error:.2f}" for error in (good[0], good[len(good) // 2], good[-1])]
-    return part, f"{len(of_part)}", f"{len(of_part) - len(good)}", *errors
+def _ranges(study: StudyFile, rows: Sequence[Row]) -> Table:
+    """Return the table of parts: points, failed ones, least, median and most error."""
+    ranges: list[tuple[str, ...]] = [
+        ("part", "points", "failed", "mean ΔE2000: least", "median", "most")
+    ]
+    for part in study.parts:
+        of_part = [row for row in rows if row["part"] == part.name]
+        good = sorted(row["dE2000"] for row in of_part if row["error"] is None)
+        errors = ["–", "–", "–"]
+        if good:
+            errors = [f"{error:.2f}" for error in (good[0], good[len(good) // 2], good[-1])]
+        ranges.append((part.name, f"{len(of_part)}", f"{len(of_part) - len(good)}", *errors))
+    return Table.of(ranges)
 
 
 def summary(study: StudyFile, table: pa.Table, done: int) -> Iterator[str]:
     """Yield a line for each part: points, failures, and the range of the error."""
     rows = table.to_pylist()
-    headings = "part", "points", "failed", "mean ΔE2000: least", "median", "most"
-    parts = [_range(part.name, rows) for part in study.parts]
-    yield from tables.printed([headings, *parts], right=1)
+    yield from printed(_ranges(study, rows))
     if done < len(rows):
         yield f"{len(rows) - done} points were kept from an earlier run, or are shared."
     for row in [row for row in rows if row["error"] is not None][:3]:

@@ -1,15 +1,10 @@
-"""Tables of results, on the terminal and as CSV and Markdown."""
+"""What a run of comparisons prints, and its tables as CSV."""
 
-import csv
-import re
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from io import StringIO
 from pathlib import Path
-from typing import Any, Literal
-
-from rich.console import Console
-from rich.table import Table
-from rich.text import Text
+from typing import TYPE_CHECKING, Any
 
 from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
 from fotismos.comparisons.departure.metrics import LEADING
@@ -20,49 +15,23 @@ from fotismos.comparisons.records.comparison import (
     NoiseTarget,
     PictureFiles,
 )
+from fotismos.comparisons.records.departure import Summary
 from fotismos.reference.pairing.pairing_record import Pairing
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.records import plain
 from fotismos.reports.files import results
-from fotismos.reports.terminal.words import number, percent, seconds, visible
+from fotismos.reports.terminal.table import Column, Table, comma_separated, printed
+from fotismos.reports.terminal.words import number, percent, seconds
 
-#: Characters per line of a printed table; longer cells are folded.
-WIDTH = 120
+if TYPE_CHECKING:  # only checks load it
+    from fotismos.comparisons.records.check import Move
+
+SHOWN = 12
+"""Quantities of a check that are listed; all are in the record."""
+
 
 #: Fields of the shapes and materials in ``carriers.csv``.
 SHARES = ("name", "material", "pixels", "share", "mean_dE2000", "effect")
-
-
-def printed(rows: Iterable[Sequence[str]], right: int | None = None) -> Iterator[str]:
-    """Return the lines of a table, the same on a terminal and in a file.
-
-    The first row has the headings. Columns from number ``right`` are aligned right.
-    """
-    headings, *others = rows
-    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for column, heading in enumerate(headings):
-        is_left = right is None or column < right
-        justify: Literal["left", "right"] = "left" if is_left else "right"
-        table.add_column(heading, overflow="fold", justify=justify)
-    # As Text, since rich would read brackets in a string as markup.
-    for row in others:
-        table.add_row(*(Text(visible(cell)) for cell in row))
-    console = Console(width=WIDTH, color_system=None)
-    with console.capture() as capture:
-        console.print(table)
-    return (line.rstrip() for line in capture.get().splitlines())
-
-
-def markdown(rows: Iterable[Sequence[str]], right: int = 1) -> Iterator[str]:
-    """Yield the lines of a table in Markdown.
-
-    The first row has the headings. Columns from number ``right`` are aligned right.
-    """
-    headings, *others = rows
-    yield _row(headings)
-    yield _row(["---"] * right + ["---:"] * (len(headings) - right))
-    for row in others:
-        yield _row([cell.replace("|", "\\|") for cell in row])
 
 
 def write(folder: Path, records: Sequence[ComparisonRecord]) -> None:
@@ -84,7 +53,9 @@ def metrics_csv(records: Iterable[ComparisonRecord]) -> str:
         for name, summary in record.metrics.items()
     ]
     headings = list(dict.fromkeys(key for row in rows for key in row))
-    return comma_separated([headings, *([row.get(key, "") for key in headings] for row in rows)])
+    return comma_separated(
+        Table.of([headings, *([row.get(key, "") for key in headings] for row in rows)])
+    )
 
 
 def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -101,33 +72,6 @@ def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
             yield prefix + key, value
 
 
-def comma_separated(rows: Iterable[Sequence[Any]]) -> str:
-    """Return a table as CSV (RFC 4180, lines end with a line feed), with numbers in full.
-
-    Texts that a spreadsheet would compute as formulas begin with an apostrophe.
-    """
-    text = StringIO()
-    csv.writer(text, lineterminator="\n").writerows([*map(_inert, row)] for row in rows)
-    return text.getvalue()
-
-
-def _inert(cell: Any) -> Any:
-    is_formula = isinstance(cell, str) and cell.startswith(("=", "+", "-", "@", "\t", "\r"))
-    return f"'{cell}" if is_formula else cell
-
-
-def escaped(text: str) -> str:
-    """Return text in one line that Markdown shows unchanged; `markdown` escapes bars."""
-    # Line breaks go first, or `visible` would print them as escapes. The ampersand goes before
-    # "<", whose replacement has one.
-    text = visible(" ".join(text.split())).replace("&", "&amp;").replace("<", "&lt;")
-    return re.sub(r"([\\`*_\[\]])", r"\\\1", text)
-
-
-def _row(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
 # --- Lines on a run ----------------------------------------------------------------------------
 
 
@@ -136,22 +80,7 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
     for record in records:
         if record.agreement:
             yield from _pictures(record, record.agreement)
-    # A row for each scene, then what its columns mean.
-    headings = "differ", f"mean {LEADING.label}", "noise", "shape", "time"
-    rows: list[tuple[str, ...]] = [("scene", *headings)]
-    for record in records:
-        metric = record.metrics[LEADING.name]
-        noise = metric.noise_floor if record.is_noise_known else None
-        means = (metric.mean, noise, metric.after_exposure.mean)
-        rows.append(
-            (
-                record.scene,
-                percent(share_above(metric.visible, threshold).value),
-                *(number(mean) for mean in means),
-                "" if record.agreement else time_ratio(record),
-            )
-        )
-    yield from printed(rows, right=1)
+    yield from printed(_scenes(records, threshold))
     yield f"differ: above {LEADING.label} {threshold:g}; shape: the mean at the best exposure"
     if not all(record.agreement for record in records):
         yield "time: what a sample of the physical half takes, over one of the textbook's"
@@ -178,6 +107,29 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
                 f"{record.scene}: a probe disagreed with the plan by {guard.departure:+.1%} of the"
                 " light, so everything was simulated. Please report this scene."
             )
+
+
+def _scenes(records: Sequence[ComparisonRecord], threshold: float) -> Table:
+    """Return the table of scenes: pixels that differ, errors, and times."""
+
+    def lead(record: ComparisonRecord) -> Summary:
+        return record.metrics[LEADING.name]
+
+    def differ(record: ComparisonRecord) -> float:
+        return share_above(lead(record).visible, threshold).value
+
+    def noise(record: ComparisonRecord) -> float | None:
+        return lead(record).noise_floor if record.is_noise_known else None
+
+    columns = (
+        Column("scene", "scene"),
+        Column("differ", differ, percent, is_right=True),
+        Column(f"mean {LEADING.label}", lambda r: lead(r).mean, number, is_right=True),
+        Column("noise", noise, number, is_right=True),
+        Column("shape", lambda r: lead(r).after_exposure.mean, number, is_right=True),
+        Column("time", lambda r: "" if r.agreement else time_ratio(r), is_right=True),
+    )
+    return Table(columns, records)
 
 
 def time_ratio(record: ComparisonRecord) -> str:
@@ -260,10 +212,34 @@ def _noise(record: ComparisonRecord, stop: NoiseTarget) -> str:
     return f"{record.scene}: {noise}{after} ({asked})"
 
 
-def _shares(records: Iterable[ComparisonRecord]) -> Iterator[Sequence[Any]]:
-    yield "scene", "kind", *SHARES
+def _shares(records: Iterable[ComparisonRecord]) -> Table:
+    """Return the table of shapes and materials by their share of the error."""
+    rows: list[list[Any]] = [["scene", "kind", *SHARES]]
     for record in records:
         for kind, carriers in (("shape", record.objects), ("material", record.materials)):
             for carrier in carriers:
-                values = (getattr(carrier, column) for column in SHARES)
-                yield record.scene, kind, *("" if value is None else value for value in values)
+                values = [getattr(carrier, name) for name in SHARES]
+                texts = ["" if value is None else value for value in values]
+                rows.append([record.scene, kind, *texts])
+    return Table.of(rows)
+
+
+# --- What moved since a baseline ---------------------------------------------------------------
+
+
+def moved(moves: Sequence[Move]) -> Table:
+    """Return the table of what moved most: from, to, by how many standard errors, and p-value."""
+    columns = (
+        Column("what moved", "name"),
+        Column("baseline", lambda move: f"{move.before:.6g}"),
+        Column("now", "after", "{:.6g}".format, is_right=True),
+        Column("change", "change", is_right=True),
+        Column("standard errors", certainty, "{:+.1f}".format, is_right=True),
+        Column("p", "p_corrected", "{:.1g}".format, is_right=True),
+    )
+    return Table(columns, moves[:SHOWN])
+
+
+def certainty(move: Move) -> float | str:
+    """Return by how many standard errors a quantity moved."""
+    return "no noise" if move.standard_errors is None else move.standard_errors

@@ -1,11 +1,9 @@
-"""The work of ``fotismos doctor``."""
+"""What ``fotismos doctor`` examines."""
 
 import platform
 from collections.abc import Iterable, Iterator
 from importlib import metadata
 from importlib.util import find_spec
-
-import click
 
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure import definitions
@@ -20,12 +18,6 @@ from fotismos.reference.scene.graph import set_variant
 
 WIDTH = max(map(len, llvm.VARIANTS))
 LIBRARIES = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR")
-
-
-def run(pool: Pool) -> None:
-    """Print the lines on the installation."""
-    for found in examine(pool, llvm.VARIANTS):
-        click.echo(found)
 
 
 def examine(pool: Pool, variants: Iterable[str]) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""Work on scenes whose results go to a folder each, such as ``OUTPUT/cost/SCENE``."""
+"""Scenes whose results go to a folder each, such as ``OUTPUT/cost/SCENE``."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -16,10 +16,9 @@ def results_of(
     folder: Path,
     scenes: Sequence[str],
     work: Callable[..., Any],
-    arguments: Sequence[Any] = (),
     files: Sequence[Path] = (),
 ) -> dict[Path, Any]:
-    """Return what ``work(scene, *arguments, folder, progress)`` returns for each scene, by folder.
+    """Return what ``work(scene, folder, progress)`` returns for each scene, by folder.
 
     The scenes' folders are below ``folder``. With ``files``, which are pictures, ``scenes`` are
     only names.
@@ -27,15 +26,12 @@ def results_of(
     subjects: list[tuple[str, Path | None]] = list(zip(scenes, files, strict=False))
     if not files:
         subjects = [(name_of(scene), file_of(scene)) for scene in scenes]
-    with (
-        results.hold_results(folder, subjects, command_line()) as places,
-        progress.shown() as bar,
-    ):
+    with results.hold_results(folder, subjects, command_line()) as places, progress.shown() as bar:
         tasks = [
             Task(
                 name=target.name,
                 function=work,
-                arguments=(scene, *arguments, target),
+                arguments=(scene, target),
                 progress=bar.of(target.name),
                 ends_process=not files and is_script(scene),
             )
