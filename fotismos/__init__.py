@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fotismos.comparisons.audit.checks import Audit
     from fotismos.comparisons.case import Scene
-    from fotismos.comparisons.comparison import Comparison, ComparisonRecord
-    from fotismos.comparisons.cost.cost_record import Cost, Method
-    from fotismos.comparisons.cost.engine_record import EngineCost
     from fotismos.comparisons.departure.metrics import Metric, Pixelwise
-    from fotismos.comparisons.fit.fit_record import FitRecord
     from fotismos.comparisons.options import Options
-    from fotismos.comparisons.pixel_terms import PixelTerms
+    from fotismos.comparisons.records.check import CheckRecord
+    from fotismos.comparisons.records.comparison import ComparisonRecord
+    from fotismos.comparisons.records.cost import Cost, Method
+    from fotismos.comparisons.records.engine import EngineCost
+    from fotismos.comparisons.records.fit import FitRecord
+    from fotismos.comparisons.records.images import Comparison, PixelTerms
     from fotismos.heuristic.background import environment
     from fotismos.heuristic.errors import (
         FotismosError,
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from fotismos.heuristic.lights import DirectionalLight, PointLight, SpotLight
     from fotismos.heuristic.materials import Material
     from fotismos.heuristic.plugins import register
-    from fotismos.reports.ci.checks import CheckRecord
     from fotismos.reports.notebook import Shown, audit, check, compare, cost, declare, fit, plan
     from fotismos.reports.terminal.plan_lines import PlanReport
 
@@ -42,13 +42,14 @@ __version__ = heuristic.__version__
 NAMES = {
     "comparisons.audit.checks": ("Audit",),
     "comparisons.case": ("Scene",),
-    "comparisons.comparison": ("Comparison", "ComparisonRecord"),
-    "comparisons.cost.cost_record": ("Cost", "Method"),
-    "comparisons.cost.engine_record": ("EngineCost",),
     "comparisons.departure.metrics": ("Metric", "Pixelwise"),
-    "comparisons.fit.fit_record": ("FitRecord",),
     "comparisons.options": ("Options",),
-    "comparisons.pixel_terms": ("PixelTerms",),
+    "comparisons.records.check": ("CheckRecord",),
+    "comparisons.records.comparison": ("ComparisonRecord",),
+    "comparisons.records.cost": ("Cost", "Method"),
+    "comparisons.records.engine": ("EngineCost",),
+    "comparisons.records.fit": ("FitRecord",),
+    "comparisons.records.images": ("Comparison", "PixelTerms"),
     "heuristic.errors": (
         "FotismosError",
         "InputError",
@@ -57,7 +58,6 @@ NAMES = {
         "NonFiniteError",
         "OutputError",
     ),
-    "reports.ci.checks": ("CheckRecord",),
     "reports.notebook": (
         "Shown",
         "audit",

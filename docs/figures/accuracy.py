@@ -13,11 +13,11 @@ from docs.figures.documents import DOCS, fact, replace, write_table
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost.cost import cost
-from fotismos.comparisons.cost.cost_record import Cost, Point
 from fotismos.comparisons.cost.front import at_size, fronted, sufficient
 from fotismos.comparisons.cost.methods import FULL_PLAN, STAND_INS
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.cost import Cost, Point
 from fotismos.reports.charts import vega
 from fotismos.reports.charts.cost_charts import titled
 from fotismos.reports.sentences import busy

@@ -16,10 +16,11 @@ from PIL import Image
 
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.compare import Step, compare
-from fotismos.comparisons.comparison import Comparison, Images
+from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.halves import Step
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.images import Comparison, Images
 from fotismos.reports.charts import figures
 from fotismos.reports.files import images
 

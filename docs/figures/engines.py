@@ -21,9 +21,7 @@ from docs.figures.documents import DOCS, draw, replace
 from docs.figures.model_figures import GROUND, STYLE
 from fotismos.comparisons import timing
 from fotismos.comparisons.case import Case, open_case
-from fotismos.comparisons.comparison import machine
 from fotismos.comparisons.cost import measure
-from fotismos.comparisons.cost.cost_record import Method
 from fotismos.comparisons.cost.methods import DIRECT, FULL_PLAN, Ladder
 from fotismos.comparisons.departure.colour import luminance
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
@@ -31,9 +29,11 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.scenes import plastic_spheres
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
+from fotismos.comparisons.records.cost import Method
 from fotismos.heuristic.convention import Floats
+from fotismos.reference.records import Machine
 from fotismos.reference.rendering.gbuffer import image_size
-from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.passes import passes
 from fotismos.reference.rendering.sums import Accumulator
 from fotismos.reports.files import images
 from fotismos.reports.terminal.table import Table, markdown
@@ -165,7 +165,7 @@ def _rendered(case: Case, method: Method) -> Rendered:
     """Render an approximation, and time it in turn with the kernel in the same scene."""
     options = case.options.changed(heuristic=method.heuristic or "phong")
     ready = guarded(case.source, options)
-    ladder = Ladder(case.source, options, ready)
+    ladder = Ladder(ready)
     firsts = {one.name: ladder.renderer(one, 4) for one in (KERNEL, method)}
     width, height = image_size(ready.scene)
     renderers = measure.tried(firsts, dict.fromkeys(firsts, (4,)), width * height)
@@ -174,7 +174,7 @@ def _rendered(case: Case, method: Method) -> Rendered:
     total = Accumulator()
     renderer = firsts[method.name].sampled(measure.REFERENCE_SPP)
     for one in passes([renderer], options.seed, measure.REFERENCE_PASSES):
-        total.add(one.images[0])
+        total.add(one[0])
     return Rendered(
         picture=total.mean(),
         time=timing.ratio(lines[method.name], lines[KERNEL.name]).value,
@@ -243,7 +243,7 @@ def table(rows: Sequence[Measured]) -> Iterator[str]:
     yield ""
     yield (
         f"Pictures are {WIDTH} pixels wide. Times are from {ROUNDS} rounds on"
-        f" {machine().processor}, {machine().cores} cores."
+        f" {Machine.here().processor}, {Machine.here().cores} cores."
     )
 
 

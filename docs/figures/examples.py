@@ -10,9 +10,9 @@ from docs.figures.documents import DOCS, compared, draw, fact, panels, replace
 from docs.figures.model_figures import pictures, sheet
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.images import Comparison
 from fotismos.reference.scene.source import Source
 from fotismos.reports.terminal.table import Table, markdown
 

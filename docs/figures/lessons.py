@@ -11,9 +11,8 @@ from PIL import Image, ImageDraw
 
 from docs.figures.documents import DOCS, compared, panels, read_table, replace
 from fotismos.comparisons import atomic
-from fotismos.comparisons.comparison import Comparison, Images
-from fotismos.comparisons.pixel_terms import LightTerms, PixelTerms
-from fotismos.comparisons.steps import with_terms
+from fotismos.comparisons.records.images import Comparison, Images, LightTerms, PixelTerms
+from fotismos.comparisons.steps import TERMS
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Missing
 from fotismos.reports.files.images import webp
@@ -65,7 +64,7 @@ def rendered(command: str, side: int = SIDE, spp: int = SAMPLES) -> Comparison:
     """Compare as a command does whose words are a scene and options."""
     scene, *words = command.split(" --")
     given: dict[str, Any] = dict(word.replace("-", "_").split() for word in words)
-    return compared(scene, then=[with_terms], resolution=(side, side), spp=spp, **given)
+    return compared(scene, then=[TERMS], resolution=(side, side), spp=spp, **given)
 
 
 def values(lesson: str) -> Floats:

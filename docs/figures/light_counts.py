@@ -20,7 +20,8 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.heuristic.heuristics import Interpolation
-from fotismos.reference.rendering.renderer import Renderer, passes, warm
+from fotismos.reference.rendering.passes import passes
+from fotismos.reference.rendering.renderer import Renderer, warm
 from fotismos.reference.scene.source import Source
 from fotismos.reports.terminal.words import number
 
@@ -84,7 +85,7 @@ def _of_count(count: int) -> Iterator[ShadingCost]:
     for renderer in renderers:
         warm(renderer)
     *_, last = passes(renderers, options.seed, ROUNDS)
-    exact, *images = map(np.array, last.images)
+    exact, *images = map(np.array, last)
     distances = LEADING.against(exact, sphere.counted, options.viewing)
     for (shading, n, faces), renderer, image in zip(meshes, renderers[1:], images, strict=True):
         yield ShadingCost(

@@ -19,8 +19,8 @@ from fotismos.comparisons import atomic
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.fit import FitRecord
 from fotismos.comparisons.study import dataset, design
 from fotismos.reports.charts import vega
 from fotismos.reports.charts.cost_charts import titled

@@ -14,8 +14,8 @@ from PIL import Image
 
 import fotismos
 from docs.figures.documents import compared, draw, panels
-from fotismos.comparisons.comparison import Images
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.records.images import Images
 from fotismos.reports.charts import figures
 from fotismos.reports.files import images
 

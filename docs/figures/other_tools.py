@@ -11,9 +11,10 @@ import fotismos
 from docs.figures.documents import replace
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.criterion import LIMIT, Verdict
+from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.records.departure import Verdict
 from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reports import verdict
 from fotismos.reports.terminal.table import Table, markdown

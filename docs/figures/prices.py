@@ -16,10 +16,9 @@ from docs.figures.documents import draw, read_table, replace, write_table
 from docs.figures.model_figures import GROUND, STYLE, quiet
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import ComparisonRecord
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.price_record import Price
+from fotismos.comparisons.records.comparison import ComparisonRecord, Price
 from fotismos.comparisons.steps import steps
 from fotismos.reports import verdict
 from fotismos.reports.terminal.words import number, percent, seconds
@@ -67,7 +66,7 @@ def measured() -> list[ComparisonRecord]:
     records = []
     for name in (*SCENES, *map(str, LARGER)):
         case = open_case(name, Options(resolution=SIZE))
-        then = steps(case.options, why=True)
+        then = steps(why=True)
         made = compare(case.source, case.options, command=case.command(), then=then)
         records.append(made.record)
         print(name, flush=True)

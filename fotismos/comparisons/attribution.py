@@ -24,34 +24,30 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from fotismos.comparisons.comparison import (
+from fotismos.comparisons.departure.blocks import ratio
+from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
+from fotismos.comparisons.departure.noise import (
+    USUAL,
+    Halves,
+    contrasts,
+    distances_between,
+    visible_shares,
+    without_noise,
+)
+from fotismos.comparisons.departure.regions import find_objects
+from fotismos.comparisons.hybrids import HybridImages, HybridScenes, Pairs, labels
+from fotismos.comparisons.prepared import Prepared
+from fotismos.comparisons.records.comparison import (
     CAUSES,
     Attribution,
-    Causes,
-    Comparison,
     ComparisonRecord,
     Contribution,
     Hybrid,
     MeanError,
     ObjectContribution,
 )
-from fotismos.comparisons.departure.blocks import ratio
-from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
-from fotismos.comparisons.departure.noise import (
-    USUAL,
-    Halves,
-    VisibleShare,
-    contrasts,
-    distances_between,
-    visible_shares,
-    without_noise,
-)
-from fotismos.comparisons.departure.regions import Region, find_objects
-from fotismos.comparisons.estimates import metrics_for
-from fotismos.comparisons.hybrids import HybridImages, HybridScenes, Pairs, labels
-from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import Prepared
+from fotismos.comparisons.records.departure import Region, Viewing, VisibleShare
+from fotismos.comparisons.records.images import Causes, Comparison
 from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.planning.effects import Effect
@@ -59,14 +55,11 @@ from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import (
     ObjectIds,
     gbuffer,
-    image_size,
     require_surface,
-    resize,
     size_of_width,
 )
-from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, passes
+from fotismos.reference.rendering.passes import Progress, Stream, passes
 from fotismos.reference.rendering.sums import Grouped, block_numbers, jackknifed
-from fotismos.reference.scene.source import Source
 
 WIDTH = 48
 NARROW = 32
@@ -117,9 +110,7 @@ Player = TypeVar("Player", bound=Hashable)
 """An effect; in tests of the sums, any name."""
 
 
-def with_causes(
-    comparison: Comparison, ready: Prepared, progress: Progress | None = None
-) -> Comparison:
+def with_causes(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
     """Return a comparison with its causes, found with its own scenes and plan at a small size.
 
     If they cannot be found, a warning says why.
@@ -131,7 +122,7 @@ def with_causes(
         assert plan is not None, "the reference was rendered"
         both_halves = 2 * plan.spp * comparison.images.counted.size
         most_samples = max(PATIENCE * both_halves, AFFORDABLE)
-        causes = find(ready, ready.source, ready.options, progress, clean, limit=most_samples)
+        causes = find(ready, progress, clean, limit=most_samples)
     except FotismosError as error:
         return comparison.warned([f"The causes are unknown: {error}"])
     record = structs.replace(with_effects_named(comparison, causes.maps), why=causes.record)
@@ -141,8 +132,6 @@ def with_causes(
 
 def find(
     ready: Prepared,
-    source: Source,
-    options: Options,
     progress: Progress | None = None,
     clean: tuple[Floats, Floats] | None = None,
     most: int | None = None,
@@ -157,58 +146,51 @@ def find(
     """
     if media := sorted(name for name, _ in ready.pair.media):
         raise InputError(
-            f"{source.name} has participating media ({', '.join(media)}), which no image of some"
+            f"{ready.name} has participating media ({', '.join(media)}), which no image of some"
             " effects can hold. The other numbers do not need them."
         )
-    width, height = image_size(ready.scene)
+    width, height = ready.size
     is_large = max(len(ready.scene.emitters()), len(ready.scene.shapes())) > MANY
     most = most or (NARROW if is_large else WIDTH)
-    size = size_of_width(ready.scene, min(most, width))
+    size = size_of_width(ready.scene, ready.size, min(most, width))
     spp = EXACT_SPP if ready.plan.exact else FEW_SPP if is_large else SPP
-    surface = gbuffer(ready.scene, size)
-    require_surface(surface.hit, source.name)
-    leading: Any = metrics_for(ready.options)[LEADING.name]
-    pairs = Pairs(source, options, ready)
+    surface = gbuffer(ready.scene, size, film=ready.size)
+    require_surface(surface.hit, ready.name)
+    leading: Any = ready.metrics[LEADING.name]
+    pairs = Pairs(ready, ready.options)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
-    reference = Renderer(
-        ready.scene, ready.reference.integrator, pass_spp=spp, label="physical picture", size=size
-    )
-    try:
-        while True:
-            # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
-            loop = passes(
-                [reference], options.seed, REPLICATES, stream=Stream.OTHER_SIDE,
-                progress=progress, stage="reference",
-            )  # fmt: skip
-            groups = np.stack([np.array(rendered.images[0]) for rendered in loop])
-            meter = ErrorMeter(groups, surface.hit, options.viewing, leading)
-            images = HybridImages(
-                pairs,
-                scenes,
-                replicates=REPLICATES,
-                replicate_spp=reference.pass_spp,
-                seed=options.seed,
-                size=size,
-                progress=progress,
-            )
-            found = attribute(
-                images,
-                meter,
-                shapes=surface.shape,
-                seed=options.seed,
-                clean=clean,
-                whole=width * height,
-            )
-            more = MORE * reference.pass_spp
-            count = len(found.record.hybrids) * REPLICATES
-            is_enough = count * more * size[0] * size[1] > limit
-            if is_closed(found.record) or is_enough:
-                break
-            reference = reference.sampled(more)
-    finally:
-        # The scene is the comparison's: it gets its size back.
-        resize(ready.scene, (width, height))
-    return found
+    reference = ready.reference.sampled(spp)
+    while True:
+        # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
+        loop = passes(
+            [reference], ready.options.seed, REPLICATES, size=size, stream=Stream.OTHER_SIDE,
+            progress=progress, stage="reference",
+        )  # fmt: skip
+        groups = np.stack([np.array(rendered[0]) for rendered in loop])
+        meter = ErrorMeter(groups, surface.hit, ready.options.viewing, leading)
+        images = HybridImages(
+            pairs,
+            scenes,
+            replicates=REPLICATES,
+            replicate_spp=reference.pass_spp,
+            seed=ready.options.seed,
+            size=size,
+            progress=progress,
+        )
+        found = attribute(
+            images,
+            meter,
+            shapes=surface.shape,
+            seed=ready.options.seed,
+            clean=clean,
+            whole=width * height,
+        )
+        more = MORE * reference.pass_spp
+        count = len(found.record.hybrids) * REPLICATES
+        is_enough = count * more * size[0] * size[1] > limit
+        if is_closed(found.record) or is_enough:
+            return found
+        reference = reference.sampled(more)
 
 
 def is_closed(record: Attribution) -> bool:

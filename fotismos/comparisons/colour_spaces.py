@@ -21,12 +21,12 @@ from PIL import ExifTags, Image
 from fotismos.comparisons.departure.colour import (
     BT709,
     CHROMATICITIES,
-    DEFAULT_VIEWING,
     Array,
     from_pq,
     from_srgb,
     rgb_to_xyz,
 )
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.heuristic.convention import Floats
 
 Curve = Callable[[Array], Array]

@@ -6,41 +6,46 @@ The seed of pass ``i`` is hashed from the run's seed and ``i``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from threading import Thread
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons import timing
-from fotismos.comparisons.comparison import (
-    Comparison,
+from fotismos.comparisons.departure import marks, regions, statistics
+from fotismos.comparisons.departure.criterion import decide
+from fotismos.comparisons.departure.metrics import (
+    LEADING,
+    METRICS,
+    RATIO,
+    declared,
+)
+from fotismos.comparisons.halves import Halves, Step
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.comparison import (
     ComparisonRecord,
     Deviations,
     NoiseTarget,
     TimeSpent,
-    versions,
 )
-from fotismos.comparisons.departure.metrics import METRICS, leading_distance
-from fotismos.comparisons.estimates import Estimates, PassSums, measure, metrics_for
-from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import Prepared, guarded
-from fotismos.comparisons.price_record import Price
+from fotismos.comparisons.records.departure import Significant, Summary
+from fotismos.comparisons.records.images import Comparison, Images
+from fotismos.comparisons.steps import PICTURES, steps
 from fotismos.heuristic.errors import InstallationError
-from fotismos.reference.rendering.gbuffer import image_size
-from fotismos.reference.rendering.renderer import Progress, passes
-from fotismos.reference.scene.source import Source, collect_messages, count_messages
+from fotismos.heuristic.program import versions
+from fotismos.reference.records import Pixels
+from fotismos.reference.rendering.passes import Progress, passes
 
-Step = Callable[[Comparison, Prepared, Progress | None], Comparison]
-"""What adds to a comparison once it is measured, with what it was rendered with."""
+if TYPE_CHECKING:  # two pictures need no Mitsuba
+    from fotismos.reference.scene.source import Source
 
-COMPUTED_TWICE = 4096
+PIXELS_COMPUTED_TWICE = 4096
 """Counted pixels at which colour-science computes differences, too; all if there are fewer."""
 
 DEVIATION_ALLOWED = 1e-3
@@ -64,16 +69,173 @@ def compare(
     `NonFiniteError` for a NaN or an infinity in a rendering. Times are taken within the context
     ``alone``.
     """
-    options = options or Options()
+    from fotismos.comparisons.prepared import guarded  # loaded late: two pictures need no Mitsuba
+    from fotismos.reference.scene.source import collect_messages, count_messages  # the same
+
     _require_colour_science()
     printed: list[str] = []
     with collect_messages(printed):
-        comparison, ready = _render_and_measure(source, options, progress, command, alone)
+        halves = guarded(source, options)
+        comparison = look(halves, command, progress, alone)
     comparison = comparison.warned(count_messages([*source.messages, *printed]))
-    for step in then:
-        comparison = step(comparison, ready, progress)
+    return finish(comparison, halves, then, progress)
+
+
+def compare_pictures(options: Options, name: str, command: str = "") -> Comparison:
+    """Compare the pictures that options name: ``image`` with ``reference``.
+
+    Both may be repeats, whose spread gives their noise. ``name`` is that of the comparison, and
+    ``command`` repeats it. Raises `InputError` if a picture cannot be read, if they differ in size,
+    or if both are black.
+    """
+    from fotismos.comparisons.pictures import two_pictures  # loaded late: scenes have none
+
+    halves = two_pictures(options, name)
+    return finish(look(halves, command), halves, steps(why=False))
+
+
+def look(
+    halves: Halves,
+    command: str = "",
+    progress: Progress | None = None,
+    alone: AbstractContextManager[Any] | None = None,
+) -> Comparison:
+    """Take the passes of both halves, and measure what a page shows first; see :func:`compare`.
+
+    These are the leading metric and the declared ones; :func:`finish` adds the others.
+    """
+    stages = dict(halves.seconds)
+    begin = perf_counter()
+
+    def done(stage: str, elsewhere: float = 0.0) -> None:
+        """Note the time of a stage, without what is counted elsewhere."""
+        nonlocal begin
+        now = perf_counter()
+        stages[stage] = now - begin - elsewhere
+        begin = now
+
+    # The passes, and their times.
+    first = halves.first
+    second = halves.second
+    images, noise_target = render(halves, progress)
+    difference = images.difference
+    assert difference is not None, "nothing is measured yet"
+    done("sums of passes", sum(first.times) + sum(second.times))
+    if first.preparation:
+        stages["preparation"] = first.preparation
+    price = halves.price(alone)
+    done("timing")
+
+    # The departure.
+    if COMPUTED_TWICE.needs <= halves.has:
+        _load()  # not beside the passes, whose times are compared
+    counted = halves.counted
+    summaries, maps = _summarised(halves, images, (LEADING.name, *declared()))
+    ratio, maps[RATIO.name] = statistics.summarise_log2_luminance(
+        images.heuristic, images.reference, counted
+    )
+    marked = marks.find(
+        difference,
+        images.heuristic,
+        counted,
+        halves.distance,
+        exact=halves.is_exact,
+        noise_shown=halves.noise_shown,
+    )
+    images = replace(images, maps=maps, significant=marked.image)
+    objects, images = halves.with_objects(images)
+    caution = halves.caution(images.heuristic, images.reference)
+    done("metrics")
+    record = ComparisonRecord(
+        scene=halves.name,
+        heuristic=halves.options.first_half,
+        seed=halves.options.seed,
+        resolution=counted.shape[::-1],
+        viewing=halves.options.viewing,
+        metrics=summaries,
+        log2_luminance=ratio,
+        significant=Significant(
+            fraction=statistics.share(marked.image[counted] == marks.MARKED),
+            undetermined=statistics.share(marked.image[counted] == marks.UNDETERMINED),
+            level=marks.LEVEL,
+            certain=marked.is_certain,
+        ),
+        pixels=Pixels(counted=int(counted.sum()), total=counted.size),
+        regions=regions.find(maps[LEADING.name], counted),
+        time=TimeSpent(heuristic=first.pass_times(), reference=second.pass_times(), stages=stages),
+        price=price,
+        versions=versions(halves.libraries),
+        command=command,
+        caution=caution,
+        noise_target=noise_target,
+        **objects,
+        **halves.fields(difference.passes),
+    )
+    comparison = Comparison(record=record, images=images)
+    shares = summaries[LEADING.name].visible
+    undecided = decide(shares, is_certain=marked.is_certain) == "undecided"
+    if undecided and halves.has == PICTURES.needs:
+        # A mistake may decide, and what a page shows first should stay.
+        judged = PICTURES.add(comparison, halves, progress).record
+        record = structs.replace(record, significant=judged.significant)
+    return replace(comparison, record=record)
+
+
+def finish(
+    comparison: Comparison,
+    halves: Halves,
+    then: Sequence[Step],
+    progress: Progress | None = None,
+) -> Comparison:
+    """Return a comparison with what the steps add, as far as the halves have what they need."""
     # Last, since colour-science is loaded in the meantime.
-    return _computed_twice(comparison)
+    for step in (OTHER_METRICS, *then, COMPUTED_TWICE):
+        if step.needs <= halves.has:
+            comparison = step.add(comparison, halves, progress)
+    return comparison
+
+
+def _summarised(
+    halves: Halves, images: Images, names: Iterable[str]
+) -> tuple[dict[str, Summary], dict[str, np.ndarray]]:
+    """Return the summaries of metrics over the pixels that count, and the maps of the drawn."""
+    assert images.difference is not None, "not all is measured yet"
+    metrics = halves.metrics
+    summaries = {}
+    maps = {}
+    for name in names:
+        summaries[name], distances = statistics.summarise(
+            metrics[name],
+            images.heuristic,
+            reference=images.reference,
+            mask=images.counted,
+            viewing=halves.options.viewing,
+            noise=images.difference.noise,
+            grouped=images.difference.grouped,
+        )
+        if metrics[name].drawn:
+            maps[name] = distances
+    return summaries, maps
+
+
+def _with_other_metrics(
+    comparison: Comparison, halves: Halves, progress: Progress | None
+) -> Comparison:
+    """Return a comparison with all metrics."""
+    begin = perf_counter()
+    record = comparison.record
+    images = comparison.images
+    rest = [name for name in METRICS if name not in record.metrics]
+    summaries, maps = _summarised(halves, images, rest)
+    summaries |= record.metrics
+    maps |= images.maps
+    record = structs.replace(record, metrics={name: summaries[name] for name in METRICS})
+    drawn = {name: maps[name] for name in (*METRICS, RATIO.name) if name in maps}
+    whole = replace(comparison, record=record, images=replace(images, maps=drawn, difference=None))
+    return whole.timed("metrics", record.time.stages["metrics"] + perf_counter() - begin)
+
+
+OTHER_METRICS = Step(needs=frozenset(), add=_with_other_metrics)
 
 
 def _require_colour_science() -> None:
@@ -93,13 +255,16 @@ def _load() -> None:
     Thread(target=import_module, args=("fotismos.comparisons.departure.definitions",)).start()
 
 
-def _computed_twice(comparison: Comparison) -> Comparison:
+def _with_deviations(
+    comparison: Comparison, halves: Halves, progress: Progress | None
+) -> Comparison:
     """Note how far colour differences are from those of colour-science, and warn if it is far."""
     from fotismos.comparisons.departure import definitions  # loaded late: see `_load`
 
     shown = comparison.images
     record = comparison.record
-    some = np.random.default_rng(0).permutation(np.flatnonzero(shown.counted))[:COMPUTED_TWICE]
+    counted = np.random.default_rng(0).permutation(np.flatnonzero(shown.counted))
+    some = counted[:PIXELS_COMPUTED_TWICE]
     first = shown.heuristic.reshape(-1, 3)[some]
     second = shown.reference.reshape(-1, 3)[some]
     distances = {name: values.ravel()[some] for name, values in shown.maps.items()}
@@ -115,129 +280,36 @@ def _computed_twice(comparison: Comparison) -> Comparison:
     return replace(comparison, record=record).warned(warnings)
 
 
-def _render_and_measure(
-    source: Source,
-    options: Options,
-    progress: Progress | None,
-    command: str,
-    alone: AbstractContextManager[Any] | None,
-) -> tuple[Comparison, Prepared]:
-    """Return the record and the images of a scene, and what they were rendered with."""
-    stages: dict[str, float] = {}
-    begin = perf_counter()
-
-    def done(stage: str, elsewhere: float = 0.0) -> None:
-        """Note the time of a stage, without what is counted elsewhere."""
-        nonlocal begin
-        now = perf_counter()
-        stages[stage] = now - begin - elsewhere
-        begin = now
-
-    # The scene, both halves and the plan.
-    ready = guarded(source, options)
-    heuristic: Any = ready.heuristic  # a renderer, or pictures in its place
-    reference: Any = ready.reference
-    guard_seconds = ready.guard.seconds if ready.guard else 0.0
-    done("scene and pairing", ready.planning_seconds + guard_seconds)
-    stages |= {"planning": ready.planning_seconds, "guard": guard_seconds}
-
-    # The passes, and their times.
-    estimates, noise_target = render(ready, progress)
-    done("sums of passes", sum(heuristic.times) + sum(reference.times))
-    if prepared := getattr(heuristic, "preparation", 0.0):  # pictures have none
-        stages["preparation"] = prepared
-    price = _price(ready, alone)
-    done("timing")
-
-    # The departure.
-    _load()  # not beside the passes, whose times are compared
-    # A picture has noise of its own, whatever the plan is.
-    exact = ready.plan.exact and not options.has_pictures
-    numbers, images = measure(estimates, ready.counted, options, ready.traced(), exact)
-    caution = ready.caution() or ready.require_light(images.heuristic, images.reference)
-    done("metrics")
-    record = ComparisonRecord(
-        scene=source.name,
-        variant=reference.variant,
-        heuristic_variant=heuristic.variant,
-        heuristic=options.first_half,
-        interpolation=options.polygon_shading.value,
-        seed=options.seed,
-        resolution=images.counted.shape[::-1],
-        plan=None if options.reference else ready.plan_record(estimates.passes),
-        pairing=ready.pair.pairing,
-        time=TimeSpent(
-            heuristic=heuristic.pass_times(), reference=reference.pass_times(), stages=stages
-        ),
-        price=price,
-        unrepresentable=ready.pair.unrepresentable,
-        integrator_given=ready.pair.integrator,
-        overridden=ready.overridden,
-        warnings=tuple(ready.warnings()),
-        versions=versions(),
-        command=command,
-        caution=caution,
-        noise_target=noise_target,
-        **numbers,
-    )
-    return Comparison(record=record, images=images), ready
+COMPUTED_TWICE = Step(needs=frozenset({"scene"}), add=_with_deviations)
 
 
-def _price(ready: Prepared, alone: AbstractContextManager[Any] | None) -> Price | None:
-    """Return the times per sample of both halves; of a picture the time is not known.
-
-    A reference that is a picture has no price.
-    """
-    if ready.options.reference:
-        return None
-    reference = ready.reference
-    if not ready.options.image:
-        return timing.measure(
-            ready.heuristic,
-            reference,
-            everything=ready.unpruned,
-            seed=ready.options.seed,
-            alone=alone,
-        )
-    width, height = image_size(reference.scene)
-    pixels = width * height
-    return Price(
-        ratio=None,
-        reason=timing.NOT_TIMED.reason,
-        heuristic_s=None,
-        reference_s=min(reference.times) / (reference.pass_spp * pixels),
-        pixels=pixels,
-    )
-
-
-def render(ready: Prepared, progress: Progress | None) -> tuple[Estimates, NoiseTarget | None]:
-    """Render the passes of both halves in turn: a drift of the machine then affects both.
+def render(halves: Halves, progress: Progress | None) -> tuple[Images, NoiseTarget | None]:
+    """Take the passes of both halves in turn: a drift of the machine then affects both.
 
     Return also where a run with a noise target ended.
     """
-    options = ready.options
-    distance = leading_distance(options.viewing, metrics_for(options))
-    given = ready.given
-    sums = PassSums(ready.counted) if given is None else given.pass_sums(ready.counted)
+    options = halves.options
+    sums = halves.sums(halves.counted)
     reached = None
-    loop = passes((ready.heuristic, ready.reference), options.seed, ready.passes, progress=progress)
+    sources = (halves.first, halves.second)
+    loop = passes(sources, options.seed, halves.passes, progress=progress)
     for rendered in loop:
-        sums.add(*rendered.images)
+        sums.add(*rendered)
         # Else the images of this pass stay alongside the next ones.
         del rendered
-        if options.noise is not None and is_checked(sums.passes, ready.passes):
-            reached = sums.noise_percentile(distance)
+        if options.noise is not None and is_checked(sums.passes, halves.passes):
+            reached = sums.noise_percentile(halves.distance)
             if reached <= options.noise:
                 break
     loop.close()
     if options.noise is None:
-        return sums.estimates(), None
+        return sums.images(), None
     assert reached is not None, "the noise is checked after the last pass"
-    return sums.estimates(), NoiseTarget(
+    return sums.images(), NoiseTarget(
         target=options.noise,
         reached=reached,
         stopped_by="target" if reached <= options.noise else "samples",
-        limit_spp=ready.passes * ready.reference.pass_spp,
+        limit_spp=halves.spp,
     )
 
 

@@ -20,10 +20,10 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from fotismos.comparisons.comparison import CAUSES
 from fotismos.comparisons.departure.blocks import averaged, ratio
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, pair_for, pair_options
+from fotismos.comparisons.records.comparison import CAUSES
 from fotismos.heuristic.convention import Floats, Scene
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.pairing import lights
@@ -43,12 +43,11 @@ from fotismos.reference.planning.facts import BSDF, EMITTER, SHAPE, Facts
 from fotismos.reference.planning.plan import physical_integrator
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.rendering import direct
-from fotismos.reference.rendering.gbuffer import image_size, resize
-from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, passes, variant
+from fotismos.reference.rendering.passes import Progress, Stream, passes
+from fotismos.reference.rendering.renderer import Renderer, variant
 from fotismos.reference.rendering.sampler import with_sampler
 from fotismos.reference.rendering.transport import Transport
 from fotismos.reference.scene.graph import properties
-from fotismos.reference.scene.source import Source
 
 REPLACED = tuple(effect for effect in EFFECTS if isinstance(effect, ReplacedEffect))
 IN_SCENE: frozenset[Effect] = frozenset(REPLACED)
@@ -81,11 +80,10 @@ class Pairs:
     The pair of ``ready``, which is prepared with the same options, is the first of them.
     """
 
-    def __init__(self, source: Source, options: Options, ready: Prepared) -> None:
+    def __init__(self, ready: Prepared, options: Options) -> None:
         self.options = options
         self.ready = ready
         self.heuristic_variant = options.heuristic_variant or ready.reference.variant
-        self._source = source
         self._known = {(ready.reference.variant, pair_options(options)): ready.pair}
 
     def of(self, interpolation: Interpolation) -> Pair:
@@ -117,7 +115,7 @@ class Pairs:
     def _of(self, options: Options) -> Pair:
         key = mi.variant(), pair_options(options)
         if key not in self._known:
-            self._known[key] = pair_for(self._source, options)
+            self._known[key] = pair_for(self.ready.source, options)
         return self._known[key]
 
 
@@ -366,22 +364,18 @@ class HybridImages:
     def _passes(
         self, renderer: Renderer, count: int = 1, progress: Progress | None = None
     ) -> list[Floats]:
-        """Render the replicates on a film of the preview's size, then restore the film's.
+        """Render the replicates on a film of the preview's size.
 
         The channels of a pass are those of ``count`` images.
         """
         width, height = self.size
-        whole = image_size(renderer.scene)
-        renderer.size = self.finer * width, self.finer * height
-        try:
-            loop = passes(
-                [renderer], self._seed, self.replicates, stream=Stream.REPLICATES,
-                progress=progress, stage=CAUSES,
-            )  # fmt: skip
-            # (R, f H, f W, 3 count): the channels of an image are neighbours.
-            made = np.stack([np.array(rendered.images[0]) for rendered in loop])
-        finally:
-            resize(renderer.scene, whole)
+        size = self.finer * width, self.finer * height
+        loop = passes(
+            [renderer], self._seed, self.replicates, size=size, stream=Stream.REPLICATES,
+            progress=progress, stage=CAUSES,
+        )  # fmt: skip
+        # (R, f H, f W, 3 count): the channels of an image are neighbours.
+        made = np.stack([np.array(rendered[0]) for rendered in loop])
         # An image in grey has one channel.
         return [
             np.broadcast_to(image, (*image.shape[:3], 3)) for image in np.split(made, count, axis=3)

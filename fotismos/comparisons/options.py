@@ -16,7 +16,7 @@ from fotismos.heuristic import llvm, program
 from fotismos.heuristic.errors import InputError, unknown
 
 if TYPE_CHECKING:  # the command line reads options without loading Dr.Jit
-    from fotismos.comparisons.departure.colour import Viewing
+    from fotismos.comparisons.records.departure import Viewing
     from fotismos.heuristic.heuristics import Interpolation  # loaded late: help needs no Mitsuba
 
     # Options take more than they keep: functions, mappings, arrays, a single name.
@@ -39,7 +39,7 @@ Side = Annotated[int, Meta(ge=1, le=2**31 - 1)]
 Fineness = Annotated[int, Meta(ge=1, le=512)]  # fotismos.heuristic.tessellation.FINEST
 VertexWeights = Literal["mean", "area", "angle"]  # fotismos.heuristic.normals.WEIGHTINGS
 Sensor = Annotated[int, Meta(ge=0, le=2**31 - 1)]
-Density = Annotated[float, Meta(ge=1, le=1000)]  # departure.colour.MOST_PIXELS
+Density = Annotated[float, Meta(ge=1, le=1000)]  # records.departure.MOST_PIXELS
 ToneMapName = Literal["reinhard", "aces", "agx", "neutral"]  # departure.tone_maps.TONE_MAPS
 
 
@@ -251,11 +251,6 @@ class Options(
         return program.command(*arguments)
 
     @property
-    def has_pictures(self) -> bool:
-        """Whether pictures of other renderers replace a half."""
-        return bool(self.image or self.reference)
-
-    @property
     def picture_files(self) -> tuple[str, ...]:
         """The files of pictures and of the mask."""
         return (*self.image, *self.reference, *((self.mask,) if self.mask else ()))
@@ -277,7 +272,7 @@ class Options(
     def viewing(self) -> Viewing:
         """The viewing conditions."""
         # Loaded late: help needs no Mitsuba.
-        from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Viewing
+        from fotismos.comparisons.records.departure import DEFAULT_VIEWING, Viewing
 
         density = self.pixels_per_degree
         return DEFAULT_VIEWING if density is None else Viewing(pixels_per_degree=density)

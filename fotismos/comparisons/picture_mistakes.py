@@ -26,7 +26,8 @@ from fotismos.comparisons.departure.colour import (
 )
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.tone_maps import Curves, FittedCurve, Light
+from fotismos.comparisons.departure.tone_maps import Curves, FittedCurve
+from fotismos.comparisons.records.images import Light
 from fotismos.heuristic.convention import Floats
 
 Mending = Callable[[Array], Array]

@@ -6,7 +6,8 @@ They are read by :mod:`fotismos.comparisons.picture_files`, placed by
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import repeat
 from pathlib import Path
@@ -18,18 +19,20 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons import alignment, picture_mistakes
-from fotismos.comparisons.comparison import Agreement, Comparison, Images, PictureFiles
 from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedReference
 from fotismos.comparisons.departure.marks import NoiseShown
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light, ToneMap
-from fotismos.comparisons.estimates import Estimates, PassSums
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS, ToneMap
+from fotismos.comparisons.halves import Halves, PassSums
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.comparisons.picture_mistakes import Mending, Names, NoisyImage
+from fotismos.comparisons.records.comparison import Agreement, PictureFiles
+from fotismos.comparisons.records.images import Comparison, Images, Light
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Times
+from fotismos.reference.rendering.passes import Size, Stream
 
 FEWEST = 2
 """Passes of single pictures, which are equal."""
@@ -40,9 +43,6 @@ USED = {
 }  # fmt: skip
 """Options that serve pictures, or are stated without being given; the others are of a scene."""
 
-TEMPLATE_SPP = 16
-"""Samples per pixel of the textbook half whose edges and colours a picture may have."""
-
 SAME = 0.01
 """ΔE2000 to which a picture equals the textbook half, away from edges."""
 
@@ -52,25 +52,30 @@ FLAT = 0.1
 
 @dataclass(frozen=True)
 class Pictures:
-    """The pictures of a half, all of one size: their names, and how each was read.
+    """The pictures of a half, all of one size, as a source of passes: one after another.
 
-    ``transfer`` is the function that was stated for their values, None for the files' own;
-    ``tone_map`` the curve by which they show light.
+    Several are repeats, whose spread gives the noise: each pass is the mean of one or more of them,
+    as many in all passes as possible. A single picture serves for every pass. ``names`` are those
+    of the files. ``transfer`` is the function that was stated for their values, None for the files'
+    own; ``tone_map`` the curve by which they show light.
     """
 
     names: tuple[str, ...]
     files: tuple[PictureFile, ...]
     transfer: str | None = None
     tone_map: str | None = None
+    times: list[float] = field(default_factory=list)
+    variant: str = ""
+    preparation: float = 0.0
 
     @property
-    def size(self) -> tuple[int, int]:
+    def size(self) -> Size:
         """Width and height in pixels."""
         height, width = self.files[0].image.shape[:2]
         return width, height
 
     @property
-    def passes(self) -> int | None:
+    def most_passes(self) -> int | None:
         """The most passes that they give, an even number; None for one, which shows no noise."""
         count = len(self.files)
         return None if count == 1 else count - count % 2
@@ -79,6 +84,27 @@ class Pictures:
     def shows_noise(self) -> bool:
         """Whether they show their noise: they are repeats, and not copies of one picture."""
         return len({file.digest for file in self.files}) > 1
+
+    def active(self) -> AbstractContextManager[None]:
+        """Return a context that does nothing."""
+        return nullcontext()
+
+    def passes(
+        self, count: int, size: Size | None = None, stream: Stream = Stream.COMPARED, seed: int = 0
+    ) -> Iterator[np.ndarray]:
+        """Yield ``count`` passes (H, W, 3), which are the same for all streams and seeds."""
+        groups = min(count, len(self.files))
+        means = [
+            np.mean([file.image for file in self.files[number::groups]], axis=0)
+            for number in range(groups)
+        ]
+        for number in range(count):
+            self.times.append(0.0)  # they were read before
+            yield means[number % groups]
+
+    def pass_times(self) -> Times:
+        """Return the times of the passes, which are read already."""
+        return Times.of(self.times, 0.0)
 
     @cached_property
     def mean(self) -> Array:
@@ -112,38 +138,6 @@ class Pictures:
         )
 
 
-class PictureHalf:
-    """Pictures as the passes of a half, one after another.
-
-    Several are repeats, whose spread gives the noise: each pass is the mean of one or more of them,
-    as many in all passes as possible. A single picture serves for every pass. ``replaced`` is the
-    renderer that they replace, whose variant is ``variant``.
-    """
-
-    def __init__(
-        self, pictures: Pictures, passes: int, variant: str = "", replaced: Any = None
-    ) -> None:
-        self.pictures = pictures
-        self.variant = variant
-        self.replaced = replaced
-        self.pass_spp: int = replaced.pass_spp if replaced else 1
-        self.times: list[float] = []
-        images = [file.image for file in pictures.files]
-        count = min(passes, len(images))
-        self._means = [np.mean(images[number::count], axis=0) for number in range(count)]
-
-    def render(self, seed: int) -> np.ndarray:
-        """Return the next pass (H, W, 3); the seed is ignored."""
-        begin = perf_counter()
-        image: np.ndarray = self._means[len(self.times) % len(self._means)]
-        self.times.append(perf_counter() - begin)
-        return image
-
-    def pass_times(self) -> Times:
-        """Return the times of the passes, which are read already."""
-        return Times.of(self.times, 0.0)
-
-
 class MappedPassSums(PassSums):
     """Running sums of passes, of which the reference is shown by a tone map."""
 
@@ -153,9 +147,9 @@ class MappedPassSums(PassSums):
         self._reference = self._mapped
         self._difference = MappedDifference(counted, self._mapped)
 
-    def estimates(self) -> Estimates:
-        """Return the estimates so far, in single precision, like the files."""
-        return replace(super().estimates(), light=self._mapped.light())
+    def images(self) -> Images:
+        """Return the means so far, in single precision, like the files; nothing is marked yet."""
+        return replace(super().images(), light=self._mapped.light())
 
 
 # --- Reading -----------------------------------------------------------------------------------
@@ -183,8 +177,8 @@ class GivenPictures:
     def passes(self) -> int | None:
         """The passes of both halves; None if each is one picture, or rendered."""
         halves = (self.image, self.reference)
-        counts = [half.passes for half in halves if half is not None and half.passes is not None]
-        return min(counts, default=None)
+        counts = [half.most_passes for half in halves if half is not None]
+        return min((count for count in counts if count is not None), default=None)
 
     @property
     def noise_shown(self) -> NoiseShown:
@@ -210,6 +204,102 @@ class GivenPictures:
                 " Check the mask, or give the colour behind the pictures with `over`."
             )
         return counted
+
+    def sized(self, film: Size, options: Options) -> Options:
+        """Return options with the resolution of the pictures, which must be the film's in shape.
+
+        ``film`` is the width and height of the scene's film, in pixels.
+        """
+        if not self.halves:
+            return options
+        width, height = self.halves[0].size
+        name = self.halves[0].names[0]
+        if options.resolution and options.resolution != (width, height):
+            raise InputError(
+                f"{name}: it has {width}x{height} pixels, and"
+                f" `resolution={_by(options.resolution)}` is requested. Omit the option."
+            )
+        if not options.resolution and abs(width * film[1] - height * film[0]) > max(film):
+            raise InputError(  # more than a pixel apart
+                f"{name}: it has {width}x{height} pixels, an aspect ratio of"
+                f" {width / height:.4g}, and the scene's film {_by(film)},"
+                f" {film[0] / film[1]:.4g}. Render the picture with the scene's camera, or ignore"
+                f" the film's size with `resolution={width}x{height}`."
+            )
+        return options.changed(resolution=(width, height))
+
+    def require_size_of_mask(self, options: Options, size: Size) -> None:
+        """Ensure that the mask, if there is one, has a width and height."""
+        if self.mask is not None and self.mask.shape[::-1] != size:
+            height, width = self.mask.shape
+            raise InputError(
+                f"{options.mask}: the mask has {width}x{height} pixels, and the pictures"
+                f" {_by(size)}. Give a mask of that size."
+            )
+
+    def parts(self) -> dict[str, Any]:
+        """Return what halves have of the pictures, by the fields of :class:`Halves`."""
+        named = {"picture": self.image, "reference_picture": self.reference}
+        return {
+            "pictures": {name: half.record() for name, half in named.items() if half is not None},
+            "judge": self.judged,
+            "where": self.where(),
+            "sums": self.pass_sums,
+        }
+
+    def judged(
+        self,
+        comparison: Comparison,
+        expected: Sequence[np.ndarray] = (),
+        textbook: np.ndarray | None = None,
+    ) -> Comparison:
+        """Return a comparison with what is odd about the pictures, which it warns of first.
+
+        ``expected`` and ``textbook`` are as for :func:`agreement`. Where a mistake is certain, so
+        is a difference.
+        """
+        record = comparison.record
+        images = comparison.images
+        if self.image is not None:
+            found = agreement(self.image, images, expected, Names(), textbook)
+        else:
+            assert self.reference is not None
+            swapped = replace(
+                images,
+                heuristic=images.reference,
+                reference=images.heuristic,
+                reference_stderr=np.zeros_like(images.reference_stderr),
+            )
+            found = agreement(self.reference, swapped, expected, REFERENCE)
+        found = structs.replace(found, odd=(*same_files(self), *found.odd, *unknown_noise(self)))
+        is_certain = record.significant.certain or found.certain
+        record = structs.replace(
+            record,
+            agreement=found,
+            significant=structs.replace(record.significant, certain=is_certain),
+            warnings=(*found.mistakes, *found.odd, *record.warnings),
+        )
+        return replace(comparison, record=record)
+
+
+def two_pictures(options: Options, name: str) -> Halves:
+    """Return the two pictures that options name, ``image`` and ``reference``, as halves."""
+    begin = perf_counter()
+    given = read_all(options)
+    if given.image is None or given.reference is None:
+        raise InputError("two pictures are needed: give `image` and `reference`.")
+    require_no_scene(options)
+    return Halves(
+        name=name,
+        options=options,
+        first=given.image,
+        second=given.reference,
+        passes=given.passes or FEWEST,
+        has=frozenset({"pictures"}),
+        noise_shown=given.noise_shown,
+        seconds={"reading": perf_counter() - begin},
+        **given.parts(),
+    )
 
 
 def require_no_scene(options: Options, others: Iterable[str] = ()) -> None:
@@ -245,18 +335,9 @@ def read_all(options: Options, settings: Iterable[Sequence[str]] = ()) -> GivenP
         (file.image for half in given.halves for file in half.files),
         [name for half in given.halves for name in half.names],
     )
-    if mask is not None and given.halves:
-        require_size_of_mask(options, mask, given.halves[0].size)
+    if given.halves:
+        given.require_size_of_mask(options, given.halves[0].size)
     return given
-
-
-def require_size_of_mask(options: Options, mask: NDArray[np.bool_], size: tuple[int, int]) -> None:
-    """Ensure that a mask (H, W) has the width and height of what it is for."""
-    if mask.shape[::-1] != size:
-        raise InputError(
-            f"{options.mask}: the mask has {mask.shape[1]}x{mask.shape[0]} pixels, and the pictures"
-            f" {_by(size)}. Give a mask of that size."
-        )
 
 
 def _read(
@@ -300,70 +381,10 @@ def _by(size: tuple[int, int]) -> str:
     return f"{size[0]}x{size[1]}"
 
 
-def at_size_of_pictures(film: tuple[int, int], given: GivenPictures, options: Options) -> Options:
-    """Return options with the resolution of their pictures, which must be the film's in shape.
-
-    ``film`` is the width and height of the scene's film, in pixels.
-    """
-    pictures = given.halves[0]
-    width, height = pictures.size
-    name = pictures.names[0]
-    if options.resolution and options.resolution != (width, height):
-        raise InputError(
-            f"{name}: it has {width}x{height} pixels, and"
-            f" `resolution={_by(options.resolution)}` is requested. Omit the option."
-        )
-    if not options.resolution and abs(width * film[1] - height * film[0]) > max(film):
-        raise InputError(  # more than a pixel apart
-            f"{name}: it has {width}x{height} pixels, an aspect ratio of"
-            f" {width / height:.4g}, and the scene's film {_by(film)},"
-            f" {film[0] / film[1]:.4g}. Render the picture with the scene's camera, or ignore the"
-            f" film's size with `resolution={width}x{height}`."
-        )
-    return options.changed(resolution=(width, height))
-
-
 # --- What is odd -------------------------------------------------------------------------------
 
 
 REFERENCE = Names(picture="The reference picture", other="the other picture")
-
-
-def with_records(
-    comparison: Comparison,
-    given: GivenPictures,
-    expected: Sequence[np.ndarray] = (),
-    textbook: np.ndarray | None = None,
-) -> Comparison:
-    """Return a comparison with the records of its pictures, and what is odd about them.
-
-    ``expected`` and ``textbook`` are as for :func:`agreement`. Where a mistake is certain, so is a
-    difference.
-    """
-    record = comparison.record
-    images = comparison.images
-    if given.image is not None:
-        found = agreement(given.image, images, expected, Names(), textbook)
-    else:
-        assert given.reference is not None
-        swapped = replace(
-            images,
-            heuristic=images.reference,
-            reference=images.heuristic,
-            reference_stderr=np.zeros_like(images.reference_stderr),
-        )
-        found = agreement(given.reference, swapped, expected, REFERENCE)
-    found = structs.replace(found, odd=(*same_files(given), *found.odd, *unknown_noise(given)))
-    is_certain = record.significant.certain or found.certain
-    record = structs.replace(
-        record,
-        picture=given.image and given.image.record(),
-        reference_picture=given.reference and given.reference.record(),
-        agreement=found,
-        significant=structs.replace(record.significant, certain=is_certain),
-        warnings=(*found.mistakes, *found.odd, *record.warnings),
-    )
-    return replace(comparison, record=record)
 
 
 def agreement(

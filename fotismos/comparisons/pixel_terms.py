@@ -5,7 +5,7 @@ may be moved to a pixel of interest.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import drjit as dr
@@ -15,16 +15,24 @@ from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.images import (
+    GridLight,
+    LivePoints,
+    TermGrid,
+    TermMaterial,
+    Whole,
+    colour,
+)
 from fotismos.heuristic import kernel, materials, terms, vectors
 from fotismos.heuristic.convention import Floats, Scene
-from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.heuristic.kernel import LightContribution
 from fotismos.heuristic.lights import lamps
 from fotismos.heuristic.materials import COEFFICIENTS, FORMS, Material
 from fotismos.reference.records import Missing
-from fotismos.reference.rendering.gbuffer import centre_rays, image_size, pixel_rays
-from fotismos.reference.rendering.renderer import Renderer, pass_seed, variant
+from fotismos.reference.rendering.gbuffer import centre_rays, pixel_rays
+from fotismos.reference.rendering.passes import pass_seed
+from fotismos.reference.rendering.renderer import Renderer, variant
 
 SIDE = 64
 """Points along the longer side of the grid, at most."""
@@ -56,169 +64,6 @@ MODELS = "phong", "blinn"
 """The heuristics that are the sum of 8.10."""
 
 
-Colour = tuple[float, float, float]
-"""Linear RGB."""
-
-Whole = NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class TermMaterial:
-    """The kernel's material at some points; a lobe's normalisation is part of ``k_s``."""
-
-    name: str
-    k_i: Colour
-    k_a: Colour
-    k_d: Colour
-    k_s: Colour
-    n: float
-    form: str
-    ambient: Colour
-
-
-@dataclass(frozen=True)
-class GridLight:
-    """A light at all points, arrays (H, W).
-
-    ``intensity`` and ``specular_intensity`` are ``L_d`` and ``L_s``, mostly both ``I_p0``; RGB,
-    display-linear. ``attenuation`` is ``f_att``, the cone of a spot light included;
-    ``cos_incidence`` is ``N·L``, below 0 if the light is behind the surface; ``cos_view`` is
-    ``L·V``, which gives ``R·V = 2 (N·L) (N·V) − L·V``; ``lobe`` is the kernel's ``(R·V)^n`` or
-    ``(N·H)^n``, 0 below the horizon.
-    """
-
-    name: str
-    intensity: Colour
-    specular_intensity: Colour
-    attenuation: Any
-    cos_incidence: Any
-    cos_view: Any
-    lobe: Any
-
-
-@dataclass(frozen=True)
-class LightTerms(GridLight):
-    """One light at one point, with its terms as RGB, display-linear; arrays are numbers here."""
-
-    cos_reflection: float
-    diffuse: Colour
-    specular: Colour
-
-
-@dataclass(frozen=True)
-class PixelTerms:
-    """Equation 8.10 at the centre of a pixel; colours are RGB, display-linear.
-
-    ``pixel`` is column and row of the nearest point of the grid, ``cos_view`` is ``N·V``, and
-    ``others`` the sum of the lights that are not listed.
-    """
-
-    pixel: tuple[int, int]
-    material: TermMaterial
-    cos_view: float
-    emission: Colour
-    ambient: Colour
-    lights: tuple[LightTerms, ...]
-    others: Colour
-
-    @property
-    def total(self) -> Colour:
-        """The sum, which equals the kernel's value here."""
-        lit = [part for light in self.lights for part in (light.diffuse, light.specular)]
-        return _colour(sum(map(np.array, (self.emission, self.ambient, self.others, *lit))))
-
-
-@dataclass(frozen=True)
-class TermGrid:
-    """The terms at a grid of pixels, whose ``columns`` and ``rows`` are given.
-
-    ``material`` (H, W) is the index in ``materials``, -1 where no shaded surface is seen;
-    ``cos_view`` (H, W) is ``N·V``. ``others`` (H, W, 3) is the sum of the lights that are not in
-    ``lights``.
-    """
-
-    resolution: tuple[int, int]
-    columns: Whole
-    rows: Whole
-    materials: tuple[TermMaterial, ...]
-    material: Whole
-    cos_view: NDArray[np.float64]
-    lights: tuple[GridLight, ...]
-    others: NDArray[np.float64] | None = None
-
-    def at(self, x: int, y: int) -> PixelTerms | None:
-        """Return the terms at the grid's point nearest to a pixel; None for the background."""
-        width, height = self.resolution
-        if not (0 <= x < width and 0 <= y < height):
-            raise InputError(
-                f"pixel {x}, {y} is outside the image: give 0, 0 to {width - 1}, {height - 1}."
-            )
-        cell = y * len(self.rows) // height, x * len(self.columns) // width
-        number = self.material[cell]
-        if number < 0:
-            return None
-        material = self.materials[number]
-        return PixelTerms(
-            pixel=(int(self.columns[cell[1]]), int(self.rows[cell[0]])),
-            material=material,
-            cos_view=float(self.cos_view[cell]),
-            emission=material.k_i,
-            ambient=_colour(np.multiply(material.ambient, material.k_a)),
-            lights=tuple(self._light(light, material, cell) for light in self.lights),
-            others=_colour((0, 0, 0) if self.others is None else self.others[cell]),
-        )
-
-    def light_image(self, light: GridLight) -> NDArray[np.float64]:
-        """Return one light's terms, (H, W, 3); 0 where no shaded surface is seen."""
-        # The background's index, −1, is that of the black material at the end.
-        k_d = np.array([material.k_d for material in self.materials] + [(0.0, 0.0, 0.0)])
-        k_s = np.array([material.k_s for material in self.materials] + [(0.0, 0.0, 0.0)])
-        diffuse = k_d[self.material] * np.maximum(light.cos_incidence, 0)[..., None]
-        specular = k_s[self.material] * light.lobe[..., None]
-        reflected = light.intensity * diffuse + light.specular_intensity * specular
-        image: NDArray[np.float64] = light.attenuation[..., None] * reflected
-        return image
-
-    def _light(self, light: GridLight, material: TermMaterial, cell: tuple[int, int]) -> LightTerms:
-        arrays = ("attenuation", "cos_incidence", "cos_view", "lobe")
-        here = vars(light) | {name: float(getattr(light, name)[cell]) for name in arrays}
-        n_l = here["cos_incidence"]
-        fading = here["attenuation"]
-        return LightTerms(
-            **here,
-            cos_reflection=2 * n_l * float(self.cos_view[cell]) - here["cos_view"],
-            diffuse=_colour(np.multiply(light.intensity, material.k_d) * fading * max(n_l, 0)),
-            specular=_colour(
-                np.multiply(light.specular_intensity, material.k_s) * fading * here["lobe"]
-            ),
-        )
-
-
-@dataclass(frozen=True)
-class LivePoints:
-    """What 8.10 reads at the pixels of a coarse film, so that a page can shade them again.
-
-    ``planes`` (H, W) are ``material``, 1 more than the index in ``materials``, 0 where no shaded
-    surface is seen; ``depth``, the logarithm of the distance from a ray's origin; ``normal.x`` and
-    so on; ``face_normal.x`` and so on, if faces of meshes have other normals; and ``k_d.x`` and so
-    on, factors on the materials', if they vary. ``lights`` have a name, and the fields of
-    :mod:`fotismos.heuristic.lights` as lists of numbers. ``rays`` (2, 3, 3) are origins and
-    directions, of any length, of the rays of three pixels in the corners: left, right, and left
-    again below.
-    """
-
-    planes: dict[str, Floats]
-    materials: tuple[TermMaterial, ...]
-    lights: tuple[dict[str, Any], ...]
-    rays: list[Any]
-    is_flat: bool
-
-
-def _colour(values: object) -> Colour:
-    red, green, blue = np.asarray(values, float).tolist()
-    return red, green, blue
-
-
 # --- Reading the kernel ------------------------------------------------------------------------
 
 
@@ -232,7 +77,7 @@ def trace(
     with variant(half.variant):
         if reason := _without(half, options, Interpolation.PHONG):
             return Missing(reason)
-        return _traced(half.scene, half.integrator, pixel)
+        return _traced(half, pixel)
 
 
 def live(half: Renderer, options: Options) -> LivePoints | Missing:
@@ -264,8 +109,6 @@ def _without(half: Renderer, options: Options, *allowed: Interpolation) -> str:
 
 def _without_sum(half: Renderer, options: Options) -> str:
     """Return why a half has no terms in any form; empty if it has."""
-    if options.image:
-        return "The textbook half is a picture, which has no terms."
     if options.heuristic not in MODELS:
         return f"The heuristic {options.heuristic} is not the sum of equation 8.10."
     if len(half.scene.emitters()) > MOST_LIGHTS:
@@ -281,8 +124,8 @@ def _live(half: Renderer, options: Options) -> LivePoints | Missing:
         return Missing(f"There are more than {LIVE_LIGHTS} lights.")
     if not isinstance(sensor, mi.ProjectiveCamera):
         return Missing(f"The camera, {sensor.class_name()}, has no plane film.")
-    size = shrunk(image_size(scene), LIVE_SIDE)
-    ray = centre_rays(scene, size)
+    size = shrunk(half.size, LIVE_SIDE)
+    ray = centre_rays(scene, size, film=half.size)
     ahead = sensor.world_transform() @ mi.Vector3f(0, 0, 1)
     # Directions that end on a plane are linear over the film: three corners give all others.
     film = (ray.o, ray.d / dr.dot(ray.d, ahead))
@@ -324,15 +167,17 @@ def _live(half: Renderer, options: Options) -> LivePoints | Missing:
     )
 
 
-def _traced(scene: Scene, integrator: Any, pixel: tuple[int, int] | None) -> TermGrid | Missing:
-    emitters = lamps(scene)
-    resolution = image_size(scene)
+def _traced(half: Renderer, pixel: tuple[int, int] | None) -> TermGrid | Missing:
+    emitters = lamps(half.scene)
+    resolution = half.size
     columns, rows = _pixels(resolution, min(max(len(emitters), 1), LIGHTS))
     if pixel:
         columns[pixel[0] * len(columns) // resolution[0]] = pixel[0]
         rows[pixel[1] * len(rows) // resolution[1]] = pixel[1]
     x, y = np.meshgrid(columns, rows)
-    points = _Points(scene, integrator, pixel_rays(scene, resolution, x=x, y=y))
+    points = _Points(
+        half.scene, half.integrator, pixel_rays(half.scene, resolution, x=x, y=y, film=resolution)
+    )
     materials, places = points.materials()
     if len(materials) > MATERIALS:
         return TOO_MANY_MATERIALS
@@ -432,13 +277,13 @@ class _Points:
         (form,) = parts["form"]
         return TermMaterial(
             name=self.known.bsdfs[int(number)].id(),
-            k_i=_colour(parts["k_i"]),
-            k_a=_colour(parts["k_a"]),
-            k_d=_colour(parts["k_d"]),
-            k_s=_colour(parts["k_s"]),
+            k_i=colour(parts["k_i"]),
+            k_a=colour(parts["k_a"]),
+            k_d=colour(parts["k_d"]),
+            k_s=colour(parts["k_s"]),
             n=n,
             form=FORMS[int(form)],
-            ambient=_colour(parts["ambient"]),
+            ambient=colour(parts["ambient"]),
         )
 
     def light(self, emitter: Any, shape: tuple[int, int]) -> GridLight:
@@ -471,8 +316,8 @@ class _Points:
         cos_view = self.floats(dr.dot(arrival.toward, self.view))
         return GridLight(
             name=emitter.id(),
-            intensity=_colour(intensity[:3]),
-            specular_intensity=_colour(intensity[3:]),
+            intensity=colour(intensity[:3]),
+            specular_intensity=colour(intensity[3:]),
             attenuation=scale.reshape(shape),
             cos_incidence=self.floats(shared.cos_incidence).reshape(shape),
             cos_view=cos_view.reshape(shape),
@@ -514,7 +359,10 @@ def layers(half: Renderer, options: Options, whole: Floats) -> dict[str, Floats]
                 integrator.shares = {k: dr.opaque(mi.Float, k == kept) for k in COEFFICIENTS}
                 integrator.hide_emitters = hides = hidden or name != "emission"
                 renderer = renderers.setdefault(
-                    hides, Renderer(scene, integrator, pass_spp=half.pass_spp, label="terms")
+                    hides,
+                    Renderer(
+                        scene, integrator, pass_spp=half.pass_spp, label="terms", size=half.size
+                    ),
                 )
                 images[name] = np.array(renderer.render(pass_seed(options.seed, 0)))
         finally:

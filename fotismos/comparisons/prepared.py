@@ -1,23 +1,31 @@
 """A scene made ready to be rendered: paired, planned, probed, with a renderer for each half."""
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from msgspec import structs
+from numpy.typing import NDArray
 
-from fotismos.comparisons.departure.criterion import caution
+from fotismos.comparisons import timing
+from fotismos.comparisons.departure import regions
+from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.halves import Halves, Part
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.comparison import Price
+from fotismos.comparisons.records.images import Images
 from fotismos.heuristic import meshes
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
-from fotismos.heuristic.heuristics import named
+from fotismos.heuristic.heuristics import PHONG, named
+from fotismos.heuristic.program import LIBRARIES
 from fotismos.reference.pairing import halves
 from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.pairing.halves import Pair
@@ -36,6 +44,7 @@ from fotismos.reference.rendering.gbuffer import (
     require_surface,
 )
 from fotismos.reference.rendering.integrators import SAMPLER, STOCK_SAMPLER
+from fotismos.reference.rendering.passes import Size
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
 from fotismos.reference.rendering.sampler import with_sampler
 from fotismos.reference.scene.checks import require_frames
@@ -50,6 +59,9 @@ WAVEFRONT = 2**24
 MOST_TILT = 0.01
 """Difference of a lamp's mean normals, of its surface and its vertices, beyond which its light is
 wrong: at a right angle to a flat lamp, as a share. Those of a smoothed ball cancel."""
+
+TEMPLATE_SPP = 16
+"""Samples per pixel of the textbook picture whose edges and colours pictures may have."""
 
 LIMIT_SPP = 4096
 """Samples per pixel at which a run with a noise target stops, unless another limit is given."""
@@ -79,44 +91,87 @@ def schedule(
     return per_pass, passes
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """A scene that is ready to be rendered: its halves, its plan, and a renderer for each half.
+@dataclass(frozen=True, kw_only=True)
+class Prepared(Halves):
+    """A scene that is ready to be rendered: its pair, its plan, and a renderer for each half.
 
-    ``given`` are pictures of other renderers: a :class:`fotismos.comparisons.pictures.PictureHalf`
-    of them takes the part of a half's renderer.
+    Pictures may stand in for ``heuristic`` as the ``first`` source, or for ``reference`` as the
+    ``second``; the renderers are those of the scene all the same.
     """
 
     source: Source
-    options: Options
     pair: Pair
     plan: Plan
     scene: Scene
     heuristic: Renderer
     reference: Renderer
-    passes: int
-    planning_seconds: float
     guard: Guard | None = None
-    given: "GivenPictures | None" = None
+
+    libraries: ClassVar[Sequence[str]] = LIBRARIES
+
+    @property
+    def size(self) -> Size:
+        """Width and height of both halves, in pixels."""
+        return self.reference.size
+
+    @property
+    def spp(self) -> int:
+        return self.reference.pass_spp * self.passes
+
+    def with_pictures(self, given: "GivenPictures") -> "Prepared":
+        """Return the scene with pictures in place of its halves, as far as they are given.
+
+        There is a pass for each repeat, if there are any, with as many samples in all.
+        """
+        given.require_size_of_mask(self.options, self.size)
+        passes = given.passes or self.passes
+        spp = max(1, self.spp // passes)
+        heuristic = self.heuristic.sampled(spp)
+        reference = self.reference.sampled(spp)
+        halves: dict[Part, Any] = {"textbook": given.image, "physical": given.reference}
+        replaced: set[Part] = {part for part, half in halves.items() if half is not None}
+        return replace(
+            self,
+            passes=passes,
+            heuristic=heuristic,
+            reference=reference,
+            first=given.image or heuristic,
+            second=given.reference or reference,
+            has=self.has - replaced | ({"pictures"} if replaced else set()),
+            is_exact=self.is_exact and not replaced,  # pictures have a noise of their own
+            **given.parts(),
+        )
+
+    @property
+    def rendered(self) -> list[Renderer]:
+        """The renderers among both sources."""
+        return [half for half in (self.first, self.second) if isinstance(half, Renderer)]
 
     def traced(self, finer: int = 1) -> GBuffer:
         """Return what each pixel sees; traced at each call, since it takes much memory.
 
         Each side of a pixel has ``finer`` rays.
         """
-        width, height = image_size(self.scene)
-        surface = gbuffer(self.scene, (finer * width, finer * height))
+        width, height = self.size
+        surface = gbuffer(self.scene, (finer * width, finer * height), film=self.size)
         dr.flush_malloc_cache()
         return surface
 
-    def shaded_by(self, heuristic: str) -> Renderer:
-        """Return what renders the textbook half with another heuristic."""
-        options = self.options.changed(heuristic=heuristic)
+    def shaded_by_textbook(self) -> Renderer:
+        """Return what renders the textbook half with Phong's model in place of its own."""
+        options = self.options.changed(heuristic=PHONG.name)
         pair = pair_for(self.source, options)
-        renderer: Renderer = _heuristic_renderer(
+        return _heuristic_renderer(
             self.source, pair, chosen=self.plan, spp=self.reference.pass_spp, options=options
         )
-        return renderer
+
+    def template(self) -> tuple[Sequence[np.ndarray], np.ndarray | None]:
+        from fotismos.comparisons import alignment  # loaded late: few comparisons have pictures
+
+        textbook = None
+        if "textbook" not in self.has:
+            textbook = np.array(self.heuristic.sampled(TEMPLATE_SPP).render(0), float)
+        return alignment.scene_edges(self.traced(alignment.FINER), textbook), textbook
 
     @cached_property
     def unpruned(self) -> Renderer | None:
@@ -124,27 +179,78 @@ class Prepared:
 
         None if its plan does so.
         """
-        if self.options.reference:
-            return None
         whole = self.plan.unpruned()
         if (whole.integrator, whole.max_depth) == (self.plan.integrator, self.plan.max_depth):
             return None
         integrator = physical_integrator(whole, self.scene, self.pair.hide_emitters)
         spp = self.reference.pass_spp
-        return Renderer(self.scene, integrator, pass_spp=spp, label="everything simulated")
+        return Renderer(
+            self.scene, integrator, pass_spp=spp, label="everything simulated", size=self.size
+        )
 
     @cached_property
-    def counted(self) -> np.ndarray:
+    def counted(self) -> NDArray[Any]:
         """The pixels (H, W) that count: those that see a surface, and that pictures do not hide."""
         hit = self.traced().hit
-        return hit if self.given is None else hit & self.given.where()
+        return hit if self.where is None else hit & self.where
+
+    def with_objects(self, images: Images) -> tuple[dict[str, Any], Images]:
+        surface = self.traced()
+        error = images.maps[LEADING.name]
+        shapes, seen = regions.find_objects(
+            error, self.counted, owners=surface.shape, materials=surface.bsdf
+        )
+        materials, made_of = regions.find_objects(error, self.counted, surface.bsdf)
+        images = replace(
+            images,
+            position=surface.position,
+            normal=surface.normal,
+            objects=seen,
+            materials=made_of,
+        )
+        return {"objects": shapes, "materials": materials}, images
+
+    def fields(self, passes: int) -> dict[str, Any]:
+        return super().fields(passes) | {
+            "variant": self.reference.variant,
+            "heuristic_variant": self.heuristic.variant,
+            "interpolation": self.options.polygon_shading.value,
+            "plan": self.plan_record(passes) if "physical" in self.has else None,
+            "pairing": self.pair.pairing,
+            "unrepresentable": self.pair.unrepresentable,
+            "integrator_given": self.pair.integrator,
+            "overridden": self.overridden,
+            "warnings": tuple(self.warnings()),
+        }
+
+    def price(self, alone: AbstractContextManager[Any] | None) -> Price | None:
+        if "physical" not in self.has:
+            return None
+        if "textbook" not in self.has:
+            return timing.untimed(self.reference)
+        return timing.measure(
+            self.heuristic,
+            self.reference,
+            everything=self.unpruned,
+            seed=self.options.seed,
+            alone=alone,
+        )
+
+    def caution(self, test: np.ndarray, reference: np.ndarray) -> str:
+        return self.doubt() or self.require_light(test, reference)
+
+    def require_light(self, test: np.ndarray, reference: np.ndarray) -> str:
+        try:
+            return super().require_light(test, reference)
+        except InputError as error:  # a warning may name the reason
+            raise InputError(" ".join([str(error), *self.pair.warnings])) from error
 
     @property
     def overridden(self) -> tuple[Override, ...]:
         """The settings of the scene that are not used, and what is used instead."""
         pair = self.pair
         plan = self.plan
-        used = f"{plan.sampler}, {self.reference.pass_spp * self.passes} samples per pixel"
+        used = f"{plan.sampler}, {self.spp} samples per pixel"
         overrides = [
             structs.replace(entry, used=used) if entry.what == "sampler" else entry
             for entry in pair.overridden
@@ -161,9 +267,9 @@ class Prepared:
             )
         return tuple(overrides)
 
-    def caution(self) -> str:
+    def doubt(self) -> str:
         """Return where no integrator of Mitsuba is right, in words; empty if there is none."""
-        if self.options.reference:
+        if "physical" not in self.has:
             return ""
         for shape in self.scene.shapes():
             if shape.emitter() is None or not shape.is_mesh():
@@ -178,7 +284,7 @@ class Prepared:
                 )
         if not (self.pair.hide_emitters and self.plan.integrator in ("volpath", "volpathmis")):
             return ""
-        rays = centre_rays(self.scene, image_size(self.scene))
+        rays = centre_rays(self.scene, self.size, film=self.size)
         count = int(np.sum(is_behind_two_lamps(self.scene, rays)))
         if not count:
             return ""
@@ -186,20 +292,6 @@ class Prepared:
             f"The reference is wrong at {count} pixels, which see a shape through both sides of a"
             " hidden lamp: no integrator of Mitsuba is right there. Show the lamp, or make it flat."
         )
-
-    def require_light(self, test: np.ndarray, reference: np.ndarray) -> str:
-        """Return why the error of linear images (H, W, 3) may mean nothing; see :func:`caution`."""
-        try:
-            return caution(
-                test[self.counted],
-                reference[self.counted],
-                name=self.source.name,
-                allow_empty=self.options.allow_empty,
-                is_picture=bool(self.options.image),
-                exposure=self.options.viewing.exposure,
-            )
-        except InputError as error:  # a warning may name the reason
-            raise InputError(" ".join([str(error), *self.pair.warnings])) from error
 
     def plan_record(self, passes: int) -> Plan:
         """Return the plan with the samples and passes that were rendered."""
@@ -212,7 +304,7 @@ class Prepared:
     def warnings(self) -> Iterator[str]:
         """Yield what is odd about a scene: its pair, its plan, or how Mitsuba renders it."""
         yield from self.pair.warnings
-        if self.options.reference:  # Mitsuba does not render it
+        if "physical" not in self.has:
             return
         if self.guard and self.guard.state == "disagreed":
             yield (
@@ -248,6 +340,7 @@ def pair_for(source: Source, options: Options) -> Pair:
 
 def prepare(source: Source, options: Options | None = None) -> Prepared:
     """Pair and plan a scene in the current variant, and make both halves ready to render."""
+    begin = perf_counter()
     options = options or Options()
     if options.tone_map and not options.image:
         raise InputError(
@@ -255,56 +348,53 @@ def prepare(source: Source, options: Options | None = None) -> Prepared:
             " `image`, or omit it."
         )
     given = None
-    if options.has_pictures or options.mask is not None:
+    if options.image or options.reference or options.mask is not None:
         from fotismos.comparisons import pictures  # loaded late: few comparisons have any
 
         given = pictures.read_all(options)
-        if given.halves:
-            film = film_size(source.parse(), options.sensor)
-            options = pictures.at_size_of_pictures(film, given, options)
+        options = given.sized(film_size(source.parse(), options.sensor), options)
     pair = pair_for(source, options)
     sampler = STOCK_SAMPLER if options.everything else SAMPLER
     physical = with_sampler(pair.physical, sampler).instantiate()
     require_frames(source.name, physical)
     width, height = image_size(physical)
-    if given is not None and given.mask is not None:
-        pictures.require_size_of_mask(options, given.mask, (width, height))
     if width * height > LARGEST_PASS:
         raise InputError(
             f"{source.name}: an image of {width}x{height} pixels is too large: at most"
             f" {LARGEST_PASS} pixels are allowed. Give a smaller `resolution`."
         )
     require_memory(source.name, width, height)
-    begin = perf_counter()
+    planning = perf_counter()
     chosen = plan(pair, physical, options.polygon_shading, options.everything)
     integrator = physical_integrator(chosen, physical, pair.hide_emitters)
-    planning = perf_counter() - begin
+    planning = perf_counter() - planning
     # Dr.Jit traces every live BSDF: those of finished scenes would slow this one.
     gc.collect()
     spp, passes = schedule(chosen, width * height, spp=options.spp, noise=options.noise)
-    if given is not None and given.passes is not None:  # a pass for each repeat
-        spp = max(1, spp * passes // given.passes)
-        passes = given.passes
-    heuristic: Any = _heuristic_renderer(source, pair, chosen=chosen, spp=spp, options=options)
-    reference: Any = Renderer(
+    heuristic = _heuristic_renderer(source, pair, chosen=chosen, spp=spp, options=options)
+    reference = Renderer(
         physical, integrator, pass_spp=spp, label="physical picture", warnings=pair.warnings
     )
-    if given is not None and given.image is not None:
-        heuristic = pictures.PictureHalf(given.image, passes, heuristic.variant, heuristic)
-    if given is not None and given.reference is not None:
-        reference = pictures.PictureHalf(given.reference, passes, mi.variant(), reference)
-    return Prepared(
-        source=source,
+    has: set[Part] = {"scene", "textbook", "physical"}
+    if not named(options.heuristic).is_builtin:
+        has.add("shader")
+    ready = Prepared(
+        name=source.name,
         options=options,
+        first=heuristic,
+        second=reference,
+        passes=passes,
+        has=frozenset(has),
+        is_exact=chosen.exact,
+        seconds={"scene and pairing": perf_counter() - begin - planning, "planning": planning},
+        source=source,
         pair=pair,
         plan=chosen,
         scene=physical,
         heuristic=heuristic,
         reference=reference,
-        passes=passes,
-        planning_seconds=planning,
-        given=given,
     )
+    return ready if given is None else ready.with_pictures(given)
 
 
 def guarded(source: Source, options: Options | None = None) -> Prepared:
@@ -315,21 +405,22 @@ def guarded(source: Source, options: Options | None = None) -> Prepared:
     """
     options = options or Options()
     ready = prepare(source, options)
-    if not options.reference:  # else no plan is followed
-        width, height = image_size(ready.scene)
+    found = None
+    if "physical" in ready.has:  # else no plan is followed
+        width, height = ready.size
         found = examine_plan(
             ready.plan,
             ready.scene,
             hide_emitters=ready.pair.hide_emitters,
-            samples=ready.reference.pass_spp * ready.passes * width * height,
+            samples=ready.spp * width * height,
             seed=options.seed,
         )
         if found.state == "disagreed":
             ready = prepare(source, options.changed(everything=True))
             ready = replace(ready, plan=ready.plan.unpruned("guard", found.words))
-        ready = replace(ready, guard=found)
     # The options are those given, even if everything had to be simulated.
-    ready = replace(ready, options=options)
+    seconds = {**ready.seconds, "guard": found.seconds if found else 0.0}
+    ready = replace(ready, options=options, guard=found, seconds=seconds)
     if not options.allow_empty:
         require_surface(ready.counted, source.name)
     return ready

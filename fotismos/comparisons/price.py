@@ -24,24 +24,23 @@ from typing import Any
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons.comparison import Comparison
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS, Pixelwise
-from fotismos.comparisons.departure.noise import USUAL, VisibleShare, shares_above
-from fotismos.comparisons.estimates import metrics_for
+from fotismos.comparisons.departure.noise import USUAL, shares_above
 from fotismos.comparisons.prepared import Prepared
-from fotismos.comparisons.price_record import (
+from fotismos.comparisons.records.comparison import (
     MOST_SPP,
     EffectsThatPass,
     Price,
     SamplesThatPass,
     Saving,
 )
+from fotismos.comparisons.records.departure import Viewing, VisibleShare
+from fotismos.comparisons.records.images import Comparison
 from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.reference.records import Interval
-from fotismos.reference.rendering.gbuffer import gbuffer, image_size, resize, size_of_width
-from fotismos.reference.rendering.renderer import Progress, Renderer, Stream, pass_seed, passes
+from fotismos.reference.rendering.gbuffer import gbuffer, size_of_width
+from fotismos.reference.rendering.passes import Progress, Stream, pass_seed, passes
 
 WIDTH = 128
 NARROWEST = 24
@@ -76,9 +75,8 @@ def with_price(comparison: Comparison, ready: Prepared, progress: Progress | Non
     begin = perf_counter()
     record = comparison.record
     price = record.price
-    if price is None:  # of a reference that is a picture
-        return comparison
-    leading: Any = metrics_for(ready.options)[LEADING.name]
+    assert price is not None, "the physical half was rendered"
+    leading: Any = ready.metrics[LEADING.name]
     causes = comparison.causes
     price = structs.replace(
         price,
@@ -162,17 +160,12 @@ def samples_that_pass(ready: Prepared, metric: Pixelwise) -> tuple[SamplesThatPa
 
 def _noisy_pictures(ready: Prepared, metric: Pixelwise) -> NoisyPictures | None:
     """Render passes, and pictures with fewer samples; None if no pixel counts."""
-    size = size_of_width(ready.scene, _width(ready))
-    film = image_size(ready.scene)
-    try:
-        counted = gbuffer(ready.scene, size).hit
-        if not counted.any():
-            return None
-        pictures, long = _deviating(ready, size, PASS, PASSES, counted)
-        short = {spp: _deviating(ready, size, spp, PICTURES, counted)[1] for spp in SINGLE}
-    finally:
-        for half in _halves(ready):
-            resize(half.scene, film)
+    size = size_of_width(ready.scene, ready.size, _width(ready))
+    counted = gbuffer(ready.scene, size, film=ready.size).hit
+    if not counted.any():
+        return None
+    pictures, long = _deviating(ready, size, PASS, PASSES, counted)
+    short = {spp: _deviating(ready, size, spp, PICTURES, counted)[1] for spp in SINGLE}
     middle = long.mean(axis=0)
     deviations = {spp: images - middle for spp, images in short.items()}
     deviations |= {size * PASS: _means_apart(long, size) for size in GROUPS}
@@ -184,14 +177,9 @@ def _noisy_pictures(ready: Prepared, metric: Pixelwise) -> NoisyPictures | None:
     )
 
 
-def _halves(ready: Prepared) -> list[Renderer]:
-    """Return the renderers of both halves; a picture in place of one has none."""
-    return [ready.reference] if ready.options.image else [ready.heuristic, ready.reference]
-
-
 def _width(ready: Prepared) -> int:
     """Return the width of the pictures, for which the samples suffice."""
-    columns, rows = image_size(ready.scene)
+    columns, rows = ready.size
     of_a_pixel = PASS * PASSES + PICTURES * sum(SINGLE)
     affordable = np.sqrt(SAMPLES / of_a_pixel * columns / rows)
     return int(np.clip(affordable, min(NARROWEST, columns), min(WIDTH, columns)))
@@ -204,12 +192,12 @@ def _deviating(
 
     Both (K, N, 3), of the counted pixels. A picture in place of the textbook half has no rays.
     """
-    renderers = [half.sampled(spp, size) for half in _halves(ready)]
+    renderers = [half.sampled(spp) for half in ready.rendered]
     # Each count has its own passes.
     seed = pass_seed(ready.options.seed, spp, Stream.PRICE)
-    loop = passes(renderers, seed, count, stream=Stream.PRICE)
+    loop = passes(renderers, seed, count, size=size, stream=Stream.PRICE)
     pictures = np.array(
-        [[np.array(image, float)[counted] for image in rendered.images] for rendered in loop]
+        [[np.array(image, float)[counted] for image in rendered] for rendered in loop]
     )
     reference = pictures[:, -1]
     return reference, reference if len(renderers) == 1 else reference - pictures[:, 0]
@@ -289,15 +277,10 @@ def saving(ready: Prepared, price: Price) -> Saving | None:
     whole = ready.unpruned
     if whole is None or not price.everything_s or not price.reference_s:
         return None
-    size = size_of_width(ready.scene, _width(ready))
-    film = image_size(ready.scene)
-    renderers = [half.sampled(PASS, size) for half in (*_halves(ready), whole)]
-    try:
-        loop = passes(renderers, ready.options.seed, 2, stream=Stream.PRICE)
-        first, second = [np.array(rendered.images, float) for rendered in loop]
-    finally:
-        for half in _halves(ready):
-            resize(half.scene, film)
+    size = size_of_width(ready.scene, ready.size, _width(ready))
+    renderers = [half.sampled(PASS) for half in (*ready.rendered, whole)]
+    loop = passes(renderers, ready.options.seed, 2, size=size, stream=Stream.PRICE)
+    first, second = [np.array(rendered, float) for rendered in loop]
     # The difference from the textbook half, whose rays are the same, has no noise of edges.
     heuristic, plan, everything = first - second
     noise = float(np.sqrt(np.mean((plan - heuristic) ** 2)))

@@ -1,58 +1,45 @@
 """What is added to a comparison once it is measured, step by step.
 
-A step takes the comparison and what it was rendered with, and returns the comparison with one part
-more (:data:`fotismos.comparisons.compare.Step`). The modules behind the steps are loaded late: each
-serves some comparisons, and none is part of all.
+A step takes the comparison and the halves that were compared, and returns the comparison with one
+part more. It says which parts of the halves it needs (:class:`fotismos.comparisons.halves.Step`).
+The modules behind the steps are loaded late: each serves some comparisons, and none is part of all.
 """
+
+from __future__ import annotations
 
 from dataclasses import replace
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons.compare import Step
-from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.blocks import bands
-from fotismos.comparisons.departure.metrics import LEADING, leading_distance
+from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.regions import worst_pixel
-from fotismos.comparisons.estimates import metrics_for
-from fotismos.comparisons.options import Options
-from fotismos.comparisons.prepared import Prepared
-from fotismos.comparisons.price import with_price
-from fotismos.heuristic import heuristics
-from fotismos.reference.rendering.renderer import Progress, passes
+from fotismos.comparisons.halves import Halves, Step
+from fotismos.comparisons.records.images import Comparison
+from fotismos.reference.records import Missing
+from fotismos.reference.rendering.passes import Progress, passes
 from fotismos.reference.rendering.sums import MEAN, Accumulator
 
+if TYPE_CHECKING:  # two pictures need no Mitsuba
+    from fotismos.comparisons.prepared import Prepared
 
-def steps(options: Options, why: bool) -> list[Step]:
-    """Return the steps for options; ``why`` traces the terms of 8.10, and finds causes."""
-    added: list[Step] = []
-    if not options.image and not heuristics.named(options.heuristic).is_builtin:
-        added += [with_mistakes, with_textbook]
-    if options.has_pictures:  # no effect can be added to a picture
-        added += [with_pictures, with_terms] if why else [with_pictures]
-        return [*added, with_price]
-    if why:
-        from fotismos.comparisons.attribution import with_causes  # see above
-
-        added += [with_terms, with_causes]
-    return [*added, with_price]
+PICTURED = Missing("The textbook half is a picture, which has no terms.")
 
 
-def with_pictures(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
+def steps(why: bool) -> list[Step]:
+    """Return the steps of a comparison; ``why`` traces the terms of 8.10, and finds causes."""
+    explained = (TERMS, CAUSES) if why else ()
+    return [MISTAKES, TEXTBOOK, PICTURES, *explained, PRICE]
+
+
+def with_pictures(comparison: Comparison, halves: Halves, progress: Progress | None) -> Comparison:
     """Return a comparison with the record of its pictures, which it warns of first."""
-    from fotismos.comparisons import alignment, pictures  # see above
-
-    given = ready.given
-    assert given is not None
-    textbook = None
-    if given.image is not None:
-        half: Any = ready.heuristic
-        textbook = np.array(half.replaced.sampled(pictures.TEMPLATE_SPP).render(0), float)
-    expected = alignment.scene_edges(ready.traced(alignment.FINER), textbook)
-    return pictures.with_records(comparison, given, expected, textbook)
+    assert halves.judge is not None, "the step needs pictures"
+    expected, textbook = halves.template()
+    return halves.judge(comparison, expected, textbook)
 
 
 def with_mistakes(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
@@ -69,16 +56,15 @@ def with_textbook(comparison: Comparison, ready: Prepared, progress: Progress | 
     record = comparison.record
     images = comparison.images
     sums = Accumulator(MEAN)
-    renderer = ready.shaded_by(heuristics.PHONG.name)
+    renderer = ready.shaded_by_textbook()
     for rendered in passes(
         (renderer,), record.seed, ready.passes, progress=progress, stage="textbook image"
     ):
-        sums.add(rendered.images[0])
+        sums.add(rendered[0])
     shown = sums.mean(np.float32)
-    distance = leading_distance(record.viewing, metrics_for(ready.options))
     counted = images.counted
     total = sum(
-        distance(shown[rows][counted[rows]], images.reference[rows][counted[rows]]).sum()
+        ready.distance(shown[rows][counted[rows]], images.reference[rows][counted[rows]]).sum()
         for rows in bands(len(counted))
     )
     record = structs.replace(record, textbook=float(total / max(counted.sum(), 1)))
@@ -89,6 +75,8 @@ def with_terms(comparison: Comparison, ready: Prepared, progress: Progress | Non
     """Return a comparison with its terms at pixels and as images, and the points to shade again."""
     from fotismos.comparisons import pixel_terms  # see above
 
+    if "textbook" not in ready.has:
+        return replace(comparison, terms=PICTURED, live=PICTURED)
     begin = perf_counter()
     half = ready.heuristic
     options = ready.options
@@ -102,3 +90,25 @@ def with_terms(comparison: Comparison, ready: Prepared, progress: Progress | Non
         images=replace(images, terms=layers),
     )
     return comparison.timed("terms", perf_counter() - begin)
+
+
+def with_causes(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
+    """Return a comparison with its causes."""
+    from fotismos.comparisons import attribution  # see above
+
+    return attribution.with_causes(comparison, ready, progress)
+
+
+def with_price(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
+    """Return a comparison whose price names the samples that pass and the effects needed."""
+    from fotismos.comparisons import price  # see above
+
+    return price.with_price(comparison, ready, progress)
+
+
+MISTAKES = Step(needs=frozenset({"shader"}), add=with_mistakes)
+TEXTBOOK = Step(needs=frozenset({"shader"}), add=with_textbook)
+PICTURES = Step(needs=frozenset({"pictures"}), add=with_pictures)
+TERMS = Step(needs=frozenset({"scene"}), add=with_terms)
+CAUSES = Step(needs=frozenset({"textbook", "physical"}), add=with_causes)
+PRICE = Step(needs=frozenset({"physical"}), add=with_price)

@@ -27,11 +27,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fotismos.comparisons.price_record import FEWEST_SPP, Price
+from fotismos.comparisons.records.comparison import FEWEST_SPP, Price
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Interval, Missing
-from fotismos.reference.rendering.gbuffer import image_size, resize, size_of_width
-from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, Stream, passes, warm
+from fotismos.reference.rendering.gbuffer import size_of_width
+from fotismos.reference.rendering.passes import Size, Stream, passes
+from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, warm
 
 DRAWS = 400
 """Sets of rounds drawn for an interval."""
@@ -177,17 +178,12 @@ def measure(
     halves = {"heuristic": heuristic, "reference": reference}
     if everything is not None:
         halves["everything"] = everything
-    films = [(half.scene, image_size(half.scene)) for half in halves.values()]
-    width, height = image_size(reference.scene)
-    size = size_of_width(reference.scene, WIDTH)
-    try:
-        pairs = {name: _pair(half, size) for name, half in halves.items()}
-        # Compiling is over: only what is timed needs the machine alone.
-        with alone or nullcontext():
-            found, of_halves = _of_pairs(pairs, size[0] * size[1], seed)
-    finally:
-        for scene, film in films:
-            resize(scene, film)
+    width, height = reference.size
+    size = size_of_width(reference.scene, reference.size, WIDTH)
+    pairs = {name: _pair(half, size) for name, half in halves.items()}
+    # Compiling is over: only what is timed needs the machine alone.
+    with alone or nullcontext():
+        found, of_halves = _of_pairs(pairs, size, seed)
     is_known = _is_narrow(of_halves)
     return Price(
         ratio=of_halves if is_known else None,
@@ -199,8 +195,21 @@ def measure(
     )
 
 
+def untimed(reference: Renderer) -> Price:
+    """Return the price of a physical half beside a picture, whose time is not known."""
+    width, height = reference.size
+    pixels = width * height
+    return Price(
+        ratio=None,
+        reason=NOT_TIMED.reason,
+        heuristic_s=None,
+        reference_s=min(reference.times) / (reference.pass_spp * pixels),
+        pixels=pixels,
+    )
+
+
 def _of_pairs(
-    pairs: Mapping[str, tuple[Renderer, Renderer]], pixels: int, seed: int
+    pairs: Mapping[str, tuple[Renderer, Renderer]], size: Size, seed: int
 ) -> tuple[dict[str, Line], Interval]:
     """Time pairs of renderers until the ratio of the halves is known, or the machine too busy.
 
@@ -214,12 +223,15 @@ def _of_pairs(
         renderer.times.clear()
         renderer.processor_times.clear()
     for _ in range(ATTEMPTS):
-        for _ in passes(renderers, seed, rounds, stream=Stream.PROBE):
+        for _ in passes(renderers, seed, rounds, size=size, stream=Stream.PROBE):
             pass
         found = lines(
             {
                 name: {
-                    renderer.pass_spp * pixels: (renderer.times, renderer.processor_times)
+                    renderer.pass_spp * size[0] * size[1]: (
+                        renderer.times,
+                        renderer.processor_times,
+                    )
                     for renderer in pair
                 }
                 for name, pair in pairs.items()
@@ -236,7 +248,7 @@ def _is_narrow(found: Interval) -> bool:
     return found.high - found.low <= WIDEST * found.value
 
 
-def _pair(half: Renderer, size: tuple[int, int]) -> tuple[Renderer, Renderer]:
+def _pair(half: Renderer, size: Size) -> tuple[Renderer, Renderer]:
     """Return a half with few and with more samples, at a size, both warm."""
     fewer = more = _warm(half, FEWEST_SPP, size)
     most = LARGEST_PASS // (size[0] * size[1])
@@ -252,8 +264,8 @@ def _pair(half: Renderer, size: tuple[int, int]) -> tuple[Renderer, Renderer]:
     return fewer, more
 
 
-def _warm(half: Renderer, spp: int, size: tuple[int, int]) -> Renderer:
+def _warm(half: Renderer, spp: int, size: Size) -> Renderer:
     """Return a half with some samples per pixel, which is warm."""
-    renderer = half.sampled(spp, size)
-    warm(renderer)
+    renderer = half.sampled(spp)
+    warm(renderer, size)
     return renderer

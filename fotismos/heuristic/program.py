@@ -1,13 +1,21 @@
-"""The program: its version, a digest of its sources, and the commands that it prints."""
+"""The program: its version, a digest of its sources, what it runs on, and commands it prints."""
 
 import hashlib
 import os
+import platform
 import shlex
 import sys
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
 __version__ = "0.4.0"
+
+PICTURE_LIBRARIES = ("numpy", "colour-science", "OpenEXR", "pillow")
+"""What a comparison of two pictures depends on."""
+
+LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
+"""What a comparison of a scene depends on."""
 
 PACKAGE = Path(__file__).resolve().parents[1]
 """The folder of the package, which holds the four rooms."""
@@ -27,6 +35,26 @@ def source_digest() -> str:
             whole.update(f"{path.relative_to(PACKAGE)}\0".encode())
             whole.update(hashlib.sha256(path.read_bytes()).digest())
     return whole.hexdigest()
+
+
+def cores() -> int:
+    """Return the number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def versions(libraries: Iterable[str] = LIBRARIES) -> dict[str, str]:
+    """Return the versions that a result depends on, and with Dr.Jit LLVM's."""
+    from importlib import metadata  # loaded late: help needs no versions
+
+    numbers = {"fotismos": __version__, "python": platform.python_version()}
+    numbers |= {library: metadata.version(library) for library in libraries}
+    if "drjit" in numbers:
+        import drjit as dr  # loaded late: two pictures are compared without it
+
+        numbers["LLVM"] = ".".join(map(str, dr.detail.llvm_version()))
+    return numbers
 
 
 def program() -> list[str]:

@@ -6,8 +6,10 @@ in its annotation, ``Annotated[float, msgspec.Meta(description="...", ge=0)]``, 
 """
 
 import json
+import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from statistics import median
 from typing import Annotated, Any, TypeVar, dataclass_transform
 
@@ -16,6 +18,7 @@ import numpy as np
 from msgspec import Meta
 
 from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.program import cores
 
 VERSION = 4
 """Version of all records. Records of fotismos 0.1 have none."""
@@ -71,6 +74,21 @@ class Machine(Record):
     processor: str
     cores: Size
     system: str
+
+    @classmethod
+    def here(cls) -> "Machine":
+        """Return the machine that this process runs on."""
+        try:
+            lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        except OSError:
+            lines = []
+        names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+        processor = names[0] if names else platform.processor() or platform.machine()
+        return cls(
+            processor=processor,
+            cores=cores(),
+            system=f"{platform.system()} {platform.machine()}",
+        )
 
 
 class Times(Record):
@@ -157,3 +175,30 @@ def _numpy(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     raise NotImplementedError(f"{type(value).__name__} cannot be in a record")
+
+
+WIDTH = 110
+"""Columns: enough for the colours of a block of pixels with their errors."""
+
+
+def laid_out(value: Any, depth: int = 0, before: str = "") -> str:
+    """Return JSON with one line per entry of the outer two levels, and of others if too long.
+
+    ``before`` is the text already on the line; ``ValueError`` for a NaN or an infinity.
+    """
+    line = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    is_empty = not isinstance(value, (dict, list, tuple)) or not value
+    if is_empty or (depth > 1 and len(before) + len(line) <= WIDTH):
+        return line
+    indent = "  " * (depth + 1)
+    if isinstance(value, dict):
+        keys = [f"{json.dumps(key)}: " for key in value]
+        items = list(value.values())
+    else:
+        keys = [""] * len(value)
+        items = list(value)
+    lines = [
+        indent + key + laid_out(item, depth + 1, indent + key)
+        for key, item in zip(keys, items, strict=True)
+    ]
+    return line[0] + "\n" + ",\n".join(lines) + f"\n{indent[2:]}{line[-1]}"

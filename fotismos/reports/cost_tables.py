@@ -27,14 +27,9 @@ from fotismos.reports.terminal.table import Column, Piece, Table, printed
 from fotismos.reports.terminal.words import given_time, number, parameter, percent, seconds
 
 if TYPE_CHECKING:
-    from fotismos.comparisons.cost.cost_record import Cost, EffectCost, Point, TimedMethod
-    from fotismos.comparisons.cost.engine_record import (
-        Engine,
-        EngineCost,
-        EngineSetting,
-        FrontPoint,
-    )
-    from fotismos.comparisons.departure.noise import VisibleShare
+    from fotismos.comparisons.records.cost import Cost, EffectCost, Point, TimedMethod
+    from fotismos.comparisons.records.departure import VisibleShare
+    from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting, FrontPoint
     from fotismos.reference.records import Interval
 
 BENT = 0.1

@@ -16,9 +16,10 @@ import click
 from msgspec import Meta
 
 from fotismos.comparisons.options import Declaration, Options, option
-from fotismos.comparisons.processes.pool import CAN_SHARE, Pool, cores
+from fotismos.comparisons.processes.pool import CAN_SHARE, Pool
 from fotismos.heuristic import llvm, program
 from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.program import cores
 from fotismos.reports.terminal.parsing import FILE, OutputFolder, percentage
 from fotismos.reports.terminal.words import echo, level, tell, tell_where
 

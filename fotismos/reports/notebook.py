@@ -26,20 +26,20 @@ from fotismos.comparisons.audit.checks import Audit as AuditRecord
 from fotismos.comparisons.audit.checks import Kind
 from fotismos.comparisons.audit.checks import audit as examined
 from fotismos.comparisons.case import RGB, open_case
-from fotismos.comparisons.comparison import Comparison
-from fotismos.comparisons.cost.cost_record import Cost as CostRecord
-from fotismos.comparisons.cost.cost_record import Method
-from fotismos.comparisons.cost.engine_record import EngineCost
+from fotismos.comparisons.compare import compare_pictures
 from fotismos.comparisons.cost.methods import declare as declare_method
 from fotismos.comparisons.cost.timed_pictures import TimedPicture
 from fotismos.comparisons.departure.metrics import Metric
 from fotismos.comparisons.departure.metrics import declare as declare_metric
-from fotismos.comparisons.fit.fit_record import FitRecord
 from fotismos.comparisons.names import as_files, with_files
-from fotismos.comparisons.pixel_terms import PixelTerms
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.records.check import CheckRecord
+from fotismos.comparisons.records.cost import Cost as CostRecord
+from fotismos.comparisons.records.cost import Method
+from fotismos.comparisons.records.engine import EngineCost
+from fotismos.comparisons.records.fit import FitRecord
+from fotismos.comparisons.records.images import Comparison, PixelTerms
 from fotismos.comparisons.steps import steps
-from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic import user_shaders
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Heuristic
@@ -51,7 +51,6 @@ from fotismos.reference.scene.graph import set_variant
 from fotismos.reports import verdict
 from fotismos.reports.charts import figures
 from fotismos.reports.ci import baselines, checks
-from fotismos.reports.ci.checks import CheckRecord
 from fotismos.reports.command import OnScene
 from fotismos.reports.commands.check import Baseline
 from fotismos.reports.commands.compare import Compare
@@ -177,7 +176,7 @@ def compare(asked: Compare) -> Shown:
     else:
         case = open_case(asked.scene, chosen, asked.name)
         comparison = fotismos.comparisons.compare.compare(
-            case.source, case.options, command=case.command(), then=steps(case.options, asked.why)
+            case.source, case.options, command=case.command(), then=steps(why=asked.why)
         )
     return Shown(comparison, page.render([view_of(comparison)]))
 

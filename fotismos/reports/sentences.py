@@ -9,9 +9,10 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fotismos.comparisons.cost.front import Reach, beats, is_below, reach, sufficient
+from fotismos.comparisons.cost.front import beats, is_below, reach, sufficient
 from fotismos.comparisons.departure.criterion import TOLERANCE, decide
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.records.engine import Reach
 from fotismos.reports import verdict
 from fotismos.reports.glossary import meanings
 from fotismos.reports.terminal.words import (
@@ -25,11 +26,10 @@ from fotismos.reports.terminal.words import (
 
 if TYPE_CHECKING:  # few commands need all
     from fotismos.comparisons.audit.checks import Audit
-    from fotismos.comparisons.comparison import ComparisonRecord
-    from fotismos.comparisons.cost.cost import Choice
-    from fotismos.comparisons.cost.cost_record import Cost, Point
-    from fotismos.comparisons.cost.engine_record import Engine, EngineCost, EngineSetting
-    from fotismos.comparisons.fit.fit_record import FitRecord
+    from fotismos.comparisons.records.comparison import ComparisonRecord
+    from fotismos.comparisons.records.cost import Choice, Cost, Point
+    from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting
+    from fotismos.comparisons.records.fit import FitRecord
 
 # --- What accuracy costs ---------------------------------------------------------------------
 

@@ -6,11 +6,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fotismos.comparisons.comparison import Agreement, ComparisonRecord, NoiseTarget, PictureFiles
 from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.statistics import Summary
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.comparison import (
+    Agreement,
+    ComparisonRecord,
+    NoiseTarget,
+    PictureFiles,
+)
+from fotismos.comparisons.records.departure import Summary
 from fotismos.reference.pairing.pairing_record import Pairing
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.records import plain
@@ -19,7 +24,7 @@ from fotismos.reports.terminal.table import Column, Table, comma_separated, prin
 from fotismos.reports.terminal.words import number, percent, seconds
 
 if TYPE_CHECKING:  # only checks load it
-    from fotismos.comparisons.check.moved import Move
+    from fotismos.comparisons.records.check import Move
 
 SHOWN = 12
 """Quantities of a check that are listed; all are in the record."""

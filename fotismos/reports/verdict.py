@@ -15,18 +15,17 @@ from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
 
-from fotismos.comparisons.comparison import ComparisonRecord
-from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, Verdict, decide, share_above
+from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, decide, share_above
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.comparisons.price_record import MOST_SPP, Price
+from fotismos.comparisons.records.comparison import MOST_SPP, ComparisonRecord, Price
+from fotismos.comparisons.records.departure import Verdict, VisibleShare
 from fotismos.heuristic import program
 from fotismos.reference.planning.effects import EFFECTS, MICROFACETS
 from fotismos.reports.terminal.words import number, parameter, percent, seconds
 
 if TYPE_CHECKING:
-    from fotismos.comparisons.cost.cost_record import Cost
+    from fotismos.comparisons.records.cost import Cost
 
 NAMED = 3
 """Number of effects that the sentence on a run names."""
@@ -125,8 +124,8 @@ def missing(record: ComparisonRecord) -> dict[str, float]:
 
 def cause(record: ComparisonRecord) -> str:
     """Return why a scene differs, as a sentence; empty if that is unknown, or the shader wrong."""
-    if record.agreement:
-        return " ".join(record.agreement.mistakes)
+    if record.picture_mistakes:
+        return " ".join(record.picture_mistakes)
     if record.mistakes:
         return ""
     largest = list(missing(record))[:1]
@@ -158,13 +157,11 @@ def sentence(
     looks = decision(record, threshold)
     if record.mistakes and looks != "pass":
         return "Correct the shader first."
-    has_mistakes = bool(record.agreement and record.agreement.mistakes)
     match looks:
         case "pass":
             return "No visible difference." if lead.high <= EXACT else "Nothing to do."
-        case "undecided" if not has_mistakes:
-            has_pictures = record.picture or record.reference_picture
-            more = "repeats of the pictures" if has_pictures else "samples (--spp)"
+        case "undecided" if not record.picture_mistakes:
+            more = "repeats of the pictures" if record.given else "samples (--spp)"
             if shows_only_noise(record, threshold):
                 doubt = (
                     f"Noise may hide a difference in up to {percent(found.high)} of the pixels."
@@ -182,7 +179,7 @@ def sentence(
                     " decide."
                 )
             return f"{doubt} {_samples_needed(record, threshold)}".strip()
-    if has_mistakes:
+    if record.picture_mistakes:
         return ""
     if _brightness_suffices(record, threshold):
         factor = lead.after_exposure.exposure
@@ -459,6 +456,6 @@ def advice(scenes: Sequence[Studied], threshold: float = TOLERANCE) -> Iterator[
         # The headline of a single scene is its doubt.
         doubt = record.caution if len(scenes) > 1 else ""
         wanted = "" if is_right or record.caution else sentence(record, cost, threshold)
-        why = cause(record) if record.agreement or wanted else ""
+        why = cause(record) if record.picture_mistakes or wanted else ""
         if said := " ".join(filter(None, (doubt, why, wanted))):
             yield f"{record.scene}: {said}"

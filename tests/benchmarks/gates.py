@@ -17,10 +17,11 @@ from fotismos.comparisons.options import Options  # isort: skip  it finds LLVM f
 
 from fotismos.comparisons.check.moved import sidak
 from fotismos.comparisons.check.pictures import Repeats, means
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, from_srgb, to_srgb
+from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.departure.flip import ldr_flip
 from fotismos.comparisons.prepared import prepare
-from fotismos.reference.rendering.renderer import pass_seed
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
+from fotismos.reference.rendering.passes import pass_seed
 
 HEIGHT, WIDTH, BATCH, LEVEL, FACTOR = 48, 64, 25, 0.01, 1.01322
 SHAPE, COUNTS, AXES = (HEIGHT, WIDTH, 1, BATCH), (2, 4, 8), (0, 1, 2)

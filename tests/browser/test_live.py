@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons import pixel_terms
-from fotismos.comparisons.departure.colour import BT709, Viewing, rgb_to_xyz
+from fotismos.comparisons.departure.colour import BT709, rgb_to_xyz
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.records.departure import Viewing
 from fotismos.heuristic import DirectionalLight, Material, PointLight, SpotLight, shade
 from fotismos.reference.records import plain
 from fotismos.reference.rendering.gbuffer import image_size, pixel_rays

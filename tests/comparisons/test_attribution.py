@@ -17,9 +17,9 @@ from fotismos.comparisons.attribution import (
     in_words,
     shares,
 )
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.noise import USUAL
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.reference.rendering.sums import jackknifed
 
 # -- Shapley values --------------------------------------------------------------------------------

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.departure.colour import MOST_PIXELS
 from fotismos.comparisons.options import LARGEST_SPP, Options
+from fotismos.comparisons.records.departure import MOST_PIXELS
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.tessellation import FINEST
 from fotismos.reference.scene import source

@@ -14,9 +14,9 @@ from fotismos.comparisons.check.measurement import (
     read_baseline,
 )
 from fotismos.comparisons.check.moved import differences, moved
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.scene.source import Source
 from tests.shared.parts import look_at

@@ -11,16 +11,16 @@ import pytest
 from msgspec import structs
 
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.comparison import MeanError
 from fotismos.comparisons.cost import cost as studies
 from fotismos.comparisons.cost import measure, methods
 from fotismos.comparisons.cost.cost import cost
-from fotismos.comparisons.cost.cost_record import Cost, Method
 from fotismos.comparisons.cost.measure import WIDTH, Effort, measure_ladder, reduced
 from fotismos.comparisons.cost.methods import BUILT_IN, Ladder, declare
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.records.comparison import MeanError
+from fotismos.comparisons.records.cost import Cost, Method
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Source
@@ -88,7 +88,7 @@ def declared(monkeypatch):
 
 def ladder(source, **options):
     chosen = Options(**{"resolution": (12, 12)} | options)
-    return Ladder(source, chosen, prepare(source, chosen))
+    return Ladder(prepare(source, chosen))
 
 
 @pytest.mark.parametrize(
@@ -109,13 +109,13 @@ def test_merged_methods_are_equal_images(rgb, name):
         source = SCENES[name].source()
     chosen = Options(resolution=(24, 24))
     ready = prepare(source, chosen)
-    found = Ladder(source, chosen, ready)
+    found = Ladder(ready)
     merged = [method for method in found.methods if len(method.names) > 1]
     assert merged
     # A plan that calls for all tells all methods apart.
     effects = tuple(structs.replace(one, called_for=True) for one in ready.plan.effects)
     plan = structs.replace(ready.plan, effects=effects)
-    telling = Ladder(source, chosen, replace(ready, plan=plan))
+    telling = Ladder(replace(ready, plan=plan))
     apart = {method.name: method for method in BUILT_IN}
     for method in merged:
         expected = whole(found.renderer(method, 16))

@@ -7,12 +7,13 @@ from colour.models import Lab_to_XYZ
 
 import fotismos.comparisons.compare
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.comparison import Deviations
 from fotismos.comparisons.departure import definitions
-from fotismos.comparisons.departure.colour import BT709, DEFAULT_VIEWING, ciede2000, rgb_to_xyz
+from fotismos.comparisons.departure.colour import BT709, ciede2000, rgb_to_xyz
 from fotismos.comparisons.departure.definitions import AGREEMENT, DEFINED
 from fotismos.comparisons.departure.metrics import LEADING, METRICS
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.comparison import Deviations
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.reports import tables
 from fotismos.reports.page import page
 from tests.shared import records

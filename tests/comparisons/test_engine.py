@@ -15,11 +15,11 @@ import fotismos
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost import engine, measure
 from fotismos.comparisons.cost.cost import require_other_names, truth
-from fotismos.comparisons.cost.cost_record import Cost
 from fotismos.comparisons.cost.front import fronted
 from fotismos.comparisons.cost.measure import Effort, converged, measure_ladder
 from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture, seconds_of
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.cost import Cost
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Interval
 from fotismos.reference.scene.graph import set_variant

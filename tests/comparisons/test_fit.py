@@ -13,7 +13,6 @@ import pytest
 from drjit.llvm.ad import Array3f64
 from msgspec import structs
 
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.fit import fit as fitting
 from fotismos.comparisons.fit.fit import fit
@@ -22,6 +21,7 @@ from fotismos.comparisons.fit.search import LOSSES, Objective, descend, identify
 from fotismos.comparisons.gallery.builtin import builtin
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import named
 from fotismos.heuristic.terms import normalisation

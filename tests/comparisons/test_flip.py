@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from flip_evaluator import evaluate
 
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Viewing
 from fotismos.comparisons.departure.flip import LARGEST, exposures, hdr_flip, ldr_flip
 from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING, Viewing
 
 pytestmark = pytest.mark.usefixtures("computed_by")
 FLIPS = pytest.mark.parametrize("name", ["ldr_flip", "hdr_flip"])

@@ -1,5 +1,6 @@
 """Times, fronts, and choices on numbers: a clock and renderers that are made up."""
 
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -7,12 +8,12 @@ import pytest
 from msgspec import structs
 
 from fotismos.comparisons import timing
-from fotismos.comparisons.comparison import MeanError
-from fotismos.comparisons.cost.cost_record import Point
 from fotismos.comparisons.cost.front import beats, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import timed, tried
+from fotismos.comparisons.records.comparison import MeanError
+from fotismos.comparisons.records.cost import Point
 from fotismos.reference.records import Interval
-from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.passes import passes
 
 PIXELS = 64 * 64
 KERNEL = 15e-9
@@ -33,7 +34,13 @@ class Clock:
     times: list = field(default_factory=list)
     processor_times: list = field(default_factory=list)
 
-    def render(self, seed):
+    def active(self):
+        return nullcontext()
+
+    def passes(self, count, size, stream, seed):
+        return map(self.render, range(count))
+
+    def render(self, seed, size=None):
         samples = self.pass_spp * PIXELS
         work = self.overhead + samples * self.per_sample * (1 + self.bend * samples)
         # Others only ever add time; now and then a burst adds much.

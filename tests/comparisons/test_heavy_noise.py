@@ -9,11 +9,11 @@ import pytest
 from fotismos.comparisons import attribution
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure import criterion, marks, statistics
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING, leading_distance
 from fotismos.comparisons.departure.noise import debiased
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.comparisons.steps import steps
 from fotismos.reference.scene.source import Source
 from tests.shared import noisy
@@ -101,8 +101,8 @@ def test_causes_of_a_caustic_take_more_samples_and_their_closure_holds_zero(rgb,
     source = Source("a ball", caustic())
     options = Options(seed=seed)
     ready = guarded(source, options)
-    few = attribution.find(ready, source, options).record
-    more = attribution.find(ready, source, options, limit=2**26).record
+    few = attribution.find(ready).record
+    more = attribution.find(ready, limit=2**26).record
     assert few.spp < more.spp
     for record in (few, more):
         assert record.closure.low <= 0 <= record.closure.high
@@ -115,7 +115,7 @@ def test_a_noisy_picture_of_the_scene_itself_is_not_said_to_be_shifted(rgb, tmp_
         path = str(tmp_path / f"{seed}.exr")
         mi.util.write_bitmap(path, mi.render(made, spp=16, seed=50 + seed), write_async=False)
         options = Options(image=path, seed=seed)
-        record = compare(Source("a ball", caustic()), options, then=steps(options, False)).record
+        record = compare(Source("a ball", caustic()), options, then=steps(why=False)).record
         said = " ".join(record.warnings)
         assert "shifted" not in said
         assert "misread" not in said

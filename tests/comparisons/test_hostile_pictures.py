@@ -12,9 +12,9 @@ import OpenEXR
 import pytest
 from PIL import Image
 
+from fotismos.comparisons.compare import compare_pictures
 from fotismos.comparisons.names import matching
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic.errors import InputError, NonFiniteError
 
 SIZE = (24, 32)

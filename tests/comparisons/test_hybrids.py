@@ -10,13 +10,13 @@ import pytest
 from fotismos.comparisons import attribution
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.cost.cost_record import Method
 from fotismos.comparisons.cost.methods import Ladder
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.hybrids import HybridImages, HybridScenes
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded, prepare
+from fotismos.comparisons.records.cost import Method
 from fotismos.comparisons.steps import steps
 from fotismos.reference.planning.effects import (
     BUMPS,
@@ -25,7 +25,7 @@ from fotismos.reference.planning.effects import (
     OCCLUSION,
     labelled,
 )
-from fotismos.reference.rendering.renderer import Stream, passes
+from fotismos.reference.rendering.passes import Stream, passes
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Source
 from tests.shared import noisy_scenes
@@ -68,7 +68,7 @@ def test_shadows_of_bumps_are_the_cause_where_only_they_differ(rgb):
     source = Source("bumps", bumpy())
     options = Options(spp=16)
     ready = guarded(source, options)
-    found = attribution.find(ready, source, options)
+    found = attribution.find(ready)
     removes = {part.effect: part.removes.value for part in found.record.effects}
     assert max(removes, key=removes.get) == BUMPS.label
     assert removes[BUMPS.label] > 2
@@ -97,7 +97,7 @@ def found(request):
     """The causes of one small scene, and its kernel and reference, rendered anew."""
     case = open_case(request.param, Options(resolution=(24, 24)))
     ready = guarded(case.source, case.options)
-    causes = attribution.find(ready, case.source, case.options)
+    causes = attribution.find(ready)
     images = [whole(half).mean for half in (ready.heuristic, ready.reference)]
     yield SimpleNamespace(name=request.param, causes=causes, images=images)
     set_variant("llvm_ad_rgb")
@@ -114,7 +114,7 @@ def test_a_clamped_fall_off_is_a_cause(rgb):
     }
     source = Source("clamped", description)
     ready = guarded(source, Options())
-    record = attribution.find(ready, source, Options()).record
+    record = attribution.find(ready).record
     assert record.departure > 0.5
     assert [entry.effect for entry in record.effects] == ["distance attenuation"]
     assert abs(record.closure.value) < 0.01 * record.departure
@@ -124,7 +124,7 @@ def test_a_clamped_fall_off_is_a_cause(rgb):
 def test_in_fog_the_causes_are_said_to_be_unknown(rgb):
     """No image of some effects holds a medium: its light would be missing from all of them."""
     case = open_case(noisy_scenes.fog, Options(resolution=(8, 8), spp=16))
-    record = compare(case.source, case.options, then=steps(case.options, why=True)).record
+    record = compare(case.source, case.options, then=steps(why=True)).record
     assert record.why is None
     assert any("participating media (interior)" in warning for warning in record.warnings)
 
@@ -134,7 +134,7 @@ def test_a_pane_counts_as_an_obstacle(rgb):
     """As docs/reading.md says, with numbers."""
     case = open_case(ROOT / "docs/scenes/pane.xml", Options())
     ready = guarded(case.source, case.options)
-    record = attribution.find(ready, case.source, case.options).record
+    record = attribution.find(ready).record
     removed = {entry.effect: entry.removes.value for entry in record.effects}
     expected = {"occlusion": -11, "interreflection": 6, "extended lights": 6, "transmission": 0}
     assert removed == pytest.approx(expected, abs=2)
@@ -171,7 +171,7 @@ def test_the_departure_is_that_of_the_kernel_rendered_anew(found):
 
 def removes(options):
     source = SCENES["cornell-box"].source()
-    return attribution.find(guarded(source, options), source, options).record
+    return attribution.find(guarded(source, options)).record
 
 
 @pytest.mark.slow
@@ -252,7 +252,7 @@ def test_without_effects_clear_surfaces_are_looked_through_as_by_the_kernel(rgb)
     }
     case = open_case(scene, Options(resolution=(24, 24), spp=16))
     ready = guarded(case.source, case.options)
-    record = attribution.find(ready, case.source, case.options).record
+    record = attribution.find(ready).record
     assert {"interreflection", "transmission"} <= {one.effect for one in record.effects}
     assert record.implementation < 1e-3
 
@@ -314,18 +314,18 @@ def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
     scene = shadowed(24)
     scene["sensor"]["film"]["rfilter"] = {"type": "box"}
     case = open_case(scene, Options.of({"resolution": (24, 24)}), "shadowed")
-    found = Ladder(case.source, case.options, guarded(case.source, case.options))
+    found = Ladder(guarded(case.source, case.options))
     hybrids = HybridImages(found.pairs, found.scenes, 3, 16, 0, (24, 24))
     for effects in ((), ("occlusion",)):
         image = hybrids.simulating({labelled(effect) for effect in effects})
         assert image.shape == (3, 48, 48, 3)
         corner = hybrids.pixels(image)[:, 1, 2]
         np.testing.assert_allclose(corner, image[:, 2:4, 4:6].mean(axis=(1, 2)), rtol=1e-5)
-    for rendered in (found.ready.scene, found.ready.heuristic.scene):
-        assert tuple(rendered.sensors()[0].film().size()) == (24, 24)
+    for half in (found.ready.reference, found.ready.heuristic):
+        assert half.render(0).shape[:2] == (24, 24)
     shadows = Method(name="shadows", family="kernel", shadows=True)
     loop = passes([found.renderer(shadows, 4, (48, 48))], 0, 3, stream=Stream.REPLICATES)
-    expected = np.mean([np.array(one.images[0]) for one in loop], axis=0)
+    expected = np.mean([np.array(one[0]) for one in loop], axis=0)
     np.testing.assert_allclose(image.mean(axis=0), expected, rtol=1e-3, atol=1e-4)
     assert abs(image - hybrids.simulating(())).max() > 0.05
 
@@ -337,7 +337,7 @@ def test_a_preview_is_the_same_image_in_finer_pixels(rgb):
 def test_a_clean_reference_takes_noise_out_of_previews(rgb):
     """By two runs that share nothing but the scene; the means stay."""
     case = open_case("cornell-box", Options(resolution=(48, 48)))
-    ladder = Ladder(case.source, case.options, guarded(case.source, case.options))
+    ladder = Ladder(guarded(case.source, case.options))
     ladder.ready.reference.pass_spp = 256
     total = whole(ladder.ready.reference)
     clean = total.mean, total.standard_error
@@ -358,6 +358,6 @@ def test_a_crop_keeps_its_place_in_finer_pixels(rgb):
     crop = {"crop_width": 24, "crop_height": 32, "crop_offset_x": 21, "crop_offset_y": 17}
     parts["sensor"]["film"] |= crop
     case = open_case(parts, Options(), "cropped")
-    record = compare(case.source, case.options, then=steps(case.options, True)).record
+    record = compare(case.source, case.options, then=steps(why=True)).record
     assert abs(record.why.closure.value) < 0.05 < record.why.departure
     assert record.why.departure == pytest.approx(record.metrics["dE2000"].mean, rel=0.1)

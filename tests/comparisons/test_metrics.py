@@ -5,12 +5,7 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.departure import arrays, definitions
-from fotismos.comparisons.departure.colour import (
-    Viewing,
-    cam16ucs_unclipped,
-    ciede2000,
-    from_srgb,
-)
+from fotismos.comparisons.departure.colour import cam16ucs_unclipped, ciede2000, from_srgb
 from fotismos.comparisons.departure.definitions import AGREEMENT, DEFINED
 from fotismos.comparisons.departure.metrics import (
     LEADING,
@@ -26,6 +21,7 @@ from fotismos.comparisons.departure.statistics import (
     summarise,
     summarise_log2_luminance,
 )
+from fotismos.comparisons.records.departure import Viewing
 from fotismos.heuristic.errors import InputError, InstallationError, NonFiniteError
 from fotismos.reference.records import plain
 from fotismos.reference.rendering.finite import require_finite

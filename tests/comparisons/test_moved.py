@@ -11,15 +11,10 @@ from scipy import stats
 
 from fotismos.comparisons.check import measurement as measuring
 from fotismos.comparisons.check import moved as moving
-from fotismos.comparisons.check.measurement import (
-    Block,
-    Half,
-    Measurement,
-    MetricAmount,
-    measurement,
-)
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.check.measurement import measurement
 from fotismos.comparisons.departure.metrics import METRICS, RATIO
+from fotismos.comparisons.records.check import Block, Half, Measurement, MetricAmount
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 
 PASSES = 16
 

@@ -11,6 +11,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure import regions
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.departure import Region
 from fotismos.comparisons.steps import steps
 from fotismos.reference.rendering.gbuffer import ObjectIds, gbuffer
 from tests.shared import records
@@ -20,7 +21,7 @@ from tests.shared.parts import CENTRE, RADIUS, moved, shadowed
 @pytest.fixture(scope="module")
 def compared():
     case = open_case(shadowed(), Options.of({"resolution": (48, 48)}), "shadowed")
-    found = compare(case.source, case.options, then=steps(case.options, True))
+    found = compare(case.source, case.options, then=steps(why=True))
     return SimpleNamespace(found=found, record=found.record)
 
 
@@ -102,9 +103,7 @@ def test_effects_are_taken_where_the_pixels_of_a_shape_lie():
     carriers, places = regions.find_objects(error, counted, owners)
     effects = {"shadow": np.array([[3.0, 0], [3, 0]]), "gloss": np.array([[0.0, 2], [0, 2]])}
     images = records.images(4, 4, objects=places, materials=places)
-    boxes = [
-        regions.Region(x=x, y=1, width=2, height=2, share=0.5, mean_dE2000=1.0) for x in (0, 2)
-    ]
+    boxes = [Region(x=x, y=1, width=2, height=2, share=0.5, mean_dE2000=1.0) for x in (0, 2)]
     record = records.record(objects=carriers, materials=carriers, regions=tuple(boxes))
     found = with_effects_named(records.Comparison(record, images), effects)
     assert {each.name: each.effect for each in found.objects} == {

@@ -35,7 +35,7 @@ def read(word, *how, **more):
 
 def picture_of(scene, words, spp=64, **more):
     case = open_case(scene, Options(image=words, spp=spp, **more))
-    return compare(case.source, case.options, then=steps(case.options, False)).record
+    return compare(case.source, case.options, then=steps(why=False)).record
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,8 @@ import pytest
 from fotismos.comparisons import pixel_terms
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.reference.records import Missing
-from fotismos.reference.rendering.renderer import passes, variant
+from fotismos.reference.rendering.passes import passes
+from fotismos.reference.rendering.renderer import variant
 from fotismos.reports.files import results
 from fotismos.reports.page import page
 from fotismos.reports.page.why_view import terms_view
@@ -163,7 +164,7 @@ def test_other_shading_has_no_terms_and_says_why():
 
 def textbook(ready, count=1):
     """Return the mean of passes of the heuristic half, (H, W, 3)."""
-    return np.mean([np.array(one.images[0]) for one in passes([ready.heuristic], 0, count)], axis=0)
+    return np.mean([np.array(one[0]) for one in passes([ready.heuristic], 0, count)], axis=0)
 
 
 def images(scene, **options):

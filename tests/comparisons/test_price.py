@@ -7,15 +7,14 @@ import pytest
 from fotismos.comparisons import price, timing
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS
-from fotismos.comparisons.departure.noise import VisibleShare
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
-from fotismos.comparisons.price_record import MOST_SPP
+from fotismos.comparisons.records.comparison import MOST_SPP
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING, VisibleShare
 from fotismos.comparisons.steps import steps
-from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.passes import passes
 from fotismos.reference.rendering.transport import power_share
 from tests.shared import noisy_scenes
 from tests.shared.misplanned import DIFFUSE, scene
@@ -28,7 +27,7 @@ GREY = 0.3
 def priced(make, why=False, **options):
     """Return the price of a scene."""
     case = open_case(make, Options(**options))
-    then = steps(case.options, why)
+    then = steps(why=why)
     return compare(case.source, case.options, then=then).record.price
 
 
@@ -93,7 +92,7 @@ def test_a_scene_passes_with_the_samples_of_its_price(name, rgb):
     def differences(spp, seed, count):
         """Return differences of the halves, and pictures of the reference, (count, N, 3)."""
         halves = [half.sampled(spp) for half in (ready.heuristic, ready.reference)]
-        images = np.array([np.array(each.images, float) for each in passes(halves, seed, count)])
+        images = np.array([np.array(each, float) for each in passes(halves, seed, count)])
         images = images[:, :, counted]
         return images[:, 1] - images[:, 0], images[:, 1]
 

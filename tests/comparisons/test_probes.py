@@ -196,7 +196,7 @@ def test_a_shader_that_breaks_in_a_probe_is_compared_all_the_same(rgb, tmp_path,
 
 def compared(source, path, **options):
     case = open_case(source, Options(heuristic=path, resolution=(16, 12), spp=8, **options))
-    return compare(case.source, case.options, then=steps(case.options, False)).record
+    return compare(case.source, case.options, then=steps(why=False)).record
 
 
 def test_the_textbook_stands_beside_a_wrong_shader_and_no_advice_to_trace(rgb, tmp_path):

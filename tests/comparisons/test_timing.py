@@ -1,5 +1,6 @@
 """Ratios of times: alternating order, intervals, and the refusal to name one."""
 
+from contextlib import nullcontext
 from copy import copy
 
 import numpy as np
@@ -25,18 +26,25 @@ class Timed:
         self.rng = rng
         self.spread = spread
         self.scene = None
+        self.size = (64, 64)
         self.variant = "llvm_ad_rgb"
 
-    def sampled(self, pass_spp, size):
+    def active(self):
+        return nullcontext()
+
+    def sampled(self, pass_spp):
         other = copy(self)
         other.pass_spp = pass_spp
-        other.pixels = size[0] * size[1]
         other.times = []
         other.processor_times = []
         return other
 
-    def render(self, seed):
-        seconds = 2e-3 + self.per_sample * self.pass_spp * self.pixels
+    def passes(self, count, size, stream, seed):
+        for _ in range(count):
+            yield self.render(seed, size)
+
+    def render(self, seed, size):
+        seconds = 2e-3 + self.per_sample * self.pass_spp * size[0] * size[1]
         seconds *= 1 + abs(self.rng.normal(0, self.spread))
         other_work = self.rng.uniform(0, 2) if self.rng.random() < self.busy else 0.0
         self.times.append(seconds * (1 + other_work))
@@ -47,9 +55,7 @@ class Timed:
 @pytest.fixture
 def unscaled(monkeypatch):
     """Renderers of a test have no film."""
-    monkeypatch.setattr(timing, "image_size", lambda scene: (64, 64))
-    monkeypatch.setattr(timing, "size_of_width", lambda scene, width: (width, width))
-    monkeypatch.setattr(timing, "resize", lambda scene, size: None)
+    monkeypatch.setattr(timing, "size_of_width", lambda scene, size, width: (width, width))
 
 
 @pytest.mark.guarantee(

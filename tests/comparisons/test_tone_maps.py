@@ -16,11 +16,12 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.departure import tone_maps
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedReference
-from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light, aces, agx, neutral, reinhard
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS, aces, agx, neutral, reinhard
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options, ToneMapName
 from fotismos.comparisons.picture_mistakes import Names, NoisyImage
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.records.images import Light
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.rendering.sums import Accumulator
 from tests.shared.outputs import write

@@ -11,8 +11,9 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter
 
 import fotismos
-from fotismos.comparisons import pictures, two_pictures
+from fotismos.comparisons import compare, pictures
 from fotismos.comparisons.case import open_case
+from fotismos.comparisons.compare import compare_pictures
 from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.departure.metrics import LEADING, METRICS
@@ -21,7 +22,6 @@ from fotismos.comparisons.names import as_files
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import read_file
 from fotismos.comparisons.prepared import prepare
-from fotismos.comparisons.two_pictures import compare_pictures
 from fotismos.heuristic.errors import InputError
 from fotismos.reports import verdict
 from tests.shared.patches import patches
@@ -91,9 +91,9 @@ def two(tmp_path, monkeypatch):
 def test_the_first_page_has_the_verdict_and_reloads_into_the_whole(run, two, monkeypatch):
     pages = []
 
-    def finish(first):
+    def finish(*first):
         pages.append(Path("out/index.html").read_text())
-        return two_pictures.finish(first)
+        return compare.finish(*first)
 
     monkeypatch.setattr("fotismos.reports.run.pictures.finish", finish)
     assert run(*two)[0] == 0
@@ -116,7 +116,7 @@ def test_the_first_page_has_the_verdict_and_reloads_into_the_whole(run, two, mon
 
 @pytest.mark.parametrize(("fault", "code"), [(InputError("late"), 2), (KeyboardInterrupt(), 130)])
 def test_a_first_page_does_not_outlive_its_command(run, two, monkeypatch, fault, code):
-    def finish(first):
+    def finish(*first):
         assert Path("out/index.html").is_file()
         raise fault
 
@@ -147,8 +147,7 @@ def test_every_repeat_counts_in_the_mean():
         files = tuple(read_file(f"{i}.npy") for i in range(3))
     given = pictures.Pictures(names=("a", "b", "c"), files=files)
     for count in (2, 3):
-        half = pictures.PictureHalf(given, count)
-        passes = [half.render(number)[0, 0, 0] for number in range(count)]
+        passes = [image[0, 0, 0] for image in given.passes(count)]
         parts = [images[number::count] for number in range(count)]
         assert passes == pytest.approx([np.mean([i[0, 0, 0] for i in part]) for part in parts])
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.departure import criterion, statistics
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING, METRICS
-from fotismos.comparisons.departure.noise import VisibleShare, debiased
+from fotismos.comparisons.departure.noise import debiased
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING, VisibleShare
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering import sums

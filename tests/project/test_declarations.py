@@ -20,10 +20,10 @@ from scipy.ndimage import uniform_filter
 from fotismos.comparisons.check.measurement import measurement
 from fotismos.comparisons.check.moved import differences
 from fotismos.comparisons.cost import methods
-from fotismos.comparisons.cost.cost_record import Method
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import METRICS, Metric, declare
 from fotismos.comparisons.fit.fit import RenderedHalves, departures
+from fotismos.comparisons.records.cost import Method
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.comparisons.study import dataset
 from fotismos.heuristic.declared import Declared
 from fotismos.heuristic.errors import InputError

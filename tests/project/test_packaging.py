@@ -6,11 +6,11 @@ from importlib import metadata
 
 import pytest
 
+from fotismos.comparisons.records.check import Change, CheckRecord
 from fotismos.heuristic import mitsuba_version
 from fotismos.heuristic.errors import InstallationError
 from fotismos.heuristic.program import __version__
 from fotismos.reports.ci import summary
-from fotismos.reports.ci.checks import CheckRecord, VersionChange
 from fotismos.reports.run import doctor
 from tests.shared.programs import ROOT, command_line
 
@@ -67,7 +67,7 @@ def test_another_mitsuba_is_refused_with_what_to_install(version, installed):
 
 
 def test_a_check_says_once_that_mitsuba_is_another():
-    change = VersionChange(before="3.9.1", after="3.9.2")
+    change = Change(before="3.9.1", after="3.9.2")
     made = [
         CheckRecord(baseline=name, scene=name, status="passed", seconds=1, versions=versions)
         for name, versions in (("a", {"mitsuba": change}), ("b", {"mitsuba": change}), ("c", None))

@@ -54,7 +54,8 @@ COMPARED = (
 import json
 from pathlib import Path
 import numpy as np
-from fotismos.comparisons.comparison import PICTURE_LIBRARIES, machine, versions
+from fotismos.heuristic.program import PICTURE_LIBRARIES, versions
+from fotismos.reference.records import Machine
 from fotismos.comparisons.departure.metrics import drawn
 from fotismos.comparisons.departure.statistics import summarise_log2_luminance
 from fotismos.comparisons.picture_files import read_file

@@ -5,7 +5,6 @@ import re
 import struct
 import tomllib
 from pathlib import Path
-from types import SimpleNamespace
 
 import mitsuba as mi
 import numpy as np
@@ -16,12 +15,12 @@ from fotismos.comparisons.check.measurement import measure_scene
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.departure import criterion
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.criterion import TOLERANCE, caution
 from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.fit.fit import fit
+from fotismos.comparisons.halves import Halves
 from fotismos.comparisons.options import LARGEST_SPP, Options
-from fotismos.comparisons.prepared import Prepared
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.comparisons.study import design
 from fotismos.heuristic.errors import FotismosError, InputError, NonFiniteError
 from fotismos.reference.rendering.renderer import LARGEST_PASS
@@ -209,18 +208,23 @@ def test_doubts_about_pictures_are_told_from_their_values():
     black, grey = np.zeros((4, 5, 3)), np.where(seen[..., None], (0.2, 0.3, 0.4), 0.0)
 
     def view(counted):
-        pair = SimpleNamespace(warnings=())
-        return SimpleNamespace(
-            counted=counted, options=Options(), source=Source("a", None), pair=pair
+        return Halves(
+            name="a",
+            options=Options(),
+            first=None,
+            second=None,
+            passes=2,
+            has=frozenset({"textbook"}),
+            where=counted,
         )
 
     def doubt(test, reference):
-        return Prepared.require_light(view(seen), test, reference)
+        return view(seen).caution(test, reference)
 
     assert doubt(noise, noise) == doubt(grey, noise) == doubt(black, noise) == ""
     assert doubt(noise, black).startswith("The picture to compare with is black")
     assert doubt(grey, 2 * grey).startswith("Each picture is one colour")
-    assert not Prepared.require_light(view(np.zeros((4, 5), bool)), black, black)
+    assert not view(np.zeros((4, 5), bool)).caution(black, black)
     with pytest.raises(InputError, match="a: both pictures are black"):
         doubt(black, 1e-6 * noise)
 

@@ -56,7 +56,7 @@ def test_a_lamp_casts_no_shadow_on_what_it_lights(rgb, kind):
 @pytest.mark.parametrize("kind", ["ball", "box"])
 def test_shadows_are_not_blamed_for_the_lamp(rgb, kind):
     small = Options(resolution=(48, 36), spp=16)
-    found = compare(Source("lamp", room(kind)), small, then=steps(small, True)).record.why
+    found = compare(Source("lamp", room(kind)), small, then=steps(why=True)).record.why
     errors = {each.effects: each.error for each in found.hybrids}
     assert errors["occlusion",] < 1.5 * errors[()]
     removed = {one.effect: one.removes.value for one in found.effects}

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from fotismos.reference.rendering.renderer import Renderer, Stream, pass_seed
+from fotismos.reference.rendering.passes import Stream, pass_seed
+from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.rendering.sums import Accumulator
 from tests.shared.misplanned import scene as described
 from tests.shared.parts import moved

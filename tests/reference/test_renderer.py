@@ -1,14 +1,20 @@
 """Rendering in passes: sums, common camera rays, and light."""
 
+from contextlib import nullcontext
+from types import SimpleNamespace
+
 import mitsuba as mi
 import numpy as np
 import pytest
 from scipy import stats
 
 from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
 from fotismos.reference.pairing import halves
 from fotismos.reference.rendering import renderer, sums
-from fotismos.reference.rendering.renderer import pass_seed
+from fotismos.reference.rendering.gbuffer import size_of_width
+from fotismos.reference.rendering.passes import Stream, pass_seed, passes
 from tests.shared.parts import camera, look_at, moved
 
 GLOSSY = {"type": "roughplastic", "alpha": 0.3, "diffuse_reflectance": 0.4}
@@ -39,10 +45,10 @@ def lamp():
     }
 
 
-def estimate(made, integrator, spp, passes, first_seed=0):
+def estimate(made, integrator, spp, count, first_seed=0):
     half = renderer.Renderer(made, integrator, spp, "a test")
     total = sums.Accumulator()
-    for seed in range(passes):
+    for seed in range(count):
         total.add(half.render(first_seed + seed))
     return total.estimate()
 
@@ -69,7 +75,7 @@ def test_camera_rays_coincide_in_both_halves(rgb, name, integrator):
 
 def test_no_two_runs_have_a_pass_in_common():
     """Seeds of runs next to each other, of 64 passes each and of every stream."""
-    streams = list(renderer.Stream)
+    streams = list(Stream)
     seeds = [
         pass_seed(seed, number, stream)
         for seed in range(50)
@@ -119,3 +125,50 @@ def test_indirect_light_is_that_of_mitsubas_path(rgb):
     made = mi.load_dict(scene(12, one=POINT, two=SECOND, lamp=lamp(), sky=CONSTANT))
     integrators = ({"type": kind, "max_depth": -1} for kind in ("direct_all", "path"))
     check_same_means(made, *integrators, passes=32)
+
+
+def test_a_size_is_of_its_passes_alone(rgb):
+    """Renderers that share a scene give at each size what a scene of that size gives."""
+
+    direct = mi.load_dict({"type": "direct"})
+
+    def alone(size):
+        half = renderer.Renderer(mi.load_dict(scene(size, point=POINT)), direct, 4, "a test")
+        return [np.array(image) for image in half.passes(2, seed=5)]
+
+    made = mi.load_dict(scene(24, point=POINT))
+    pair = [renderer.Renderer(made, direct, 4, "a test", size=size) for size in (None, (16, 16))]
+    for size in (None, (12, 12), None, (8, 8), (12, 12)):
+        found = [tuple(map(np.array, images)) for images in passes(pair, 5, 2, size=size)]
+        for images, own in zip(zip(*found, strict=True), (24, 16), strict=True):
+            np.testing.assert_array_equal(images, alone(size[0] if size else own))
+
+
+def test_sources_take_turns_and_those_of_a_variant_follow_each_other():
+    """With 0 or 1 changes of the variant a pass, and the same seeds for all."""
+    said = []
+
+    class Source(SimpleNamespace):
+        def active(self):
+            said.append(self.variant)
+            return nullcontext()
+
+        def passes(self, count, size, stream, seed):
+            for number in range(count):
+                said.append(self.name)
+                yield pass_seed(seed, number, stream)
+
+    sources = [Source(name=name, variant=name[0]) for name in ("a1", "b1", "a2")]
+    found = list(passes(sources, 7, 3, stream=Stream.PRICE))
+    assert found == [(pass_seed(7, number, Stream.PRICE),) * 3 for number in range(3)]
+    forth = ["a", "a1", "a2", "b", "b1"]
+    assert said == [*forth, "a", "a2", "a1", "b", "b1", *forth]
+
+
+def test_surfaces_are_those_of_the_halves_whatever_was_rendered_last(rgb):
+    """A pass of another size may have another shape, by the rounding of its rows."""
+    ready = prepare(SCENES["fig-8-9"].source(), Options(resolution=(24, 16)))
+    before = ready.traced().position
+    size = size_of_width(ready.scene, ready.size, 128)
+    assert [image.shape[:2] for image in ready.reference.passes(1, size)] == [(85, 128)]
+    np.testing.assert_array_equal(ready.traced().position, before)

@@ -20,7 +20,7 @@ def methods(name, is_short=False):
     case = open_case(name, Options(resolution=(24, 16)))
     mi.set_variant(case.variant)
     ready = prepare(case.source, case.options)
-    found = Ladder(case.source, case.options, ready, is_short)
+    found = Ladder(ready, is_short)
     return {method.name: found.renderer(method, 4) for method in found.methods}
 
 

@@ -13,11 +13,11 @@ import OpenEXR
 import pytest
 from msgspec import structs
 
-from fotismos.comparisons.check.measurement import HALVES, MeasuredScene, measurement
-from fotismos.comparisons.check.moved import Check, Move, differences, moved
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
+from fotismos.comparisons.check.measurement import MeasuredScene, measurement
+from fotismos.comparisons.check.moved import Check, differences, moved
 from fotismos.comparisons.departure.metrics import METRICS
-from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.comparisons.records.check import HALVES, Move
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING, VisibleShare
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.ci import checks, summary
 from fotismos.reports.commands.compare import Compare

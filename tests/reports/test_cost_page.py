@@ -10,8 +10,8 @@ import pytest
 import vl_convert
 from msgspec import convert, structs
 
-from fotismos.comparisons.comparison import MeanError
-from fotismos.comparisons.cost.cost_record import Point
+from fotismos.comparisons.records.comparison import MeanError
+from fotismos.comparisons.records.cost import Point
 from fotismos.reports import cost_tables, sentences
 from fotismos.reports.charts import cost_charts
 from fotismos.reports.page import page

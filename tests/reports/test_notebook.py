@@ -17,7 +17,7 @@ import fotismos
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.steps import with_terms
+from fotismos.comparisons.steps import TERMS
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Missing
 from fotismos.reports.notebook import Shown
@@ -68,7 +68,7 @@ def test_a_notebook_shows_the_view_of_the_page_in_a_frame(monkeypatch, tmp_path)
 def shown():
     """A sphere in front of nothing, wider than high so that no column passes for a row."""
     case = open_case("fig-8-9", Options(spp=4, resolution=(24, 16)))
-    return Shown(compare(case.source, case.options, then=[with_terms]), page="")
+    return Shown(compare(case.source, case.options, then=[TERMS]), page="")
 
 
 @pytest.mark.parametrize("place", [(12, 8), (9, 5)])

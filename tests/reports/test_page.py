@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fotismos.comparisons.comparison import machine
 from fotismos.comparisons.cost.methods import BUILT_IN
 from fotismos.comparisons.departure.metrics import METRICS, THRESHOLDS, drawn
 from fotismos.reference.planning.effects import EFFECTS
@@ -200,7 +199,7 @@ def test_the_overview_has_the_runs_size_samples_versions_and_machine(record):
     shown = " ".join(Page(page.render([records.view(record)])).text.split())
     width, height = record["resolution"]
     assert f"{width} × {height} pixels; {record['plan']['spp']} samples per pixel" in shown
-    assert f"{machine().processor}, {machine().cores} cores" in shown
+    assert f"{Machine.here().processor}, {Machine.here().cores} cores" in shown
 
 
 def test_a_small_map_of_the_error_has_the_colours_of_the_pages():

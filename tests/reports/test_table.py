@@ -6,7 +6,7 @@ from operator import itemgetter
 
 import pytest
 
-from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.comparisons.records.departure import VisibleShare
 from fotismos.reference.records import Interval
 from fotismos.reports import cost_tables, sentences
 from fotismos.reports.ci import summary

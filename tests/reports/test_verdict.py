@@ -7,12 +7,17 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from fotismos.comparisons.comparison import MeanError
-from fotismos.comparisons.cost import cost_record
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.noise import VisibleShare
-from fotismos.comparisons.price_record import EffectsThatPass, Price, SamplesThatPass, Saving
 from fotismos.comparisons.processes.pool import Task
+from fotismos.comparisons.records import cost as cost_records
+from fotismos.comparisons.records.comparison import (
+    EffectsThatPass,
+    MeanError,
+    Price,
+    SamplesThatPass,
+    Saving,
+)
+from fotismos.comparisons.records.departure import VisibleShare
 from fotismos.heuristic.heuristics import HEURISTICS, Interpolation, Point
 from fotismos.reference.records import Interval
 from fotismos.reports import verdict
@@ -53,7 +58,7 @@ def study(*points):
         for name, *_ in (kernel, *points)
     ]  # fmt: skip
     made = [
-        cost_record.Point(
+        cost_records.Point(
             method=name,
             spp=spp,
             seconds=Interval(value=ms / 1e3, low=0.95 * ms / 1e3, high=1.05 * ms / 1e3),

@@ -6,10 +6,10 @@ import numpy as np
 from msgspec import convert, structs
 
 from fotismos.comparisons.attribution import Causes
-from fotismos.comparisons.comparison import Attribution
-from fotismos.comparisons.cost.cost_record import Cost
 from fotismos.comparisons.cost.engine import Study
-from fotismos.comparisons.cost.engine_record import Engine
+from fotismos.comparisons.records.comparison import Attribution
+from fotismos.comparisons.records.cost import Cost
+from fotismos.comparisons.records.engine import Engine
 from fotismos.reference.records import VERSION
 from tests.shared import records
 

@@ -11,13 +11,13 @@ import mitsuba as mi
 import numpy as np
 
 from fotismos.comparisons.departure import marks
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING, leading_distance
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.reference.rendering.gbuffer import gbuffer
-from fotismos.reference.rendering.renderer import pass_seed
+from fotismos.reference.rendering.passes import pass_seed
 from fotismos.reference.rendering.sums import Accumulator, DifferenceSums
 from fotismos.reference.scene.source import Source
 from tests.shared.parts import camera, look_at, moved, rgb_of

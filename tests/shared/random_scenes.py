@@ -25,7 +25,7 @@ import numpy as np
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.heuristic.errors import FotismosError
-from fotismos.reference.rendering.renderer import pass_seed
+from fotismos.reference.rendering.passes import pass_seed
 from fotismos.reference.scene.source import Source
 from tests.shared.misplanned import octahedron
 

@@ -6,11 +6,10 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from fotismos.comparisons.comparison import Comparison, ComparisonRecord, Images
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.metrics import METRICS, RATIO, THRESHOLDS, drawn
-from fotismos.comparisons.departure.noise import VisibleShare
-from fotismos.comparisons.departure.statistics import Summary
+from fotismos.comparisons.records.comparison import ComparisonRecord
+from fotismos.comparisons.records.departure import Summary, Viewing, VisibleShare
+from fotismos.comparisons.records.images import Comparison, Images
 from fotismos.reference.records import plain
 from fotismos.reports.page.scene_view import SceneView
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fotismos.comparisons.pixel_terms import GridLight, LivePoints, TermGrid, TermMaterial
+from fotismos.comparisons.records.images import GridLight, LivePoints, TermGrid, TermMaterial
 
 CELL = 4
 """Pixels along the sides of a cell."""

@@ -3,9 +3,9 @@
 import numpy as np
 
 from fotismos.comparisons.departure import marks
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import METRICS, leading_distance
 from fotismos.comparisons.departure.statistics import summarise
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.reference.rendering.sums import DifferenceSums
 
 

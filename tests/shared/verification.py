@@ -14,7 +14,8 @@ from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.reference.rendering.renderer import Renderer, Stream, pass_seed, passes
+from fotismos.reference.rendering.passes import Stream, pass_seed, passes
+from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.rendering.sampler import with_sampler
 from fotismos.reference.rendering.sums import DEVIATION, Accumulator, DifferenceSums, add_difference
 from fotismos.reference.scene.source import Source
@@ -58,7 +59,7 @@ def verify(source, options=None):
     )
     own, apart = (Accumulator(DEVIATION), Accumulator(DEVIATION)), DifferenceSums(counted)
     for both in zip(*streams, strict=True):
-        add_difference((*own, apart), [one.images[0] for one in both])
+        add_difference((*own, apart), [one[0] for one in both])
     mean = sum(total.mean() for total in own) / 2
     distance = leading_distance(options.viewing)
     marked = marks.find(apart.estimate(), mean, counted, distance, level=LEVEL)

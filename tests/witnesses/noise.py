@@ -19,11 +19,11 @@ import numpy as np
 from fotismos.comparisons import attribution
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import Attribution
 from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.records.comparison import Attribution
 from fotismos.comparisons.steps import steps
 
 SEEDS = 8
@@ -89,7 +89,7 @@ def measured(make) -> SceneMeasured:
     kernels = []
     for seed in range(SEEDS):
         case = open_case(make, Options(seed=seed))
-        comparison = compare(case.source, case.options, then=steps(case.options, why=True))
+        comparison = compare(case.source, case.options, then=steps(why=True))
         record = comparison.record
         kernels.append(comparison.images.heuristic)
         for number, low, high in _intervals(record):
@@ -136,7 +136,7 @@ def _true_effects(make) -> dict[str, float]:
     ready = prepare(case.source, case.options)
     more = {name: FINER * getattr(attribution, name) for name in ("SPP", "FEW_SPP", "EXACT_SPP")}
     with mock.patch.multiple(attribution, **more, EXACT_EFFECTS=MOST):
-        record: Attribution = attribution.find(ready, case.source, case.options).record
+        record: Attribution = attribution.find(ready).record
     return {item.effect: item.removes.value for item in record.effects}
 
 

@@ -10,7 +10,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.passes import passes
 from tests.shared import parts
 from tests.witnesses import radiance, stage
 from tests.witnesses.witness import BLOCKS, CHANCE, ROUNDING, means
@@ -57,7 +57,7 @@ def reference(make):
     """Return what is rendered, and passes (P, H, W, 3)."""
     case = open_case(make, Options(resolution=(SIZE, SIZE), spp=SPP), "a scene")
     ready = prepare(case.source, case.options)
-    images = [one.images[0] for one in passes((ready.reference,), 0, ready.passes)]
+    images = [one[0] for one in passes((ready.reference,), 0, ready.passes)]
     return ready, np.array(images, float)
 
 

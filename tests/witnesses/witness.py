@@ -15,7 +15,7 @@ from scipy import stats
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.reference.rendering.renderer import passes
+from fotismos.reference.rendering.passes import passes
 
 BLOCKS = 4
 """Blocks along each side of the image, whose means are looked at too: the shape counts."""
@@ -87,7 +87,7 @@ def rendered(witness: Witness, everything: bool = False) -> tuple[np.ndarray, in
     request = Options(resolution=(witness.size, witness.size), everything=everything)
     case = open_case(witness.scene, request, witness.name)
     ready = prepare(case.source, case.options)
-    images = [np.mean(one.images[0], axis=2) for one in passes((ready.reference,), 0, ready.passes)]
+    images = [np.mean(one[0], axis=2) for one in passes((ready.reference,), 0, ready.passes)]
     return np.array(images, float), ready.reference.pass_spp * ready.passes
 
 

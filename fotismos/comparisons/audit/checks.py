@@ -17,10 +17,10 @@ from fotismos.comparisons.audit.subjects import (
     ShadingSubject,
     Subject,
 )
-from fotismos.comparisons.comparison import versions
 from fotismos.heuristic import heuristics
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import FotismosError, InputError
+from fotismos.heuristic.program import versions
 from fotismos.heuristic.user_code import error_text
 from fotismos.reference.records import VERSION, Amount, Record, Versions
 

@@ -8,128 +8,42 @@ fixed order, with a line per number and its error, or per block's colours. Value
 digits, far finer than rounding errors, and errors 3.
 """
 
-import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
 import numpy as np
-from msgspec import Meta, structs
 
 from fotismos.comparisons.case import Case
-from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.departure.blocks import shrunk
-from fotismos.comparisons.departure.colour import Array, Viewing
+from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, log2_luminance_ratio
 from fotismos.comparisons.departure.statistics import noise_floor
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
+from fotismos.comparisons.records.check import HALVES, Baseline, Half, Measurement, MetricAmount
+from fotismos.comparisons.records.departure import Viewing
 from fotismos.heuristic import program
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.program import versions
 from fotismos.reference import records
 from fotismos.reference.pairing.settings import film_size
-from fotismos.reference.records import VERSION, Amount, Record, Versions
-from fotismos.reference.rendering.renderer import Progress, passes
+from fotismos.reference.records import VERSION
+from fotismos.reference.rendering.passes import Progress, passes
 from fotismos.reference.rendering.sums import jackknife_error
 from fotismos.reference.scene.source import Source
 
 PASSES = 16
-MOST_PASSES = 1024
-"""PASSES are enough for a t-test, corrected for a hundred quantities, to detect five standard
-errors. There are at most MOST_PASSES, since the images of all passes are in memory at once."""
-
 GRID = 4
 """Blocks along each side of the image: few enough to read, small enough to locate a change."""
 
 LONGEST = 64
 """Default number of pixels along the longer side of a measured scene."""
 
-HALVES = ("heuristic", "reference")
-
 LINEAR_ROUNDING = 1e-6
 """The difference that rounding can make in a colour."""
-
-Colour = tuple[float, float, float]
-Errors = Annotated[tuple[Amount, Amount, Amount], Meta(description="Standard errors.")]
-
-
-class MetricAmount(Record, omit_defaults=True):
-    """A departure metric, its standard error, and its value from noise alone.
-
-    ``noise_floor`` is None for the signed ratio of luminances, which noise does not raise.
-    """
-
-    value: float
-    error: Amount
-    noise_floor: Amount | None = None
-
-
-class Block(Record):
-    """Mean linear RGB of a block of pixels."""
-
-    mean: Colour
-    error: Errors
-
-
-class Half(Record):
-    """Mean linear RGB of a half, over the image and over its blocks, row by row."""
-
-    mean: Colour
-    error: Errors
-    blocks: tuple[tuple[Block, ...], ...]
-
-    def means(self) -> Array:
-        """Return the blocks' colours, (rows, columns, 3)."""
-        return np.array([[block.mean for block in row] for row in self.blocks])
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A number that a check tests: of a metric, of the colour of a half, or of a block of it.
-
-    ``block`` is its row and column, from 1.
-    """
-
-    name: str
-    value: float
-    error: float
-    half: str | None = None
-    block: tuple[int, int] | None = None
-
-
-class Measurement(Record):
-    """All measurements of a scene, from ``passes`` independent passes of both halves."""
-
-    passes: Annotated[int, Meta(ge=2, le=MOST_PASSES)]
-    metrics: dict[str, MetricAmount]
-    heuristic: Half
-    reference: Half
-
-    def of(self, metrics: Iterable[str]) -> "Measurement":
-        """Return the measurement with only these metrics."""
-        return structs.replace(self, metrics={name: self.metrics[name] for name in metrics})
-
-    def quantities(self) -> Iterator[Quantity]:
-        """Yield all numbers: metrics, then whole images, then blocks."""
-        for name, metric in self.metrics.items():
-            yield Quantity(name=name, value=metric.value, error=metric.error)
-        halves = {name: getattr(self, name) for name in HALVES}
-        for name, half in halves.items():
-            for letter, value, error in zip("RGB", half.mean, half.error, strict=True):
-                yield Quantity(name=f"{name} {letter}", half=name, value=value, error=error)
-        for name, half in halves.items():
-            for i, row in enumerate(half.blocks, start=1):
-                for j, block in enumerate(row, start=1):
-                    for letter, value, error in zip("RGB", block.mean, block.error, strict=True):
-                        yield Quantity(
-                            name=f"{name} {letter}, block {i},{j}",
-                            half=name,
-                            block=(i, j),
-                            value=value,
-                            error=error,
-                        )
 
 
 @dataclass(frozen=True)
@@ -159,13 +73,11 @@ def measure_scene(
     """
     options.require_model("a check of a scene")
     ready = guarded(source, options)
-    spp = options.spp or ready.reference.pass_spp * ready.passes
+    spp = options.spp or ready.spp
     pass_spp = max(1, spp // count)
     halves = ready.heuristic.sampled(pass_spp), ready.reference.sampled(pass_spp)
     loop = passes(halves, options.seed, count, progress=progress)
-    images = np.array(
-        [[np.array(image) for image in rendered.images] for rendered in loop], np.float64
-    )
+    images = np.array([[np.array(image) for image in rendered] for rendered in loop], np.float64)
     numbers = measurement(images, ready.counted, options.viewing)
     heuristic, reference = images.mean(axis=0)
     caution = ready.require_light(heuristic, reference)
@@ -261,40 +173,6 @@ LARGEST = float(np.finfo(np.float32).max)
 """Largest number: images are in single precision, and squares of errors must not overflow."""
 
 
-class Baseline(Record, omit_defaults=True):
-    """Measurements of one scene, from independent passes of both halves."""
-
-    record_version: int
-    scene: Annotated[
-        str, Meta(description="A built-in name, or a file's path from the baseline's folder.")
-    ]
-    options: Annotated[
-        dict[str, Any], Meta(description="As on the command line; defaults are left out.")
-    ]
-    passes: Annotated[int, Meta(ge=2, le=MOST_PASSES)]
-    versions: Annotated[Versions, Meta(description="Of the software that measured it.")]
-    images: Annotated[
-        str | None,
-        Meta(description="An EXR with both pictures, beside the baseline, for people to look at."),
-    ] = None
-    metrics: dict[str, MetricAmount]
-    heuristic: Half
-    reference: Half
-
-    def measured(self) -> Measurement:
-        """Return the measurement."""
-        return Measurement(
-            passes=self.passes,
-            metrics=self.metrics,
-            heuristic=self.heuristic,
-            reference=self.reference,
-        )
-
-    def text(self) -> str:
-        """Return the file's content."""
-        return laid_out(records.plain(self)) + "\n"
-
-
 def baseline_of(scene: str, options: Mapping[str, Any], measured: Measurement) -> Baseline:
     """Return the baseline of a scene just measured, with the current versions."""
     return msgspec.convert(
@@ -356,30 +234,3 @@ def _rounded(value: Any, digits: int = 8) -> Any:
     if isinstance(value, (list, tuple)):
         return [_rounded(item, digits) for item in value]
     return float(f"{value:.{digits}g}") if isinstance(value, float) else value
-
-
-WIDTH = 110
-"""Columns: enough for the colours of a block of pixels with their errors."""
-
-
-def laid_out(value: Any, depth: int = 0, before: str = "") -> str:
-    """Return JSON with one line per entry of the outer two levels, and of others if too long.
-
-    ``before`` is the text already on the line; ``ValueError`` for a NaN or an infinity.
-    """
-    line = json.dumps(value, ensure_ascii=False, allow_nan=False)
-    is_empty = not isinstance(value, (dict, list, tuple)) or not value
-    if is_empty or (depth > 1 and len(before) + len(line) <= WIDTH):
-        return line
-    indent = "  " * (depth + 1)
-    if isinstance(value, dict):
-        keys = [f"{json.dumps(key)}: " for key in value]
-        items = list(value.values())
-    else:
-        keys = [""] * len(value)
-        items = list(value)
-    lines = [
-        indent + key + laid_out(item, depth + 1, indent + key)
-        for key, item in zip(keys, items, strict=True)
-    ]
-    return line[0] + "\n" + ",\n".join(lines) + f"\n{indent[2:]}{line[-1]}"

@@ -6,25 +6,17 @@ unchanged numbers differ by even less than the test allows for.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
-from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from fotismos.comparisons.check.measurement import (
-    HALVES,
-    LINEAR_ROUNDING,
-    MeasuredScene,
-    Measurement,
-    measure_scene,
-)
+from fotismos.comparisons.check.measurement import LINEAR_ROUNDING, MeasuredScene, measure_scene
 from fotismos.comparisons.departure.colour import Array, luminance
 from fotismos.comparisons.departure.metrics import METRICS, RATIO
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.records.check import HALVES, READERS, Measurement, Move
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.records import Amount, Record, Share
-from fotismos.reference.rendering.renderer import Progress
+from fotismos.reference.rendering.passes import Progress
 from fotismos.reference.scene.source import Source
 
 LEVEL = 0.01
@@ -39,9 +31,6 @@ ALIKE = 0.02
 DARK = 1e-3
 """Luminance below which a block has no meaningful factor."""
 
-READERS = {"heuristic": "textbook", "reference": "physical"}
-"""What readers call the halves."""
-
 CAUSES = {
     (): "The colours of neither half moved, only the error between them: look at the noise, the"
     " samples, or how metrics are computed.",
@@ -53,54 +42,6 @@ CAUSES = {
     " lights.",
 }
 """Where to look, by the halves that moved."""
-
-
-class Move(Record):
-    """One quantity, before and after.
-
-    Attributes
-    ----------
-    error
-        Standard error of the difference.
-    standard_errors
-        The signed difference over that error; None if neither side has any spread.
-    p
-        Chance of a difference at least this large if nothing changed.
-    p_corrected
-        Chance of one such among all quantities tested (Šidák).
-    """
-
-    quantity: str
-    half: str | None
-    block: Annotated[tuple[int, int], Meta(description="Row and column, from 1.")] | None
-    before: float
-    after: float
-    error: Amount
-    standard_errors: float | None
-    p: Share
-    p_corrected: Share
-
-    @property
-    def name(self) -> str:
-        """What readers call the quantity: halves are textbook and physical."""
-        name = self.quantity
-        for half, shown in READERS.items():
-            name = name.replace(half, shown)
-        return name
-
-    @property
-    def size(self) -> float:
-        """How much it moved: metrics, which differ in unit, by their share, colours in light."""
-        change = abs(self.after - self.before)
-        if self.half or self.block:
-            return change
-        return change / max(abs(self.before), abs(self.after), 1e-9)
-
-    @property
-    def change(self) -> str:
-        """How much it moved, in words: in percent of what it was, unless that was 0."""
-        change = self.after - self.before
-        return f"{100 * change / abs(self.before):+.2g} %" if self.before else f"{change:+.2g}"
 
 
 def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:

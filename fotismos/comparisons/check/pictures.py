@@ -33,16 +33,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil, floor, log10
-from typing import Annotated, Literal
 
 import numpy as np
-from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from fotismos.comparisons.check.measurement import LINEAR_ROUNDING, Colour, Errors
+from fotismos.comparisons.check.measurement import LINEAR_ROUNDING
 from fotismos.comparisons.check.moved import (
     RELATIVE_ROUNDING,
-    Move,
     level_of_each,
     moved,
     sidak,
@@ -50,12 +47,13 @@ from fotismos.comparisons.check.moved import (
 )
 from fotismos.comparisons.departure.blocks import block_sums, ratio
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.criterion import Verdict, decide
+from fotismos.comparisons.departure.criterion import decide
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.noise import MARGIN, VisibleShare
+from fotismos.comparisons.departure.noise import MARGIN
 from fotismos.comparisons.pictures import require_one_size
+from fotismos.comparisons.records.check import Move, PictureGate, SmallestChanges
+from fotismos.comparisons.records.departure import Colour, VisibleShare
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.records import VERSION, Amount, Record, Resolution, Share
 
 SIDE = 16
 TILES = 8
@@ -280,85 +278,11 @@ SUMS: dict[str, Callable[[Array], Array]] = {
 # --- Baselines -----------------------------------------------------------------------------------
 
 
-class PictureBaseline(Record):
-    """Repeats of a picture; the mean and the variance of each pixel are in an EXR beside it.
-
-    Attributes
-    ----------
-    transfer, over
-        How its files are read; null for what they say themselves.
-    mean, error
-        Mean linear RGB of the picture, and its standard errors.
-    correlation
-        Variance of sums over tiles, over that of independent pixels.
-    """
-
-    record_version: int = VERSION
-    repeats: Annotated[int, Meta(ge=2)]
-    resolution: Resolution
-    transfer: Literal["linear", "srgb"] | None
-    over: str | None = None
-    mean: Colour
-    error: Errors
-    correlation: Amount
-    images: str
-
-
-class SmallestChanges(Record):
-    """The smallest changes that a check catches with the chance `power`, in linear R, G, B.
-
-    Attributes
-    ----------
-    mean
-        Of the mean of the picture.
-    block, noisiest
-        Of the mean of a block of 16 by 16 pixels: the median of the blocks, and the largest.
-    """
-
-    power: Share
-    mean: Colour
-    block: Colour
-    noisiest: Colour
-
-
 # --- A tolerance ---------------------------------------------------------------------------------
 
 
 SURE_ERRORS = 3.0
 """Standard errors of shares of pixels, to each side: a gate must not fail by chance."""
-
-
-class PictureGate(Record):
-    """Whether too many pixels of a picture differ visibly from its baseline.
-
-    Attributes
-    ----------
-    visible
-        The share of pixels above a ΔE2000, with an interval that holds the repeats' noise.
-    bound
-        The largest share that is allowed.
-    """
-
-    visible: VisibleShare
-    bound: Share
-    state: Verdict
-
-    @property
-    def sentence(self) -> str:
-        """What differs, what is allowed, and the result."""
-        share = self.visible
-        shown = f"{share.value:.2%}"
-        if share.low != share.high:
-            shown = f"{shown} ({share.low:.2%} to {share.high:.2%})"
-        results: dict[Verdict, str] = {
-            "pass": "it passes",
-            "fail": "it fails",
-            "undecided": "noise leaves it undecided, and more repeats decide",
-        }
-        return (
-            f"{shown} of the pixels differ by more than {LEADING.label} {share.threshold:g}, at"
-            f" most {self.bound:.2%} may: {results[self.state]}."
-        )
 
 
 def picture_gate(before: Repeats, after: Repeats, threshold: float, bound: float) -> PictureGate:

@@ -10,11 +10,9 @@ from msgspec import structs
 from fotismos.comparisons import timing
 from fotismos.comparisons.alignment import FINER, scene_edges
 from fotismos.comparisons.attribution import find
-from fotismos.comparisons.comparison import Causes, machine, versions
 from fotismos.comparisons.cost import engine
-from fotismos.comparisons.cost.cost_record import Cost, CostAttribution, EffectCost, Point
 from fotismos.comparisons.cost.engine import Study
-from fotismos.comparisons.cost.front import Reach, at_size, fronted, reach, sufficient
+from fotismos.comparisons.cost.front import at_size, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import (
     LARGEST_CERTAIN,
     QUICK,
@@ -32,13 +30,17 @@ from fotismos.comparisons.cost.methods import FULL_PLAN, all_methods
 from fotismos.comparisons.cost.timed_pictures import EngineTimes
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.pictures import TEMPLATE_SPP, GivenPictures, at_size_of_pictures
-from fotismos.comparisons.price_record import Price
+from fotismos.comparisons.pictures import GivenPictures
+from fotismos.comparisons.prepared import TEMPLATE_SPP
+from fotismos.comparisons.records.cost import Choice, Cost, CostAttribution, EffectCost
+from fotismos.comparisons.records.images import Causes
 from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.program import versions
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.plan_record import Guard
-from fotismos.reference.records import VERSION, Pixels, Positive, Record, Resolution
-from fotismos.reference.rendering.renderer import LARGEST_PASS, Progress, require_memory
+from fotismos.reference.records import Machine, Pixels
+from fotismos.reference.rendering.passes import Progress
+from fotismos.reference.rendering.renderer import LARGEST_PASS, require_memory
 from fotismos.reference.scene.source import Source
 
 SPP = 64
@@ -81,7 +83,7 @@ def cost(
     if engine_times:
         require_other_names(engine_times)
         given = engine.read(engine_times, options)
-        options = at_size_of_pictures(film_size(source.parse(), options.sensor), given, options)
+        options = given.sized(film_size(source.parse(), options.sensor), options)
     if at:
         size = options.resolution or reduced(source, options.changed(resolution=at), WIDTH)
         require(source.name, at, size, is_measured)
@@ -94,7 +96,7 @@ def cost(
     measured = measure_at(found, at, progress) if at and is_measured else ()
     ladder.forget()  # its scenes would slow later work
     judged = engine.judged(given, engine_times, truth(found)) if engine_times else None
-    known = causes or find(ready, source, options, progress, most=found.size[0])
+    known = causes or find(ready, progress, most=found.size[0])
     made = Cost(
         scene=source.name,
         variant=ready.reference.variant,
@@ -114,7 +116,7 @@ def cost(
         closure=known.record.closure,
         viewing=options.viewing,
         pixels=Pixels(counted=int(counted.sum()), total=counted.size),
-        machine=machine(),
+        machine=Machine.here(),
         versions=versions(),
         command=command,
         guard=ready.guard or Guard(),
@@ -222,42 +224,6 @@ def attribution(found: Measurements, causes: Causes) -> CostAttribution:
         resolution=found.size,
         spp=SPP,
     )
-
-
-class Choice(Record):
-    """The answer of ``fotismos plan --within``.
-
-    Attributes
-    ----------
-    resolution, measured
-        Size of the times, and of the images in which errors were measured.
-    within
-        The tolerance, ΔE2000.
-    chosen
-        The fastest point that passes; None if none does.
-    best
-        The one that passes at the smallest tolerance.
-    full
-        The full plan with the fewest samples that pass, else with the most samples.
-    left_out
-        Methods that the scene cannot have, and why.
-    reach
-        If none passes: what more samples would do, if known.
-    price
-        What it takes to look right without these methods.
-    """
-
-    scene: str
-    resolution: Resolution
-    measured: Resolution
-    within: Positive
-    chosen: Point | None
-    best: Point
-    full: Point
-    left_out: dict[str, str]
-    reach: Reach | None = None
-    price: Price | None = None
-    record_version: int = VERSION
 
 
 def choose(

@@ -21,24 +21,19 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from fotismos.comparisons.comparison import PICTURE_LIBRARIES, Images, MeanError, versions
-from fotismos.comparisons.cost.engine_record import Engine, EngineCost, EngineSetting
 from fotismos.comparisons.cost.front import fronted
 from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import caution, decide
 from fotismos.comparisons.departure.mapped_sums import MappedReference
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.noise import VisibleShare
-from fotismos.comparisons.departure.statistics import Summary, noise_floor, summarise
-from fotismos.comparisons.departure.tone_maps import TONE_MAPS, Light
+from fotismos.comparisons.departure.statistics import noise_floor, summarise
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS
 from fotismos.comparisons.names import matching, with_files
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_mistakes import Names
 from fotismos.comparisons.pictures import (
     FEWEST,
     GivenPictures,
-    PictureHalf,
     Pictures,
     agreement,
     read_all,
@@ -46,8 +41,13 @@ from fotismos.comparisons.pictures import (
     same_files,
     unknown_noise,
 )
+from fotismos.comparisons.records.comparison import MeanError
+from fotismos.comparisons.records.departure import Summary, Viewing, VisibleShare
+from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting
+from fotismos.comparisons.records.images import Images, Light
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
+from fotismos.heuristic.program import PICTURE_LIBRARIES, versions
 from fotismos.reference.records import Interval, Pixels
 from fotismos.reference.rendering.sums import DifferenceEstimate, DifferenceSums, student
 
@@ -102,7 +102,7 @@ def front_of_pictures(
     engine = judged(given, times, truth, options.allow_empty)
     estimate = truth.reference
     floor = None
-    if reference.passes is not None:
+    if reference.most_passes is not None:
         floor = noise_floor(
             LEADING, estimate.mean, estimate.noise, mask=truth.counted, viewing=truth.viewing
         )
@@ -128,10 +128,9 @@ def _truth(reference: Pictures, counted: NDArray[np.bool_], options: Options) ->
         sums = DifferenceSums(counted)
     else:
         sums = MappedReference(counted, TONE_MAPS[options.tone_map])
-    passes = reference.passes or FEWEST
-    half = PictureHalf(reference, passes)
-    for number in range(passes):
-        sums.add(half.render(number))
+    count = reference.most_passes or FEWEST
+    for picture in reference.passes(count):
+        sums.add(picture)
     return Truth(
         reference=sums.estimate(),
         counted=counted,

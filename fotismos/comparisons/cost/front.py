@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, TypeVar
 
 from msgspec import structs
 
-from fotismos.comparisons.cost.engine_record import FrontPoint
-from fotismos.reference.records import Interval, Record
+from fotismos.comparisons.records.engine import FrontPoint, Reach
+from fotismos.reference.records import Interval
 
 if TYPE_CHECKING:  # pictures have no methods
-    from fotismos.comparisons.cost.cost_record import Point, TimedMethod
+    from fotismos.comparisons.records.cost import Point, TimedMethod
 
 OnFront = TypeVar("OnFront", bound=FrontPoint)
 
@@ -84,22 +84,6 @@ def at_size(
         structs.replace(point, seconds=known[point.method].seconds(point.spp * samples))
         for point in points
     ]
-
-
-class Reach(Record):
-    """How near a method comes to the reference with any number of samples.
-
-    Attributes
-    ----------
-    left
-        ΔE2000 that 5 % of the pixels exceed without noise.
-    spp
-        Samples per pixel with which it should pass at a tolerance; None if too much is left.
-    """
-
-    method: str
-    left: float
-    spp: int | None = None
 
 
 def reach(points: Sequence[Point], tolerance: float) -> Reach | None:

@@ -20,27 +20,21 @@ from msgspec import structs
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons import timing
-from fotismos.comparisons.comparison import MeanError
-from fotismos.comparisons.cost.cost_record import Converged, Method, Point, TimedMethod
 from fotismos.comparisons.cost.methods import Ladder, Step
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
+from fotismos.comparisons.records.comparison import MeanError
+from fotismos.comparisons.records.cost import Converged, Method, Point, TimedMethod
+from fotismos.comparisons.records.departure import Viewing
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.records import Interval
-from fotismos.reference.rendering.gbuffer import gbuffer, image_size, resize
-from fotismos.reference.rendering.renderer import (
-    LARGEST_PASS,
-    Progress,
-    Renderer,
-    Stream,
-    passes,
-    warm,
-)
+from fotismos.reference.rendering.gbuffer import gbuffer
+from fotismos.reference.rendering.passes import Progress, Stream, passes
+from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, warm
 from fotismos.reference.rendering.sums import (
     Accumulator,
     DifferenceEstimate,
@@ -183,8 +177,8 @@ def measure_ladder(
     converged(ready, options.seed, progress, total=total)
     reference = total.estimate()
     judge = judge_by(reference, ready.counted, options.viewing)
-    ladder = Ladder(source, options, ready=ready, is_short=effort.is_short)
-    size = image_size(ready.scene)
+    ladder = Ladder(ready, is_short=effort.is_short)
+    size = ready.size
     gc.collect()  # release scenes that pairing left behind
     # Steps also need methods that are not on the ladder: they are timed, not judged.
     steps = tuple(ladder.steps())
@@ -256,16 +250,15 @@ def converged(
     total: Accumulator | None = None,
 ) -> Estimate:
     """Render the reference into a sum, with seeds that no method has."""
-    integrator = ready.reference.integrator
-    spp = _reference_spp(size or image_size(ready.scene))
-    renderer = Renderer(ready.scene, integrator, pass_spp=spp, label="reference image", size=size)
+    size = size or ready.size
+    renderer = ready.reference.sampled(_reference_spp(size))
     total = total or Accumulator()
     count = max(REFERENCE_PASSES, ready.plan.passes)
     stream = Stream.OTHER_SIDE
     for rendered in passes(
-        [renderer], seed, count, stream=stream, progress=progress, stage="reference"
+        [renderer], seed, count, size=size, stream=stream, progress=progress, stage="reference"
     ):
-        total.add(rendered.images[0])
+        total.add(rendered[0])
     return total.estimate()
 
 
@@ -325,7 +318,7 @@ def rendered(
     images: dict[Key, Floats] = {}
     loop = passes([*renderers.values()], seed, rounds, progress=progress, stage=stage)
     for images_of_pass in loop:
-        for key, image in zip(renderers, images_of_pass.images, strict=True):
+        for key, image in zip(renderers, images_of_pass, strict=True):
             if key in judged:
                 images[key] = np.array(image)
                 errors[key].append(judge(images[key]))
@@ -379,7 +372,7 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
     scene = found.ready.scene
     options = found.options
     reference = converged(found.ready, options.seed, progress=progress, size=size)
-    judge = judge_by(reference, gbuffer(scene, size).hit, options.viewing)
+    judge = judge_by(reference, gbuffer(scene, size, film=size).hit, options.viewing)
     renderers = {
         (method.name, spp): found.ladder.renderer(method, spp, size)
         for method in found.methods
@@ -390,8 +383,6 @@ def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Poi
     errors, _ = rendered(
         renderers, judge, renderers, MEASURED_ROUNDS, options.seed, progress, "measuring"
     )
-    # The scene is shared: it gets back the size of the study.
-    resize(scene, found.size)
     points = []
     for (name, spp), renderer in renderers.items():
         took = renderer.times[-MEASURED_ROUNDS:]

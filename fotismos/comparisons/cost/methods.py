@@ -4,7 +4,7 @@ Each method first loses what the scene's plan leaves out. Methods that do not di
 then become equal, and are merged; the result keeps all their names. Methods from outside come
 before the full plan::
 
-    from fotismos.comparisons.cost.cost_record import Method
+    from fotismos.comparisons.records.cost import Method
     from fotismos.comparisons.cost.methods import declare
 
     declare(Method(name="no shadows", family="physical", without=("occlusion",), max_depth=2))
@@ -17,10 +17,9 @@ from typing import Any, NamedTuple
 import mitsuba as mi
 from msgspec import structs
 
-from fotismos.comparisons.cost.cost_record import Method
 from fotismos.comparisons.hybrids import HybridScenes, Pairs
-from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared
+from fotismos.comparisons.records.cost import Method
 from fotismos.heuristic.declared import Declared
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named
@@ -45,7 +44,6 @@ from fotismos.reference.planning.facts import SHAPE
 from fotismos.reference.planning.plan import physical_integrator
 from fotismos.reference.rendering.renderer import Renderer, variant
 from fotismos.reference.rendering.sampler import with_sampler
-from fotismos.reference.scene.source import Source
 
 UNLIMITED = -1
 
@@ -152,15 +150,14 @@ class Ladder:
     mesh, or the scene's own shapes.
     """
 
-    def __init__(
-        self, source: Source, options: Options, ready: Prepared, is_short: bool = False
-    ) -> None:
+    def __init__(self, ready: Prepared, is_short: bool = False) -> None:
         # Flat and Gouraud shading need vertices: all kernels get a mesh, the default one.
+        options = ready.options
         if options.polygon_shading is not Interpolation.PHONG and options.tessellation is None:
             options = options.changed(tessellation=RESOLUTION)
         self.ready = ready
         self.options = options
-        self.pairs = Pairs(source, options, ready)
+        self.pairs = Pairs(ready, options)
         self.scenes = HybridScenes(self.pairs.plain(), ready.plan, ready.scene)
         plan = ready.plan
         differences = set(self.scenes.differences)

@@ -12,16 +12,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
 from math import cos, exp, inf, pi, radians, sin
-from typing import Annotated, Literal
 
 import numpy as np
-from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons.departure import arrays
 from fotismos.comparisons.departure.arrays import Colours, Formula, Numbers
-from fotismos.heuristic.errors import InputError
-from fotismos.reference.records import Positive, Record
+from fotismos.comparisons.records.departure import Viewing
 
 Array = NDArray[np.float64]
 
@@ -30,9 +27,6 @@ PQ_PEAK = 10_000.0
 
 BLACK = 1e-5
 """Display-linear: an image with no brighter pixel is black, and no difference can be seen in it."""
-
-MOST_PIXELS = 1000.0
-"""Most pixels per degree: filters grow with it, and no eye resolves this many."""
 
 BT709 = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.3127, 0.3290))
 """CIE x, y of red, green, blue and white."""
@@ -64,43 +58,6 @@ _M16 = np.array(
 _F = 1.0
 _C = 0.69
 _N_C = 1.0
-
-
-class Viewing(Record):
-    """Viewing conditions; printed with every number that depends on them."""
-
-    exposure: Annotated[
-        Positive, Meta(description="Linear factor on both images before any perceptual metric.")
-    ] = 1.0
-    white: Literal["D65"] = "D65"
-    white_luminance: Annotated[
-        Positive,
-        Meta(description="Luminance of linear 1.0, cd/m²; 203 is BT.2408's HDR reference white."),
-    ] = 203.0
-    # CAM16's conditions from IEC 61966-2-1 (sRGB): 64 lx, so the adapting luminance is
-    # 0.2 · E/π = 4.07 cd/m².
-    ambient_illuminance: Annotated[Positive, Meta(description="CAM16: illuminance, lx.")] = 64.0
-    background: Annotated[Positive, Meta(description="CAM16: Y_b; white is 100.")] = 20.0
-    surround: Literal["average"] = "average"
-    # The default of FLIP's authors: 0.7 m from a screen 0.7 m wide with 3840 pixels.
-    pixels_per_degree: Annotated[
-        float, Meta(ge=1, le=MOST_PIXELS, description="FLIP: pixels per degree of view.")
-    ] = 67.0
-
-    def __post_init__(self) -> None:
-        for name in ("exposure", "white_luminance", "ambient_illuminance", "background"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value > 0):
-                raise InputError(f"viewing: {name} is {value}: give a positive, finite number.")
-        if not 1.0 <= self.pixels_per_degree <= MOST_PIXELS:
-            raise InputError(
-                f"pixels per degree: {self.pixels_per_degree} is not allowed: give 1 to"
-                f" {MOST_PIXELS:g}, such as 67."
-            )
-
-
-DEFAULT_VIEWING = Viewing()
-"""No exposure, 203 cd/m² white, sRGB's viewing conditions."""
 
 
 def luminance(rgb: ArrayLike) -> Array:

@@ -6,13 +6,12 @@ that are black, nearly so, or one colour, the error means little.
 """
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
 from fotismos.comparisons.departure.colour import BLACK
 from fotismos.comparisons.departure.metrics import THRESHOLDS
-from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.comparisons.records.departure import Verdict, VisibleShare
 from fotismos.heuristic.errors import InputError
 
 LIMIT = 0.05
@@ -26,8 +25,6 @@ DARK = 0.004
 
 UNIFORM = 1e-6
 """Relative differences within a picture that are rounding."""
-
-Verdict = Literal["pass", "fail", "undecided"]
 
 
 def checked_threshold(threshold: float) -> float:

@@ -22,8 +22,9 @@ from colour.models import (
     XYZ_to_Lab,
 )
 
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, PQ_PEAK, Array, Viewing
+from fotismos.comparisons.departure.colour import PQ_PEAK, Array
 from fotismos.comparisons.departure.metrics import METRICS, Metric
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING, Viewing
 
 AGREEMENT = 1e-4
 """Largest allowed deviation of the compiled colour differences from colour-science's."""

@@ -21,13 +21,8 @@ from numpy.typing import NDArray
 from fotismos.comparisons.departure import arrays
 from fotismos.comparisons.departure.arrays import Colours, Numbers
 from fotismos.comparisons.departure.blocks import bands
-from fotismos.comparisons.departure.colour import (
-    Array,
-    Viewing,
-    rgb_to_xyz,
-    times,
-    xyz_to_lab,
-)
+from fotismos.comparisons.departure.colour import Array, rgb_to_xyz, times, xyz_to_lab
+from fotismos.comparisons.records.departure import Viewing
 
 Plane = NDArray[np.float32]
 Curve = Callable[[Colours], Colours]

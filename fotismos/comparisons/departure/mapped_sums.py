@@ -14,7 +14,8 @@ import numpy as np
 
 from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.tone_maps import Light, ToneMap, derivative
+from fotismos.comparisons.departure.tone_maps import ToneMap, derivative
+from fotismos.comparisons.records.images import Light
 from fotismos.reference.rendering.sums import (
     DEVIATION,
     Accumulator,

@@ -23,10 +23,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons.departure.colour import (
-    DEFAULT_VIEWING,
     RELATIVE_EPSILON,
     Array,
-    Viewing,
     cam16ucs,
     ciede2000,
     euclidean,
@@ -40,6 +38,7 @@ from fotismos.comparisons.departure.colour import (
     symmetric_relative,
 )
 from fotismos.comparisons.departure.flip import hdr_flip, ldr_flip
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING, Viewing
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.declared import Declared
 from fotismos.heuristic.errors import InputError

@@ -55,10 +55,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fotismos.comparisons.departure.blocks import ratio
-from fotismos.comparisons.departure.colour import Array, Viewing, linear
+from fotismos.comparisons.departure.colour import Array, linear
 from fotismos.comparisons.departure.metrics import Distances, Metric, Pixelwise
+from fotismos.comparisons.records.departure import Viewing, VisibleShare
 from fotismos.heuristic.convention import Floats
-from fotismos.reference.records import Interval, Positive, Share
 from fotismos.reference.rendering.sums import Grouped, jackknife_error, student
 
 SPLITS = 2
@@ -92,15 +92,6 @@ def without_noise(measured: ArrayLike, noisier: ArrayLike, growth: float = USUAL
     before = np.square(measured)
     squares = before - (np.square(noisier) - before) / (growth**2 - 1.0)
     return np.sign(squares) * np.sqrt(np.abs(squares))
-
-
-class VisibleShare(Interval):
-    """The share of counted pixels above a threshold, without noise, and its 95 % interval."""
-
-    threshold: Positive
-    value: Share
-    low: Share
-    high: Share
 
 
 def exactly(metric: Metric, values: Floats) -> dict[str, Any]:

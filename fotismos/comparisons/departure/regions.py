@@ -13,15 +13,14 @@ of all shapes add up to 1, as do the shares of all materials.
 from __future__ import annotations
 
 from operator import itemgetter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons.departure.blocks import block_sums
+from fotismos.comparisons.records.departure import ObjectShare, Region
 from fotismos.heuristic.convention import Floats
-from fotismos.reference.records import Amount, Count, Record, Share, Size
 
 if TYPE_CHECKING:  # pictures have no objects, and need no Mitsuba
     from fotismos.reference.rendering.gbuffer import ObjectIds
@@ -38,38 +37,6 @@ LEAST_SHARE = 0.04
 
 MOST_OBJECTS = 24
 """Rows of objects; if there are more, the last row holds all others."""
-
-
-class Region(Record):
-    """A box of pixels: x, y count from the top left, and include the first pixel."""
-
-    x: Count
-    y: Count
-    width: Size
-    height: Size
-    share: Annotated[Share, Meta(description="Of the sum of dE2000 over the counted pixels.")]
-    mean_dE2000: Annotated[Amount, Meta(description="Over the box's counted pixels.")]
-    effect: Annotated[
-        str | None, Meta(description="The dominant effect there, in words, if known.")
-    ] = None
-
-
-class ObjectShare(Region):
-    """A shape or a material: the box of its pixels, and its part of the departure.
-
-    Attributes
-    ----------
-    name
-        Its id in the scene.
-    pixels
-        Number of counted pixels that see it.
-    material
-        Id of a shape's material; empty for a material itself.
-    """
-
-    name: str
-    pixels: Size
-    material: str = ""
 
 
 def worst_pixel(error: ArrayLike, counted: ArrayLike) -> tuple[int, int]:

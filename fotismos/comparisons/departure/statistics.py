@@ -6,13 +6,12 @@ difference of the two is its *level*.
 """
 
 from collections.abc import Iterator
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from msgspec import Meta
 from numpy.typing import ArrayLike, NDArray
 
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING, Array, Viewing, linear
+from fotismos.comparisons.departure.colour import Array, linear
 from fotismos.comparisons.departure.metrics import (
     Metric,
     Pixelwise,
@@ -20,53 +19,19 @@ from fotismos.comparisons.departure.metrics import (
     log2_luminance_ratio,
 )
 from fotismos.comparisons.departure.minimum import minimum
-from fotismos.comparisons.departure.noise import VisibleShare, debiased, exactly, roughly
+from fotismos.comparisons.departure.noise import debiased, exactly, roughly
+from fotismos.comparisons.records.departure import (
+    DEFAULT_VIEWING,
+    Exposed,
+    RatioSummary,
+    Summary,
+    Viewing,
+)
 from fotismos.heuristic.convention import Floats
-from fotismos.reference.records import Amount, Positive, Record
 from fotismos.reference.rendering.sums import Grouped
 
 # Pixels measured at a time, to keep temporaries small.
 _BLOCK_PIXELS = 2**18
-
-
-class Exposed(Record):
-    """A metric after the factor `exposure` on the test image that makes its mean smallest."""
-
-    exposure: Annotated[Positive, Meta(description="Linear factor; 1 changes nothing.")]
-    mean: Amount
-    p50: Amount
-    p95: Amount
-    max: Amount
-
-
-class Summary(Record):
-    """A metric over the counted pixels, in the metric's own unit."""
-
-    mean: Annotated[Amount, Meta(description="Mean; for rmse and srgb_rmse, the root mean square.")]
-    p50: Annotated[Amount, Meta(description="Median of the pixels.")]
-    p95: Amount
-    max: Amount
-    visible: Annotated[
-        tuple[VisibleShare, ...], Meta(description="Shares of the pixels, by rising threshold.")
-    ]
-    debiased: Annotated[Amount, Meta(description="Mean without the reference's noise.")]
-    low: Annotated[Amount, Meta(description="Lower end of the 95 % interval of `debiased`.")]
-    high: Amount
-    noise_floor: Annotated[Amount, Meta(description="Mean from the reference's noise alone.")]
-    after_exposure: Exposed
-    psnr: Annotated[
-        float | None,
-        Meta(description="The mean as a PSNR, dB; null of other metrics, and of equal images."),
-    ] = None
-
-
-class RatioSummary(Record):
-    """The signed luminance ratio, heuristic over reference, over the counted pixels, in stops."""
-
-    mean: float
-    p05: float
-    p50: float
-    p95: float
 
 
 def summarise(

@@ -13,6 +13,7 @@ import numpy as np
 
 from fotismos.comparisons.departure.colour import BT709, BT2020, Array, rgb_to_xyz, to_srgb
 from fotismos.comparisons.departure.minimum import minimum
+from fotismos.comparisons.records.images import Light
 
 ToneMap = Callable[[Array], Array]
 Primaries = tuple[tuple[float, float], ...]
@@ -174,14 +175,6 @@ class FittedCurve:
     def shown(self, light: np.ndarray) -> np.ndarray:
         """Return light (..., 3) as the curve shows it."""
         return CURVES[self.name](self.exposure * light)
-
-
-@dataclass(frozen=True)
-class Light:
-    """The reference before a tone map: its mean and standard error, (H, W, 3), linear."""
-
-    mean: np.ndarray
-    standard_error: np.ndarray
 
 
 @dataclass(frozen=True)

@@ -18,24 +18,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.departure import marks
-from fotismos.comparisons.departure.colour import Viewing
 from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.metrics import LEADING, drawn, leading_distance
-from fotismos.comparisons.departure.statistics import Summary, noise_floor, summarise
+from fotismos.comparisons.departure.statistics import noise_floor, summarise
 from fotismos.comparisons.fit import model
-from fotismos.comparisons.fit.fit_record import (
-    EXACT,
-    INVISIBLE,
-    FitDeparture,
-    FitRecord,
-    FittedMaterial,
-    FormFit,
-    Judgement,
-    parameter_record,
-    physical_materials,
-)
 from fotismos.comparisons.fit.model import OwnModel, PhongModel
 from fotismos.comparisons.fit.search import (
     LOSSES,
@@ -43,16 +30,30 @@ from fotismos.comparisons.fit.search import (
     Objective,
     bounded_minimum,
     identify,
+    parameter_record,
+    physical_materials,
     search,
 )
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
+from fotismos.comparisons.records.departure import Summary, Viewing
+from fotismos.comparisons.records.fit import (
+    EXACT,
+    INVISIBLE,
+    FitDeparture,
+    FitRecord,
+    FittedMaterial,
+    FormFit,
+    Judgement,
+)
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import PHONG, Interpolation, named
 from fotismos.heuristic.materials import FORMS
+from fotismos.heuristic.program import versions
 from fotismos.reference.records import Interval, Pixels
-from fotismos.reference.rendering.renderer import Progress, pass_seed, passes, variant
+from fotismos.reference.rendering.passes import Progress, pass_seed, passes
+from fotismos.reference.rendering.renderer import variant
 from fotismos.reference.rendering.sums import (
     Accumulator,
     DifferenceEstimate,
@@ -157,7 +158,7 @@ def fit(
         variant=ready.reference.variant,
         seed=options.seed,
         resolution=rendered.counted.shape[::-1],
-        spp=ready.reference.pass_spp * ready.passes,
+        spp=ready.spp,
         passes=ready.passes,
         viewing=options.viewing,
         pairing=options.pairing,
@@ -236,9 +237,9 @@ def render(ready: Prepared, progress: Progress | None) -> RenderedHalves:
         )
     difference_sums = DifferenceSums(ready.counted)
     sums = [Accumulator(), Accumulator(), difference_sums]
-    halves = (ready.heuristic, ready.reference)
+    halves = (ready.first, ready.second)
     for rendered in passes(halves, options.seed, ready.passes, progress=progress):
-        add_difference(sums, rendered.images)
+        add_difference(sums, rendered)
     before = sums[0].estimate()
     reference = sums[1].estimate()
     return RenderedHalves(

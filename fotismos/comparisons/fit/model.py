@@ -131,6 +131,7 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
             eye,
             pass_spp=renderer.pass_spp,
             label="textbook samples",
+            size=renderer.size,
             is_traced=True,  # else it would see nothing
         )
         # The passes: each gives the fixed light as its image, and its samples.

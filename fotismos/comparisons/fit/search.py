@@ -26,16 +26,21 @@ the inverse of its second derivative moves the minimum.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import exp, inf, isfinite, sqrt
 from typing import Any
 
+import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from fotismos.comparisons.departure.colour import Viewing, cam16ucs_unclipped
-from fotismos.comparisons.fit.model import bounds
+from fotismos.comparisons.departure.colour import cam16ucs_unclipped
+from fotismos.comparisons.fit.model import OwnModel, PhongModel, bounds
+from fotismos.comparisons.records.departure import Viewing
+from fotismos.comparisons.records.fit import FittedParameter
 from fotismos.heuristic.convention import Floats
+from fotismos.heuristic.terms import normalisation
+from fotismos.reference.scene.graph import Graph
 
 STEP = 1e-4
 SMALLEST_STEP = 1e-8
@@ -301,3 +306,88 @@ def _inverse_normal(jacobian: Floats) -> Floats:
     scaled = rows.T / np.maximum(singular, 1e-12 * singular[0])
     covariance: Floats = scaled @ scaled.T
     return covariance
+
+
+# --- As records ---------------------------------------------------------------------------------
+
+
+def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
+    """Return the plain parameters of each named BSDF of the physical half."""
+    materials: dict[str, dict[str, Any]] = {}
+    for index in graph.nodes(mi.ObjectType.BSDF):
+        label = graph.label(index)
+        for _, child in graph.children(index, mi.ObjectType.BSDF):
+            index = child  # inside twosided
+        materials[label] = {"plugin": graph.plugin(index)}
+        for key, value in graph.props(index).items():
+            if isinstance(value, bool | int | float | str):
+                materials[label][key] = value
+            elif isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d):
+                colour = [float(component) for component in value]
+                materials[label][key] = colour[0] if len(set(colour)) == 1 else colour
+    return materials
+
+
+def parameter_record(
+    model: PhongModel | OwnModel,
+    index: int,
+    x: Floats,
+    certainties: list[Certainty],
+    covariance: Floats,
+) -> FittedParameter:
+    """Return one parameter at the best vector ``x``, ``k_s`` and ``n`` in the chapters' units."""
+    parameter = model.parameters[index]
+    certainty = certainties[index]
+    value = float(x[index])
+    spread = COVERAGE * sqrt(covariance[index, index])
+    # Paired, fitted, and both ends of the interval.
+    raw: tuple[float, ...] = (parameter.paired, value, value - spread, value + spread)
+    limits: tuple[float, ...] = (parameter.low, parameter.high)
+    phong = model if isinstance(model, PhongModel) else None
+    if phong and parameter.name == "n":
+        # The vector holds `ln n`.
+        raw = tuple(map(exp, raw))
+        limits = tuple(map(exp, limits))
+    elif (
+        phong
+        and parameter.name == "k_s"
+        and not phong.surface.materials[parameter.owner].normalised
+    ):
+        # The vector holds the lobe's albedo; `k_s` also depends on `n`, and on its error.
+        at_n = phong.place_of_exponent(parameter.owner)
+        step = 1e-5
+        per_albedo = normalisation(phong.form, exp(x[at_n] + 0))
+        below = normalisation(phong.form, exp(x[at_n] + (-step)))
+        above = normalisation(phong.form, exp(x[at_n] + step))
+        slopes = np.zeros(len(x))
+        slopes[[index, at_n]] = per_albedo, value * (above - below) / (2 * step)
+        # To first order, with the covariance of the two.
+        variance = float(slopes @ covariance @ slopes)
+        spread = COVERAGE * sqrt(max(variance, 0))
+        at_pairing = normalisation(phong.form, exp(phong.parameters[at_n].paired))
+        k_s = value * per_albedo
+        limits = (0.0, per_albedo * parameter.high)
+        raw = parameter.paired * at_pairing, k_s, k_s - spread, k_s + spread
+        # Without a lobe `k_s` is 0 for any `n`.
+        if not certainty.reason and certainties[at_n].reason and value > AT_BOUND:
+            reason = "follows from its albedo and n, which is not identifiable"
+            certainty = Certainty(reason, (), certainty.at_bound)
+    paired, fitted, least, most = map(float, raw)
+    low, high = map(float, limits)
+    has_interval = not (certainty.reason or certainty.at_bound)
+    others = (model.parameters[other] for other in certainty.partners)
+    return FittedParameter(
+        name=parameter.name,
+        channel=parameter.channel,
+        is_factor=parameter.is_factor,
+        paired=paired,
+        fitted=None if certainty.reason else fitted,
+        interval=(max(least, low), min(most, high)) if has_interval else None,
+        bounds=(low if isfinite(low) else None, high if isfinite(high) else None),
+        at_bound=certainty.at_bound,
+        reason=certainty.reason,
+        partners=tuple(
+            f"{f'{other.name} {other.channel}'.strip()} of {model.names[other.owner]}"
+            for other in others
+        ),
+    )

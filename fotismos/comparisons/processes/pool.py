@@ -46,13 +46,6 @@ def once(set_up: Callable[[], object]) -> None:
     set_up()
 
 
-def cores() -> int:
-    """Return the number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
 @dataclass(frozen=True)
 class Task:
     """A call of ``function(*arguments)``, both of them picklable.

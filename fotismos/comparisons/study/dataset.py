@@ -15,14 +15,13 @@ import numpy as np
 from msgspec.structs import replace
 
 from fotismos.comparisons.atomic import require_regular
-from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.departure import statistics
-from fotismos.comparisons.departure.colour import DEFAULT_VIEWING
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.comparisons.study.design import OWN, StudyFile
 from fotismos.comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
 from fotismos.heuristic.errors import InputError, InstallationError, unknown
-from fotismos.heuristic.program import installation
+from fotismos.heuristic.program import installation, versions
 from fotismos.reference.planning.effects import PRUNED
 
 if TYPE_CHECKING:

@@ -21,7 +21,6 @@ import numpy as np
 
 from fotismos.comparisons.atomic import Entry
 from fotismos.comparisons.case import RGB, open_case
-from fotismos.comparisons.comparison import versions
 from fotismos.comparisons.names import is_script
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.processes.pool import Pool, Task
@@ -32,12 +31,14 @@ from fotismos.comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, lar
 from fotismos.heuristic import plugins
 from fotismos.heuristic.errors import FotismosError, InputError, unknown
 from fotismos.heuristic.heuristics import named
+from fotismos.heuristic.program import versions
 from fotismos.reference.pairing.factors import Convention
 from fotismos.reference.planning.effects import EFFECTS, PRUNED
 from fotismos.reference.planning.plan import physical_integrator
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.rendering import direct
-from fotismos.reference.rendering.renderer import Progress, Renderer, passes
+from fotismos.reference.rendering.passes import Progress, passes
+from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.rendering.sums import Accumulator
 from fotismos.reference.scene.graph import Graph, set_variant
 from fotismos.reference.scene.source import Source, digest
@@ -251,13 +252,16 @@ def _rendered(point: StudyPoint) -> tuple[Row, sheet.Pictures]:
     plans = _plans(ready.plan)
     for stage in plans.values():
         integrator = physical_integrator(stage, scene, ready.pair.hide_emitters)
-        renderers.append(Renderer(scene, integrator, pass_spp=spp, label="physical picture"))
+        renderer = Renderer(
+            scene, integrator, pass_spp=spp, label="physical picture", size=ready.size
+        )
+        renderers.append(renderer)
     sums = [Accumulator() for _ in renderers]
     difference = Accumulator()
     for rendered in passes(renderers, part.options.seed, PASSES):
-        for total, image in zip(sums, rendered.images, strict=True):
+        for total, image in zip(sums, rendered, strict=True):
             total.add(image)
-        difference.add(rendered.images[0] - rendered.images[-1])
+        difference.add(rendered[0] - rendered[-1])
     images = [total.estimate().mean for total in sums]
     result = measure(images[0], images[-1], ready.counted, difference.estimate().noise)
     # Steps that change nothing have no image, and keep 0.

@@ -24,7 +24,7 @@ import numpy as np
 
 from fotismos.reference.planning.plan import physical_integrator
 from fotismos.reference.planning.plan_record import Guard, Plan
-from fotismos.reference.rendering.renderer import Stream, pass_seed
+from fotismos.reference.rendering.passes import Stream, pass_seed
 
 SHARE = 0.02
 """Share of the reference's samples that bounds the rays, within the next two limits."""

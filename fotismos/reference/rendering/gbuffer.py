@@ -84,13 +84,13 @@ def image_size(scene: Scene) -> tuple[int, int]:
     return int(width), int(height)
 
 
-def size_of_width(scene: Scene, width: int) -> tuple[int, int]:
+def size_of_width(scene: Scene, size: tuple[int, int], width: int) -> tuple[int, int]:
     """Return the size of a scene's images, scaled to a width in pixels.
 
     A crop keeps its size: another one would lie elsewhere, by parts of a pixel.
     """
-    columns, rows = image_size(scene)
-    if tuple(scene.sensors()[0].film().size()) != (columns, rows):
+    columns, rows = size
+    if tuple(scene.sensors()[0].film().size()) != image_size(scene):
         return columns, rows
     return width, max(1, round(rows * width / columns))
 
@@ -105,10 +105,15 @@ def resize(scene: Scene, size: tuple[int, int]) -> None:
         parameters.update()
 
 
-def gbuffer(scene: Scene, size: tuple[int, int] = (GRID, GRID)) -> GBuffer:
-    """Trace rays through the centres of ``size``, columns and rows, of cells of the film."""
+def gbuffer(
+    scene: Scene, size: tuple[int, int] = (GRID, GRID), film: tuple[int, int] | None = None
+) -> GBuffer:
+    """Trace rays through the centres of ``size``, columns and rows, of cells of the film.
+
+    For ``film`` see :func:`pixel_rays`.
+    """
     width, height = size
-    si = scene.ray_intersect(centre_rays(scene, size))
+    si = scene.ray_intersect(centre_rays(scene, size, film))
     hit = si.is_valid()
     # `wi` points to the viewer: with a negative z the back is seen.
     normal = dr.mulsign(mi.Vector3f(si.sh_frame.n), si.wi.z)
@@ -158,17 +163,32 @@ def _object_ids(pointers: Any, seen: np.ndarray) -> ObjectIds:
     return ObjectIds(np.where(seen, places.reshape(seen.shape), -1), names)
 
 
-def centre_rays(scene: Scene, size: tuple[int, int]) -> Any:
-    """Return the camera rays through the centres of all cells of a film, row by row."""
+def centre_rays(scene: Scene, size: tuple[int, int], film: tuple[int, int] | None = None) -> Any:
+    """Return the camera rays through the centres of all cells of a film, row by row.
+
+    For ``film`` see :func:`pixel_rays`.
+    """
     width, height = size
     x, y = np.meshgrid(np.arange(width), np.arange(height))
-    return pixel_rays(scene, size, x=x, y=y)
+    return pixel_rays(scene, size, x=x, y=y, film=film)
 
 
-def pixel_rays(scene: Scene, size: tuple[int, int], x: np.ndarray, y: np.ndarray) -> Any:
-    """Return the camera rays through the cells in columns ``x`` and rows ``y`` of a film."""
+def pixel_rays(
+    scene: Scene,
+    size: tuple[int, int],
+    x: np.ndarray,
+    y: np.ndarray,
+    film: tuple[int, int] | None = None,
+) -> Any:
+    """Return the camera rays through the cells in columns ``x`` and rows ``y`` of a film.
+
+    ``film`` is its width and height in pixels, whose ratio gives the view its shape: needed where
+    a scene was rendered at several sizes.
+    """
+    if film is not None:
+        resize(scene, film)
     width, height = size
     across = mi.Float((np.ravel(x) + 0.5) / width)
     down = mi.Float((np.ravel(y) + 0.5) / height)
-    film = mi.Point2f(across, down)
-    return scene.sensors()[0].sample_ray_differential(0.0, 0.5, film, mi.Point2f(0.5))[0]
+    places = mi.Point2f(across, down)
+    return scene.sensors()[0].sample_ray_differential(0.0, 0.5, places, mi.Point2f(0.5))[0]

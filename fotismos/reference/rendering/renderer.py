@@ -1,17 +1,13 @@
-"""Rendering in independent passes, with mean, standard error and times.
+"""Renderers: sources of passes that Mitsuba renders, with their times.
 
-Both halves of a pair are rendered pass by pass, in turn, with the same sampler and seed: their
-camera rays, pixel filter and edges cancel in the difference, and a drift of the machine affects
-both. Samples within a pass are stratified; passes are independent, and give the standard errors.
+Samples within a pass are stratified; passes are independent.
 """
 
 import gc
 import logging
-from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, suppress
 from copy import copy
-from dataclasses import dataclass
-from enum import IntEnum
 from pathlib import Path
 from time import perf_counter, process_time
 from types import CodeType, FunctionType
@@ -26,6 +22,7 @@ from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.records import Times
 from fotismos.reference.rendering.finite import LARGEST_VALUE, require_finite, wrong_pixels
 from fotismos.reference.rendering.gbuffer import image_size, resize
+from fotismos.reference.rendering.passes import Size, Stream, pass_seed
 from fotismos.reference.scene.messages import plain_message
 
 try:
@@ -59,9 +56,10 @@ class Renderer:
     """One half of a pair, ready to render passes in the variant that it was made in.
 
     ``integrator`` None takes the scene's own; ``pass_spp`` are samples per pixel and pass; ``size``
-    is a width and height in place of the film's, of the same shape. Passes replay the kernels of
-    the first, unless the integrator's code ``is_traced`` at each. ``warnings`` of its pair explain
-    pixels that are not finite.
+    is that of its passes unless they are given another of the same shape, and the film's if
+    omitted. A film has the size of the last pass of any renderer. Passes replay the kernels of the
+    first of their size, unless the integrator's code ``is_traced`` at each. ``warnings`` of its
+    pair explain pixels that are not finite.
     """
 
     def __init__(
@@ -70,7 +68,7 @@ class Renderer:
         integrator: Any,
         pass_spp: int,
         label: str,
-        size: tuple[int, int] | None = None,
+        size: Size | None = None,
         is_traced: bool = False,
         warnings: Sequence[str] = (),
     ):
@@ -80,7 +78,7 @@ class Renderer:
         shading = getattr(self.integrator, "model", None)  # only the integrator `heuristic` has it
         self._is_users = shading is not None and not shading.is_builtin
         self.label = f"{label} ({shading.name})" if shading and self._is_users else label
-        self.size = size
+        self.size = size or image_size(scene)
         self.variant = mi.variant()
         self.times: list[float] = []
         self.processor_times: list[float] = []
@@ -91,11 +89,21 @@ class Renderer:
         is_traced = is_traced or self._is_users or mi.is_spectral
         self._replayed = None if is_traced else dr.freeze(_rendered, warn_after=100)
 
-    def render(self, seed: int) -> Any:
+    def active(self) -> AbstractContextManager[None]:
+        """Return a context in its variant, for several passes."""
+        return variant(self.variant)
+
+    def passes(
+        self, count: int, size: Size | None = None, stream: Stream = Stream.COMPARED, seed: int = 0
+    ) -> Iterator[Any]:
+        """Yield ``count`` passes of a size, which is its own if omitted; see :meth:`render`."""
+        for number in range(count):
+            yield self.render(pass_seed(seed, number, stream), size)
+
+    def render(self, seed: int, size: Size | None = None) -> Any:
         """Render one pass and return it as a tensor (H, W, 3), noting the time."""
-        if self.size:
-            resize(self.scene, self.size)
-        width, height = image_size(self.scene)
+        size = size or self.size
+        width, height = size
         if width * height * self.pass_spp > LARGEST_PASS:
             raise InputError(
                 f"{self.label}: {self.pass_spp} samples per pixel of {width}x{height} pixels at"
@@ -104,12 +112,13 @@ class Renderer:
             )
         # The pass, timed with its evaluation.
         with variant(self.variant), dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            resize(self.scene, size)
             _reset(self.scene)
             dr.kernel_history_clear()
             begin = perf_counter()
             used = process_time()
             try:
-                image = self._image(dr.opaque(mi.UInt32, seed))
+                image = self._image(dr.opaque(mi.UInt32, seed), size)
                 dr.eval(image)
                 dr.sync_thread()
             except RuntimeError as error:
@@ -148,21 +157,16 @@ class Renderer:
                 )
         return image
 
-    def sampled(self, pass_spp: int, size: tuple[int, int] | None = None) -> "Renderer":
-        """Return the same renderer with another number of samples, and another size if given."""
+    def sampled(self, pass_spp: int) -> "Renderer":
+        """Return the same renderer with another number of samples."""
         other = copy(self)
         other.pass_spp = pass_spp
-        if size is not None:
-            other.size = size
-            # A recording holds the size of its image.
-            if self._replayed is not None:
-                other._replayed = dr.freeze(_rendered, warn_after=100)
         other.times = []
         other.processor_times = []
         other.compilation = 0.0
         return other
 
-    def _image(self, seed: int) -> Any:
+    def _image(self, seed: int, size: Size) -> Any:
         """Render; later passes replay the kernels of the first if Dr.Jit knows all their arrays."""
         spp = self.pass_spp
         if self._replayed is not None:
@@ -170,14 +174,14 @@ class Renderer:
                 if hasattr(self.integrator, "collect"):  # what cannot be recorded
                     self.integrator.collect(self.scene)
                 with _no_collection():
-                    return self._replayed(self.scene, self.integrator, spp, seed)
+                    return self._replayed(self.scene, self.integrator, spp, size, seed)
             except InputError:  # the scene cannot be prepared
                 raise
             except Exception as error:  # a plugin's message is better when it is traced
                 *_, cause = _chain(error)
                 LOGGER.info("%s: passes are traced, not replayed: %s", self.label, cause)
                 self._replayed = None
-        return _rendered(self.scene, self.integrator, spp, seed)
+        return _rendered(self.scene, self.integrator, spp, size, seed)
 
     @property
     def preparation(self) -> float:
@@ -191,10 +195,10 @@ class Renderer:
         return Times.of([first, *self.times[1:]], self.compilation)
 
 
-def warm(renderer: Renderer) -> None:
-    """Render the images that are not timed."""
+def warm(renderer: Renderer, size: Size | None = None) -> None:
+    """Render the images that are not timed, of a size if given."""
     for seed in range(WARM):
-        renderer.render(seed)
+        renderer.render(seed, size)
 
 
 @contextmanager
@@ -244,7 +248,8 @@ def syntax(f: FunctionType | None = None, **options: Any) -> Callable[..., Any]:
 dr.syntax = syntax  # for Mitsuba's modules, which look it up when they are loaded
 
 
-def _rendered(scene: Any, integrator: Any, spp: int, seed: int) -> Any:
+def _rendered(scene: Any, integrator: Any, spp: int, size: Size, seed: int) -> Any:
+    """Render an image on a film of a size; a recording holds it, so each size has its own."""
     image = mi.render(scene, integrator=integrator, spp=spp, seed=seed)
     _reset(scene)
     return image
@@ -263,81 +268,6 @@ def _chain(error: BaseException | None) -> Iterator[BaseException]:
     while error is not None:
         yield error
         error = error.__cause__ or error.__context__
-
-
-Progress = Callable[[str, int, int], None]
-"""Called as ``progress(stage, done, total)``."""
-
-
-class Stream(IntEnum):
-    """The purpose of passes; passes of different streams are independent at any seed."""
-
-    COMPARED = 0
-    OTHER_SIDE = 1
-    REPLICATES = 2
-    PROBE = 3
-    PRICE = 4
-
-
-def pass_seed(seed: int, number: int, stream: Stream = Stream.COMPARED) -> int:
-    """Return the seed of a pass: 32 bits, hashed from a run's seed, the stream and the pass.
-
-    Both halves take the same, so their camera rays cancel; runs of other seeds share no pass.
-    """
-    sequence = np.random.SeedSequence(seed, spawn_key=(int(stream), number))
-    return int(sequence.generate_state(1)[0])
-
-
-@dataclass(frozen=True)
-class Pass:
-    """One pass: its number from 0, its seed, and an image (H, W, 3) of each renderer."""
-
-    number: int
-    seed: int
-    images: tuple[Any, ...]
-
-
-def passes(
-    renderers: Sequence[Renderer],
-    seed: int,
-    count: int,
-    *,
-    stream: Stream = Stream.COMPARED,
-    progress: Progress | None = None,
-    stage: str = "rendering",
-) -> Generator[Pass, None, None]:
-    """Render ``count`` passes of each renderer, in its own variant, and yield each as it is done.
-
-    The order of the renderers alternates, so that none always pays for a pause before a pass.
-    ``progress`` is called before each pass, and once more when all are done or the caller stops.
-    """
-    done = 0
-    try:
-        for number in range(count):
-            if progress:
-                progress(stage, number, count)
-            of_pass = pass_seed(seed, number, stream)
-            result = Pass(number, of_pass, _images(renderers, of_pass, backwards=number % 2 == 1))
-            done = number + 1
-            yield result
-            del result  # else its images would stay alongside the next ones
-    finally:
-        if progress:
-            progress(stage, done, done)
-
-
-def _images(renderers: Sequence[Renderer], seed: int, backwards: bool) -> tuple[Any, ...]:
-    """Render one pass, grouped by variant: a change takes as long as a small image."""
-    images: dict[int, Any] = {}
-    order = list(enumerate(renderers))
-    if backwards:
-        order.reverse()
-    for name in dict.fromkeys(renderer.variant for _, renderer in order):
-        with variant(name):
-            for index, renderer in order:
-                if renderer.variant == name:
-                    images[index] = renderer.render(seed)
-    return tuple(images[index] for index in range(len(renderers)))
 
 
 def require_memory(name: str, width: int, height: int) -> None:

@@ -10,14 +10,14 @@ import altair as alt
 import numpy as np
 from scipy.optimize import isotonic_regression
 
-from fotismos.comparisons.cost.engine_record import Engine, EngineCost
 from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.records.engine import Engine, EngineCost
 from fotismos.reports.charts.vega import FAINT, Spec, specification
 from fotismos.reports.sentences import OWN_FRONT, stated
 from fotismos.reports.terminal.words import number
 
 if TYPE_CHECKING:  # pictures without a scene need no Mitsuba
-    from fotismos.comparisons.cost.cost_record import Cost
+    from fotismos.comparisons.records.cost import Cost
 
 WIDTH = 560
 HEIGHT = 380

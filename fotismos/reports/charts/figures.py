@@ -14,8 +14,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.records.images import Comparison
 from fotismos.reports.files import images, results
 from fotismos.reports.terminal.words import number
 

@@ -14,17 +14,19 @@ from numpy.typing import NDArray
 from fotismos.comparisons import atomic
 from fotismos.comparisons.atomic import content, require_regular
 from fotismos.comparisons.case import Case, open_case
-from fotismos.comparisons.check.measurement import HALVES, Baseline, laid_out, read_baseline
-from fotismos.comparisons.check.pictures import PictureBaseline, Repeats, colour, means
-from fotismos.comparisons.comparison import PictureFiles
+from fotismos.comparisons.check.measurement import read_baseline
+from fotismos.comparisons.check.pictures import Repeats, colour, means
 from fotismos.comparisons.departure.blocks import averaged, shrunk
 from fotismos.comparisons.names import SUFFIXES, file_of, is_script, matching
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import read_file
+from fotismos.comparisons.records.check import HALVES, Baseline, PictureBaseline
+from fotismos.comparisons.records.comparison import PictureFiles
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import in_file
 from fotismos.reference import records
+from fotismos.reference.records import laid_out
 from fotismos.reports.files import images
 
 Kept = Mapping[str, NDArray[np.floating]]

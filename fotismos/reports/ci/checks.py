@@ -4,9 +4,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from msgspec import Meta, field, structs
+from msgspec import structs
 
 from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.check.measurement import (
@@ -15,28 +15,32 @@ from fotismos.comparisons.check.measurement import (
     made_small,
     measure_scene,
 )
-from fotismos.comparisons.check.moved import LEVEL, READERS, Check, Move, check, level_of_each
+from fotismos.comparisons.check.moved import LEVEL, Check, check, level_of_each
 from fotismos.comparisons.check.pictures import (
     SIDE,
-    PictureBaseline,
     PictureCheck,
-    PictureGate,
     Repeats,
-    SmallestChanges,
     check_pictures,
     picture_gate,
 )
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import PictureFiles, versions
 from fotismos.comparisons.departure.blocks import averaged
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.comparisons.records.check import (
+    READERS,
+    Change,
+    CheckRecord,
+    PictureBaseline,
+    SmallestChanges,
+)
+from fotismos.comparisons.records.comparison import PictureFiles
 from fotismos.comparisons.steps import steps
-from fotismos.heuristic import program
 from fotismos.heuristic.errors import FotismosError, InputError
-from fotismos.reference.records import VERSION, Amount, Count, Record, Share, to_json
-from fotismos.reference.rendering.renderer import Progress
+from fotismos.heuristic.program import versions
+from fotismos.reference.records import to_json
+from fotismos.reference.rendering.passes import Progress
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines
 from fotismos.reports.ci.baselines import BaselineFile
@@ -61,113 +65,6 @@ class Tolerance:
 
     within: float
     bound: float
-
-
-class Change(Record):
-    """A value in the baseline, and now."""
-
-    before: float
-    after: float
-
-
-class VersionChange(Record):
-    """The version of a library when the baseline was made, and today's."""
-
-    before: str
-    after: str
-
-
-class CheckRecord(Record, omit_defaults=True):
-    """The result for one baseline; without numbers if it was not compared."""
-
-    # Made by functions, which `omit_defaults` does not omit.
-    record_version: int = field(default_factory=lambda: VERSION)
-    baseline: Annotated[str, Meta(description="Path of its file.")]
-    scene: str
-    status: Literal["passed", "failed", "error", "created", "updated", "unchanged"]
-    passed: bool = field(default_factory=lambda: True)
-    seconds: Amount
-    message: str = ""
-    tested: Count | None = None
-    significance: Share | None = None
-    moved: tuple[Move, ...] | None = None
-    metrics: dict[str, Change] | None = None
-    versions: dict[str, VersionChange] | None = None
-    causes: Annotated[
-        tuple[str, ...], Meta(description="Why, as far as the numbers tell, in sentences.")
-    ] = ()
-    pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
-    smallest_changes: SmallestChanges | None = None
-    picture: Annotated[PictureFiles | None, Meta(description="The pictures that were checked.")] = (
-        None
-    )
-    gate: Annotated[
-        PictureGate | None, Meta(description="The tolerance that decided, in place of drift.")
-    ] = None
-
-    @property
-    def name(self) -> str:
-        """The baseline's name."""
-        return Path(self.baseline).stem
-
-    @property
-    def largest(self) -> Move | None:
-        """What moved most: of a block, which says where, if any did."""
-        moved = self.moved or ()
-        return next((move for move in moved if move.block), moved[0] if moved else None)
-
-    @property
-    def headline(self) -> str:
-        """What moved most, where, from what to what, and how much else; empty for nothing.
-
-        If a tolerance decided, what differs visibly.
-        """
-        if self.gate is not None:
-            return self.gate.sentence
-        if (most := self.largest) is None:
-            return ""
-        others = len(self.moved or ()) - 1
-        more = f", and {others} more" if others else ""
-        values = f"from {most.before:.4g} to {most.after:.4g} ({most.change})"
-        return f"{most.name} moved {values}{more}."
-
-    @property
-    def exit_code(self) -> int:
-        """1 if something moved, 2 if the baseline could not be checked, else 0."""
-        return {"failed": 1, "error": 2}.get(self.status, 0)
-
-    @property
-    def update_command(self) -> str:
-        """The command that writes what moved to the baseline."""
-        picture = ("--picture", f"{self.name}={self.scene}") if self.smallest_changes else ()
-        return program.command("check", self.baseline, "--update", *picture)
-
-    @property
-    def other_mitsuba(self) -> str:
-        """What to know if the baseline is of another Mitsuba than the installed; else empty."""
-        change = (self.versions or {}).get("mitsuba")
-        if change is None:
-            return ""
-        return (
-            f"Mitsuba {change.after} renders here, and {change.before} made the baselines: what"
-            " moved may be its noise."
-        )
-
-    @property
-    def versions_line(self) -> str:
-        """Which versions changed since the baseline; empty for none."""
-        changed = (self.versions or {}).items()
-        changes = ", ".join(f"{name} {both.before} -> {both.after}" for name, both in changed)
-        return f"versions since the baseline: {changes}" if changes else ""
-
-
-class Checks(Record):
-    """The results of one command."""
-
-    record_version: int = VERSION
-    passed: bool
-    significance: Share
-    checks: tuple[CheckRecord, ...]
 
 
 # --- One baseline ----------------------------------------------------------------------------
@@ -201,7 +98,7 @@ def examine(
     if folder is None:
         return made, None
     # Checks usually pass, so a failure alone is compared in full.
-    added = steps(case.options, why=False)
+    added = steps(why=False)
     comparison = compare(case.source, case.options, progress, case.command(), then=added)
     folder.parent.mkdir(parents=True, exist_ok=True)
     view = scene_files.write(folder.parent, folder.name, comparison)
@@ -266,7 +163,7 @@ def _checked(file: BaselineFile, case: Case, level: float, progress: Progress | 
 def _record(file: BaselineFile, status: Any, found: Check, begin: float) -> CheckRecord:
     now = versions()
     changed = {
-        name: VersionChange(before=old, after=now.get(name, "none"))
+        name: Change(before=old, after=now.get(name, "none"))
         for name, old in file.baseline.versions.items()
         if now.get(name) != old
     }

@@ -13,10 +13,10 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import click
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.comparison import ComparisonRecord
-from fotismos.comparisons.departure.criterion import TOLERANCE, Verdict
+from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.comparisons.records.comparison import ComparisonRecord
+from fotismos.comparisons.records.departure import Verdict, VisibleShare
 from fotismos.heuristic.errors import FotismosError, InputError, OutputError
 from fotismos.reports import verdict
 from fotismos.reports.tables import SHOWN, certainty, moved
@@ -24,8 +24,7 @@ from fotismos.reports.terminal.table import Column, Table, escaped, markdown, pr
 from fotismos.reports.terminal.words import echo, is_quiet, number, percent, tell, visible
 
 if TYPE_CHECKING:
-    from fotismos.comparisons.check.moved import Move
-    from fotismos.reports.ci.checks import CheckRecord
+    from fotismos.comparisons.records.check import CheckRecord, Move
     from fotismos.reports.jobs import Terminal
     from fotismos.reports.page.scene_view import SceneView
 

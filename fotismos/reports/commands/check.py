@@ -21,13 +21,14 @@ from msgspec import Meta
 from fotismos.comparisons.atomic import file_name
 from fotismos.comparisons.options import option
 from fotismos.comparisons.processes.pool import Pool
+from fotismos.comparisons.records.check import Checks
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.command import PROCESSES, SCENES, Command
 from fotismos.reports.jobs import Terminal, command_line
 from fotismos.reports.terminal.parsing import definition, percentage
 
 if TYPE_CHECKING:  # help needs no Mitsuba
-    from fotismos.reports.ci.checks import CheckRecord
+    from fotismos.comparisons.records.check import CheckRecord
 
 READING = ("--transfer", "--over")
 """Options that say how pictures are read; they are kept in their baseline."""
@@ -156,7 +157,7 @@ class Check(Baseline, frozen=True):
                 outcomes, page = self._examined(pool, terminal.output)
             code = summary.conclude_checks(outcomes, terminal, self.significance, page)
             if terminal.as_json:
-                record = checks.Checks(
+                record = Checks(
                     passed=not code, significance=self.significance, checks=tuple(outcomes)
                 )
                 terminal.show(record, ())

@@ -80,7 +80,7 @@ class Compare(OnScene, frozen=True):
 
     def _require_halves(self, scenes: tuple[str, ...]) -> None:
         """Refuse what is too little or too much: scenes, pictures, words about pictures."""
-        if not self.has_pictures:
+        if not (self.image or self.reference):
             self.refuse_reading("--image or --reference")
         if not scenes and not (self.image and self.reference):
             raise click.UsageError(

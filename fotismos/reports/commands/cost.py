@@ -18,10 +18,10 @@ from fotismos.reports.jobs import Terminal
 
 if TYPE_CHECKING:
     from fotismos.comparisons.case import Case
-    from fotismos.comparisons.cost.cost_record import Cost as CostRecord
     from fotismos.comparisons.cost.engine import Study
-    from fotismos.comparisons.cost.engine_record import EngineCost
-    from fotismos.reference.rendering.renderer import Progress
+    from fotismos.comparisons.records.cost import Cost as CostRecord
+    from fotismos.comparisons.records.engine import EngineCost
+    from fotismos.reference.rendering.passes import Progress
 
     # Functions take a mapping for the words of the command line.
     Settings: TypeAlias = Any

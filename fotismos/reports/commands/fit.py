@@ -12,8 +12,8 @@ from fotismos.reports.jobs import Terminal
 if TYPE_CHECKING:
     from fotismos.comparisons.case import Scene
     from fotismos.comparisons.fit.fit import Fit as Fitted
-    from fotismos.comparisons.fit.fit_record import FitRecord
-    from fotismos.reference.rendering.renderer import Progress
+    from fotismos.comparisons.records.fit import FitRecord
+    from fotismos.reference.rendering.passes import Progress
 
 
 class Fit(OnScene, frozen=True):

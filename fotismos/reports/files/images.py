@@ -16,12 +16,12 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.comparison import Images
 from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.departure.colour import CHROMATICITIES, to_srgb
 from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING, RATIO, drawn
+from fotismos.comparisons.records.images import Images
 
 Bytes = NDArray[np.uint8]
 

@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from msgspec import structs
 
-from fotismos.comparisons.comparison import machine
 from fotismos.comparisons.departure.colour import BT709, rgb_to_xyz
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
 from fotismos.comparisons.departure.metrics import (
@@ -32,6 +31,7 @@ from fotismos.comparisons.departure.metrics import (
     THRESHOLDS,
     declared,
 )
+from fotismos.reference.records import Machine
 from fotismos.reports import glossary, verdict
 from fotismos.reports.files import images
 from fotismos.reports.files.results import DETAILS, Failure, RunRecord
@@ -48,8 +48,8 @@ from fotismos.reports.page.templating import HELP, identifier, rendered
 from fotismos.reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
-    from fotismos.comparisons.comparison import Attribution, ComparisonRecord
     from fotismos.comparisons.hard_cases import HardCases
+    from fotismos.comparisons.records.comparison import Attribution, ComparisonRecord
 
 TITLE = "Textbook shading against physically based rendering"
 PICTURES_TITLE = "A picture against a reference"
@@ -200,7 +200,7 @@ def _settings(records: Sequence[ComparisonRecord]) -> str:
     samples = dict.fromkeys(sorted(record.plan.spp for record in records if record.plan))
     variants = dict.fromkeys(record.variant for record in records if record.variant)
     versions = records[0].versions.items()
-    computer = machine()
+    computer = Machine.here()
     parts = (
         f"{', '.join(sizes)} pixels",
         f"{', '.join(map(str, samples))} samples per pixel" if samples else "",

@@ -7,9 +7,9 @@ from typing import Any
 
 from msgspec import field
 
-from fotismos.comparisons.comparison import ComparisonRecord
 from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.records.comparison import ComparisonRecord
 from fotismos.reference.planning.effects import EFFECTS
 from fotismos.reference.records import Record
 from fotismos.reports import verdict

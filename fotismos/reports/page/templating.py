@@ -16,7 +16,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
-from fotismos.comparisons.departure.regions import Region
+from fotismos.comparisons.records.departure import Region
 from fotismos.heuristic.program import __version__
 from fotismos.reference.records import plain
 from fotismos.reports import verdict

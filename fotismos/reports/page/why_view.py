@@ -6,9 +6,8 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons.attribution import dominating
-from fotismos.comparisons.comparison import Comparison
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
+from fotismos.comparisons.records.images import Comparison, LivePoints, TermGrid
 from fotismos.reference.records import Missing, plain
 from fotismos.reports.page.embedding import COUNTED, encode, packed
 from fotismos.reports.page.scene_view import PointsView, WhyView

@@ -14,13 +14,13 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from fotismos.comparisons.comparison import LIBRARIES, machine, versions
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.names import is_script, picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import FotismosError, InputError, InstallationError, OutputError
-from fotismos.reference.records import to_json
+from fotismos.heuristic.program import LIBRARIES, versions
+from fotismos.reference.records import Machine, to_json
 from fotismos.reports import jobs, tables, verdict
 from fotismos.reports.files import results
 from fotismos.reports.files.results import FIGURES, START, TABLES, Failure, RunRecord
@@ -86,7 +86,7 @@ class Batch:
             command=self.command,
             stages=dict(self.stages) | {"other": max(0.0, other)},
             failures=tuple(self.failures()),
-            machine=machine(),
+            machine=Machine.here(),
             versions=versions(self.libraries),
         )
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from PIL.Image import Resampling
 
-from fotismos.comparisons.cost.engine_record import EngineCost
 from fotismos.comparisons.departure.blocks import shrunk
 from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.records.engine import EngineCost
 from fotismos.heuristic.convention import Floats
 from fotismos.reference import records
 from fotismos.reports import cost_tables, glossary
@@ -20,8 +20,8 @@ from fotismos.reports.page.scene_view import CostView, Figure
 from fotismos.reports.page.templating import HELP, head, rendered
 
 if TYPE_CHECKING:  # pictures without a scene need no Mitsuba
-    from fotismos.comparisons.cost.cost_record import Cost
     from fotismos.comparisons.cost.engine import Study
+    from fotismos.comparisons.records.cost import Cost
 
     AnyStudy = Study[Cost] | Study[EngineCost]
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from fotismos.comparisons.departure.metrics import LEADING, drawn
 from fotismos.comparisons.fit.fit import Fit
-from fotismos.comparisons.fit.fit_record import FitRecord, FittedParameter, FormFit
+from fotismos.comparisons.records.fit import FitRecord, FittedParameter, FormFit
 from fotismos.reference.pairing.factors import alpha_of, exponent_of
 from fotismos.reference.records import to_json
 from fotismos.reports.files import images, results

@@ -5,10 +5,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from fotismos.comparisons.comparison import PICTURE_LIBRARIES
+from fotismos.comparisons.compare import finish, look
 from fotismos.comparisons.names import picture_parts
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.two_pictures import finish, look
+from fotismos.comparisons.pictures import two_pictures
+from fotismos.comparisons.steps import steps
+from fotismos.heuristic.program import PICTURE_LIBRARIES
 from fotismos.reports.jobs import Job
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files
@@ -40,12 +42,13 @@ def compared(
     ``show`` puts them on the page before the slow part.
     """
     begin = perf_counter()
-    first = look(job.options, name=word, command=job.options.command("compare", ""))
-    view = scene_files.view_of(first.comparison)
+    halves = two_pictures(job.options, word)
+    first = look(halves, job.options.command("compare", ""))
+    view = scene_files.view_of(first)
     seconds = {"pictures": perf_counter() - begin}
     show(target, view)
     begin = perf_counter()
-    comparison = finish(first)
+    comparison = finish(first, halves, steps(why=False))
     seconds["pictures"] += perf_counter() - begin
     begin = perf_counter()
     view = scene_files.write(folder, target, comparison, view=view, with_figures=job.figures)

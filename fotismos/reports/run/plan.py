@@ -6,13 +6,14 @@ from msgspec import structs
 
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import ComparisonRecord
-from fotismos.comparisons.cost.cost import Choice, choose
+from fotismos.comparisons.cost.cost import choose
 from fotismos.comparisons.cost.measure import WIDTH, reduced, requested
 from fotismos.comparisons.departure.criterion import checked_threshold
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.comparisons.records.comparison import ComparisonRecord
+from fotismos.comparisons.records.cost import Choice
 from fotismos.comparisons.steps import steps
 from fotismos.reports import sentences
 from fotismos.reports.jobs import Terminal
@@ -61,7 +62,7 @@ def priced(name: str, options: Options, within: float, progress: Any) -> Compari
     width, height = requested(source, options)
     if width * height > LARGEST:
         options = options.changed(resolution=reduced(source, options, WIDTH))
-    return compare(source, options, progress, then=steps(options, why=True)).record
+    return compare(source, options, progress, then=steps(why=True)).record
 
 
 def chosen(name: str, options: Options, within: float, progress: Any) -> Choice:

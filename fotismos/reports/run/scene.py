@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.comparison import CAUSES, ComparisonRecord, versions
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.names import file_of, name_of, picture_parts
 from fotismos.comparisons.processes.pool import Turn
+from fotismos.comparisons.records.comparison import CAUSES, ComparisonRecord
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic import program
 from fotismos.heuristic.heuristics import named
+from fotismos.heuristic.program import versions
 from fotismos.reference.records import VERSION, plain
 from fotismos.reference.scene.source import digest
 from fotismos.reports.files import results
@@ -66,7 +67,7 @@ def compared(
             in_turn,
             command=case.command(),
             alone=turn.alone(),
-            then=steps(options, job.with_causes),
+            then=steps(why=job.with_causes),
         )
         spent = _stages(comparison.record, perf_counter() - begin)
         # The costs of methods, for a few scenes.

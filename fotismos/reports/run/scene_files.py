@@ -9,17 +9,18 @@ import msgspec
 from msgspec import structs
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.comparison import Comparison, ComparisonRecord, Images
 from fotismos.comparisons.departure.metrics import LEADING, drawn
 from fotismos.comparisons.departure.regions import worst_pixel
+from fotismos.comparisons.records.comparison import ComparisonRecord
+from fotismos.comparisons.records.images import Comparison, Images
 from fotismos.reference.records import Missing, Record, plain, to_json
 from fotismos.reports.files import images, results
 from fotismos.reports.page import embedding
 from fotismos.reports.page.scene_view import PointsView, SceneView
 
 if TYPE_CHECKING:  # few scenes have one
-    from fotismos.comparisons.cost.cost_record import Cost
     from fotismos.comparisons.cost.engine import Study
+    from fotismos.comparisons.records.cost import Cost
 
 RECORD = "comparison.json"
 PICTURE = "comparison.exr"
@@ -45,9 +46,7 @@ def load(folder: Path, key: str | None) -> SceneView | None:
             return None
         view = found.view
         if view.cost:
-            from fotismos.comparisons.cost.cost_record import (
-                Cost,  # loaded late: few scenes have costs
-            )
+            from fotismos.comparisons.records.cost import Cost  # loaded late: few scenes have costs
 
             record = msgspec.convert(view.cost.record, Cost, builtin_types=())
             view = structs.replace(view, cost=structs.replace(view.cost, record=record))

@@ -9,13 +9,12 @@ from typing import Any
 import msgspec
 
 from fotismos.comparisons.audit.checks import Audit
-from fotismos.comparisons.check.measurement import Baseline, laid_out
-from fotismos.comparisons.check.pictures import PictureBaseline
-from fotismos.comparisons.comparison import ComparisonRecord
-from fotismos.comparisons.cost.cost_record import Cost
-from fotismos.comparisons.cost.engine_record import EngineCost
-from fotismos.comparisons.fit.fit_record import FitRecord
-from fotismos.reports.ci.checks import Checks
+from fotismos.comparisons.records.check import Baseline, Checks, PictureBaseline
+from fotismos.comparisons.records.comparison import ComparisonRecord
+from fotismos.comparisons.records.cost import Cost
+from fotismos.comparisons.records.engine import EngineCost
+from fotismos.comparisons.records.fit import FitRecord
+from fotismos.reference.records import laid_out
 from fotismos.reports.files.results import RunRecord
 
 FOLDER = Path(__file__).parent

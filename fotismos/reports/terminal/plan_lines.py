@@ -61,7 +61,7 @@ def plan_report(scene: str, ready: Prepared, variant: str) -> PlanReport:
         scene=scene,
         variant=variant,
         shading=ready.pair.shading,
-        planning_s=ready.planning_seconds,
+        planning_s=ready.seconds["planning"],
         left_out=ready.plan.omissions(),
         **asdict(plan) | {"effects": tuple(map(_planned, plan.effects))},
     )

@@ -4,9 +4,9 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from fotismos.comparisons.comparison import Contribution, MeanError
-from fotismos.comparisons.cost.engine_record import Engine, FrontPoint
-from fotismos.comparisons.departure.colour import Viewing
+from fotismos.comparisons.records.comparison import Contribution, MeanError, Price
+from fotismos.comparisons.records.departure import Viewing
+from fotismos.comparisons.records.engine import Engine, FrontPoint, Reach
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import (
@@ -233,3 +233,39 @@ class Cost(Record):
 
 LEAST_SHARE = 0.85
 """Share of the threads' processor time: less tells of a busy machine."""
+
+
+class Choice(Record):
+    """The answer of ``fotismos plan --within``.
+
+    Attributes
+    ----------
+    resolution, measured
+        Size of the times, and of the images in which errors were measured.
+    within
+        The tolerance, ΔE2000.
+    chosen
+        The fastest point that passes; None if none does.
+    best
+        The one that passes at the smallest tolerance.
+    full
+        The full plan with the fewest samples that pass, else with the most samples.
+    left_out
+        Methods that the scene cannot have, and why.
+    reach
+        If none passes: what more samples would do, if known.
+    price
+        What it takes to look right without these methods.
+    """
+
+    scene: str
+    resolution: Resolution
+    measured: Resolution
+    within: Positive
+    chosen: Point | None
+    best: Point
+    full: Point
+    left_out: dict[str, str]
+    reach: Reach | None = None
+    price: Price | None = None
+    record_version: int = VERSION

@@ -4,9 +4,8 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from fotismos.comparisons.comparison import Agreement, MeanError, PictureFiles
-from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.departure.noise import VisibleShare
+from fotismos.comparisons.records.comparison import Agreement, MeanError, PictureFiles
+from fotismos.comparisons.records.departure import Viewing, VisibleShare
 from fotismos.reference.records import (
     VERSION,
     Amount,
@@ -42,6 +41,22 @@ class FrontPoint(Record):
     error: MeanError
     front: bool = False
     ties: tuple[str, ...] = ()
+
+
+class Reach(Record):
+    """How near a method comes to the reference with any number of samples.
+
+    Attributes
+    ----------
+    left
+        ΔE2000 that 5 % of the pixels exceed without noise.
+    spp
+        Samples per pixel with which it should pass at a tolerance; None if too much is left.
+    """
+
+    method: str
+    left: float
+    spp: int | None = None
 
 
 class EngineSetting(FrontPoint):

@@ -1,27 +1,18 @@
-"""What a comparison returns: its record, ``comparison.json``, its images, and its causes."""
+"""The record of a comparison, ``comparison.json``: its price, its causes and its pictures."""
 
-from __future__ import annotations
-
-import platform
-from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
-from importlib import metadata
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import msgspec
-import numpy as np
-from msgspec import Meta, structs
-from numpy.typing import NDArray
+from msgspec import Meta
 
-from fotismos.comparisons.departure.colour import Viewing
-from fotismos.comparisons.departure.noise import VisibleShare
-from fotismos.comparisons.departure.regions import ObjectShare, Region
-from fotismos.comparisons.departure.statistics import RatioSummary, Summary
-from fotismos.comparisons.price_record import Price
-from fotismos.comparisons.processes.pool import cores
-from fotismos.heuristic import __version__
-from fotismos.heuristic.convention import Floats
+from fotismos.comparisons.records.departure import (
+    ObjectShare,
+    RatioSummary,
+    Region,
+    Significant,
+    Summary,
+    Viewing,
+)
 from fotismos.reference.pairing.pairing_record import Override, Pairing, Unrepresentable
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.records import (
@@ -29,84 +20,120 @@ from fotismos.reference.records import (
     Amount,
     Count,
     Interval,
-    Machine,
-    Missing,
     Pixels,
     Positive,
     Record,
     Resolution,
-    Share,
     Size,
     Times,
     Versions,
 )
 
-if TYPE_CHECKING:
-    from fotismos.comparisons.departure.tone_maps import Light
-    from fotismos.comparisons.pixel_terms import LivePoints, TermGrid
-
-
-PICTURE_LIBRARIES = ("numpy", "colour-science", "OpenEXR", "pillow")
-"""What a comparison of two pictures depends on."""
-
-LIBRARIES = ("mitsuba", "drjit", "numpy", "colour-science", "OpenEXR")
-"""What a comparison of a scene depends on."""
-
-
-def versions(libraries: Iterable[str] = LIBRARIES) -> dict[str, str]:
-    """Return the versions that a result depends on, and with Dr.Jit LLVM's."""
-    numbers = {"fotismos": __version__, "python": platform.python_version()}
-    numbers |= {library: metadata.version(library) for library in libraries}
-    if "drjit" in numbers:
-        import drjit as dr  # loaded late: two pictures are compared without it
-
-        numbers["LLVM"] = ".".join(map(str, dr.detail.llvm_version()))
-    return numbers
-
-
-def machine() -> Machine:
-    """Return what times depend on."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        lines = []
-    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
-    processor = names[0] if names else platform.processor() or platform.machine()
-    return Machine(
-        processor=processor, cores=cores(), system=f"{platform.system()} {platform.machine()}"
-    )
-
-
-class Significant(Record):
-    """Share of the counted pixels that are certain to differ; it grows with the samples."""
-
-    fraction: Share
-    undetermined: Annotated[
-        Share, Meta(description="Not certain to differ, but noise may hide a visible error there.")
-    ]
-    level: Annotated[
-        float,
-        Meta(
-            gt=0,
-            lt=1,
-            description="Expected share of false ones among them; if the images do not differ, the"
-            " chance of any.",
-        ),
-    ]
-    certain: Annotated[
-        bool,
-        Meta(
-            description="Whether the images differ for sure, in a block of pixels or as a whole;"
-            " without it, noise may explain every difference."
-        ),
-    ] = True
-
-
-NO_TERMS = Missing("Terms are traced with the causes, which were not asked for.")
-NOT_LIVE = Missing("It needs the causes, which were not asked for.")
-
 CAUSES = "causes"
 """The stage that finds causes."""
+
+FEWEST_SPP = 4
+MOST_SPP = 65536
+"""Samples per pixel: the fewest that smooth edges, and the most that a price names."""
+
+
+class SamplesThatPass(Record):
+    """The fewest samples per pixel with which the physical half passes at a threshold.
+
+    They are powers of 4, from :data:`FEWEST_SPP` to :data:`MOST_SPP`; null means more.
+
+    Attributes
+    ----------
+    low, high
+        With fewer it fails for sure, and with ``high`` it passes for sure.
+    """
+
+    threshold: Positive
+    value: Size | None
+    low: Size | None
+    high: Size | None
+
+
+class EffectsThatPass(Record):
+    """The fewest effects that must be simulated to pass surely at a threshold.
+
+    Attributes
+    ----------
+    visible
+        The share of pixels that still differ visibly, with its interval.
+    """
+
+    threshold: Positive
+    effects: tuple[str, ...]
+    visible: Interval
+
+
+class Saving(Record):
+    """What a plan saves over everything simulated: factors, above 1 where it does.
+
+    Attributes
+    ----------
+    time
+        Of a sample.
+    noise
+        Of the standard deviation of a sample; null if the plan has no noise.
+    """
+
+    time: Positive
+    noise: Positive | None
+
+
+class Price(Record):
+    """What it takes to look right.
+
+    Attributes
+    ----------
+    ratio
+        Time per sample of the physical half over the textbook's; null if it is not known.
+    reason
+        Why there is no ratio; empty if there is one.
+    heuristic_s, reference_s
+        Seconds per sample and pixel; null of pictures.
+    everything_s
+        That of the physical half with everything simulated; null if its plan leaves out nothing.
+    pixels
+        Of the scene's picture.
+    samples
+        For each threshold; empty if they were not asked for.
+    needed
+        For each threshold; null without causes.
+    left_out
+        What the plan proved to change nothing, as nouns.
+    saved
+        What leaving it out saves; null if nothing was left out.
+    """
+
+    ratio: Interval | None
+    reason: str
+    heuristic_s: Amount | None
+    reference_s: Amount | None
+    everything_s: Amount | None = None
+    pixels: Size
+    samples: tuple[SamplesThatPass, ...] = ()
+    needed: tuple[EffectsThatPass, ...] | None = None
+    left_out: tuple[str, ...] = ()
+    saved: Saving | None = None
+
+    def samples_at(self, threshold: float) -> SamplesThatPass | None:
+        """Return the samples that pass at a threshold, if they are known."""
+        return next((found for found in self.samples if found.threshold == threshold), None)
+
+    def needed_at(self, threshold: float) -> EffectsThatPass | None:
+        """Return the effects that pass at a threshold, if they are known."""
+        return next((found for found in self.needed or () if found.threshold == threshold), None)
+
+    def seconds(self, spp: int) -> float | None:
+        """Return the time of a physical picture with some samples per pixel, if it is known."""
+        return None if self.reference_s is None else self.reference_s * self.pixels * spp
+
+    def times(self, spp: int) -> float | None:
+        """Return this time over that of the textbook picture with :data:`FEWEST_SPP` samples."""
+        return None if self.ratio is None else self.ratio.value * spp / FEWEST_SPP
 
 
 class TimeSpent(Record):
@@ -226,25 +253,6 @@ class Attribution(Record):
     orders: int
     hybrids: tuple[Hybrid, ...] = ()
     objects: tuple[ObjectContribution, ...] = ()
-
-
-@dataclass(frozen=True)
-class Causes:
-    """The attribution of a departure, and where in the image the effects remove what.
-
-    ``maps`` are ``{effect: (H, W)}``, the ΔE2000 that each removes; with ``left``, what remains
-    when all are simulated, they add up to ``departure``. ``counted`` (H, W) are the pixels that
-    count. ``previews`` are ``{labels of the simulated effects: (f H, f W, 3)}``, linear, and
-    ``visible`` the shares of their pixels that differ visibly, by rising threshold.
-    """
-
-    record: Attribution
-    maps: dict[str, Floats]
-    departure: Floats
-    left: Floats
-    counted: NDArray[np.bool_]
-    previews: dict[tuple[str, ...], Floats]
-    visible: dict[tuple[str, ...], tuple[VisibleShare, ...]]
 
 
 class PictureFiles(Record):
@@ -390,58 +398,16 @@ class ComparisonRecord(Record):
     record_version: int = VERSION
 
     @property
+    def given(self) -> tuple[PictureFiles, ...]:
+        """The pictures that replace halves."""
+        return tuple(half for half in (self.picture, self.reference_picture) if half is not None)
+
+    @property
     def is_noise_known(self) -> bool:
         """Whether passes or repeats show the noise: two single pictures do not."""
-        halves = (self.picture, self.reference_picture)
-        return any(half is None or half.repeats > 1 for half in halves)
+        return len(self.given) < 2 or any(half.repeats > 1 for half in self.given)
 
-
-@dataclass(frozen=True)
-class Images:
-    """The images of a comparison; (H, W, 3) linear, or (H, W) for maps.
-
-    ``maps`` are those of the perceptual metrics and ``log2_luminance``. ``objects`` and
-    ``materials`` hold the index in the record of what each pixel sees, -1 for uncounted pixels.
-    Two pictures without a scene have neither these nor ``position`` and ``normal``. ``light`` is
-    the reference before its tone map, if it has one.
-    ``terms`` are those of 8.10 in the textbook half, by layer, if it has any.
-    """
-
-    heuristic: np.ndarray
-    reference: np.ndarray
-    reference_stderr: np.ndarray
-    maps: dict[str, np.ndarray]
-    significant: np.ndarray
-    counted: np.ndarray
-    position: np.ndarray | None = None
-    normal: np.ndarray | None = None
-    objects: np.ndarray | None = None
-    materials: np.ndarray | None = None
-    terms: dict[str, np.ndarray] = field(default_factory=dict)
-    light: Light | None = None
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """What a comparison returns: the content of ``comparison.json``, and the images.
-
-    Steps add the others: ``terms`` of 8.10 at pixels, ``live``, the points that a page shades
-    again, and ``causes``, those of ``record.why``, by pixel.
-    """
-
-    record: ComparisonRecord
-    images: Images
-    terms: TermGrid | Missing = NO_TERMS
-    live: LivePoints | Missing = NOT_LIVE
-    causes: Causes | None = None
-
-    def warned(self, warnings: Iterable[str]) -> Comparison:
-        """Return the comparison with more warnings."""
-        record = structs.replace(self.record, warnings=(*self.record.warnings, *warnings))
-        return replace(self, record=record)
-
-    def timed(self, stage: str, seconds: float) -> Comparison:
-        """Return the comparison with the time of one more stage."""
-        time = self.record.time
-        time = structs.replace(time, stages=time.stages | {stage: seconds})
-        return replace(self, record=structs.replace(self.record, time=time))
+    @property
+    def picture_mistakes(self) -> tuple[str, ...]:
+        """The mistakes that pictures seem to have, in words."""
+        return self.agreement.mistakes if self.agreement else ()

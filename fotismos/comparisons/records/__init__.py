@@ -1,0 +1,1 @@
+"""The records and images that comparisons return; nothing here imports what makes them."""
