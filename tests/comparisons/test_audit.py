@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from fotismos.comparisons.audit import checks, furnace, samples
+from fotismos.comparisons.audit import checks, samples
 from fotismos.comparisons.audit.subjects import (
     DISTANCES,
     EXTREMES,
@@ -174,7 +174,7 @@ def test_rough_glass_passes_what_a_quadrature_over_its_facets_finds(rgb):
         given = {"alpha": alpha, "int_ior": ior, "ext_ior": 1.0, "distribution": "ggx"}
         subject = ScatteringSubject("roughdielectric", given)
         curve = checks.curve(subject, "roughdielectric")
-        angles = furnace.both_sides(checks.ANGLES, subject.eta)
+        angles = subject.both_sides(checks.ANGLES)
         expected = [facets(alpha, subject.eta, degrees) for degrees in angles]
         np.testing.assert_allclose([curve.seen, curve.returned], [expected] * 2, rtol=1e-3)
     found, _ = checked(small(subject, (48, 36)))

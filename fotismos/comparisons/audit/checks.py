@@ -180,10 +180,10 @@ def examined(subject: Subject) -> Audit:
         kind="bsdf",
         parameters={},
         variant=mi.variant(),
-        angles=furnace.both_sides(ANGLES, subject.eta),
+        angles=subject.both_sides(ANGLES),
         curves=curves,
         lights=LIGHTS,
-        views=furnace.both_sides(VIEWS, subject.eta),
+        views=subject.both_sides(VIEWS),
         derivatives={by: disagreement(value, shade) for by, value, shade in subject.numbers()},
         checks=(),
         command="",
@@ -198,7 +198,7 @@ def curve(subject: Subject, material: str) -> MaterialCurves:
     response = partial(subject.response, material)
     alpha = subject.materials[material]
     eta = subject.eta
-    angles = furnace.both_sides(ANGLES, eta)
+    angles = subject.both_sides(ANGLES)
     lights = LIGHTS if alpha in (None, PICTURED) else ()
     return MaterialCurves(
         material=material,
@@ -215,7 +215,7 @@ def curve(subject: Subject, material: str) -> MaterialCurves:
 def lobe(subject: Subject, material: str, degrees: float) -> tuple[float, ...]:
     """Return ``pi f`` at :data:`VIEWS`."""
     light = furnace.direction(np.deg2rad(-degrees), 0.0)
-    view = furnace.direction(np.deg2rad(furnace.both_sides(VIEWS, subject.eta)), 0.0)
+    view = furnace.direction(np.deg2rad(subject.both_sides(VIEWS)), 0.0)
     # The response includes the light's cosine; of its channels, the largest counts.
     return tuple((subject.response(material, light, view) / light[2]).max(axis=0).tolist())
 
@@ -271,11 +271,7 @@ def energy(subject: Subject, record: Audit) -> Worst:
 def reciprocity(subject: Subject, record: Audit) -> Worst:
     """``f(i, o) = f(o, i)``, over the squares of indices, for random directions."""
     a, b = furnace.random_pairs(PAIRS, subject.eta)
-    differences = {
-        material: furnace.asymmetries(partial(subject.response, material), a, b=b, eta=subject.eta)
-        for material in subject.materials
-    }
-    return _largest(differences, a, b)
+    return _largest(subject, a, b, lambda s: furnace.asymmetries(s, a, b, eta=subject.eta))
 
 
 def horizon(subject: Subject, record: Audit) -> Worst:
@@ -285,27 +281,30 @@ def horizon(subject: Subject, record: Audit) -> Worst:
     view = furnace.direction(np.deg2rad(polar.ravel()), np.deg2rad(azimuth.ravel()))
     above = np.array([[1.0], [0.0], [GRAZING]])
     below = np.array([[1.0], [0.0], [-GRAZING]])
-    jumps = {
-        material: np.abs(
-            subject.response(material, above, view) - subject.response(material, below, view)
-        )
-        for material in subject.materials
-    }
-    return _largest(jumps, above, view)
+    return _largest(subject, above, view, lambda s: np.abs(s(above, view) - s(below, view)))
 
 
 def light_from_below(subject: Subject, record: Audit) -> Worst:
     """Light from behind the surface is not seen."""
-    lights = np.linspace(91, 180, 90)
-    azimuths = np.arange(0, 181, 20.0)
-    viewers = np.array([0.0, 30, 60, 80])
-    # Every combination of the three, (3, N).
-    angles = np.deg2rad(np.stack(np.meshgrid(lights, azimuths, viewers)).reshape(3, -1))
-    polar, azimuth, viewer = angles
+    # Every combination of the light's angle, its azimuth and the viewer's angle, (3, N).
+    angles = np.meshgrid(np.linspace(91, 180, 90), np.arange(0, 181, 20.0), [0.0, 30, 60, 80])
+    polar, azimuth, viewer = np.deg2rad(np.stack(angles).reshape(3, -1))
     light = furnace.direction(polar, azimuth)
     view = furnace.direction(viewer, 0 * viewer)
-    shown = {material: subject.response(material, light, view) for material in subject.materials}
-    return _largest(shown, light, view)
+    return _largest(subject, light, view, lambda s: s(light, view))
+
+
+def _largest(
+    subject: Subject, light: Floats, view: Floats, asked: Callable[[furnace.Response], Floats]
+) -> Worst:
+    """Return the largest value (C, N) that is asked of any material, and describe its case."""
+    values = {
+        material: asked(partial(subject.response, material)) for material in subject.materials
+    }
+    material = max(values, key=lambda name: values[name].max())
+    largest = values[material].max(axis=0)
+    index = int(largest.argmax())
+    return float(largest[index]), f"{material}, {furnace.describe(light, view, index)}"
 
 
 def gradient(subject: Subject, record: Audit) -> Worst:
@@ -319,13 +318,8 @@ def directions(subject: Subject, record: Audit) -> Worst:
     return min(
         (samples.p_value(subject.scattering, angle, subject.eta is not None),
          f"viewer at {angle:g}°")
-        for angle in incident(subject)
+        for angle in subject.both_sides(INCIDENT)
     )  # fmt: skip
-
-
-def incident(subject: Subject) -> tuple[float, ...]:
-    """Return the angles at which samples are compared with the density."""
-    return furnace.both_sides(INCIDENT, subject.eta)
 
 
 def weights(subject: Subject, record: Audit) -> Worst:
@@ -339,14 +333,6 @@ def values(subject: Subject, record: Audit) -> Worst:
     for description, cases, pairs in subject.hard_cases():
         subject.note(description, cases, pairs)
     return len(subject.faults), subject.faults[0] if subject.faults else "none"
-
-
-def _largest(values: dict[str, Floats], light: Floats, view: Floats) -> Worst:
-    """Return the largest value (C, N) of any material, and describe its case."""
-    material = max(values, key=lambda name: values[name].max())
-    largest = values[material].max(axis=0)
-    index = int(largest.argmax())
-    return float(largest[index]), f"{material}, {furnace.describe(light, view, index)}"
 
 
 CHECKS = (
@@ -367,7 +353,7 @@ CHECKS = (
     ),
     Check(
         "directions", directions, "p of χ² at least {least:.2g}",
-        least=lambda subject: 1 - (1 - LEVEL) ** (1 / len(incident(subject))),  # Šidák
+        least=lambda subject: 1 - (1 - LEVEL) ** (1 / len(subject.both_sides(INCIDENT))),  # Šidák
         unasked=lambda subject, record: subject.unsampled,
     ),
     Check(
@@ -384,6 +370,10 @@ CHECKS = (
 
 def disagreement(centre: float, shade: Any) -> float:
     """Return how far Dr.Jit's derivative is from finite differences, at :data:`QUANTILE`."""
+
+    def shaded(value: float) -> Floats:
+        return np.array(dr.detach(shade(mi.Float(value))), float)
+
     number = mi.Float(centre)
     dr.enable_grad(number)
     value = shade(number)
@@ -393,8 +383,10 @@ def disagreement(centre: float, shade: Any) -> float:
         dr.set_grad(number, 1.0)
         automatic = np.array(dr.forward_to(value), float)
     # Richardson's extrapolation of two central differences.
-    wide = _central(shade, centre, STEP * centre)
-    narrow = _central(shade, centre, (STEP / 2) * centre)
+    wide, narrow = (
+        (shaded(centre + step) - shaded(centre - step)) / (2 * step)
+        for step in (STEP * centre, STEP / 2 * centre)
+    )
     finite = np.broadcast_to((4 * narrow - wide) / 3, len(automatic))
     # Relative to the larger of the two, a difference is at most 2.
     size = np.maximum(np.abs(automatic), np.abs(finite))
@@ -404,13 +396,6 @@ def disagreement(centre: float, shade: Any) -> float:
         return 0.0
     relative = np.abs(automatic - finite) / np.maximum(size, FAINT * size.max())
     return float(np.quantile(relative, QUANTILE))
-
-
-def _central(shade: Any, centre: float, step: float) -> np.ndarray:
-    above = np.array(dr.detach(shade(mi.Float(centre + step))), float)
-    below = np.array(dr.detach(shade(mi.Float(centre + (-step)))), float)
-    slope: np.ndarray = (above - below) / (2 * step)
-    return slope
 
 
 # --- Pictures of what is audited ----------------------------------------------------------------

@@ -92,11 +92,6 @@ def sphere(azimuths: int, heights: int, edge: float = 1.0) -> tuple[Floats, Floa
     return np.stack([above, above * [[1], [1], [-1]]]), solid_angle
 
 
-def both_sides(degrees: tuple[float, ...], eta: float | None) -> tuple[float, ...]:
-    """Return angles from the normal; of what transmits light, also those from behind."""
-    return degrees if eta is None else degrees + tuple(180 - degree for degree in reversed(degrees))
-
-
 def radiance(eta: float | None, directions: Floats) -> Floats:
     """Return the square of the index of refraction on the side of directions; 1 above."""
     return np.where(directions[2] < 0, (eta or 1) ** 2, 1.0)

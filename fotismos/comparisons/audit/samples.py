@@ -133,8 +133,7 @@ def _random_directions(rng: np.random.Generator) -> Floats:
 
 def _of_samples(bsdf: Any, si: Any, sample: Any, weight: Any) -> Iterator[Compared]:
     """Yield what samples carry."""
-    value = _rows(bsdf.eval(mi.BSDFContext(), si, sample.wo))
-    density = _rows(bsdf.pdf(mi.BSDFContext(), si, sample.wo))
+    value, density = _asked(bsdf, si, sample.wo)
     quotient = np.divide(value, density, out=np.zeros_like(value), where=density > 0)
     yield Compared("the weight of sample", _rows(weight), "eval / pdf", quotient, in_the_mean=True)
     yield Compared("pdf of sample", _rows(sample.pdf), "pdf", density)
@@ -148,11 +147,16 @@ def _of_samples(bsdf: Any, si: Any, sample: Any, weight: Any) -> Iterator[Compar
 
 def _of_pairs(bsdf: Any, si: Any, toward: Any) -> Iterator[Compared]:
     """Yield what ``eval_pdf`` returns, which integrators call in place of ``eval`` and ``pdf``."""
-    value = _rows(bsdf.eval(mi.BSDFContext(), si, toward))
-    density = _rows(bsdf.pdf(mi.BSDFContext(), si, toward))
+    value, density = _asked(bsdf, si, toward)
     both = bsdf.eval_pdf(mi.BSDFContext(), si, toward)
     yield Compared("eval of eval_pdf", _rows(both[0]), "eval", value)
     yield Compared("pdf of eval_pdf", _rows(both[1]), "pdf", density)
+
+
+def _asked(bsdf: Any, si: Any, toward: Any) -> tuple[Floats, Floats]:
+    """Return what ``eval`` and ``pdf`` return, (C, N) and (1, N)."""
+    context = mi.BSDFContext()
+    return _rows(bsdf.eval(context, si, toward)), _rows(bsdf.pdf(context, si, toward))
 
 
 def _rows(values: Any) -> Floats:

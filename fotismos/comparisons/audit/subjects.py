@@ -41,10 +41,9 @@ class Subject(ABC):
     """A heuristic or a BSDF, with white materials and the roughness of those that have several.
 
     ``untuned`` and ``unsampled`` say why no derivative, and no sample, can be checked, where that
-    is so. ``bsdfs`` are those whose samples are checked, ``scattering``
-    is the BSDF as Mitsuba reads it. ``faults`` describe values that light
-    cannot have, from any check. ``eta`` is the relative index of refraction below what transmits
-    light, None for others.
+    is so. ``bsdfs`` are those whose samples are checked, ``scattering`` is the BSDF as Mitsuba
+    reads it. ``faults`` describe values that light cannot have, from any check. ``eta`` is the
+    relative index of refraction below what transmits light, None for others.
     """
 
     materials: dict[str, float | None]
@@ -69,6 +68,10 @@ class Subject(ABC):
     @abstractmethod
     def numbers(self) -> Iterator[Number]:
         """Yield the numbers that it depends on."""
+
+    def both_sides(self, degrees: tuple[float, ...]) -> tuple[float, ...]:
+        """Return angles from the normal; of what transmits light, also those from behind."""
+        return degrees + tuple(180 - degree for degree in reversed(degrees) if self.eta)
 
     def response(self, material: str, light: Floats, view: Floats) -> Floats:
         """Return ``pi f cos(theta_l)``, (C, N): see :mod:`fotismos.comparisons.audit.furnace`.
