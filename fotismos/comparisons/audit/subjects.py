@@ -158,11 +158,7 @@ class ShadingSubject(Subject):
         }
         self.white = white(heuristic.form or "phong")
         self.materials = {name: material.get("alpha") for name, material in self.white.items()}
-        prepared = {
-            parameter.name: self.values[parameter.name]
-            for parameter in known.values()
-            if parameter.prepared
-        }
+        prepared = {name: self.values[name] for name in known if known[name].prepared}
         self.prepared = heuristic.prepared(user_shaders.trial_scene(0.0), prepared)
         if not heuristic.traced:
             self.untuned = "Dr.Jit cannot differentiate it"
@@ -181,17 +177,14 @@ class ShadingSubject(Subject):
         low = furnace.grazing()
         values = self._values(MIDDLE, low.light, low.view)
         yield "grazing, head on and from behind", values, low
-        lights: dict[str, list[Any]] = {
-            f"a light at a distance of {far:g}": [
-                PointLight(mi.Point3f(0, 0, far), mi.Spectrum(1.0))
-            ]
-            for far in DISTANCES
-        }
-        lights["a light of intensity 0"] = [DirectionalLight((0.0, 0.0, -1.0), 0.0)]
+        for far in DISTANCES:
+            lamp = PointLight(mi.Point3f(0, 0, far), mi.Spectrum(1.0))
+            values = self._values(MIDDLE, [lamp], view)
+            yield f"a light at a distance of {far:g}", values, None
+        dark = DirectionalLight((0.0, 0.0, -1.0), 0.0)
+        yield "a light of intensity 0", self._values(MIDDLE, [dark], view), None
         if self.heuristic.prepare is None:  # it may prepare one item per light
-            lights["no light at all"] = []
-        for words, lamps in lights.items():
-            yield words, self._values(MIDDLE, lamps, view), None
+            yield "no light at all", self._values(MIDDLE, [], view), None
         yield "a viewer at the point itself", self._values(MIDDLE, UP, np.zeros((3, 1))), None
 
     def numbers(self) -> Iterator[Number]:
@@ -250,23 +243,23 @@ def shaded(
     hides a light. ``values`` are those of its parameters, if not the defaults.
     """
     count = max(vector.shape[1] for vector in point)
+    position, normal, view = (np.broadcast_to(vector, (3, count)) for vector in point)
     known = dict.fromkeys(COLOURS, 0.0) | {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
     # Opaque, as in a scene: Dr.Jit drops products with a literal 0, even of NaN.
-    made = {name: _opaque(value) for name, value in (known | dict(material)).items()}
-    made |= {name: mi.Spectrum(made[name]) for name in COLOURS}
-    values = {vector.name: vector.default for vector in heuristic.parameters} | dict(values or {})
-    vectors = [mi.Vector3f(_single(np.broadcast_to(vector, (3, count)))) for vector in point]
-    position, normal, view = vectors
+    opaque = {name: _opaque(value) for name, value in (known | dict(material)).items()}
+    opaque |= {name: mi.Spectrum(opaque[name]) for name in COLOURS}
     arguments = ShadingArguments(
-        position=position,
-        normal=normal,
-        view=view,
-        material=PairedMaterial(**made, form=heuristic.form or "phong"),
+        position=mi.Vector3f(_single(position)),
+        normal=mi.Vector3f(_single(normal)),
+        view=mi.Vector3f(_single(view)),
+        material=PairedMaterial(**opaque, form=heuristic.form or "phong"),
         lights=lights,
         ambient=mi.Spectrum(ambient),
         visible=lambda toward, distance: dr.full(mi.Bool, True, count),
     )
-    parameters = {name: mi.Float(value) for name, value in values.items()}
+    defaults = {parameter.name: parameter.default for parameter in heuristic.parameters}
+    numbers = defaults | dict(values or {})
+    parameters = {name: mi.Float(number) for name, number in numbers.items()}
     return mi.Spectrum(heuristic.evaluate(arguments, mi.Point2f(0.5), parameters, prepared))
 
 
