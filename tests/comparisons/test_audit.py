@@ -326,6 +326,21 @@ def test_wrong_samples_are_named(rgb, written, kind):
     assert (found.verdict, said in found.worst) == ("does not hold", True), found.worst
 
 
+UNASKED = (
+    ("directions", "diffuse", {"reflectance": 0.0}, "it scatters nothing"),
+    ("weights", "diffuse", {"reflectance": 0.0}, "it scatters nothing"),
+    ("light from below", "roughdielectric", {"alpha": 0.3}, "it transmits light"),
+    ("weights", None, {}, "textbook shading is not sampled"),
+)
+
+
+@pytest.mark.parametrize(("name", "plugin", "given", "why"), UNASKED)
+def test_what_cannot_be_checked_is_not_asked_and_says_why(rgb, name, plugin, given, why):
+    subject = ScatteringSubject(plugin, given) if plugin else named("phong")
+    found = check(name, subject)
+    assert (found.verdict, found.value, found.worst) == ("not asked", None, why)
+
+
 LOBES = """
         is_uniform = sample1 < 0.5
         bs.wo = dr.select(is_uniform, mi.warp.square_to_uniform_hemisphere(sample2), bs.wo)
