@@ -1,22 +1,18 @@
 """The checks of an audit, and the audit itself, from a heuristic's or BSDF's values alone."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from msgspec import Meta
+from msgspec.structs import replace
 
 from fotismos.comparisons.audit import diagnosis, furnace, samples
-from fotismos.comparisons.audit.subjects import (
-    INCIDENT,
-    LEVEL,
-    ScatteringSubject,
-    ShadingSubject,
-    Subject,
-)
+from fotismos.comparisons.audit.samples import Worst
+from fotismos.comparisons.audit.subjects import ScatteringSubject, ShadingSubject, Subject
 from fotismos.heuristic import heuristics
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import FotismosError, InputError
@@ -47,6 +43,31 @@ GRAZING = 1e-6
 
 JUMP = 0.01
 """In units of display white."""
+
+DARK = 1e-5
+"""What light from below may show, in units of display white."""
+
+INCIDENT = (0.0, 45.0, 75.0)
+"""Degrees at which samples are compared with the density."""
+
+LEVEL = 0.001
+"""Chance that correct densities fail, over all angles together."""
+
+STEP = 0.02
+"""Step of a finite difference, relative to the number."""
+
+QUANTILE = 0.9
+AGREES = 0.05
+"""Largest relative difference at this quantile of the points: others may lie at kinks, where the
+two rightly differ."""
+
+FAINT = 1e-3
+NOTHING = 1e-5
+"""A derivative below FAINT times the largest is judged by its absolute difference. If all are below
+NOTHING, they are rounding errors."""
+
+OPPOSITE = 2.0
+"""The largest possible relative difference; it also stands for derivatives that are not finite."""
 
 Kind = Literal["heuristic", "bsdf"]
 
@@ -113,7 +134,7 @@ class Audit(Record):
         return next(check for check in self.checks if check.name == name)
 
 
-# --- Checks ------------------------------------------------------------------------------------
+# --- The audit ---------------------------------------------------------------------------------
 
 
 def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "") -> Audit:
@@ -130,238 +151,229 @@ def audit_with_subject(
 ) -> tuple[Audit, Subject]:
     """Return what :func:`audit` returns, and what was audited."""
     try:
-        subject = _subject_of(kind, name, parameters)
-        return _audited(subject, kind, name=name, parameters=parameters, command=command), subject
+        if kind == "bsdf":
+            subject: Subject = ScatteringSubject(name, parameters)
+        else:
+            subject = ShadingSubject(heuristics.named(name), parameters)
+        record = examined(subject)
     except Exception as error:  # a user's code may raise anything
         is_users = kind == "bsdf" and heuristics.in_file(name)
         if isinstance(error, FotismosError) or not is_users:
             raise
         raise InputError(f"{error_text(error)} (BSDF {name}).") from error
-
-
-def _subject_of(kind: Kind, name: str, parameters: Mapping[str, Any]) -> Subject:
-    """Return what is audited, with its white materials."""
-    if kind == "bsdf":
-        return ScatteringSubject(name, parameters)
-    return ShadingSubject(heuristics.named(name), parameters)
-
-
-def _audited(
-    subject: Subject, kind: Kind, name: str, parameters: Mapping[str, Any], command: str
-) -> Audit:
-    curves = tuple(curve(subject, material) for material in subject.materials)
-    derivatives = {by: disagreement(value, shade) for by, value, shade in subject.numbers()}
-    return Audit(
+    named = replace(
+        record,
         subject=name,
         kind=kind,
         parameters=dict(parameters),
-        variant=mi.variant(),
-        angles=furnace.both_sides(ANGLES, subject.eta),
-        curves=curves,
-        lights=LIGHTS,
-        views=furnace.both_sides(VIEWS, subject.eta),
-        derivatives=derivatives,
-        checks=all_checks(subject, curves, derivatives),
-        faults=tuple(subject.faults),
         mistakes=diagnosis.describe(name) if kind == "heuristic" else (),
         command=command,
+    )
+    return named, subject
+
+
+def examined(subject: Subject) -> Audit:
+    """Return the record of an audit, in which the subject has no name yet."""
+    curves = tuple(curve(subject, material) for material in subject.materials)
+    record = Audit(
+        subject="",
+        kind="bsdf",
+        parameters={},
+        variant=mi.variant(),
+        angles=subject.both_sides(ANGLES),
+        curves=curves,
+        lights=LIGHTS,
+        views=subject.both_sides(VIEWS),
+        derivatives={by: disagreement(value, shade) for by, value, shade in subject.numbers()},
+        checks=(),
+        command="",
         versions=versions(),
     )
-
-
-def all_checks(
-    subject: Subject, curves: tuple[MaterialCurves, ...], derivatives: Mapping[str, float]
-) -> tuple[Checked, ...]:
-    """Make every check."""
-    angles = furnace.both_sides(ANGLES, subject.eta)
-    return (
-        white_furnace(angles, curves),
-        energy(angles, curves),
-        reciprocity(subject),
-        horizon(subject),
-        light_from_below(subject),
-        gradient(subject, derivatives),
-        directions(subject),
-        weights(subject),
-        values(subject),  # last: it reports what the others met
-    )
+    found = tuple(check.of(subject, record) for check in CHECKS)
+    return replace(record, checks=found, faults=tuple(subject.faults))
 
 
 def curve(subject: Subject, material: str) -> MaterialCurves:
     """Return the albedos of a white material over the angles, and its lobes."""
     response = partial(subject.response, material)
     alpha = subject.materials[material]
-    lights = LIGHTS if alpha in (None, PICTURED) else ()
-    angles = furnace.both_sides(ANGLES, subject.eta)
-    grid = subject.grid
     eta = subject.eta
+    angles = subject.both_sides(ANGLES)
+    lights = LIGHTS if alpha in (None, PICTURED) else ()
     return MaterialCurves(
         material=material,
         alpha=alpha,
-        seen=tuple(furnace.seen(response, angle, grid, eta) for angle in angles),
-        returned=tuple(furnace.returned(response, angle, grid, eta) for angle in angles),
+        seen=tuple(furnace.seen(response, angle, subject.grid, eta) for angle in angles),
+        returned=tuple(furnace.returned(response, angle, subject.grid, eta) for angle in angles),
         single_scattering=tuple(
             furnace.single_scattering(alpha, min(angle, 180 - angle)) for angle in angles if alpha
         ),
-        lobes=tuple(lobe(subject, material, angle) for angle in lights),
+        lobes=tuple(lobe(subject, material, light) for light in lights),
     )
 
 
 def lobe(subject: Subject, material: str, degrees: float) -> tuple[float, ...]:
     """Return ``pi f`` at :data:`VIEWS`."""
     light = furnace.direction(np.deg2rad(-degrees), 0.0)
-    view = furnace.direction(np.deg2rad(furnace.both_sides(VIEWS, subject.eta)), 0.0)
+    view = furnace.direction(np.deg2rad(subject.both_sides(VIEWS)), 0.0)
     # The response includes the light's cosine; of its channels, the largest counts.
     return tuple((subject.response(material, light, view) / light[2]).max(axis=0).tolist())
 
 
-def white_furnace(angles: tuple[float, ...], curves: tuple[MaterialCurves, ...]) -> Checked:
-    """Check that a white surface is as bright as its surroundings at every angle."""
-    value, worst = max(
+# --- Checks ------------------------------------------------------------------------------------
+
+
+class Check(NamedTuple):
+    """A measurement, the bounds within which it holds, in words, and why it is not asked.
+
+    It is made of a subject, and of the ``Audit`` with the subject's curves and derivatives.
+    """
+
+    name: str
+    measure: Callable[[Subject, Audit], Worst]
+    expected: str
+    most: float = np.inf
+    least: Callable[[Subject], float] = lambda subject: -np.inf
+    unasked: Callable[[Subject, Audit], str] = lambda subject, record: ""
+
+    def of(self, subject: Subject, record: Audit) -> Checked:
+        """Make the check."""
+        least = self.least(subject)
+        verdict: Any = "not asked"
+        value = None
+        worst = self.unasked(subject, record)
+        if not worst:
+            value, worst = self.measure(subject, record)
+            verdict = "holds" if least <= value <= self.most else "does not hold"
+        expected = self.expected.format(least=least)
+        return Checked(name=self.name, verdict=verdict, value=value, expected=expected, worst=worst)
+
+
+def white_furnace(subject: Subject, record: Audit) -> Worst:
+    """A white surface is as bright as its surroundings at every angle."""
+    return max(
         ((value, f"{curve.material}, viewer at {angle:g}°")
-         for curve in curves for angle, value in zip(angles, curve.seen, strict=True)),
+         for curve in record.curves
+         for angle, value in zip(record.angles, curve.seen, strict=True)),
         key=lambda pair: abs(pair[0] - 1),
     )  # fmt: skip
-    return _checked("white furnace", abs(value - 1) <= TOLERANCE, value, f"1 ± {TOLERANCE}", worst)
 
 
-def energy(angles: tuple[float, ...], curves: tuple[MaterialCurves, ...]) -> Checked:
-    """Check that no more light leaves than arrives, at the worst angle."""
-    value, worst = max(
+def energy(subject: Subject, record: Audit) -> Worst:
+    """No more light leaves than arrives, at the worst angle."""
+    return max(
         (value, f"{curve.material}, light at {angle:g}°")
-        for curve in curves for angle, value in zip(angles, curve.returned, strict=True)
-    )  # fmt: skip
-    return _checked("energy", value <= 1 + TOLERANCE, value, f"at most {1 + TOLERANCE}", worst)
+        for curve in record.curves
+        for angle, value in zip(record.angles, curve.returned, strict=True)
+    )
 
 
-def reciprocity(subject: Subject) -> Checked:
-    """Check that ``f(i, o) = f(o, i)``, over the squares of indices, for random directions."""
+def reciprocity(subject: Subject, record: Audit) -> Worst:
+    """``f(i, o) = f(o, i)``, over the squares of indices, for random directions."""
     a, b = furnace.random_pairs(PAIRS, subject.eta)
-    differences = {
-        material: furnace.asymmetries(partial(subject.response, material), a, b=b, eta=subject.eta)
-        for material in subject.materials
-    }
-    value, worst = _largest(differences, a, b)
-    expected = f"at most {RECIPROCAL} of the mean"
-    return _checked("reciprocity", value <= RECIPROCAL, value, expected, worst)
+    return _largest(subject, a, b, lambda s: furnace.asymmetries(s, a, b, eta=subject.eta))
 
 
-def horizon(subject: Subject) -> Checked:
-    """Check that no value jumps as a light along x sets."""
+def horizon(subject: Subject, record: Audit) -> Worst:
+    """No value jumps as a light along x sets."""
     # Viewers on one side of the light's plane stand for those on the other.
     polar, azimuth = np.meshgrid(np.linspace(0, 80, 33), np.linspace(0, 180, 61))
     view = furnace.direction(np.deg2rad(polar.ravel()), np.deg2rad(azimuth.ravel()))
-    above = np.tile([[1.0], [0.0], [GRAZING]], view.shape[1])
-    below = np.tile([[1.0], [0.0], [(-GRAZING)]], view.shape[1])
-    jumps = {
-        material: np.abs(
-            subject.response(material, above, view) - subject.response(material, below, view)
-        )
-        for material in subject.materials
-    }
-    value, worst = _largest(jumps, above, view)
-    return _checked("horizon", value <= JUMP, value, f"a jump of at most {JUMP}", worst)
+    above = np.array([[1.0], [0.0], [GRAZING]])
+    below = np.array([[1.0], [0.0], [-GRAZING]])
+    return _largest(subject, above, view, lambda s: np.abs(s(above, view) - s(below, view)))
 
 
-def light_from_below(subject: Subject) -> Checked:
-    """Check that light from behind the surface is not seen, unless it is to be transmitted."""
-    if subject.eta:
-        return _checked("light from below", None, None, "0", "it transmits light")
-    lights = np.linspace(91, 180, 90)
-    azimuths = np.arange(0, 181, 20.0)
-    viewers = np.array([0.0, 30, 60, 80])
-    # Every combination of the three, (3, N).
-    angles = np.deg2rad(np.stack(np.meshgrid(lights, azimuths, viewers)).reshape(3, -1))
-    polar, azimuth, viewer = angles
+def light_from_below(subject: Subject, record: Audit) -> Worst:
+    """Light from behind the surface is not seen."""
+    # Every combination of the light's angle, its azimuth and the viewer's angle, (3, N).
+    angles = np.meshgrid(np.linspace(91, 180, 90), np.arange(0, 181, 20.0), [0.0, 30, 60, 80])
+    polar, azimuth, viewer = np.deg2rad(np.stack(angles).reshape(3, -1))
     light = furnace.direction(polar, azimuth)
     view = furnace.direction(viewer, 0 * viewer)
-    shown = {material: subject.response(material, light, view) for material in subject.materials}
-    value, worst = _largest(shown, light, view)
-    return _checked("light from below", value <= 1e-5, value, "0", worst)
-
-
-def directions(subject: Subject) -> Checked:
-    """Check the density of samples against ``pdf``, of BSDFs."""
-    bound = 1 - (1 - LEVEL) ** (1 / len(furnace.both_sides(INCIDENT, subject.eta)))  # Šidák
-    expected = f"p of χ² at least {bound:.2g}"
-    if not isinstance(subject, ScatteringSubject) or subject.is_black:
-        return _checked("directions", None, None, expected, _why_not_sampled(subject))
-    value, worst = subject.directions()
-    return _checked("directions", value >= bound, value, expected, worst)
-
-
-def weights(subject: Subject) -> Checked:
-    """Check what samples carry against ``eval`` and ``pdf``, of BSDFs."""
-    expected = f"at most {TOLERANCE:.0%} off"
-    if not isinstance(subject, ScatteringSubject) or subject.is_black:
-        return _checked("weights", None, None, expected, _why_not_sampled(subject))
-    deviations = [samples.worst(bsdf) for bsdf in subject.bsdfs.values()]
-    value, worst = max(deviations, key=lambda deviation: deviation.value)
-    return _checked("weights", value <= TOLERANCE, value, expected, worst)
-
-
-def _why_not_sampled(subject: Subject) -> str:
-    is_bsdf = isinstance(subject, ScatteringSubject)
-    return "it scatters nothing" if is_bsdf else "textbook shading is not sampled"
-
-
-def values(subject: Subject) -> Checked:
-    """Check that hard cases, and all values met so far, are finite and not negative."""
-    for description, cases, pairs in subject.hard_cases():
-        subject.note(description, cases, pairs)
-    worst = subject.faults[0] if subject.faults else "none"
-    expected = "0 cases of NaN, infinity or a negative value"
-    return _checked("values", not subject.faults, len(subject.faults), expected, worst)
-
-
-def _checked(
-    name: str, holds: bool | None, value: float | None, expected: str, worst: str
-) -> Checked:
-    verdict: Any = {True: "holds", False: "does not hold", None: "not asked"}[holds]
-    return Checked(name=name, verdict=verdict, value=value, expected=expected, worst=worst)
+    return _largest(subject, light, view, lambda s: s(light, view))
 
 
 def _largest(
-    values: dict[str, np.ndarray], light: np.ndarray, view: np.ndarray
-) -> tuple[float, str]:
-    """Return the largest value (C, N) of any material, and describe its case."""
+    subject: Subject, light: Floats, view: Floats, asked: Callable[[furnace.Response], Floats]
+) -> Worst:
+    """Return the largest value (C, N) that is asked of any material, and describe its case."""
+    values = {
+        material: asked(partial(subject.response, material)) for material in subject.materials
+    }
     material = max(values, key=lambda name: values[name].max())
     largest = values[material].max(axis=0)
     index = int(largest.argmax())
     return float(largest[index]), f"{material}, {furnace.describe(light, view, index)}"
 
 
+def gradient(subject: Subject, record: Audit) -> Worst:
+    """Dr.Jit's derivatives by all numbers are right."""
+    worst = max(record.derivatives, key=record.derivatives.__getitem__)
+    return record.derivatives[worst], f"by {worst}"
+
+
+def directions(subject: Subject, record: Audit) -> Worst:
+    """The density of samples is ``pdf``, of BSDFs."""
+    return min(
+        (samples.p_value(subject.scattering, angle, subject.eta is not None),
+         f"viewer at {angle:g}°")
+        for angle in subject.both_sides(INCIDENT)
+    )  # fmt: skip
+
+
+def weights(subject: Subject, record: Audit) -> Worst:
+    """What samples carry is ``eval`` and ``pdf``, of BSDFs."""
+    deviations = [samples.worst(bsdf) for bsdf in subject.bsdfs.values()]
+    return max(deviations, key=lambda deviation: deviation[0])
+
+
+def values(subject: Subject, record: Audit) -> Worst:
+    """Hard cases, and all values met so far, are finite and not negative."""
+    for description, cases, pairs in subject.hard_cases():
+        subject.note(description, cases, pairs)
+    return len(subject.faults), subject.faults[0] if subject.faults else "none"
+
+
+CHECKS = (
+    Check(
+        "white furnace", white_furnace, f"1 ± {TOLERANCE}",
+        most=1 + TOLERANCE, least=lambda subject: 1 - TOLERANCE,
+    ),
+    Check("energy", energy, f"at most {1 + TOLERANCE}", most=1 + TOLERANCE),
+    Check("reciprocity", reciprocity, f"at most {RECIPROCAL} of the mean", most=RECIPROCAL),
+    Check("horizon", horizon, f"a jump of at most {JUMP}", most=JUMP),
+    Check(
+        "light from below", light_from_below, "0", most=DARK,
+        unasked=lambda subject, record: "it transmits light" if subject.eta else "",
+    ),
+    Check(
+        "gradient", gradient, f"at most {AGREES} of it at {QUANTILE:.0%} of the points",
+        most=AGREES, unasked=lambda subject, record: "" if record.derivatives else subject.untuned,
+    ),
+    Check(
+        "directions", directions, "p of χ² at least {least:.2g}",
+        least=lambda subject: 1 - (1 - LEVEL) ** (1 / len(subject.both_sides(INCIDENT))),  # Šidák
+        unasked=lambda subject, record: subject.unsampled,
+    ),
+    Check(
+        "weights", weights, f"at most {TOLERANCE:.0%} off",
+        most=TOLERANCE, unasked=lambda subject, record: subject.unsampled,
+    ),
+    Check("values", values, "0 cases of NaN, infinity or a negative value", most=0),
+)  # fmt: skip
+"""All checks, in their order: the last reports what the others met."""
+
+
 # --- Derivatives against finite differences, which share no code with them ---------------------
-
-STEP = 0.02
-"""Step of a finite difference, relative to the number."""
-
-QUANTILE = 0.9
-AGREES = 0.05
-"""Largest relative difference at this quantile of the points: others may lie at kinks, where the
-two rightly differ."""
-
-FAINT = 1e-3
-NOTHING = 1e-5
-"""A derivative below FAINT times the largest is judged by its absolute difference. If all are below
-NOTHING, they are rounding errors."""
-
-OPPOSITE = 2.0
-"""The largest possible relative difference; it also stands for derivatives that are not finite."""
-
-
-def gradient(subject: Subject, derivatives: Mapping[str, float]) -> Checked:
-    """Check that Dr.Jit's derivatives by all numbers are right."""
-    expected = f"at most {AGREES} of it at {QUANTILE:.0%} of the points"
-    if not derivatives:
-        return _checked("gradient", None, None, expected, subject.untuned)
-    worst = max(derivatives, key=derivatives.__getitem__)
-    value = derivatives[worst]
-    return _checked("gradient", value <= AGREES, value, expected, f"by {worst}")
 
 
 def disagreement(centre: float, shade: Any) -> float:
     """Return how far Dr.Jit's derivative is from finite differences, at :data:`QUANTILE`."""
+
+    def shaded(value: float) -> Floats:
+        return np.array(dr.detach(shade(mi.Float(value))), float)
+
     number = mi.Float(centre)
     dr.enable_grad(number)
     value = shade(number)
@@ -371,8 +383,10 @@ def disagreement(centre: float, shade: Any) -> float:
         dr.set_grad(number, 1.0)
         automatic = np.array(dr.forward_to(value), float)
     # Richardson's extrapolation of two central differences.
-    wide = _central(shade, centre, STEP * centre)
-    narrow = _central(shade, centre, (STEP / 2) * centre)
+    wide, narrow = (
+        (shaded(centre + step) - shaded(centre - step)) / (2 * step)
+        for step in (STEP * centre, STEP / 2 * centre)
+    )
     finite = np.broadcast_to((4 * narrow - wide) / 3, len(automatic))
     # Relative to the larger of the two, a difference is at most 2.
     size = np.maximum(np.abs(automatic), np.abs(finite))
@@ -382,13 +396,6 @@ def disagreement(centre: float, shade: Any) -> float:
         return 0.0
     relative = np.abs(automatic - finite) / np.maximum(size, FAINT * size.max())
     return float(np.quantile(relative, QUANTILE))
-
-
-def _central(shade: Any, centre: float, step: float) -> np.ndarray:
-    above = np.array(dr.detach(shade(mi.Float(centre + step))), float)
-    below = np.array(dr.detach(shade(mi.Float(centre + (-step)))), float)
-    slope: np.ndarray = (above - below) / (2 * step)
-    return slope
 
 
 # --- Pictures of what is audited ----------------------------------------------------------------

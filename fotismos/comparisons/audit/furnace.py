@@ -13,7 +13,7 @@ n_l^2``, with the indices ``n`` on the sides of ``l`` and ``v`` (Veach 1997, sec
 
 from collections.abc import Callable
 from functools import cache, lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -26,6 +26,14 @@ UP = np.array([[0.0], [0.0], [1.0]])
 
 Response = Callable[[Floats, Floats], Floats]
 """Of directions (3, N) to the light and the viewer: values (C, N)."""
+
+
+class Pairs(NamedTuple):
+    """Directions (3, N) to lights and to viewers."""
+
+    light: Floats
+    view: Floats
+
 
 GRID = (240, 180)
 """Azimuths and heights. It errs by less than a thousandth for GGX of an alpha of 0.1, even at 89
@@ -82,11 +90,6 @@ def sphere(azimuths: int, heights: int, edge: float = 1.0) -> tuple[Floats, Floa
     # `sin(theta) d theta = 2 t dt`, and `d phi = 3 pi u^2 du` with `du = 2 / azimuths`.
     solid_angle = np.tile((lengths * weights).ravel(), azimuths) * t * 12 * np.pi * u**2 / azimuths
     return np.stack([above, above * [[1], [1], [-1]]]), solid_angle
-
-
-def both_sides(degrees: tuple[float, ...], eta: float | None) -> tuple[float, ...]:
-    """Return angles from the normal; of what transmits light, also those from behind."""
-    return degrees if eta is None else degrees + tuple(180 - degree for degree in reversed(degrees))
 
 
 def radiance(eta: float | None, directions: Floats) -> Floats:
@@ -181,31 +184,31 @@ def asymmetries(response: Response, a: Floats, b: Floats, eta: float | None = No
     return relative
 
 
+def polar(directions: Floats) -> Any:
+    """Return the angles of directions (3,) or (3, N) from the normal, in degrees."""
+    return np.degrees(np.arctan2(np.hypot(directions[0], directions[1]), directions[2]))
+
+
 def describe(light: np.ndarray, view: np.ndarray, index: int) -> str:
     """Describe a pair of directions (3, N): angles from the normal, and the azimuth between."""
     light = light[:, index % light.shape[1]]
     view = view[:, index % view.shape[1]]
-    polar = [
-        np.degrees(np.arctan2(np.hypot(direction[0], direction[1]), direction[2]))
-        for direction in (light, view)
-    ]
     about = np.degrees(np.arctan2(light[1], light[0]) - np.arctan2(view[1], view[0])) % 360
-    return (
-        f"light at {polar[0]:.4g}°, viewer at {polar[1]:.4g}°, {min(about, 360 - about):.3g}° apart"
-    )
+    apart = min(about, 360 - about)
+    return f"light at {polar(light):.4g}°, viewer at {polar(view):.4g}°, {apart:.3g}° apart"
 
 
-def random_and_mirrored() -> tuple[np.ndarray, np.ndarray]:
-    """Return random directions (3, 512) to lights and viewers; half face each other's mirror."""
+def random_and_mirrored() -> Pairs:
+    """Return 512 random pairs; half of the viewers are in the direction of the mirrored light."""
     light, view = random_pairs(256)
     mirrored = light * [[-1], [-1], [1]]
-    return np.hstack([light, light]), np.hstack([view, mirrored])
+    return Pairs(np.hstack([light, light]), np.hstack([view, mirrored]))
 
 
-def grazing() -> tuple[np.ndarray, np.ndarray]:
-    """Return lights and viewers (3, N) at the horizon and the normal, and lights below them."""
+def grazing() -> Pairs:
+    """Return lights and viewers at the horizon and the normal, and lights below them."""
     azimuth = np.deg2rad([0.0, 90.0, 180.0])
     rows = [np.stack([np.cos(azimuth), np.sin(azimuth), np.full(3, z)]) for z in (0, 1e-7, 1e-3)]
     views = np.concatenate([UP, *rows], axis=1)
     lights = np.concatenate([views, -views], axis=1)
-    return np.repeat(lights, views.shape[1], axis=1), np.tile(views, lights.shape[1])
+    return Pairs(np.repeat(lights, views.shape[1], axis=1), np.tile(views, lights.shape[1]))

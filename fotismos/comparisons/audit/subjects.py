@@ -7,7 +7,7 @@ file registers by this name.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +15,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from fotismos.comparisons.audit import furnace
-from fotismos.comparisons.audit.furnace import UP
+from fotismos.comparisons.audit import furnace, samples
+from fotismos.comparisons.audit.furnace import UP, Pairs
 from fotismos.heuristic import heuristics, terms, user_shaders
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import Heuristic, ShadingArguments
 from fotismos.heuristic.lights import DirectionalLight, PointLight
@@ -29,8 +30,8 @@ from fotismos.reference.scene import checks
 ALPHAS = (0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0)
 """Roughness of the materials; the quadrature resolves their lobes at every angle."""
 
-CaseValues = tuple[str, np.ndarray, tuple[np.ndarray, np.ndarray] | None]
-"""Words, the values (C, N), and directions to light and viewer if they identify a value."""
+CaseValues = tuple[str, Floats, Pairs | None]
+"""Words, the values (C, N), and the directions if they identify a value."""
 
 Number = tuple[str, float, Callable[[Any], Any]]
 """Name and value of a number to differentiate by, and the function of it, one value per point."""
@@ -39,21 +40,25 @@ Number = tuple[str, float, Callable[[Any], Any]]
 class Subject(ABC):
     """A heuristic or a BSDF, with white materials and the roughness of those that have several.
 
-    ``untuned`` says why no derivative can be checked, where that is so. ``faults`` describe values
-    that light cannot have, from any check. ``eta`` is the relative index of refraction below what
-    transmits light, None for others.
+    ``untuned`` and ``unsampled`` say why no derivative, and no sample, can be checked, where that
+    is so. ``bsdfs`` are those whose samples are checked, ``scattering`` is the BSDF as Mitsuba
+    reads it. ``faults`` describe values that light cannot have, from any check. ``eta`` is the
+    relative index of refraction below what transmits light, None for others.
     """
 
     materials: dict[str, float | None]
     grid = furnace.GRID
-    untuned = "it depends on no number"
     eta: float | None = None
+    untuned = "it depends on no number"
+    unsampled = "textbook shading is not sampled"
 
     def __init__(self) -> None:
         self.faults: list[str] = []
+        self.scattering: dict[str, Any] = {}
+        self.bsdfs: dict[str, Any] = {}
 
     @abstractmethod
-    def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+    def evaluate(self, material: str, light: Floats, view: Floats) -> Floats:
         """Return what ``response`` returns, before it is checked."""
 
     @abstractmethod
@@ -64,7 +69,11 @@ class Subject(ABC):
     def numbers(self) -> Iterator[Number]:
         """Yield the numbers that it depends on."""
 
-    def response(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+    def both_sides(self, degrees: tuple[float, ...]) -> tuple[float, ...]:
+        """Return angles from the normal; of what transmits light, also those from behind."""
+        return degrees + tuple(180 - degree for degree in reversed(degrees) if self.eta)
+
+    def response(self, material: str, light: Floats, view: Floats) -> Floats:
         """Return ``pi f cos(theta_l)``, (C, N): see :mod:`fotismos.comparisons.audit.furnace`.
 
         Values that are not finite, or negative, are noted and count as 0.
@@ -73,21 +82,16 @@ class Subject(ABC):
         light = np.broadcast_to(light, (3, count))
         view = np.broadcast_to(view, (3, count))
         values = np.broadcast_to(self.evaluate(material, light, view), (3, count))
-        self.note(material, values, (light, view))
+        self.note(material, values, Pairs(light, view))
         return np.where(np.isfinite(values) & (values > 0), values, 0.0)
 
-    def note(
-        self, description: str, values: np.ndarray, pairs: tuple[np.ndarray, np.ndarray] | None
-    ) -> None:
+    def note(self, description: str, values: Floats, pairs: Pairs | None) -> None:
         """Note the first value (C, N) that is not finite, or negative."""
         is_wrong = ~(np.isfinite(values) & (values >= -user_shaders.ROUNDING))
         if is_wrong.any():
             channel, index = np.argwhere(is_wrong)[0]
-            where = description
-            if pairs:
-                light, view = pairs
-                where += f", {furnace.describe(light, view, index)}"
-            self.faults.append(f"{values[channel, index]:.3g} ({where})")
+            where = f", {furnace.describe(pairs.light, pairs.view, index)}" if pairs else ""
+            self.faults.append(f"{values[channel, index]:.3g} ({description}{where})")
 
 
 # --- Heuristics --------------------------------------------------------------------------------
@@ -154,85 +158,79 @@ class ShadingSubject(Subject):
         }
         self.white = white(heuristic.form or "phong")
         self.materials = {name: material.get("alpha") for name, material in self.white.items()}
-        prepared = {
-            parameter.name: self.values[parameter.name]
-            for parameter in known.values()
-            if parameter.prepared
-        }
+        prepared = {name: self.values[name] for name in known if known[name].prepared}
         self.prepared = heuristic.prepared(user_shaders.trial_scene(0.0), prepared)
         if not heuristic.traced:
             self.untuned = "Dr.Jit cannot differentiate it"
 
-    def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
-        return self._array(self.white[material], _sun(light), view)
+    def evaluate(self, material: str, light: Floats, view: Floats) -> Floats:
+        return self._values(self.white[material], light, view)
 
     def hard_cases(self) -> Iterator[CaseValues]:
-        light, view = pairs = furnace.random_and_mirrored()
-        # Extreme materials, in ordinary directions.
-        for description, change in EXTREMES:
-            yield description, self._array(MIDDLE | change, _sun(light), view), pairs
-        # Ordinary materials, with normals and directions that are not.
+        around = furnace.random_and_mirrored()
+        light, view = around
+        for words, change in EXTREMES:
+            yield words, self._values(MIDDLE | change, light, view), around
         for length in LENGTHS:
-            values = self._array(MIDDLE, _sun(light), view, length * UP)
-            yield f"a normal of length {length:g}", values, pairs
+            values = self._values(MIDDLE, light, view, normal=length * UP)
+            yield f"a normal of length {length:g}", values, around
         low = furnace.grazing()
-        values = self._array(MIDDLE, _sun(low[0]), low[1])
+        values = self._values(MIDDLE, low.light, low.view)
         yield "grazing, head on and from behind", values, low
-        # Lights that are very near, very far, dark, or missing.
-        lights: dict[str, Any] = {
-            f"a light at a distance of {far:g}": PointLight(mi.Point3f(0, 0, far), mi.Spectrum(1.0))
-            for far in DISTANCES
-        }
-        lights["a light of intensity 0"] = DirectionalLight((0.0, 0.0, -1.0), 0.0)
+        for far in DISTANCES:
+            lamp = PointLight(mi.Point3f(0, 0, far), mi.Spectrum(1.0))
+            values = self._values(MIDDLE, [lamp], view)
+            yield f"a light at a distance of {far:g}", values, None
+        dark = DirectionalLight((0.0, 0.0, -1.0), 0.0)
+        yield "a light of intensity 0", self._values(MIDDLE, [dark], view), None
         if self.heuristic.prepare is None:  # it may prepare one item per light
-            lights["no light at all"] = None
-        for description, lamp in lights.items():
-            yield description, self._array(MIDDLE, lamp, view), None
-        nothing = np.zeros((3, 1))
-        yield "a viewer at the point itself", self._array(MIDDLE, _sun(UP), nothing), None
+            yield "no light at all", self._values(MIDDLE, [], view), None
+        yield "a viewer at the point itself", self._values(MIDDLE, UP, np.zeros((3, 1))), None
 
     def numbers(self) -> Iterator[Number]:
         if not self.heuristic.traced:
             return
         light, view = furnace.random_pairs(512)
 
-        def shade(name: str, is_parameter: bool, number: Any) -> Any:
-            change = {name: number}
-            material = MIDDLE if is_parameter else MIDDLE | change
-            values = change if is_parameter else None
-            # The mean of the channels: one value per point.
-            return dr.mean(self._colour(material, _sun(light), view, UP, values))
+        # Both return the mean of the channels: one value per point.
+        def of_material(name: str, number: Any) -> Any:
+            return dr.mean(self._colour(MIDDLE | {name: number}, light, view))
+
+        def of_parameter(name: str, number: Any) -> Any:
+            return dr.mean(self._colour(MIDDLE, light, view, values={name: number}))
 
         for name, value in MIDDLE.items():
             if value:
-                yield name, value, partial(shade, name, False)
+                yield name, value, partial(of_material, name)
         # A preparation gets plain numbers, through which no derivative passes.
         for parameter in self.heuristic.parameters:
-            if not parameter.prepared and (
-                centre := _within(parameter, self.values[parameter.name])
-            ):
-                yield parameter.name, centre, partial(shade, parameter.name, True)
+            centre = _within(parameter, self.values[parameter.name])
+            if centre and not parameter.prepared:
+                yield parameter.name, centre, partial(of_parameter, parameter.name)
 
-    def _array(self, *arguments: Any) -> np.ndarray:
-        return np.array(self._colour(*arguments), float).reshape(3, -1)
+    def _values(self, material: Mapping[str, Any], light: Any, view: Floats, **case: Any) -> Floats:
+        """Return the colours (3, N)."""
+        return np.array(self._colour(material, light, view, **case), float).reshape(3, -1)
 
     def _colour(
         self,
         material: Mapping[str, Any],
         light: Any,
-        view: np.ndarray,
-        normal: np.ndarray = UP,
+        view: Floats,
+        normal: Floats = UP,
         values: Mapping[str, Any] | None = None,
     ) -> Any:
-        point = (0 * UP, normal, view)
-        lights = [] if light is None else [light]
+        """Return the colours under lamps, or parallel light from directions (3, N)."""
+        is_parallel = isinstance(light, np.ndarray)
+        lights = [DirectionalLight(mi.Vector3f(-light), 1.0)] if is_parallel else light
         values = self.values | dict(values or {})
+        point = (0 * UP, normal, view)
         return shaded(self.heuristic, point, material, lights, 0.0, values, self.prepared)
 
 
 def shaded(
     heuristic: Heuristic,
-    point: tuple[np.ndarray, np.ndarray, np.ndarray],
+    point: tuple[Floats, Floats, Floats],
     material: Mapping[str, Any],
     lights: list[Any],
     ambient: Any = 0.0,
@@ -245,23 +243,23 @@ def shaded(
     hides a light. ``values`` are those of its parameters, if not the defaults.
     """
     count = max(vector.shape[1] for vector in point)
+    position, normal, view = (np.broadcast_to(vector, (3, count)) for vector in point)
     known = dict.fromkeys(COLOURS, 0.0) | {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
     # Opaque, as in a scene: Dr.Jit drops products with a literal 0, even of NaN.
-    made = {name: _opaque(value) for name, value in (known | dict(material)).items()}
-    made |= {name: mi.Spectrum(made[name]) for name in COLOURS}
-    values = {vector.name: vector.default for vector in heuristic.parameters} | dict(values or {})
-    vectors = [mi.Vector3f(_single(np.broadcast_to(vector, (3, count)))) for vector in point]
-    position, normal, view = vectors
+    opaque = {name: _opaque(value) for name, value in (known | dict(material)).items()}
+    opaque |= {name: mi.Spectrum(opaque[name]) for name in COLOURS}
     arguments = ShadingArguments(
-        position=position,
-        normal=normal,
-        view=view,
-        material=PairedMaterial(**made, form=heuristic.form or "phong"),
+        position=mi.Vector3f(_single(position)),
+        normal=mi.Vector3f(_single(normal)),
+        view=mi.Vector3f(_single(view)),
+        material=PairedMaterial(**opaque, form=heuristic.form or "phong"),
         lights=lights,
         ambient=mi.Spectrum(ambient),
         visible=lambda toward, distance: dr.full(mi.Bool, True, count),
     )
-    parameters = {name: mi.Float(value) for name, value in values.items()}
+    defaults = {parameter.name: parameter.default for parameter in heuristic.parameters}
+    numbers = defaults | dict(values or {})
+    parameters = {name: mi.Float(number) for name, number in numbers.items()}
     return mi.Spectrum(heuristic.evaluate(arguments, mi.Point2f(0.5), parameters, prepared))
 
 
@@ -271,12 +269,8 @@ def _opaque(value: Any) -> Any:
     return value if dr.is_array_v(value) else dr.opaque(mi.Float, value)
 
 
-def _single(values: np.ndarray) -> np.ndarray:
+def _single(values: Floats) -> Floats:
     return np.ascontiguousarray(values, np.float32)
-
-
-def _sun(toward: np.ndarray) -> DirectionalLight:
-    return DirectionalLight(mi.Vector3f(-toward), 1.0)
 
 
 def _within(parameter: heuristics.Parameter, value: float) -> float | None:
@@ -306,12 +300,6 @@ ROUGH = ("alpha", "alpha_u", "alpha_v", "roughness")
 RESOLVED = {**dict.fromkeys(ROUGH[:3], (0.1, 1.0)), "roughness": (0.32, 1.0), "n": (0.0, 50.0)}
 """Parameters of which both the quadrature and the cells of χ² resolve the lobe."""
 
-LEVEL = 0.001
-"""Chance that correct densities fail, over all angles together."""
-
-INCIDENT = (0.0, 45.0, 75.0)
-"""Degrees at which samples are compared with the density."""
-
 LEAST_BEND = 0.08
 """Least ``|1 - 1 / eta|`` of an interface whose transmitted lobes the quadrature resolves."""
 
@@ -332,17 +320,6 @@ def registered(word: str) -> str:
     return name
 
 
-def _index(bsdf: Any) -> float:
-    """Return the relative index of refraction below a BSDF, as its samples report it, or 1."""
-    lobe, x, y = np.random.default_rng(0).random((3, 256))
-    si = furnace.interaction(np.broadcast_to(UP, (3, 256)))
-    found, _ = bsdf.sample(
-        mi.BSDFContext(), si, mi.Float(lobe), mi.Point2f(mi.Float(x), mi.Float(y))
-    )
-    # Only a sample that passes to the other side tells the index.
-    return dr.max(dr.select(found.wo.z < 0, found.eta, 0))[0] or 1.0
-
-
 class ScatteringSubject(Subject):
     """A BSDF of some type; parameters that are omitted are of :data:`WHITE`.
 
@@ -353,62 +330,64 @@ class ScatteringSubject(Subject):
     def __init__(self, word: str, parameters: Mapping[str, Any]) -> None:
         super().__init__()
         self.plugin = plugin = registered(word)
-        self.parameters = dict(parameters)
-        for name, given in self.parameters.items():
-            for allowed in checks.objections(plugin, name, given):
-                wrong = f"{name} = {checks.shown(given)}"
+        for name, value in parameters.items():
+            for allowed in checks.objections(plugin, name, value):
+                wrong = f"{name} = {checks.shown(value)}"
                 raise InputError(f"BSDF {plugin!r}: {wrong} is not allowed: give {allowed}.")
         # Values whose lobes quadrature or χ² could not resolve are refused.
         for name, (least, most) in RESOLVED.items():
-            value = self.parameters.get(name)
+            value = parameters.get(name)
             if isinstance(value, float) and not least <= value <= most:
                 raise InputError(
                     f"BSDF {plugin!r}: {name} = {value:g} makes a lobe too narrow for the audit, or"
                     f" too wide: give {least:g} to {most:g}."
                 )
+        self.parameters = dict(parameters)
+        self.scattering = {"type": plugin} | WHITE.get(plugin, {}) | self.parameters
         self.bsdf = self._made()
-        if mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Delta):
+        flags = self.bsdf.flags()
+        if mi.has_flag(flags, mi.BSDFFlags.Delta):
             raise InputError(
                 f"BSDF {plugin!r} reflects light as a mirror, or passes it in one direction: it has"
                 " no density to audit. Give a rough one, such as roughconductor or roughdielectric."
             )
-        if mi.has_flag(self.bsdf.flags(), mi.BSDFFlags.Transmission):
-            eta = self.eta = _index(self.bsdf)
+        if mi.has_flag(flags, mi.BSDFFlags.Transmission):
+            eta = self.eta = samples.index_below(self.bsdf)
             if 0 < abs(1 - 1 / eta) < LEAST_BEND:
                 raise InputError(
                     f"BSDF {plugin!r}: an index of refraction of {eta:.3g} makes a lobe too narrow"
                     f" for the audit: give one above {1 / (1 - LEAST_BEND):.2f}."
                 )
         # One BSDF, or one for each roughness if that is left open.
+        self.materials = {plugin: None}
         self.bsdfs = {plugin: self.bsdf}
-        self.materials: dict[str, float | None] = {plugin: None}
         self.keys = {key.partition(".")[0] for key, _ in mi.traverse(self.bsdf)}
-        if self.keys.intersection(ROUGH) and not self.parameters.keys() & set(ROUGH):
+        if self.keys.intersection(ROUGH) and not parameters.keys() & set(ROUGH):
+            self.materials = {f"{plugin}, alpha {alpha:g}": alpha for alpha in ALPHAS}
             # Where it is called `roughness`, it is the root of alpha.
-            by_root = "roughness" in self.keys
-            of = {f"{plugin}, alpha {alpha:g}": alpha for alpha in ALPHAS}
-            self.materials = {**of}
+            name, power = ("roughness", 0.5) if "roughness" in self.keys else ("alpha", 1)
             self.bsdfs = {
-                name: self._made(**({"roughness": alpha**0.5} if by_root else {"alpha": alpha}))
-                for name, alpha in of.items()
+                material: self._made(**{name: alpha**power})
+                for material, alpha in zip(self.materials, ALPHAS, strict=True)
             }
+        light, view = furnace.random_pairs(256, self.eta)
+        is_black = not furnace.of_bsdf(self.bsdf)(light, view).any()
+        self.unsampled = "it scatters nothing" if is_black else ""
 
-    def evaluate(self, material: str, light: np.ndarray, view: np.ndarray) -> np.ndarray:
+    def evaluate(self, material: str, light: Floats, view: Floats) -> Floats:
         return furnace.of_bsdf(self.bsdfs[material])(light, view)
 
     def hard_cases(self) -> Iterator[CaseValues]:
+        response = furnace.of_bsdf(self.bsdf)
         light, view = furnace.grazing()
         # Each pair again, with the viewer on the other side.
-        pairs = np.hstack([light, light]), np.hstack([view, -view])
-        yield (
-            "grazing, head on and from behind",
-            furnace.of_bsdf(self.bsdf)(pairs[0], pairs[1]),
-            pairs,
-        )
-        yield "a direction of length 0", furnace.of_bsdf(self.bsdf)(np.zeros((3, 1)), UP), None
-        light, view = pairs = furnace.random_and_mirrored()
+        low = Pairs(np.hstack([light, light]), np.hstack([view, -view]))
+        yield "grazing, head on and from behind", response(low.light, low.view), low
+        yield "a direction of length 0", response(np.zeros((3, 1)), UP), None
+        around = furnace.random_and_mirrored()
         for alpha in (1e-4, 1.0) if "alpha" in self.keys else ():
-            yield f"alpha = {alpha:g}", furnace.of_bsdf(self._made(alpha=alpha))(light, view), pairs
+            response = furnace.of_bsdf(self._made(alpha=alpha))
+            yield f"alpha = {alpha:g}", response(around.light, around.view), around
 
     def numbers(self) -> Iterator[Number]:
         light, view = furnace.random_pairs(512, self.eta)
@@ -423,45 +402,9 @@ class ScatteringSubject(Subject):
                 centre = min(max(centre, 0.1), 0.9) if is_share else centre
                 yield key, centre, partial(self._changed, key, type(value), light, view)
 
-    @cached_property
-    def is_black(self) -> bool:
-        """Whether it scatters nothing."""
-        light, view = furnace.random_pairs(256, self.eta)
-        return not furnace.of_bsdf(self.bsdf)(light, view).any()
-
-    def directions(self) -> tuple[float, str]:
-        """Return the least p of χ² between samples and ``pdf`` (Mitsuba's test), and its angle."""
-        angles = furnace.both_sides(INCIDENT, self.eta)
-        return min((self._p_value(angle), f"viewer at {angle:g}°") for angle in angles)
-
-    def _p_value(self, degrees: float) -> float:
-        wi = mi.Vector3f(furnace.direction(np.deg2rad(degrees), 0.3))
-        parameters = {"type": self.plugin} | WHITE.get(self.plugin, {}) | self.parameters
-        sample, density = mi.chi2.BSDFAdapter(self.plugin, parameters, wi=wi)
-
-        def turned(sample1: Any) -> Any:
-            # Cells are fine at the equator: transmitted lobes about the normal are narrow.
-            wo, weight = sample(sample1)
-            return mi.Vector3f(wo.y, wo.z, wo.x), weight
-
-        def counted(wo: Any) -> Any:
-            wo = mi.Vector3f(wo.z, wo.x, wo.y)
-            # Samples below the horizon weigh nothing: roughplastic's density there is irrelevant.
-            return dr.select((wo.z > 0) | (self.eta is not None), density(wo), 0)
-
-        test = mi.chi2.ChiSquareTest(
-            mi.chi2.SphericalDomain(), turned, counted, sample_dim=3,
-            sample_count=200_000, ires=32, res=100,
-        )  # fmt: skip
-        test.run(quiet=True)
-        # The test also fails for a negative density, or for samples where it is 0.
-        p = 0.0 if test.fail else float(np.array(test.p_value).ravel()[0])
-        return p if np.isfinite(p) else 0.0
-
     def _made(self, **instead: Any) -> Any:
-        parameters = WHITE.get(self.plugin, {}) | self.parameters | instead
         try:
-            made = mi.load_dict({"type": self.plugin} | parameters)
+            made = mi.load_dict(self.scattering | instead)
         except RuntimeError as error:
             said = str(error).strip().splitlines()
             reason = " ".join(" ".join(said[-2:] if "Traceback" in str(error) else said).split())
@@ -477,9 +420,7 @@ class ScatteringSubject(Subject):
             )
         return made
 
-    def _changed(
-        self, key: str, kind: type, light: np.ndarray, view: np.ndarray, number: Any
-    ) -> Any:
+    def _changed(self, key: str, kind: type, light: Floats, view: Floats, number: Any) -> Any:
         # Made for each derivative: the one under audit keeps its values.
         bsdf = self._made()
         parameters = mi.traverse(bsdf)
