@@ -35,14 +35,13 @@ def page(fit: Fit, folder: Path | None = None) -> str:
     error = best.departure[LEADING.name]
     scale = f"{LEADING.label} from 0 to {high:g}"
     before = LEADING(fit.before, fit.reference, record.viewing)
+    after = LEADING(fit.after, fit.reference, record.viewing)
     shown = {
         "physical": images.tonemap(fit.reference, exposure),
         "textbook, paired": images.tonemap(fit.before, exposure),
         f"textbook, fitted ({best.form})": images.tonemap(fit.after, exposure),
         f"error before, mean {difference(error.before)} ({scale})": images.error_map(before, high),
-        f"error after, mean {difference(error.after)} ({scale})": images.error_map(
-            fit.maps[LEADING.name], high
-        ),
+        f"error after, mean {difference(error.after)} ({scale})": images.error_map(after, high),
     }
     return rendered(
         "fit_page.html.j2",
