@@ -149,8 +149,8 @@ def fit(
     ``loss`` is a name in :data:`fotismos.comparisons.fit.search.LOSSES`; ``forms`` are forms of the
     lobe. The resolution and samples are :data:`RESOLUTION` and :data:`SPP` if omitted. Films get a
     box filter, which keeps pixels independent. Pictures of another renderer may be the reference.
-    ``progress(stage, done, total)`` is called after
-    each pass; ``command`` repeats the fit, for the record.
+    ``progress(stage, done, total)`` is called after each pass; ``command`` repeats the fit, for the
+    record.
     """
     begin = perf_counter()
     if loss not in LOSSES:
@@ -234,15 +234,14 @@ def _completed(options: Options) -> Options:
 
 def filter_by_box(graph: Graph) -> None:
     """Give the films of a scene a box filter."""
-    for film in graph.nodes(mi.ObjectType.Film):
-        for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
-            graph.detach(film, key)
     # A sensor without a film would get Mitsuba's own, with another filter.
     for sensor in graph.nodes(mi.ObjectType.Sensor):
         if not graph.children(sensor, mi.ObjectType.Film):
             film = graph.add(mi.ObjectType.Film, properties("hdrfilm"))
             graph.attach(sensor, "film", film)
     for film in graph.nodes(mi.ObjectType.Film):
+        for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
+            graph.detach(film, key)
         box = graph.add(mi.ObjectType.ReconstructionFilter, properties("box"))
         graph.attach(film, "rfilter", box)
 

@@ -28,7 +28,7 @@ rendered once, sample by sample, with the reference's rays (the same sampler, se
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
-from math import exp, log, sqrt
+from math import log
 from typing import Any
 
 import drjit as dr
@@ -36,14 +36,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from fotismos.comparisons.fit.search import COVERAGE, FitParameter, Model, bounded_minimum
+from fotismos.comparisons.fit.search import FitParameter, Model, bounded_minimum
 from fotismos.comparisons.records.fit import Channel
 from fotismos.heuristic.convention import Colour, Doubles, Floats, Interaction, Mask, Scene
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Heuristic
 from fotismos.heuristic.kernel import BLOCK, shade
 from fotismos.heuristic.materials import Material
-from fotismos.heuristic.terms import normalisation
 from fotismos.reference.pairing.factors import alpha_of, exponent_of, specular_albedo
 from fotismos.reference.rendering.renderer import Renderer, variant
 
@@ -273,13 +272,15 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
             is_grey = has_texture or np.ptp(colour) <= 1e-6 * max(colour)
             channels: tuple[Channel, ...] = ("",) if is_grey else ("R", "G", "B")
             values = [max(colour)] if is_grey else colour
+            is_scaled = name == "k_s" and not material.normalised
             fitted += [
                 FitParameter(
                     name=name,
-                    owner=owner,
                     paired=float(value),
                     low=0.0,
                     high=LARGEST_FACTOR if has_texture else 1.0,
+                    owner=owner,
+                    held="albedo" if is_scaled else "itself",
                     channel=channel,
                     is_factor=has_texture,
                 )
@@ -290,10 +291,11 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
         fitted.append(
             FitParameter(
                 name="n",
-                owner=owner,
                 paired=log(min(max(n, low), high)),
                 low=log(low),
                 high=log(high),
+                owner=owner,
+                held="logarithm",
             )
         )
     return tuple(fitted)
@@ -358,39 +360,6 @@ class PhongModel(Model):
             starts.append(x)
         return starts
 
-    def stated(self, number: int, x: Floats) -> float:
-        value = float(x[number])
-        if self.parameters[number].name == "n":
-            return exp(value)
-        at_n = self.other_in_unit(number)
-        return value if at_n is None else value * self._per_albedo(x[at_n])
-
-    def interval(self, number: int, x: Floats, covariance: Floats) -> tuple[float, float]:
-        at_n = self.other_in_unit(number)
-        if at_n is None:
-            return super().interval(number, x, covariance)
-        # To first order, with the error of `n` and the covariance of the two.
-        step = 1e-5
-        rise = self._per_albedo(x[at_n] + step) - self._per_albedo(x[at_n] - step)
-        slopes = np.zeros(len(x))
-        slopes[number] = self._per_albedo(x[at_n])
-        slopes[at_n] = x[number] * rise / (2 * step)
-        spread = COVERAGE * sqrt(max(float(slopes @ covariance @ slopes), 0))
-        k_s = self.stated(number, x)
-        return k_s - spread, k_s + spread
-
-    def other_in_unit(self, number: int) -> int | None:
-        """Return the place of ``n`` for a ``k_s``, of which the vector holds the lobe's albedo."""
-        parameter = self.parameters[number]
-        is_scaled = not self.surface.materials[parameter.owner].normalised
-        if parameter.name == "k_s" and is_scaled:
-            return self.place_of_exponent(parameter.owner)
-        return None
-
-    def _per_albedo(self, log_n: float) -> float:
-        """Return ``k_s`` of a lobe of albedo 1."""
-        return float(normalisation(self.form, exp(log_n)))
-
     def coefficients(self, x: Floats, name: str) -> dict[int, Floats]:
         """Return RGB of a coefficient for each material (for ``k_s``, the lobe's albedo)."""
         sums: dict[int, Floats] = {owner: np.zeros(3) for owner in range(len(self.surface.samples))}
@@ -398,10 +367,6 @@ class PhongModel(Model):
             if parameter.name == name:
                 sums[parameter.owner] += number * parameter.tint
         return sums
-
-    def place_of_exponent(self, owner: int) -> int:
-        """Return the index of a material's ``n``."""
-        return [(p.name, p.owner) for p in self.parameters].index(("n", owner))
 
     def _derivatives(self, x: Floats) -> Any:
         result = np.empty((len(x), *self.surface.fixed.shape))
@@ -476,7 +441,6 @@ class OwnModel(Model):
         self.parameters = tuple(
             FitParameter(
                 name=parameter.name,
-                owner=0,
                 paired=parameter.default,
                 low=parameter.low,
                 high=parameter.high,

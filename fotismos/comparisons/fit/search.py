@@ -26,7 +26,8 @@ the inverse of its second derivative moves the minimum.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite, sqrt
+from math import exp, inf, isfinite, sqrt
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,7 @@ from fotismos.comparisons.departure.colour import cam16ucs_unclipped
 from fotismos.comparisons.records.departure import Viewing
 from fotismos.comparisons.records.fit import Channel, FittedParameter
 from fotismos.heuristic.convention import Doubles, Floats
+from fotismos.heuristic.terms import normalisation
 
 STEP = 1e-4
 SMALLEST_STEP = 1e-8
@@ -62,6 +64,13 @@ AT_BOUND = 1e-5
 PARTNER = 0.1
 """Share of a change that another parameter must take up to be named."""
 
+REASONS = (
+    "does not show in the image",
+    "others make up for it",
+    "lost in the noise of the physical picture",
+)
+"""Why a parameter is not identifiable; the first that holds is given."""
+
 COVERAGE = 1.96
 """Standard errors to either side, of an interval that covers 95 % of normal errors."""
 
@@ -74,14 +83,16 @@ class FitParameter:
     """One number to be fitted: ``k_a``, ``k_d``, ``k_s`` or ``n``, or a heuristic's own.
 
     ``owner`` is the index of its material. The value by the pairing table and the bounds are as in
-    the vector. A coefficient of three numbers has one in each ``channel``.
+    the vector, which has the ``logarithm`` of ``n``, and for ``k_s`` may have the lobe's
+    ``albedo``. A coefficient of three numbers has one in each ``channel``.
     """
 
     name: str
-    owner: int
     paired: float
     low: float
     high: float
+    owner: int = 0
+    held: Literal["itself", "logarithm", "albedo"] = "itself"
     channel: Channel = ""
     is_factor: bool = False
 
@@ -92,7 +103,7 @@ class FitParameter:
 
 
 class Model:
-    """A textbook half as a function of a vector with all of its ``parameters``.
+    """A textbook half as a function of a vector ``x`` (P,) with all of its ``parameters``.
 
     ``names`` are those of its materials, each of which ``reached`` so many of the pixels that are
     ``counted`` (N,). ``form`` is that of the lobe, or the name of a heuristic.
@@ -136,26 +147,46 @@ class Model:
         """The paired values (P,), which may lie outside the bounds."""
         return np.array([parameter.paired for parameter in self.parameters])
 
-    def stated(self, number: int, x: Floats) -> float:
-        """Return a parameter of a vector in the unit of records."""
-        return float(x[number])
+    def label(self, number: int) -> str:
+        """Return the name of a parameter and its material."""
+        parameter = self.parameters[number]
+        name = f"{parameter.name} {parameter.channel}".strip()
+        return f"{name} of {self.names[parameter.owner]}"
+
+    def place_of_exponent(self, owner: int) -> int:
+        """Return the index of a material's ``n``."""
+        return [(p.name, p.owner) for p in self.parameters].index(("n", owner))
+
+    def stated(self, number: int, x: Floats, value: float) -> float:
+        """Return a value of a parameter in the unit of records, beside the others of ``x``."""
+        parameter = self.parameters[number]
+        if parameter.held == "logarithm":
+            return exp(value)
+        if parameter.held == "albedo":
+            return float(value * self.per_albedo(x[self.place_of_exponent(parameter.owner)]))
+        return float(value)
+
+    def per_albedo(self, logarithm: float) -> float:
+        """Return the ``k_s`` of a lobe of albedo 1 and a given ``ln n``."""
+        return float(normalisation(self.form, exp(logarithm)))
 
     def interval(self, number: int, x: Floats, covariance: Floats) -> tuple[float, float]:
         """Return the interval of a parameter in the unit of records, bounds aside."""
-        spread = COVERAGE * sqrt(covariance[number, number])
-        low = self.stated(number, moved(x, number, x[number] - spread))
-        return low, self.stated(number, moved(x, number, x[number] + spread))
-
-    def other_in_unit(self, number: int) -> int | None:
-        """Return the index of the parameter that a parameter's unit depends on, if it does."""
-        return None
-
-
-def moved(x: Floats, number: int, value: float) -> Floats:
-    """Return a vector with another value in one place."""
-    copy = x.copy()
-    copy[number] = value
-    return copy
+        parameter = self.parameters[number]
+        if parameter.held != "albedo":
+            spread = COVERAGE * sqrt(covariance[number, number])
+            low = self.stated(number, x, x[number] - spread)
+            return low, self.stated(number, x, x[number] + spread)
+        # `k_s` also depends on `n`: to first order, with the covariance of the two.
+        at_n = self.place_of_exponent(parameter.owner)
+        step = 1e-5
+        rise = self.per_albedo(x[at_n] + step) - self.per_albedo(x[at_n] - step)
+        slopes = np.zeros(len(x))
+        slopes[number] = self.per_albedo(x[at_n])
+        slopes[at_n] = x[number] * rise / (2 * step)
+        spread = COVERAGE * sqrt(max(float(slopes @ covariance @ slopes), 0))
+        k_s = self.stated(number, x, x[number])
+        return k_s - spread, k_s + spread
 
 
 # --- The loss -----------------------------------------------------------------------------------
@@ -341,7 +372,7 @@ def identify(
     # A norm over all pixels, divided by this, is a root mean square over those it reaches.
     pixels = [model.reached[parameter.owner] for parameter in model.parameters]
     root = np.sqrt(np.maximum(pixels, 1))
-    _, curvature, jacobian = objective.changes(x)
+    _, _, jacobian = objective.changes(x)
     flat = jacobian.reshape(-1, len(x))
     shows = np.linalg.norm(flat, axis=0) / root >= threshold
     inverse = np.zeros((len(x), len(x)))
@@ -351,65 +382,62 @@ def identify(
     determined[shows] = 1 / np.sqrt(np.diag(inverse)[shows]) / root[shows] >= threshold
     covariance = np.zeros((len(x), len(x)))
     if (inside := determined & ~at_bound).any():
-        second = objective.quadratic(x)[1][np.ix_(inside, inside)]
-        slopes = objective.loss.derivative(objective.reference, objective.viewing)
-        # What one standard error of each reference channel changes in the slopes, (N, K, 3).
-        noise = curvature @ (slopes * standard_error[:, None, :])
-        spread = np.einsum("nkp,nkc->pnc", jacobian[..., inside], noise) / len(noise)
-        change = np.linalg.pinv(second, hermitian=True) @ spread.reshape(len(spread), -1)
+        moved = _moved(objective, x, inside, standard_error)
         # Pixels and channels count as independent: their squares add up.
-        covariance[np.ix_(inside, inside)] = change @ change.T
+        covariance[np.ix_(inside, inside)] = moved @ moved.T
     # Half an interval above one natural change tells nothing of the value.
     lost = COVERAGE * np.sqrt(np.diag(covariance)) > 1
-    reasons = np.select(
-        [~shows, ~determined, lost],
-        [
-            "does not show in the image",
-            "others make up for it",
-            "lost in the noise of the physical picture",
-        ],
-        "",
-    ).tolist()
+    reasons = np.select([~shows, ~determined, lost], REASONS, "").tolist()
     records = []
     for number, parameter in enumerate(model.parameters):
         reason = reasons[number]
         partners: list[str] = []
-        if shows[number] and not determined[number]:
+        if reason == REASONS[1]:
             # How far each other parameter moves to undo a unit of this one.
             shares = np.abs(inverse[number] / inverse[number, number])
-            partners = [
-                f"{f'{other.name} {other.channel}'.strip()} of {model.names[other.owner]}"
-                for other, share in zip(model.parameters, shares, strict=True)
-                if other is not parameter and share > PARTNER
-            ]
+            shares[number] = 0
+            partners = [model.label(other) for other in range(len(x)) if shares[other] > PARTNER]
         # Without a lobe `k_s` is 0 for any `n`.
-        other_in_unit = model.other_in_unit(number)
-        if other_in_unit is not None and reasons[other_in_unit] and x[number] > AT_BOUND:
-            reason = reason or "follows from its albedo and n, which is not identifiable"
-        lowest = model.stated(number, moved(x, number, parameter.low))
-        highest = model.stated(number, moved(x, number, parameter.high))
-        interval = None
-        if not (reason or at_bound[number]):
-            least, most = model.interval(number, x, covariance)
-            interval = max(least, lowest), min(most, highest)
+        if parameter.held == "albedo" and not reason and x[number] > AT_BOUND:
+            lost_n = reasons[model.place_of_exponent(parameter.owner)]
+            reason = lost_n and "follows from its albedo and n, which is not identifiable"
+        lowest = model.stated(number, x, parameter.low)
+        highest = model.stated(number, x, parameter.high)
+        least, most = model.interval(number, x, covariance)
+        has_interval = not (reason or at_bound[number])
         records.append(
             FittedParameter(
                 name=parameter.name,
                 channel=parameter.channel,
                 is_factor=parameter.is_factor,
-                paired=model.stated(number, model.paired),
-                fitted=None if reason else model.stated(number, x),
-                interval=interval,
-                bounds=(
-                    lowest if isfinite(lowest) else None,
-                    highest if isfinite(highest) else None,
-                ),
+                paired=model.stated(number, model.paired, parameter.paired),
+                fitted=None if reason else model.stated(number, x, x[number]),
+                interval=(max(least, lowest), min(most, highest)) if has_interval else None,
+                bounds=(_finite(lowest), _finite(highest)),
                 at_bound=bool(at_bound[number]),
                 reason=reason,
                 partners=tuple(partners),
             )
         )
     return records, covariance
+
+
+def _moved(
+    objective: Objective, x: Floats, inside: NDArray[np.bool_], standard_error: Floats
+) -> Floats:
+    """Return how far one standard error of each channel (N C) moves the parameters inside."""
+    _, curvature, jacobian = objective.changes(x)
+    second = objective.quadratic(x)[1][np.ix_(inside, inside)]
+    slopes = objective.loss.derivative(objective.reference, objective.viewing)
+    # What one standard error of each reference channel changes in the slopes, (N, K, 3).
+    noise = curvature @ (slopes * standard_error[:, None, :])
+    spread = np.einsum("nkp,nkc->pnc", jacobian[..., inside], noise) / len(noise)
+    moved: Floats = np.linalg.pinv(second, hermitian=True) @ spread.reshape(len(spread), -1)
+    return moved
+
+
+def _finite(bound: float) -> float | None:
+    return bound if isfinite(bound) else None
 
 
 def _inverse_normal(jacobian: Floats) -> Floats:

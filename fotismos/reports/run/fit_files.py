@@ -29,7 +29,7 @@ def page(fit: Fit, folder: Path | None = None) -> str:
     The pictures are tone-mapped; the map has the metric's fixed range.
     """
     record = fit.record
-    best = fit.record.nearest
+    best = record.nearest
     exposure = record.viewing.exposure
     high = LEADING.map_range[1]
     error = best.departure[LEADING.name]
@@ -142,8 +142,7 @@ def _interval(parameter: FittedParameter) -> str:
     """Return the interval of a parameter, or that it is narrower than the value's last digit."""
     if not parameter.interval:
         return ""
-    low = f"{parameter.interval[0]:.4g}"
-    high = f"{parameter.interval[1]:.4g}"
+    low, high = (f"{end:.4g}" for end in parameter.interval)
     return "below the last digit" if low == high else f"{low} to {high}"
 
 
