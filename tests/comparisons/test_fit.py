@@ -14,9 +14,8 @@ from drjit.llvm.ad import Array3f64
 from msgspec import structs
 
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.fit import fit as fitting
 from fotismos.comparisons.fit.fit import fit
-from fotismos.comparisons.fit.model import OwnModel, PhongModel, bounds, see, start
+from fotismos.comparisons.fit.model import OwnModel, PhongModel, see
 from fotismos.comparisons.fit.search import LOSSES, Objective, descend, identify, search
 from fotismos.comparisons.gallery.builtin import builtin
 from fotismos.comparisons.options import Options
@@ -86,12 +85,12 @@ def objective_of(surface, image, form="phong", loss="perceptual", vector=None):
 
 
 def best(objective):
-    return search(objective, fitting.form_starts(objective))[0]
+    return search(objective)[0]
 
 
 def inside(objective):
     """Return parameters well within their bounds."""
-    low, high = bounds(objective.model.parameters)
+    low, high = objective.model.bounds
     return low + np.random.default_rng(0).uniform(0.3, 0.6, len(low)) * (high - low)
 
 
@@ -118,7 +117,7 @@ def test_the_model_at_the_paired_parameters_is_the_integrators_image(case, rgb):
         scene["a"]["bsdf"] |= {"normalised": True, "k_s": 0.1}
     surface, image = surface_of(scene)
     model = objective_of(surface, image, form).model
-    modelled = model.image(start(model.parameters))
+    modelled = model.image(np.clip(model.paired, *model.bounds))
     assert image.max() > 0.1
     # n known to be moderate lets the integrator do without double precision: 1e-4 at most.
     np.testing.assert_allclose(modelled, image, rtol=1e-4, atol=1e-5)
@@ -193,7 +192,7 @@ def certainties_of(scene, noise=0.0):
     surface, image = surface_of(scene)
     objective = objective_of(surface, image)
     x = best(objective)
-    found, _ = identify(objective, x, np.full(len(x), len(image)), np.full((len(image), 3), noise))
+    found, _ = identify(objective, x, np.full((len(image), 3), noise))
     names = [f"{p.name} of {surface.names[p.owner]}" for p in objective.model.parameters]
     return dict(zip(names, found, strict=True))
 
@@ -226,8 +225,8 @@ def test_what_does_not_show_is_not_identifiable(rgb):
 def test_ambient_and_constant_light_cannot_be_told_apart(k_a, rgb):
     found = certainties_of(flat(k_a))
     assert found["k_a of floor"].reason == "others make up for it" == found["k_d of floor"].reason
-    assert 1 in found["k_a of floor"].partners
-    assert 0 in found["k_d of floor"].partners
+    assert "k_d of floor" in found["k_a of floor"].partners
+    assert "k_a of floor" in found["k_d of floor"].partners
 
 
 def test_a_parameter_under_the_noise_is_not_identifiable(rgb):
@@ -244,9 +243,8 @@ def test_the_standard_error_is_the_spread_of_fits_to_noisy_images(rgb):
     for _ in range(24):
         noisy = image + noise * rng.normal(size=image.shape)
         objective = objective_of(surface, noisy, loss="linear")
-        fits.append(descend(objective, start(objective.model.parameters))[0])
-    reached, error = np.full(len(fits[0]), len(image)), np.full(image.shape, noise)
-    _, covariance = identify(objective, fits[-1], reached, error)
+        fits.append(descend(objective, objective.model.paired)[0])
+    _, covariance = identify(objective, fits[-1], np.full(image.shape, noise))
     ratio = np.std(fits, axis=0, ddof=1) / np.sqrt(np.diag(covariance))
     # 24 fits give a standard deviation within 15 % (one standard error), for each of 16 parameters.
     assert np.all((ratio > 0.5) & (ratio < 1.6))

@@ -8,9 +8,8 @@ For Phong's model, the forms of its lobe are fitted; for a user's heuristic, the
 declares.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import log
 from time import perf_counter
 from typing import Any
 
@@ -22,18 +21,8 @@ from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.criterion import share_above
 from fotismos.comparisons.departure.metrics import LEADING, drawn, leading_distance
 from fotismos.comparisons.departure.statistics import noise_floor, summarise
-from fotismos.comparisons.fit import model
-from fotismos.comparisons.fit.model import OwnModel, PhongModel
-from fotismos.comparisons.fit.search import (
-    LOSSES,
-    Loss,
-    Objective,
-    bounded_minimum,
-    identify,
-    parameter_record,
-    physical_materials,
-    search,
-)
+from fotismos.comparisons.fit.model import OwnModel, PhongModel, see
+from fotismos.comparisons.fit.search import LOSSES, Loss, Model, Objective, identify, search
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
 from fotismos.comparisons.records.departure import Summary, Viewing
@@ -55,14 +44,15 @@ from fotismos.reference.records import Interval, Pixels
 from fotismos.reference.rendering.passes import Progress, pass_seed, passes
 from fotismos.reference.rendering.renderer import variant
 from fotismos.reference.rendering.sums import (
+    MEAN,
     Accumulator,
     DifferenceEstimate,
     DifferenceSums,
-    Estimate,
     add_difference,
 )
 from fotismos.reference.scene.graph import Graph, properties
 from fotismos.reference.scene.source import Source
+from fotismos.reference.scene.values import COLOURS
 
 RESOLUTION = (96, 96)
 SPP = 64
@@ -70,35 +60,26 @@ SPP = 64
 
 VARIANT = "llvm_ad_rgb"
 
-STARTS = (2.0, 8.0, 32.0, 128.0, 512.0)
-"""Exponents of the form ``phong`` to start from; ``blinn`` has four times as large ones."""
-
-OWN_STARTS = 6
-"""Places within the bounds to start from for a heuristic's own parameters."""
-
-REACH = 4.0
-"""Starts of a parameter without bounds lie within this many times its default, or its unit."""
-
 
 @dataclass(frozen=True)
 class Fit:
-    """A fit: its record, linear images (H, W, 3), and maps (H, W) of the best form, by metric."""
+    """A fit: its record, and linear images (H, W, 3)."""
 
     record: FitRecord
     before: Floats
     reference: Floats
     after: Floats
-    maps: dict[str, Floats]
 
 
 @dataclass(frozen=True)
 class RenderedHalves:
-    """Both halves of a scene: the image of the paired parameters, the reference, the pixels."""
+    """Linear images (H, W, 3) of both halves, the textbook one with the paired parameters.
 
-    ready: Prepared
-    seeds: tuple[int, ...]
+    ``difference`` is that of the passes, over the ``counted`` pixels (H, W).
+    """
+
     before: Floats
-    reference: Estimate
+    reference: Floats
     difference: DifferenceEstimate
     counted: NDArray[np.bool_]
     viewing: Viewing
@@ -114,6 +95,46 @@ class RenderedHalves:
             grouped=replace(grouped, means=means),
         )
 
+    def departures(self, after: Floats) -> dict[str, FitDeparture]:
+        """Return what is between the halves before and after a fit, by metric."""
+        by_metric = {}
+        for name, metric in drawn().items():
+            before, left = (
+                metric.mean(metric(image, self.reference, self.viewing)[self.counted])
+                for image in (self.before, after)
+            )
+            floor = noise_floor(
+                metric,
+                self.reference,
+                noise=self.difference.noise,
+                mask=self.counted,
+                viewing=self.viewing,
+            )
+            by_metric[name] = FitDeparture(before=before, after=left, noise_floor=floor)
+        return by_metric
+
+    def summary(self, image: Floats) -> Summary:
+        """Return the summary of an image with the paired or the fitted parameters."""
+        summary, _ = summarise(
+            LEADING,
+            image,
+            reference=self.reference,
+            mask=self.counted,
+            viewing=self.viewing,
+            noise=self.difference.noise,
+            grouped=self.difference_of(image).grouped,
+        )
+        return summary
+
+    def judgement(self, after: Floats, left: Summary) -> Judgement:
+        """Return whether the model is right, by the fitted image and its summary."""
+        distance = leading_distance(self.viewing)
+        found = marks.find(self.difference_of(after), after, self.counted, distance)
+        if found.is_certain:
+            return "wrong"
+        is_right = left.low <= EXACT and left.high <= INVISIBLE
+        return "right within noise" if is_right else "undecided"
+
 
 def fit(
     source: Source,
@@ -128,8 +149,8 @@ def fit(
     ``loss`` is a name in :data:`fotismos.comparisons.fit.search.LOSSES`; ``forms`` are forms of the
     lobe. The resolution and samples are :data:`RESOLUTION` and :data:`SPP` if omitted. Films get a
     box filter, which keeps pixels independent. Pictures of another renderer may be the reference.
-    ``progress(stage, done, total)`` is called after
-    each pass; ``command`` repeats the fit, for the record.
+    ``progress(stage, done, total)`` is called after each pass; ``command`` repeats the fit, for the
+    record.
     """
     begin = perf_counter()
     if loss not in LOSSES:
@@ -139,45 +160,44 @@ def fit(
     options = _completed(options or Options())
     heuristic = named(options.heuristic)
     # Both halves are rendered once; every form is fitted to the same images.
-    rendered = render(guarded(source.edited(filter_by_box), options), progress)
+    ready = guarded(source.edited(filter_by_box), options)
+    rendered = render(ready, progress)
     rendering = perf_counter() - begin
-    ready = rendered.ready
-    if heuristic is PHONG:
-        with variant(VARIANT):
-            surface = model.see(ready.heuristic, rendered.seeds)
-            models = [PhongModel(surface, form, rendered.counted.ravel()) for form in forms]
-            fits = [_best(rendered, form_model, form_starts, LOSSES[loss]) for form_model in models]
-    else:
-        own_model = OwnModel(
-            ready.heuristic, heuristic, seeds=rendered.seeds, counted=rendered.counted
-        )
-        fits = [_best(rendered, own_model, own_starts, LOSSES[loss])]
+    counted = rendered.counted
+    seeds = [pass_seed(options.seed, number) for number in range(ready.passes)]
+    models: Sequence[Model]
+    with variant(VARIANT):
+        if heuristic is PHONG:
+            surface = see(ready.heuristic, seeds)
+            models = [PhongModel(surface, form, counted.ravel()) for form in forms]
+        else:
+            models = [OwnModel(ready.heuristic, heuristic, seeds=seeds, counted=counted)]
+        physical = physical_materials(ready.pair.physical)
+        fits = [_fitted(model, rendered, LOSSES[loss], physical) for model in models]
     best = min(range(len(fits)), key=lambda number: fits[number][0].loss)
     record = FitRecord(
         scene=source.name,
         variant=ready.reference.variant,
         seed=options.seed,
-        resolution=rendered.counted.shape[::-1],
+        resolution=counted.shape[::-1],
         spp=ready.spp,
         passes=ready.passes,
         viewing=options.viewing,
         pairing=options.pairing,
         loss={"name": loss, "unit": LOSSES[loss].unit},
-        pixels=Pixels(counted=int(rendered.counted.sum()), total=rendered.counted.size),
-        fits=tuple(form for form, _, _ in fits),
+        pixels=Pixels(counted=int(counted.sum()), total=counted.size),
+        fits=tuple(form for form, _ in fits),
         best=best,
         warnings=tuple(ready.warnings()),
         versions=versions(),
         time={"rendering_s": rendering, "fitting_s": perf_counter() - begin - rendering},
         command=command,
     )
-    _, after, maps = fits[best]
     return Fit(
         record=record,
         before=rendered.before,
-        reference=rendered.reference.mean,
-        after=after,
-        maps=maps,
+        reference=rendered.reference,
+        after=fits[best][1],
     )
 
 
@@ -214,170 +234,91 @@ def _completed(options: Options) -> Options:
 
 def filter_by_box(graph: Graph) -> None:
     """Give the films of a scene a box filter."""
-    for film in graph.nodes(mi.ObjectType.Film):
-        for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
-            graph.detach(film, key)
     # A sensor without a film would get Mitsuba's own, with another filter.
     for sensor in graph.nodes(mi.ObjectType.Sensor):
         if not graph.children(sensor, mi.ObjectType.Film):
             film = graph.add(mi.ObjectType.Film, properties("hdrfilm"))
             graph.attach(sensor, "film", film)
     for film in graph.nodes(mi.ObjectType.Film):
+        for key, _ in graph.children(film, mi.ObjectType.ReconstructionFilter):
+            graph.detach(film, key)
         box = graph.add(mi.ObjectType.ReconstructionFilter, properties("box"))
         graph.attach(film, "rfilter", box)
 
 
 def render(ready: Prepared, progress: Progress | None) -> RenderedHalves:
     """Render the passes of both halves in turn."""
-    options = ready.options
     if ready.heuristic.variant != VARIANT:
         raise InputError(
             f"variant {ready.heuristic.variant}: parameters are fitted in RGB. Give"
             f" `heuristic_variant={VARIANT}`."
         )
-    difference_sums = DifferenceSums(ready.counted)
-    sums = [Accumulator(), Accumulator(), difference_sums]
+    difference = DifferenceSums(ready.counted)
+    sums = [Accumulator(MEAN), Accumulator(MEAN), difference]
     halves = (ready.first, ready.second)
-    for rendered in passes(halves, options.seed, ready.passes, progress=progress):
-        add_difference(sums, rendered)
-    before = sums[0].estimate()
-    reference = sums[1].estimate()
+    for images in passes(halves, ready.options.seed, ready.passes, progress=progress):
+        add_difference(sums, images)
     return RenderedHalves(
-        ready=ready,
-        seeds=tuple(pass_seed(options.seed, number) for number in range(ready.passes)),
-        before=before.mean,
-        reference=reference,
-        difference=difference_sums.estimate(),
+        before=sums[0].mean(),
+        reference=sums[1].mean(),
+        difference=difference.estimate(),
         counted=ready.counted,
-        viewing=options.viewing,
+        viewing=ready.options.viewing,
     )
 
 
-def _best(
-    rendered: RenderedHalves,
-    fitted: PhongModel | OwnModel,
-    starts: Callable[[Objective], list[Floats]],
-    loss: Loss,
-) -> tuple[FormFit, Floats, dict[str, Floats]]:
-    """Return the record of a fit, its image, and the maps of what it leaves."""
+def _fitted(
+    model: Model, rendered: RenderedHalves, loss: Loss, physical: dict[str, dict[str, Any]]
+) -> tuple[FormFit, Floats]:
+    """Return the record of a fit, and its image (H, W, 3); ``physical`` materials are by name."""
     counted = rendered.counted
-    objective = Objective(
-        fitted, rendered.reference.mean[counted], loss=loss, viewing=rendered.viewing
-    )
-    x, least, converged = search(objective, starts(objective))
-    # What the image tells of each parameter, given its noise.
-    pixels = np.array([fitted.reached[parameter.owner] for parameter in fitted.parameters])
+    objective = Objective(model, rendered.reference[counted], loss=loss, viewing=rendered.viewing)
+    x, least, converged = search(objective)
     # The halves share their camera rays: noise that cancels in the difference moves no fit.
-    error = rendered.difference.standard_error[counted]
-    certainties, covariance = identify(objective, x, pixels=pixels, standard_error=error)
-    physical = physical_materials(rendered.ready.pair.physical)
-    materials = tuple(
+    parameters, _ = identify(objective, x, rendered.difference.standard_error[counted])
+    materials = [
         FittedMaterial(
             name=name,
             reference=physical.get(name),
-            pixels=fitted.reached[owner],
+            pixels=model.reached[owner],
             parameters=tuple(
-                parameter_record(
-                    fitted, number, x=x, certainties=certainties, covariance=covariance
-                )
-                for number, parameter in enumerate(fitted.parameters)
+                record
+                for record, parameter in zip(parameters, model.parameters, strict=True)
                 if parameter.owner == owner
             ),
         )
-        for owner, name in enumerate(fitted.names)
-    )
+        for owner, name in enumerate(model.names)
+    ]
     # The image with the best parameters, judged by every metric.
-    after = fitted.whole(x).reshape(rendered.before.shape)
-    by_metric, maps = departures(rendered, after)
-    judged = [_judged(rendered, image) for image in (rendered.before, after)]
-    left = judged[1]
-    is_certain = marks.find(
-        rendered.difference_of(after), after, counted, leading_distance(rendered.viewing)
-    ).is_certain
-    judgement: Judgement = "undecided"
-    if is_certain:
-        judgement = "wrong"
-    elif left.low <= EXACT and left.high <= INVISIBLE:
-        judgement = "right within noise"
+    after = model.whole(x).reshape(rendered.before.shape)
+    paired = rendered.summary(rendered.before)
+    left = rendered.summary(after)
     record = FormFit(
-        form=fitted.form,
+        form=model.form,
         loss=least,
         parameter_error=objective.value_of(rendered.before[counted]) - least,
-        departure=by_metric,
-        differ=tuple(share_above(summary.visible) for summary in judged),
+        departure=rendered.departures(after),
+        differ=(share_above(paired.visible), share_above(left.visible)),
         left=Interval(value=left.debiased, low=left.low, high=left.high),
-        judgement=judgement,
-        materials=materials,
+        judgement=rendered.judgement(after, left),
+        materials=tuple(materials),
         converged=converged,
     )
-    return record, after, maps
+    return record, after
 
 
-def _judged(rendered: RenderedHalves, image: Floats) -> Summary:
-    """Return the summary of an image (H, W, 3) with the paired or the fitted parameters."""
-    summary, _ = summarise(
-        LEADING,
-        image,
-        reference=rendered.reference.mean,
-        mask=rendered.counted,
-        viewing=rendered.viewing,
-        noise=rendered.difference.noise,
-        grouped=rendered.difference_of(image).grouped,
-    )
-    return summary
-
-
-def form_starts(objective: Objective) -> list[Floats]:
-    """Return the paired parameters, and lobes of several widths with coefficients that suit each.
-
-    The latter are the best in linear RGB.
-    """
-    phong: Any = objective.model
-    paired = model.start(phong.parameters)
-    low, high = model.bounds(phong.parameters)
-    at_n = np.array([parameter.name == "n" for parameter in phong.parameters])
-    linear = phong.linear
-    starts: list[Floats] = [paired]
-    for n in STARTS:
-        x = np.where(at_n, log(n * 4 if phong.form == "blinn" else n), paired)
-        # At a given `n` the image is linear in its coefficients: a row (3 N,) for each.
-        columns = phong.columns(x)[linear].reshape(linear.sum(), -1)
-        target = (objective.reference - phong.surface.fixed[phong.counted]).ravel()
-        x[linear] = bounded_minimum(
-            columns @ columns.T, -columns @ target, low=low[linear], high=high[linear]
-        )
-        starts.append(x)
-    return starts
-
-
-def own_starts(objective: Objective) -> list[Floats]:
-    """Return the defaults of a heuristic's parameters, and places within their bounds."""
-    parameters = objective.model.parameters
-    default = np.array([parameter.paired for parameter in parameters])
-    reach = REACH * np.maximum(np.abs(default), 1.0)
-    low, high = model.bounds(parameters)
-    low = np.maximum(low, default - reach)
-    high = np.minimum(high, default + reach)
-    # A search expects the paired start first.
-    return [default, *np.random.default_rng(0).uniform(low, high, (OWN_STARTS, len(default)))]
-
-
-def departures(
-    rendered: RenderedHalves, after: Floats
-) -> tuple[dict[str, FitDeparture], dict[str, Floats]]:
-    """Return the departures by metric, and the metrics' maps (H, W) after the fit."""
-    reference = rendered.reference.mean
-    counted = rendered.counted
-    viewing = rendered.viewing
-    by_metric = {}
-    maps = {}
-    for name, metric in drawn().items():
-        first = metric(rendered.before, reference, viewing)
-        maps[name] = metric(after, reference, viewing)
-        before = metric.mean(first[counted])
-        after_fit = metric.mean(maps[name][counted])
-        floor = noise_floor(
-            metric, reference, noise=rendered.difference.noise, mask=counted, viewing=viewing
-        )
-        by_metric[name] = FitDeparture(before=before, after=after_fit, noise_floor=floor)
-    return by_metric, maps
+def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
+    """Return the plain parameters of each named BSDF of the physical half."""
+    materials: dict[str, dict[str, Any]] = {}
+    for index in graph.nodes(mi.ObjectType.BSDF):
+        label = graph.label(index)
+        for _, child in graph.children(index, mi.ObjectType.BSDF):
+            index = child  # inside twosided
+        materials[label] = {"plugin": graph.plugin(index)}
+        for key, value in graph.props(index).items():
+            if isinstance(value, bool | int | float | str):
+                materials[label][key] = value
+            elif isinstance(value, COLOURS):
+                colour = [float(component) for component in value]
+                materials[label][key] = colour[0] if len(set(colour)) == 1 else colour
+    return materials

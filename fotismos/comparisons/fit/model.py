@@ -26,7 +26,7 @@ rendered once, sample by sample, with the reference's rays (the same sampler, se
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from math import log
 from typing import Any
@@ -36,13 +36,14 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from fotismos.heuristic.convention import Colour, Doubles, Floats, Mask, Scene
+from fotismos.comparisons.fit.search import FitParameter, Model, bounded_minimum
+from fotismos.comparisons.records.fit import Channel
+from fotismos.heuristic.convention import Colour, Doubles, Floats, Interaction, Mask, Scene
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import Heuristic
 from fotismos.heuristic.kernel import BLOCK, shade
 from fotismos.heuristic.materials import Material
-from fotismos.heuristic.plugins.coefficients import SceneMaterials
-from fotismos.reference.pairing.factors import Phong, alpha_of, exponent_of, specular_albedo
+from fotismos.reference.pairing.factors import alpha_of, exponent_of, specular_albedo
 from fotismos.reference.rendering.renderer import Renderer, variant
 
 COEFFICIENTS = ("k_a", "k_d", "k_s")
@@ -53,33 +54,14 @@ EXPONENTS = (0.5, 4096.0)
 LARGEST_FACTOR = 4.0
 """On a texture, whose values are unknown here."""
 
+STARTS = (2.0, 8.0, 32.0, 128.0, 512.0)
+"""Exponents of the form ``phong`` to start from; ``blinn`` has four times as large ones."""
 
-@dataclass(frozen=True)
-class FitParameter:
-    """One number to be fitted: ``k_a``, ``k_d``, ``k_s`` or ``n``, or a heuristic's own.
+OWN_STARTS = 6
+"""Places within the bounds to start from for a heuristic's own parameters."""
 
-    ``owner`` is the index of its material. The value by the pairing table and the bounds are as in
-    the vector. A coefficient is a multiple of ``tint``, in one ``channel`` if it has three numbers.
-    """
-
-    name: str
-    owner: int
-    paired: float
-    low: float
-    high: float
-    tint: tuple[float, ...] = (1.0, 1.0, 1.0)
-    channel: Any = ""
-    is_factor: bool = False
-
-
-def start(parameters: Sequence[FitParameter]) -> NDArray[np.float64]:
-    """Return the paired values as a vector, moved into the bounds."""
-    return np.array([min(max(p.paired, p.low), p.high) for p in parameters])
-
-
-def bounds(parameters: Sequence[FitParameter]) -> NDArray[np.float64]:
-    """Return the lower and upper bounds as two vectors."""
-    return np.array([[p.low for p in parameters], [p.high for p in parameters]])
+REACH = 4.0
+"""Starts of a parameter without bounds lie within this many times its default, or its unit."""
 
 
 # --- The surface -------------------------------------------------------------------------------
@@ -102,10 +84,10 @@ class Surface:
     samples: tuple[dict[str, Floats], ...]
     lights: tuple[Any, ...]
     ambient: Colour
-    fixed: NDArray[np.float64]
+    fixed: Doubles
     samples_per_pixel: int
 
-    def pixels(self, owner: int, values: Colour) -> NDArray[np.float64]:
+    def pixels(self, owner: int, values: Colour) -> Doubles:
         """Return the image (N, 3) of one value for each sample of a material."""
         pixel = self.samples[owner]["pixel"]
         count = len(self.fixed)
@@ -122,7 +104,7 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
     with variant(renderer.variant):
         shading = renderer.integrator
         scene = renderer.scene
-        bsdfs = SceneMaterials(scene, prune=False).bsdfs
+        bsdfs = shading.known(scene).materials.bsdfs
         names = _names(scene, bsdfs)
         _require_fittable(names, bsdfs)
         eye = _eye(shading)
@@ -137,23 +119,23 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
         # The passes: each gives the fixed light as its image, and its samples.
         fixed: Any = 0.0
         passes = []
-        samples_per_pixel = 0
         for seed in seeds:
-            image = np.array(eyes.render(seed), np.float64)
-            fixed = fixed + image / len(seeds)
-            arrays = {key: np.array(values) for key, values in eye.seen.items()}
-            count = len(arrays["material"])
-            for key, values in arrays.items():  # an orthographic camera has one view for all
-                arrays[key] = np.broadcast_to(values, (*values.shape[:-1], count))
-            # The samples of a pixel follow each other.
-            spp = count // image[..., 0].size
-            passes.append(arrays | {"pixel": np.arange(count) // spp})
-            samples_per_pixel += spp
+            fixed = fixed + np.array(eyes.render(seed), np.float64) / len(seeds)
+            passes.append({key: np.array(values) for key, values in eye.seen.items()})
         # The copies suffice: the last pass need not stay in Dr.Jit's memory.
         eye.seen = None
-        whole = {
-            key: np.concatenate([samples[key] for samples in passes], axis=-1) for key in passes[0]
-        }
+        fixed = np.reshape(fixed, (-1, 3))
+        count = len(passes[0]["material"])
+        whole = {}
+        for key in passes[0]:
+            arrays = [samples[key] for samples in passes]
+            # An orthographic camera has one view for all.
+            whole[key] = np.concatenate(
+                [np.broadcast_to(values, (*values.shape[:-1], count)) for values in arrays], axis=-1
+            )
+        # The samples of a pixel follow each other.
+        spp = count // len(fixed)
+        whole["pixel"] = np.tile(np.arange(count) // spp, len(passes))
         facing = whole.pop("facing")
         material = whole.pop("material")
         # Samples by material; a side that is not shaded is black for any parameters.
@@ -169,8 +151,8 @@ def see(renderer: Renderer, seeds: Sequence[int]) -> Surface:
             samples=tuple(samples),
             lights=tuple(shading.lights(scene, point, True)),
             ambient=shading.ambient_at(point, True),
-            fixed=np.reshape(fixed, (-1, 3)),
-            samples_per_pixel=samples_per_pixel,
+            fixed=fixed,
+            samples_per_pixel=spp * len(passes),
         )
 
 
@@ -192,55 +174,51 @@ def _require_fittable(names: Sequence[str], bsdfs: Sequence[Any]) -> None:
 
 
 def _eye(shading: Any) -> Any:
-    """Return an integrator that keeps the points that ``shading`` would shade, and shows emission.
+    """Return an integrator with the rays of ``shading``, which shows emission and background.
 
-    Each rendering puts them into ``seen``, by the names of :class:`Surface`.
+    Each rendering puts the points that ``shading`` would shade into ``seen``, by the names of
+    :class:`Surface`.
     """
+    base: Any = type(shading)
 
-    class Eye(mi.SamplingIntegrator):
-        """Rays and backgrounds of ``shading``, with its surfaces' emission as the image."""
+    class Eye(base):
+        """See above."""
 
-        def sample(
-            self, scene: Scene, sampler: Any, ray: Any, medium: Any = None, active: Mask = True
-        ) -> tuple[Colour, Mask, list[Any]]:
-            si = scene.ray_intersect(ray, active)
-            hit = active & si.is_valid()
-            normal, is_shaded = shading.seen_side(scene, si, hit)
-            materials = shading.known(scene).materials
-            number = materials.index(si, hit) if len(materials.bsdfs) > 1 else mi.UInt32(0)
+        def surface_colour(self, scene: Scene, si: Interaction, view: Any, active: Mask) -> Colour:
+            normal, is_shaded = self.seen_side(scene, si, active)
+            materials = self.known(scene).materials
 
             def read(name: str) -> Any:
                 """Return one coefficient of the material at each sample, as the scene gives it."""
                 readers = [partial(_coefficient, bsdf, name) for bsdf in materials.bsdfs]
-                return materials.switch(readers, si, hit)
+                return materials.switch(readers, si, active)
 
             position = mi.Vector3f(si.p)
             seen = {
                 "position": position,
                 "normal": mi.Vector3f(normal),
-                "view": mi.Vector3f(-ray.d),
-                "facing": hit & is_shaded,
-                # A single material's number is a literal: widened to one for each sample.
-                "material": number + dr.zeros(mi.UInt32, dr.width(si.p)),
+                "view": view,
+                "facing": active & is_shaded,
+                "material": materials.index(si, active),
             }
             for name in {name for bsdf in materials.bsdfs for name in _textured(bsdf)}:
                 seen[name] = read(name)
-            visible = shading.visibility(scene, si, hit)
+            visible = self.visibility(scene, si, active)
             if visible is not None:
-                for index, light in enumerate(shading.lights(scene, si, hit)):
+                for index, light in enumerate(self.lights(scene, si, active)):
                     arrival = light.illuminate(position)
                     seen[f"light {index}"] = visible(arrival.toward, arrival.distance)
             dr.schedule(seen)
             self.seen = seen
-            emission = dr.select(hit & is_shaded, read("k_i"), 0)
-            return emission + shading.background(scene, si, active & ~hit), hit, []
+            return dr.select(active & is_shaded, read("k_i"), 0)
 
     props = mi.Properties("heuristic")
     props["hide_emitters"] = shading.hide_emitters
+    props["occlusion"] = shading.occlusion
     return Eye(props)
 
 
-def _coefficient(bsdf: Any, name: str, si: Any, active: Any) -> Any:
+def _coefficient(bsdf: Any, name: str, si: Any, active: Any = True) -> Any:
     return mi.Color3f(getattr(bsdf, name).eval(si, active))
 
 
@@ -258,7 +236,7 @@ def _described(bsdf: Any) -> Material:
     point = dr.zeros(mi.SurfaceInteraction3f)
     coefficients: dict[str, Any] = dict.fromkeys(COEFFICIENTS, (1.0,) * 3)
     for name in set(COEFFICIENTS) - set(_textured(bsdf)):
-        coefficients[name] = plain(mi.Color3f(getattr(bsdf, name).eval(point)))
+        coefficients[name] = plain(_coefficient(bsdf, name, point))
     return Material(**coefficients, n=plain(bsdf.n)[0], form=bsdf.form, normalised=bsdf.normalised)
 
 
@@ -285,53 +263,47 @@ def phong_parameters(surface: Surface, form: str) -> tuple[FitParameter, ...]:
     fitted: list[FitParameter] = []
     low, high = EXPONENTS
     for owner, material in enumerate(surface.materials):
-        phong = Phong(
-            k_d=material.k_d,
-            k_s=material.k_s,
-            n=material.n,
-            form=material.form,
-            normalised=material.normalised,
-        )
         # As in the vector: the lobe by its albedo, not by `k_s`.
-        paired = {"k_a": material.k_a, "k_d": material.k_d, "k_s": tuple(specular_albedo(phong))}
+        paired = {"k_a": material.k_a, "k_d": material.k_d, "k_s": specular_albedo(material)}
         if isinstance(surface.ambient, int):  # no ambient light
             del paired["k_a"]
         for name, colour in paired.items():
             has_texture = name in surface.samples[owner]
-            whole = FitParameter(
-                name=name,
-                owner=owner,
-                paired=float(max(colour)),
-                low=0.0,
-                high=LARGEST_FACTOR if has_texture else 1.0,
-                is_factor=has_texture,
-            )
-            if has_texture or np.ptp(colour) <= 1e-6 * max(colour):
-                fitted.append(whole)
-                continue
-            # A number for each channel: its tint is 0 in the two others.
-            for value, tint, channel in zip(colour, np.eye(3), "RGB", strict=True):
-                fitted.append(
-                    replace(whole, paired=float(value), tint=tuple(tint), channel=channel)
+            is_grey = has_texture or np.ptp(colour) <= 1e-6 * max(colour)
+            channels: tuple[Channel, ...] = ("",) if is_grey else ("R", "G", "B")
+            values = [max(colour)] if is_grey else colour
+            is_scaled = name == "k_s" and not material.normalised
+            fitted += [
+                FitParameter(
+                    name=name,
+                    paired=float(value),
+                    low=0.0,
+                    high=LARGEST_FACTOR if has_texture else 1.0,
+                    owner=owner,
+                    held="albedo" if is_scaled else "itself",
+                    channel=channel,
+                    is_factor=has_texture,
                 )
+                for channel, value in zip(channels, values, strict=True)
+            ]
         # The exponent of this form whose lobe is as wide as the scene's.
         n = exponent_of(alpha_of(material.n, material.form), form)
         fitted.append(
             FitParameter(
                 name="n",
-                owner=owner,
                 paired=log(min(max(n, low), high)),
                 low=log(low),
                 high=log(high),
+                owner=owner,
+                held="logarithm",
             )
         )
     return tuple(fitted)
 
 
-class PhongModel:
+class PhongModel(Model):
     """The textbook half of a scene as a function of its parameters, for one form of the lobe.
 
-    An image is that of the pixels of a mask (N), of which each material has ``reached`` some.
     ``vector`` is the type of the kernel's arrays, such as one of double precision.
     """
 
@@ -353,38 +325,48 @@ class PhongModel:
             [parameter.name in COEFFICIENTS for parameter in self.parameters], bool
         )
         self._vector = vector or mi.Vector3f
-        # Bases are the same for all `x`; of the lobes, the last of each material is kept.
-        self._basis, self._points = cache(self._rendered_basis), cache(self._point)
-        self._lobe = lru_cache(maxsize=len(surface.names))(self._rendered_lobe)
+        self._points = cache(self._point)
+        # Those of coefficients stay the same for all `x`; of the lobes, the last ones are kept.
+        self._term = lru_cache(maxsize=4 * len(surface.names))(self._rendered)
         self._columns = lru_cache(maxsize=1)(self._derivatives)
 
-    def whole(self, x: Floats) -> NDArray[np.float64]:
-        """Return the image of all pixels for a vector of parameters."""
+    def whole(self, x: Floats) -> Doubles:
         # A sum over the coefficients; the rows by `n` are derivatives alone.
-        columns = self._columns(tuple(x))[self.linear]
+        columns = self.derivatives(x)[self.linear]
         return self.surface.fixed + np.tensordot(x[self.linear], columns, 1)
 
-    def image(self, x: Floats) -> NDArray[np.float64]:
-        """Return the image (N, 3) of the counted pixels."""
-        image: Doubles = self.whole(x)[self.counted]
-        return image
+    def derivatives(self, x: Floats) -> Doubles:
+        columns: Doubles = self._columns(tuple(x))
+        return columns
 
-    def columns(self, x: Floats) -> NDArray[np.float64]:
-        """Return the derivatives (number of parameters, N, 3) of the image."""
-        derivatives: Doubles = self._columns(tuple(x))[:, self.counted]
-        return derivatives
+    def starts(self, reference: Floats) -> list[Floats]:
+        """Return the paired parameters, and lobes of several widths with coefficients to suit them.
+
+        The latter are the best in linear RGB.
+        """
+        low, high = self.bounds
+        paired = np.clip(self.paired, low, high)
+        at_n = np.array([parameter.name == "n" for parameter in self.parameters])
+        linear = self.linear
+        starts: list[Floats] = [paired]
+        for n in STARTS:
+            x = np.where(at_n, log(n * 4 if self.form == "blinn" else n), paired)
+            # At a given `n` the image is linear in its coefficients: a row (3 N,) for each.
+            columns = self.columns(x)[linear].reshape(linear.sum(), -1)
+            target = (reference - self.surface.fixed[self.counted]).ravel()
+            x[linear] = bounded_minimum(
+                columns @ columns.T, -columns @ target, low=low[linear], high=high[linear]
+            )
+            starts.append(x)
+        return starts
 
     def coefficients(self, x: Floats, name: str) -> dict[int, Floats]:
         """Return RGB of a coefficient for each material (for ``k_s``, the lobe's albedo)."""
         sums: dict[int, Floats] = {owner: np.zeros(3) for owner in range(len(self.surface.samples))}
         for number, parameter in zip(x, self.parameters, strict=True):
             if parameter.name == name:
-                sums[parameter.owner] += number * np.array(parameter.tint)
+                sums[parameter.owner] += number * parameter.tint
         return sums
-
-    def place_of_exponent(self, owner: int) -> int:
-        """Return the index of a material's ``n``."""
-        return [(p.name, p.owner) for p in self.parameters].index(("n", owner))
 
     def _derivatives(self, x: Floats) -> Any:
         result = np.empty((len(x), *self.surface.fixed.shape))
@@ -393,52 +375,41 @@ class PhongModel:
             owner = parameter.owner
             name = parameter.name
             if name in ("k_a", "k_d"):
-                result[index] = self._basis(owner, name) * parameter.tint
+                result[index] = self._term(owner, name)[0] * parameter.tint
                 continue
             # A lobe of albedo 1: by `k_s` its basis, by `ln n` the slope times the albedo.
-            basis, slope = self._lobe(owner, float(np.exp(x[self.place_of_exponent(owner)])))
+            n = float(np.exp(x[self.place_of_exponent(owner)]))
+            basis, slope = self._term(owner, "k_s", n)
             result[index] = basis * parameter.tint if name == "k_s" else slope * albedo[owner]
         return result
 
-    def _rendered_basis(self, owner: int, name: str) -> Any:
-        """Return the ambient or the diffuse basis of a material, (N, 3)."""
-        if name == "k_a":
-            value = self._shaded(owner, name, lights=(), ambient=self.surface.ambient)
-        else:
-            value = self._shaded(owner, name, self.surface.lights)
-        return self.surface.pixels(owner, 0.0 if value is None else value)
-
-    def _rendered_lobe(self, owner: int, n: float) -> Any:
-        """Return the specular basis of a material, and its derivative by ``ln n``."""
+    def _rendered(self, owner: int, name: str, n: float = 1.0) -> tuple[Doubles, Doubles]:
+        """Return the basis (N, 3) of a material's coefficient, and its derivative by ``ln n``."""
+        lights = () if name == "k_a" else self.surface.lights
+        has_samples = len(self.surface.samples[owner]["pixel"])
+        if not (has_samples and (lights or name == "k_a")):
+            return (self.surface.pixels(owner, 0.0),) * 2
+        position, normal, view, textures, masks = self._points(owner)
         # Opaque, so that another `n` compiles no kernel.
         exponent = dr.opaque(dr.value_t(self._vector), n)
         dr.enable_grad(exponent)
-        lobe = {"n": exponent, "form": self.form, "normalised": True}
-        value = self._shaded(owner, "k_s", self.surface.lights, **lobe)
-        if value is None:
-            return (self.surface.pixels(owner, 0.0),) * 2
+        coefficient = {name: textures.get(name, 1.0)}
+        material = Material(**coefficient, n=exponent, form=self.form, normalised=True)
+        ambient = self.surface.ambient if name == "k_a" else 0
+        # Masks are in the order of the lights. The kernel asks for them in this order as long as
+        # the lights fit into one block: more would be grouped by their kind.
+        remaining = iter(masks)
+        visible = (lambda toward, distance: next(remaining)) if masks else None
+        value: Any = 0
+        for begin in range(0, max(len(lights), 1), BLOCK):
+            block = list(lights[begin : begin + BLOCK])
+            value = value + shade(position, normal, view, material, block, ambient, visible)
         dr.forward_from(exponent)
         basis = dr.detach(value)
         slope = dr.grad(value)
         dr.eval(basis, slope)
         # `d / d ln n = n d / dn`.
         return self.surface.pixels(owner, basis), n * self.surface.pixels(owner, slope)
-
-    def _shaded(self, owner: int, name: str, lights: Any, ambient: Any = 0, **lobe: Any) -> Any:
-        """Call the kernel with one coefficient of 1; None if no sample or light shows it."""
-        if not len(self.surface.samples[owner]["pixel"]) or not (lights or name == "k_a"):
-            return None
-        position, normal, view, textures, visible = self._points(owner)
-        material = Material(**{name: textures.get(name, 1.0)}, **lobe)
-        # Masks are in the order of the lights. The kernel asks for them in this order as long as
-        # the lights fit into one block: more would be grouped by their kind.
-        masks = iter(visible)
-        test = (lambda toward, distance: next(masks)) if visible else None
-        total: Any = 0
-        for begin in range(0, max(len(lights), 1), BLOCK):
-            block = list(lights[begin : begin + BLOCK])
-            total = total + shade(position, normal, view, material, block, ambient, test)
-        return total
 
     def _point(self, owner: int) -> Any:
         """Return the kernel's arrays of a material: place, textures, and masks of the lights."""
@@ -452,7 +423,7 @@ class PhongModel:
 # --- A heuristic's own parameters --------------------------------------------------------------
 
 
-class OwnModel:
+class OwnModel(Model):
     """The textbook half of a scene as a function of the parameters that a heuristic declares.
 
     An image is a rendering: the passes of the textbook half, with the reference's seeds, over the
@@ -470,7 +441,6 @@ class OwnModel:
         self.parameters = tuple(
             FitParameter(
                 name=parameter.name,
-                owner=0,
                 paired=parameter.default,
                 low=parameter.low,
                 high=parameter.high,
@@ -479,28 +449,29 @@ class OwnModel:
         )
         self.form = heuristic.name
         self.names = (heuristic.name,)
+        self.counted = counted.ravel()
         self.reached = [int(counted.sum())]
         self._renderer = renderer
         self._seeds = seeds
-        self._counted = counted
         # Room for an image, all its derivatives, and the image of a trial step.
         self._kept = lru_cache(maxsize=2 + len(self.parameters))(self._rendered)
 
-    def whole(self, x: Floats) -> Floats:
-        """Return the whole image, (H, W, 3)."""
+    def whole(self, x: Floats) -> Doubles:
         return self._kept(tuple(x))
 
-    def image(self, x: Floats) -> Floats:
-        """Return the image (N, 3) of the counted pixels."""
-        image: Floats = self.whole(x)[self._counted]
-        return image
+    def derivatives(self, x: Floats) -> Doubles:
+        return np.stack([self._kept(tuple(x), index) for index in range(len(x))])
 
-    def columns(self, x: Floats) -> Floats:
-        """Return the derivatives (number of parameters, N, 3) of the image."""
-        images = (self._kept(tuple(x), index) for index in range(len(x)))
-        return np.stack([image[self._counted] for image in images])
+    def starts(self, reference: Floats) -> list[Floats]:
+        """Return the defaults, and places within the bounds."""
+        default = self.paired
+        reach = REACH * np.maximum(np.abs(default), 1.0)
+        low, high = self.bounds
+        low = np.maximum(low, default - reach)
+        high = np.minimum(high, default + reach)
+        return [default, *np.random.default_rng(0).uniform(low, high, (OWN_STARTS, len(default)))]
 
-    def _rendered(self, x: tuple[float, ...], by: int | None = None) -> Floats:
+    def _rendered(self, x: tuple[float, ...], by: int | None = None) -> Doubles:
         """Return the mean of the passes, or of their derivatives by one parameter."""
         integrator = self._renderer.integrator
         scene = self._renderer.scene
@@ -524,4 +495,4 @@ class OwnModel:
                     dr.traverse(dr.ADMode.Forward, dr.ADFlag.ClearInterior)
                     image = dr.grad(image)
                 total = total + np.array(image, float)
-        return total / len(self._seeds)
+        return np.reshape(total, (-1, 3)) / len(self._seeds)

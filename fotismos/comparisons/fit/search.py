@@ -27,20 +27,17 @@ the inverse of its second derivative moves the minimum.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import exp, inf, isfinite, sqrt
-from typing import Any
+from typing import Literal
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from fotismos.comparisons.departure.colour import cam16ucs_unclipped
-from fotismos.comparisons.fit.model import OwnModel, PhongModel, bounds
 from fotismos.comparisons.records.departure import Viewing
-from fotismos.comparisons.records.fit import FittedParameter
-from fotismos.heuristic.convention import Floats
+from fotismos.comparisons.records.fit import Channel, FittedParameter
+from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.heuristic.terms import normalisation
-from fotismos.reference.scene.graph import Graph
 
 STEP = 1e-4
 SMALLEST_STEP = 1e-8
@@ -67,8 +64,132 @@ AT_BOUND = 1e-5
 PARTNER = 0.1
 """Share of a change that another parameter must take up to be named."""
 
+REASONS = (
+    "does not show in the image",
+    "others make up for it",
+    "lost in the noise of the physical picture",
+)
+"""Why a parameter is not identifiable; the first that holds is given."""
+
 COVERAGE = 1.96
 """Standard errors to either side, of an interval that covers 95 % of normal errors."""
+
+
+# --- What is fitted -----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class FitParameter:
+    """One number to be fitted: ``k_a``, ``k_d``, ``k_s`` or ``n``, or a heuristic's own.
+
+    ``owner`` is the index of its material. The value by the pairing table and the bounds are as in
+    the vector, which has the ``logarithm`` of ``n``, and for ``k_s`` may have the lobe's
+    ``albedo``. A coefficient of three numbers has one in each ``channel``.
+    """
+
+    name: str
+    paired: float
+    low: float
+    high: float
+    owner: int = 0
+    held: Literal["itself", "logarithm", "albedo"] = "itself"
+    channel: Channel = ""
+    is_factor: bool = False
+
+    @property
+    def tint(self) -> Doubles:
+        """What the number is a multiple of, in RGB."""
+        return np.array([self.channel in ("", letter) for letter in "RGB"], np.float64)
+
+
+class Model:
+    """A textbook half as a function of a vector ``x`` (P,) with all of its ``parameters``.
+
+    ``names`` are those of its materials, each of which ``reached`` so many of the pixels that are
+    ``counted`` (N,). ``form`` is that of the lobe, or the name of a heuristic.
+    """
+
+    form: str
+    names: tuple[str, ...]
+    parameters: tuple[FitParameter, ...]
+    counted: NDArray[np.bool_]
+    reached: Sequence[int]
+
+    def whole(self, x: Floats) -> Doubles:
+        """Return the image (N, 3) of all pixels."""
+        raise NotImplementedError
+
+    def derivatives(self, x: Floats) -> Doubles:
+        """Return the derivatives (P, N, 3) of the image by the parameters."""
+        raise NotImplementedError
+
+    def starts(self, reference: Floats) -> list[Floats]:
+        """Return where to search from, the paired values first; ``reference`` as for a loss."""
+        raise NotImplementedError
+
+    def image(self, x: Floats) -> Doubles:
+        """Return the image of the counted pixels."""
+        image: Doubles = self.whole(x)[self.counted]
+        return image
+
+    def columns(self, x: Floats) -> Doubles:
+        """Return the derivatives at the counted pixels."""
+        columns: Doubles = self.derivatives(x)[:, self.counted]
+        return columns
+
+    @property
+    def bounds(self) -> Doubles:
+        """The lower and the upper bounds, (2, P)."""
+        return np.array([[p.low for p in self.parameters], [p.high for p in self.parameters]])
+
+    @property
+    def paired(self) -> Doubles:
+        """The paired values (P,), which may lie outside the bounds."""
+        return np.array([parameter.paired for parameter in self.parameters])
+
+    def label(self, number: int) -> str:
+        """Return the name of a parameter and its material."""
+        parameter = self.parameters[number]
+        name = f"{parameter.name} {parameter.channel}".strip()
+        return f"{name} of {self.names[parameter.owner]}"
+
+    def place_of_exponent(self, owner: int) -> int:
+        """Return the index of a material's ``n``."""
+        return [(p.name, p.owner) for p in self.parameters].index(("n", owner))
+
+    def stated(self, number: int, x: Floats, value: float) -> float:
+        """Return a value of a parameter in the unit of records, beside the others of ``x``."""
+        parameter = self.parameters[number]
+        if parameter.held == "logarithm":
+            return exp(value)
+        if parameter.held == "albedo":
+            return float(value * self.per_albedo(x[self.place_of_exponent(parameter.owner)]))
+        return float(value)
+
+    def per_albedo(self, logarithm: float) -> float:
+        """Return the ``k_s`` of a lobe of albedo 1 and a given ``ln n``."""
+        return float(normalisation(self.form, exp(logarithm)))
+
+    def interval(self, number: int, x: Floats, covariance: Floats) -> tuple[float, float]:
+        """Return the interval of a parameter in the unit of records, bounds aside."""
+        parameter = self.parameters[number]
+        if parameter.held != "albedo":
+            spread = COVERAGE * sqrt(covariance[number, number])
+            low = self.stated(number, x, x[number] - spread)
+            return low, self.stated(number, x, x[number] + spread)
+        # `k_s` also depends on `n`: to first order, with the covariance of the two.
+        at_n = self.place_of_exponent(parameter.owner)
+        step = 1e-5
+        rise = self.per_albedo(x[at_n] + step) - self.per_albedo(x[at_n] - step)
+        slopes = np.zeros(len(x))
+        slopes[number] = self.per_albedo(x[at_n])
+        slopes[at_n] = x[number] * rise / (2 * step)
+        spread = COVERAGE * sqrt(max(float(slopes @ covariance @ slopes), 0))
+        k_s = self.stated(number, x, x[number])
+        return k_s - spread, k_s + spread
+
+
+# --- The loss -----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -113,14 +234,13 @@ LOSSES = {
 
 
 class Objective:
-    """The loss of a model against a reference (N, 3): the mean over pixels of ``r(d)``.
+    """The loss of a model against a reference (N, 3) at the counted pixels: the mean of ``r(d)``.
 
     ``r(d) = sqrt(d^2 + c^2) - c`` of distances ``d`` in the loss's coordinates, or ``d^2 / 2`` if
-    ``c`` is infinite. A model has ``parameters``, ``image(x)`` (N, 3) of a vector of them, and
-    ``columns(x)`` (P, N, 3), its derivatives.
+    ``c`` is infinite.
     """
 
-    def __init__(self, model: Any, reference: Floats, loss: Loss, viewing: Viewing) -> None:
+    def __init__(self, model: Model, reference: Floats, loss: Loss, viewing: Viewing) -> None:
         self.model = model
         self.reference = reference
         self.loss = loss
@@ -154,9 +274,8 @@ class Objective:
         image = self.model.image(x)
         c = self.loss.rounding
         d = self.loss.coordinates(image, self.viewing) - self._target
-        jacobian = self.loss.derivative(image, self.viewing) @ self.model.columns(x).transpose(
-            1, 2, 0
-        )
+        columns = self.model.columns(x).transpose(1, 2, 0)
+        jacobian = self.loss.derivative(image, self.viewing) @ columns
         identity = np.eye(d.shape[1])
         if not isfinite(c):
             return d, np.broadcast_to(identity, (len(d), *identity.shape)), jacobian
@@ -174,11 +293,15 @@ class Objective:
         return gradient / len(slopes), second / len(slopes)
 
 
-def search(objective: Objective, starts: Sequence[Floats]) -> tuple[Floats, float, bool]:
+# --- The search ---------------------------------------------------------------------------------
+
+
+def search(objective: Objective) -> tuple[Floats, float, bool]:
     """Return the parameters of least loss, the loss there, and whether that search converged.
 
     The paired start, which is the first, and the best others are followed to their minimum.
     """
+    starts = objective.model.starts(objective.reference)
     losses = [objective.value(x) for x in starts]
     followed = {0, *(1 + np.argsort(losses[1:], kind="stable")[:FOLLOWED])}
     minima = [
@@ -190,7 +313,7 @@ def search(objective: Objective, starts: Sequence[Floats]) -> tuple[Floats, floa
 
 def descend(objective: Objective, x: Floats) -> tuple[Floats, float, bool]:
     """Return the minimum that a search from ``x`` finds, its loss, and whether it converged."""
-    low, high = bounds(objective.model.parameters)
+    low, high = objective.model.bounds
     loss = objective.value(x)
     damping = 1e-3
     gradient, second = objective.quadratic(x)
@@ -230,72 +353,91 @@ def bounded_minimum(second: Floats, gradient: Floats, low: Floats, high: Floats)
     return solution
 
 
-@dataclass(frozen=True)
-class Certainty:
-    """Whether the image determines a parameter.
-
-    ``reason`` says why it does not, else it is empty; ``partners`` are the indices of parameters
-    that undo a change of it.
-    """
-
-    reason: str
-    partners: tuple[int, ...]
-    at_bound: bool
+# --- What the image determines ------------------------------------------------------------------
 
 
 def identify(
-    objective: Objective, x: Floats, pixels: NDArray[np.int64], standard_error: Floats
-) -> tuple[list[Certainty], NDArray[np.float64]]:
-    """Judge each parameter at the best fit ``x``, and return the covariance (P, P) of them.
+    objective: Objective, x: Floats, standard_error: Floats
+) -> tuple[list[FittedParameter], Doubles]:
+    """Return the parameters at the best fit ``x`` as records, and the covariance (P, P) of them.
 
-    ``pixels`` (P,) is the number that each parameter can reach; ``standard_error`` (counted pixels,
-    3) is that of the reference, or of its difference from the heuristic. The covariance is 0 for
-    parameters not identifiable or at a bound.
+    ``standard_error`` (N, 3) is that of the reference, or of its difference from the heuristic. The
+    covariance is 0 for parameters not identifiable or at a bound.
     """
-    low, high = bounds(objective.model.parameters)
+    model = objective.model
+    low, high = model.bounds
     near = AT_BOUND * (high - low)
-    threshold = objective.loss.threshold
     at_bound = (x - low < near) | (high - x < near)
+    threshold = objective.loss.threshold
     # A norm over all pixels, divided by this, is a root mean square over those it reaches.
+    pixels = [model.reached[parameter.owner] for parameter in model.parameters]
     root = np.sqrt(np.maximum(pixels, 1))
-    _, curvature, jacobian = objective.changes(x)
+    _, _, jacobian = objective.changes(x)
     flat = jacobian.reshape(-1, len(x))
-    shows = np.linalg.norm(flat, axis=0) / root
-    free = shows >= threshold
-    inverse = _inverse_normal(flat[:, free])
-    alone = shows.copy()
+    shows = np.linalg.norm(flat, axis=0) / root >= threshold
+    inverse = np.zeros((len(x), len(x)))
+    inverse[np.ix_(shows, shows)] = _inverse_normal(flat[:, shows])
     # What remains of a change after the best answer of all others that show.
-    alone[free] = 1 / np.sqrt(np.diag(inverse)) / root[free]
-    determined = free & (alone >= threshold)
-    covariance = np.zeros((len(x),) * 2)
+    determined = shows.copy()
+    determined[shows] = 1 / np.sqrt(np.diag(inverse)[shows]) / root[shows] >= threshold
+    covariance = np.zeros((len(x), len(x)))
     if (inside := determined & ~at_bound).any():
-        second = objective.quadratic(x)[1][np.ix_(inside, inside)]
-        slopes = objective.loss.derivative(objective.reference, objective.viewing)
-        # What one standard error of each reference channel changes in the slopes, (N, K, 3).
-        noise = curvature @ (slopes * standard_error[:, None, :])
-        spread = np.einsum("nkp,nkc->pnc", jacobian[..., inside], noise) / len(noise)
-        moved = np.linalg.pinv(second, hermitian=True) @ spread.reshape(len(spread), -1)
+        moved = _moved(objective, x, inside, standard_error)
         # Pixels and channels count as independent: their squares add up.
         covariance[np.ix_(inside, inside)] = moved @ moved.T
     # Half an interval above one natural change tells nothing of the value.
-    lost = determined & (COVERAGE * np.sqrt(np.diag(covariance)) > 1)
-    certainties = []
-    for number in range(len(x)):
-        reason = ""
-        partners: tuple[int, ...] = ()
-        if shows[number] < threshold:
-            reason = "does not show in the image"
-        elif not determined[number]:
-            reason = "others make up for it"
-            index = int(free[:number].sum())
+    lost = COVERAGE * np.sqrt(np.diag(covariance)) > 1
+    reasons = np.select([~shows, ~determined, lost], REASONS, "").tolist()
+    records = []
+    for number, parameter in enumerate(model.parameters):
+        reason = reasons[number]
+        partners: list[str] = []
+        if reason == REASONS[1]:
             # How far each other parameter moves to undo a unit of this one.
-            shares = np.abs(inverse[index] / inverse[index, index])
-            others = zip(np.flatnonzero(free).tolist(), shares, strict=True)
-            partners = tuple(i for i, share in others if i != number and share > PARTNER)
-        elif lost[number]:
-            reason = "lost in the noise of the physical picture"
-        certainties.append(Certainty(reason, partners, bool(at_bound[number])))
-    return certainties, covariance
+            shares = np.abs(inverse[number] / inverse[number, number])
+            shares[number] = 0
+            partners = [model.label(other) for other in range(len(x)) if shares[other] > PARTNER]
+        # Without a lobe `k_s` is 0 for any `n`.
+        if parameter.held == "albedo" and not reason and x[number] > AT_BOUND:
+            lost_n = reasons[model.place_of_exponent(parameter.owner)]
+            reason = lost_n and "follows from its albedo and n, which is not identifiable"
+        lowest = model.stated(number, x, parameter.low)
+        highest = model.stated(number, x, parameter.high)
+        least, most = model.interval(number, x, covariance)
+        has_interval = not (reason or at_bound[number])
+        records.append(
+            FittedParameter(
+                name=parameter.name,
+                channel=parameter.channel,
+                is_factor=parameter.is_factor,
+                paired=model.stated(number, model.paired, parameter.paired),
+                fitted=None if reason else model.stated(number, x, x[number]),
+                interval=(max(least, lowest), min(most, highest)) if has_interval else None,
+                bounds=(_finite(lowest), _finite(highest)),
+                at_bound=bool(at_bound[number]),
+                reason=reason,
+                partners=tuple(partners),
+            )
+        )
+    return records, covariance
+
+
+def _moved(
+    objective: Objective, x: Floats, inside: NDArray[np.bool_], standard_error: Floats
+) -> Floats:
+    """Return how far one standard error of each channel (N C) moves the parameters inside."""
+    _, curvature, jacobian = objective.changes(x)
+    second = objective.quadratic(x)[1][np.ix_(inside, inside)]
+    slopes = objective.loss.derivative(objective.reference, objective.viewing)
+    # What one standard error of each reference channel changes in the slopes, (N, K, 3).
+    noise = curvature @ (slopes * standard_error[:, None, :])
+    spread = np.einsum("nkp,nkc->pnc", jacobian[..., inside], noise) / len(noise)
+    moved: Floats = np.linalg.pinv(second, hermitian=True) @ spread.reshape(len(spread), -1)
+    return moved
+
+
+def _finite(bound: float) -> float | None:
+    return bound if isfinite(bound) else None
 
 
 def _inverse_normal(jacobian: Floats) -> Floats:
@@ -306,88 +448,3 @@ def _inverse_normal(jacobian: Floats) -> Floats:
     scaled = rows.T / np.maximum(singular, 1e-12 * singular[0])
     covariance: Floats = scaled @ scaled.T
     return covariance
-
-
-# --- As records ---------------------------------------------------------------------------------
-
-
-def physical_materials(graph: Graph) -> dict[str, dict[str, Any]]:
-    """Return the plain parameters of each named BSDF of the physical half."""
-    materials: dict[str, dict[str, Any]] = {}
-    for index in graph.nodes(mi.ObjectType.BSDF):
-        label = graph.label(index)
-        for _, child in graph.children(index, mi.ObjectType.BSDF):
-            index = child  # inside twosided
-        materials[label] = {"plugin": graph.plugin(index)}
-        for key, value in graph.props(index).items():
-            if isinstance(value, bool | int | float | str):
-                materials[label][key] = value
-            elif isinstance(value, mi.ScalarColor3f | mi.ScalarColor3d):
-                colour = [float(component) for component in value]
-                materials[label][key] = colour[0] if len(set(colour)) == 1 else colour
-    return materials
-
-
-def parameter_record(
-    model: PhongModel | OwnModel,
-    index: int,
-    x: Floats,
-    certainties: list[Certainty],
-    covariance: Floats,
-) -> FittedParameter:
-    """Return one parameter at the best vector ``x``, ``k_s`` and ``n`` in the chapters' units."""
-    parameter = model.parameters[index]
-    certainty = certainties[index]
-    value = float(x[index])
-    spread = COVERAGE * sqrt(covariance[index, index])
-    # Paired, fitted, and both ends of the interval.
-    raw: tuple[float, ...] = (parameter.paired, value, value - spread, value + spread)
-    limits: tuple[float, ...] = (parameter.low, parameter.high)
-    phong = model if isinstance(model, PhongModel) else None
-    if phong and parameter.name == "n":
-        # The vector holds `ln n`.
-        raw = tuple(map(exp, raw))
-        limits = tuple(map(exp, limits))
-    elif (
-        phong
-        and parameter.name == "k_s"
-        and not phong.surface.materials[parameter.owner].normalised
-    ):
-        # The vector holds the lobe's albedo; `k_s` also depends on `n`, and on its error.
-        at_n = phong.place_of_exponent(parameter.owner)
-        step = 1e-5
-        per_albedo = normalisation(phong.form, exp(x[at_n] + 0))
-        below = normalisation(phong.form, exp(x[at_n] + (-step)))
-        above = normalisation(phong.form, exp(x[at_n] + step))
-        slopes = np.zeros(len(x))
-        slopes[[index, at_n]] = per_albedo, value * (above - below) / (2 * step)
-        # To first order, with the covariance of the two.
-        variance = float(slopes @ covariance @ slopes)
-        spread = COVERAGE * sqrt(max(variance, 0))
-        at_pairing = normalisation(phong.form, exp(phong.parameters[at_n].paired))
-        k_s = value * per_albedo
-        limits = (0.0, per_albedo * parameter.high)
-        raw = parameter.paired * at_pairing, k_s, k_s - spread, k_s + spread
-        # Without a lobe `k_s` is 0 for any `n`.
-        if not certainty.reason and certainties[at_n].reason and value > AT_BOUND:
-            reason = "follows from its albedo and n, which is not identifiable"
-            certainty = Certainty(reason, (), certainty.at_bound)
-    paired, fitted, least, most = map(float, raw)
-    low, high = map(float, limits)
-    has_interval = not (certainty.reason or certainty.at_bound)
-    others = (model.parameters[other] for other in certainty.partners)
-    return FittedParameter(
-        name=parameter.name,
-        channel=parameter.channel,
-        is_factor=parameter.is_factor,
-        paired=paired,
-        fitted=None if certainty.reason else fitted,
-        interval=(max(least, low), min(most, high)) if has_interval else None,
-        bounds=(low if isfinite(low) else None, high if isfinite(high) else None),
-        at_bound=certainty.at_bound,
-        reason=certainty.reason,
-        partners=tuple(
-            f"{f'{other.name} {other.channel}'.strip()} of {model.names[other.owner]}"
-            for other in others
-        ),
-    )

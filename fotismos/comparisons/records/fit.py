@@ -30,11 +30,14 @@ class FitDeparture(Record):
     noise_floor: Amount
 
 
+Channel = Literal["", "R", "G", "B"]
+
+
 class FittedParameter(Record):
     """A parameter as the chapters name it, or of a heuristic's own; of a texture, factors on it."""
 
     name: str
-    channel: Literal["", "R", "G", "B"] = ""
+    channel: Channel = ""
     is_factor: bool = False
     paired: Annotated[float, Meta(description="By the pairing table.")]
     fitted: Annotated[float | None, Meta(description="Null if the image does not determine it.")]

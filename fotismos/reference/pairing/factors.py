@@ -40,6 +40,7 @@ from typing import Any
 import numpy as np
 
 from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
+from fotismos.heuristic.materials import Material
 from fotismos.heuristic.terms import normalisation
 from fotismos.reference.pairing.pairing_record import BsdfPair, EmitterPair, Miss, Unrepresentable
 
@@ -141,7 +142,7 @@ def exponent_of(alpha: float, form: str = "phong") -> float:
     return max(2 / alpha**2 - 2 if form == "blinn" else (1 / alpha**2 - 1) / 2, 0.0)
 
 
-def specular_albedo(phong: Phong) -> np.ndarray:
+def specular_albedo(phong: Phong | Material) -> np.ndarray:
     """Return the albedo of a phong's lobe at normal incidence, per channel.
 
     ``2 k_s / (n + 2)`` for the chapters' form: the radiance is ``k_s cos^n / pi`` for unit

@@ -29,20 +29,19 @@ def page(fit: Fit, folder: Path | None = None) -> str:
     The pictures are tone-mapped; the map has the metric's fixed range.
     """
     record = fit.record
-    best = fit.record.nearest
+    best = record.nearest
     exposure = record.viewing.exposure
     high = LEADING.map_range[1]
     error = best.departure[LEADING.name]
     scale = f"{LEADING.label} from 0 to {high:g}"
     before = LEADING(fit.before, fit.reference, record.viewing)
+    after = LEADING(fit.after, fit.reference, record.viewing)
     shown = {
         "physical": images.tonemap(fit.reference, exposure),
         "textbook, paired": images.tonemap(fit.before, exposure),
         f"textbook, fitted ({best.form})": images.tonemap(fit.after, exposure),
         f"error before, mean {difference(error.before)} ({scale})": images.error_map(before, high),
-        f"error after, mean {difference(error.after)} ({scale})": images.error_map(
-            fit.maps[LEADING.name], high
-        ),
+        f"error after, mean {difference(error.after)} ({scale})": images.error_map(after, high),
     }
     return rendered(
         "fit_page.html.j2",
@@ -143,8 +142,7 @@ def _interval(parameter: FittedParameter) -> str:
     """Return the interval of a parameter, or that it is narrower than the value's last digit."""
     if not parameter.interval:
         return ""
-    low = f"{parameter.interval[0]:.4g}"
-    high = f"{parameter.interval[1]:.4g}"
+    low, high = (f"{end:.4g}" for end in parameter.interval)
     return "below the last digit" if low == high else f"{low} to {high}"
 
 
