@@ -26,12 +26,12 @@ from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
 from fotismos.reference.pairing import lights
 from fotismos.reference.pairing.factors import Convention, Replacements
 from fotismos.reference.pairing.lights import (
-    SECOND_INTENSITY,
     LightNode,
     heuristic,
     is_heuristic,
     level,
 )
+from fotismos.reference.pairing.pairing_record import SECOND_INTENSITY
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph, properties
 

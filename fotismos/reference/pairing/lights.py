@@ -23,9 +23,6 @@ from fotismos.reference.scene.graph import Graph, properties
 
 FALLOFF_OF_MITSUBA = dict(zip(("k0", "k1", "k2"), map(float, INVERSE_SQUARE), strict=True))
 
-SECOND_INTENSITY = "specular intensity L_s"
-"""What a light of two intensities loses."""
-
 GLOWING = "{}_glowing"
 """The id of the textbook material of a lamp, by the lamp's label."""
 
