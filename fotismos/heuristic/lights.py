@@ -436,7 +436,12 @@ PLUGINS: dict[str, type[Light]] = {
 
 def plugins_with(field: str) -> list[str]:
     """Return the plugins of the kinds of light that have a field."""
-    return [plugin for plugin, kind in PLUGINS.items() if field in signature(kind).parameters]
+    return [plugin for plugin, kind in PLUGINS.items() if has_field(kind, field)]
+
+
+def has_field(kind: type[Light], field: str) -> bool:
+    """Return whether a kind of light has a field, such as ``attenuation`` or ``cutoff``."""
+    return field in signature(kind).parameters
 
 
 def lamps(scene: Scene) -> list[Any]:

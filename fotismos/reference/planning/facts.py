@@ -18,7 +18,7 @@ import numpy as np
 from fotismos.heuristic import meshes
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.heuristic.materials import COEFFICIENTS
-from fotismos.reference.pairing import lights
+from fotismos.reference.pairing import kinds, lights
 from fotismos.reference.pairing.bsdfs import (
     LAYERED_BUMPS,
     REFLECTANCES,
@@ -496,13 +496,13 @@ class Facts:
     @staticmethod
     def light_kind(plugin: str) -> LightKind:
         """Return the kind of a light of either half."""
-        return lights.of(plugin)
+        return kinds.of(plugin)
 
     @property
     def light_kinds(self) -> str:
         """The kinds of the physical half's lights, as evidence."""
-        kinds = {light.kind for light in self.lights}
-        return f"lights: {', '.join(sorted(kinds)) or 'none'}"
+        plugins = {light.kind for light in self.lights}
+        return f"lights: {', '.join(sorted(plugins)) or 'none'}"
 
     @property
     def sees_through_lamps(self) -> bool:
@@ -541,5 +541,5 @@ def _lights(graph: Graph) -> Iterator[LightFacts]:
         if index in owners:
             yield LightFacts(name, plugin, shape=owners[index])
         else:
-            location: dict[str, Any] = lights.of(plugin).place(LightNode(graph, index))
+            location: dict[str, Any] = kinds.of(plugin).place(LightNode(graph, index))
             yield LightFacts(name, plugin, **location)
