@@ -40,7 +40,7 @@ from fotismos.reports.terminal.table import Table, markdown
 from fotismos.reports.terminal.words import number, percent, seconds
 
 WIDTH = 192
-ROUNDS = measure.MEASURED_ROUNDS
+ROUNDS = 7
 DAYLIGHT = {"type": "sunsky", "sun_direction": (-0.5, -0.6, 0.6), "turbidity": 4.0}
 
 LAMP = "lamp"

@@ -63,6 +63,8 @@ class Declared(Mapping[str, Declaration], Generic[Declaration]):
     def _load(self) -> None:
         """Load the entry points of installed packages."""
         for entry in () if self._is_loaded else entry_points(group=self.group):
+            if entry.name.startswith("."):  # it reads files of that suffix
+                continue
             try:
                 self.declare(entry.load())
             except Exception as error:  # another package's code may raise anything

@@ -3,7 +3,7 @@
 A heuristic is a function of a :class:`Point` that returns the colour seen there. ``phong`` and
 ``blinn`` are here, those of engines in :mod:`fotismos.heuristic.shadow_maps` and
 :mod:`fotismos.heuristic.indirect_light`. Users write a function in a file
-(:mod:`fotismos.heuristic.user_shaders`, :mod:`fotismos.heuristic.glsl`); a program calls
+(:mod:`fotismos.heuristic.user_shaders`, :mod:`fotismos.heuristic.glsl.shader`); a program calls
 :func:`declare`; a package has an entry point of the group :data:`GROUP` whose object is a
 :class:`Heuristic`. Flat and Gouraud shading are not heuristics: they interpolate any heuristic
 (:mod:`fotismos.heuristic.plugins.interpolated`).
@@ -14,8 +14,9 @@ import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum
-from functools import cached_property
+from functools import cache, cached_property
 from hashlib import sha256
+from importlib.metadata import entry_points
 from numbers import Real
 from pathlib import Path
 from types import SimpleNamespace
@@ -38,18 +39,21 @@ INPUTS = (
 RESERVED = ("ambient", "hide_emitters", "interpolation", "model", "occlusion", "prune")
 """Parameters of the integrator ``heuristic`` itself; heuristics must use other names."""
 
-LOADERS = {
+READERS = {
     ".py": "fotismos.heuristic.user_shaders:from_file",
-    ".glsl": "fotismos.heuristic.glsl:from_file",
+    ".glsl": "fotismos.heuristic.glsl.shader:from_file",
 }
-"""The function that reads a user's file, by the file's suffix; imported at its first use."""
+"""The function that reads a user's file, by the file's suffix; imported at its first use.
+
+A package adds its own by an entry point of :data:`GROUP` whose name is the suffix, such as `.osl`.
+"""
 
 OF_FUNCTION = "fotismos.heuristic.user_shaders:of_function"
 SHADED = "fotismos.heuristic.user_shaders:shaded"
 PREPARED = "fotismos.heuristic.user_shaders:prepared"
 """Functions that make a heuristic of a user's function, and call it; imported as late."""
 
-_FILE = re.compile(r"(.+\.py)(?::(\w+))?|(.+\.glsl)", re.DOTALL)
+_PYTHON = re.compile(r"(.+\.py)(?::(\w+))?", re.DOTALL)
 
 
 class Interpolation(Enum):
@@ -384,7 +388,7 @@ declare = HEURISTICS.declare
 def named(name: str) -> Heuristic:
     """Return a declared heuristic, or the one in a user's file."""
     if file := in_file(name):
-        heuristic: Heuristic = pkgutil.resolve_name(LOADERS[Path(file[0]).suffix])(name)
+        heuristic: Heuristic = pkgutil.resolve_name(readers()[Path(file[0]).suffix])(name)
         return heuristic
     if name not in HEURISTICS:
         raise InputError(
@@ -414,11 +418,17 @@ def in_file(name: str) -> tuple[str, str] | None:
 
     The function is empty if the name has none, such as ``FILE.glsl``.
     """
-    match = _FILE.fullmatch(name)
-    if match is None:
-        return None
-    python, function, shader = match.groups()
-    return python or shader, function or ""
+    if match := _PYTHON.fullmatch(name):
+        return match[1], match[2] or ""
+    suffix = Path(name).suffix
+    return (name, "") if suffix and suffix in readers() else None
+
+
+@cache
+def readers() -> dict[str, str]:
+    """Return :data:`READERS` and those of installed packages."""
+    entries = entry_points(group=GROUP)
+    return {entry.name: entry.value for entry in entries if entry.name[:1] == "."} | READERS
 
 
 def content_digest(files: Iterable[Path]) -> str:

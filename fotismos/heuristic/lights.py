@@ -7,12 +7,12 @@ a kernel.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, fields
+from enum import Enum
 from inspect import signature
 from math import inf, isfinite
 from numbers import Real
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import drjit as dr
 
@@ -70,13 +70,150 @@ class Arrival(NamedTuple):
     distance: Number
 
 
+def _triple(name: str, value: Any) -> Any:
+    """Return three finite floats, or the Dr.Jit array that was given."""
+    if dr.is_array_v(value) and dr.is_jit_v(value):
+        if dr.depth_v(value) == 2 and dr.size_v(value) == 3:
+            return value
+        raise InputError(f"{name}: {type(value).__name__} is not allowed: give three components.")
+    try:
+        triple = tuple(float(component) for component in value)
+    except (TypeError, ValueError, OverflowError):
+        triple = ()
+    if len(triple) != 3 or not all(map(isfinite, triple)):
+        raise InputError(f"{name} = {value!r} is not allowed: give three finite numbers.")
+    return triple
+
+
+def _direction(name: str, value: Any) -> Any:
+    direction = _triple(name, value)
+    if isinstance(direction, tuple) and not any(direction):
+        raise InputError(f"{name} = (0, 0, 0) points nowhere: give a vector of any other length.")
+    return direction
+
+
+def _attenuation(name: str, value: Any) -> tuple[Any, ...]:
+    """Return three checked numbers; if one is a Dr.Jit value, none is checked."""
+    coefficients = tuple(value) if isinstance(value, Sequence) else ()
+    if len(coefficients) == 3 and any(map(dr.is_array_v, coefficients)):
+        return coefficients
+    are_numbers = all(isinstance(c, Real) and isfinite(c) and float(c) >= 0 for c in coefficients)
+    if len(coefficients) != 3 or not are_numbers or not any(coefficients):
+        raise InputError(
+            f"{name} = {value!r} is not allowed: give three numbers k0, k1, k2, finite, 0 or"
+            " more, and not all 0."
+        )
+    return coefficients
+
+
+def _number(is_allowed: Callable[[Any], bool], allowed: str) -> Callable[[str, Any], Any]:
+    """Return the check of a number, which says what is ``allowed``."""
+
+    def check(name: str, value: Any) -> Any:
+        number = numerics.plain(value)
+        if number is None or (isinstance(number, Real) and not is_allowed(number)):
+            raise InputError(f"{name} = {value!r} is not allowed: give {allowed}.")
+        return number
+
+    return check
+
+
+def _intensity(name: str, value: Any) -> Any:
+    is_omitted = value is None and name != "intensity"
+    return None if is_omitted else materials.checked_colour(name, value)
+
+
+class Derivative(Enum):
+    """How light depends on a parameter: smoothly, with edges that move, or not as Mitsuba counts.
+
+    As in Mitsuba's own lights, ``prb`` takes no derivative of the direction in which light arrives.
+    """
+
+    SMOOTH = "smooth"
+    EDGES = "edges"
+    NONE = "none"
+
+
+@dataclass(frozen=True)
+class LightField:
+    """What a field of a light is, as metadata of its annotation.
+
+    ``check(name, value)`` returns the value as the kernel takes it, or raises `InputError`.
+    ``parameter`` is Mitsuba's type of the plugin's parameter of the same name, such as ``Float``,
+    and ``default`` its default; empty if the plugin reads the field in another way. A parameter
+    that ``adds_nothing_at_0`` stays a plain 0, for which the kernel has no instruction.
+    """
+
+    check: Callable[[str, Any], Any]
+    parameter: str = ""
+    default: Any = 0.0
+    derivative: Derivative = Derivative.SMOOTH
+    adds_nothing_at_0: bool = False
+
+
+Intensity = Annotated[Colour, LightField(_intensity)]
+Place = Annotated[
+    Position,
+    LightField(_triple, parameter="Point3f", default=(0, 0, 0), derivative=Derivative.NONE),
+]
+Travel = Annotated[
+    Direction,
+    LightField(_direction, parameter="Vector3f", default=(0, 0, 1), derivative=Derivative.NONE),
+]
+Axis = Annotated[
+    Direction,
+    LightField(_direction, parameter="Vector3f", default=(0, 0, 1), derivative=Derivative.EDGES),
+]
+Cutoff = Annotated[
+    float,
+    LightField(
+        _number(
+            lambda degrees: 0 < degrees < 180,
+            "an angle between 0 and 180 degrees, both excluded",
+        ),
+        parameter="Float",
+        default=30.0,
+        derivative=Derivative.NONE,
+    ),
+]
+Exponent = Annotated[
+    float,
+    LightField(
+        _number(
+            lambda m: 0 <= m <= numerics.LARGEST_EXPONENT,
+            f"a finite value of 0 or more, at most {numerics.LARGEST_EXPONENT:.2g}",
+        ),
+        parameter="Float",
+    ),
+]
+Attenuation = Annotated[tuple[Number, Number, Number], LightField(_attenuation)]
+Shell = Annotated[
+    Number,
+    LightField(
+        _number(lambda r: 0 <= r < inf, "a finite radius of 0 or more"),
+        parameter="Float",
+        derivative=Derivative.NONE,
+        adds_nothing_at_0=True,
+    ),
+]
+Clamped = Annotated[bool, LightField(materials.checked_flag)]
+
+
+def light_fields(kind: type["Light"]) -> dict[str, LightField]:
+    """Return what the fields of a kind of light are, by their names."""
+    of_kind: Any = kind  # a dataclass, which `Light` itself is not
+    annotated = {field.name: getattr(field.type, "__metadata__", ()) for field in fields(of_kind)}
+    return {name: metadata[0] for name, metadata in annotated.items() if metadata}
+
+
 class Light:
     """A kind of light, as the kernel sees it; each subclass is a frozen dataclass.
 
-    ``plugin`` is its emitter in a Mitsuba scene. Fields of the same name mean the same in all
-    kinds; :data:`CHECKS` checks them. ``diffuse_intensity`` is ``L_d``, the light that takes part
-    in diffuse reflection (6.6), ``specular_intensity`` ``L_s`` (6.8); each is ``intensity`` if
-    omitted. Without a position its rays are ``parallel``.
+    ``plugin`` is its emitter in a Mitsuba scene. The annotation of a field holds its check and the
+    plugin's parameter (:class:`LightField`); fields of one name mean the same in all kinds.
+    ``diffuse_intensity`` is ``L_d``, the light that takes part in diffuse reflection (6.6),
+    ``specular_intensity`` ``L_s`` (6.8); each is ``intensity`` if omitted. Without a position its
+    rays are ``parallel``.
     """
 
     plugin: ClassVar[str]
@@ -91,9 +228,8 @@ class Light:
     extent: Extent | None = None
 
     def __post_init__(self) -> None:
-        for name, check in CHECKS.items():
-            if hasattr(self, name):
-                object.__setattr__(self, name, check(getattr(self, name)))
+        for name, field in light_fields(type(self)).items():
+            object.__setattr__(self, name, field.check(name, getattr(self, name)))
 
     @property
     def intensities(self) -> list[Colour]:
@@ -203,10 +339,10 @@ class DirectionalLight(Light):
     plugin: ClassVar[str] = "heuristic_directional"
     parallel: ClassVar[bool] = True
 
-    direction: Direction
-    intensity: Colour
-    diffuse_intensity: Colour = None
-    specular_intensity: Colour = None
+    direction: Travel
+    intensity: Intensity
+    diffuse_intensity: Intensity = None
+    specular_intensity: Intensity = None
 
     def rays(self, position: Position) -> tuple[Direction, Number, list[Colour]]:
         """Return ``L = -direction / |direction|``, an infinite distance and the intensities."""
@@ -244,13 +380,13 @@ class PointLight(Light):
 
     plugin: ClassVar[str] = "heuristic_point"
 
-    position: Position
-    intensity: Colour
-    attenuation: tuple[Number, Number, Number] = UNATTENUATED
-    clamped: bool = False
-    shell: Number = 0
-    diffuse_intensity: Colour = None
-    specular_intensity: Colour = None
+    position: Place
+    intensity: Intensity
+    attenuation: Attenuation = UNATTENUATED
+    clamped: Clamped = False
+    shell: Shell = 0
+    diffuse_intensity: Intensity = None
+    specular_intensity: Intensity = None
     extent: Extent | None = None
 
 
@@ -266,16 +402,16 @@ class SpotLight(Light):
 
     plugin: ClassVar[str] = "heuristic_spot"
 
-    position: Position
-    direction: Direction
-    intensity: Colour
-    cutoff: float
-    exponent: float = 0
-    attenuation: tuple[Number, Number, Number] = UNATTENUATED
-    clamped: bool = False
-    shell: Number = 0
-    diffuse_intensity: Colour = None
-    specular_intensity: Colour = None
+    position: Place
+    direction: Axis
+    intensity: Intensity
+    cutoff: Cutoff
+    exponent: Exponent = 0
+    attenuation: Attenuation = UNATTENUATED
+    clamped: Clamped = False
+    shell: Shell = 0
+    diffuse_intensity: Intensity = None
+    specular_intensity: Intensity = None
     extent: Extent | None = None
 
     def cone(self, toward: Direction) -> Number:
@@ -300,7 +436,12 @@ PLUGINS: dict[str, type[Light]] = {
 
 def plugins_with(field: str) -> list[str]:
     """Return the plugins of the kinds of light that have a field."""
-    return [plugin for plugin, kind in PLUGINS.items() if field in signature(kind).parameters]
+    return [plugin for plugin, kind in PLUGINS.items() if has_field(kind, field)]
+
+
+def has_field(kind: type[Light], field: str) -> bool:
+    """Return whether a kind of light has a field, such as ``attenuation`` or ``cutoff``."""
+    return field in signature(kind).parameters
 
 
 def lamps(scene: Scene) -> list[Any]:
@@ -311,73 +452,3 @@ def lamps(scene: Scene) -> list[Any]:
 def is_unattenuated(coefficients: Sequence[Number]) -> bool:
     """Return whether coefficients of 6.1 are ``(1, 0, 0)`` by construction."""
     return all(map(is_number, coefficients, UNATTENUATED))
-
-
-def _triple(name: str, value: Any) -> Any:
-    """Return three finite floats, or the Dr.Jit array that was given."""
-    if dr.is_array_v(value) and dr.is_jit_v(value):
-        if dr.depth_v(value) == 2 and dr.size_v(value) == 3:
-            return value
-        raise InputError(f"{name}: {type(value).__name__} is not allowed: give three components.")
-    try:
-        triple = tuple(float(component) for component in value)
-    except (TypeError, ValueError, OverflowError):
-        triple = ()
-    if len(triple) != 3 or not all(map(isfinite, triple)):
-        raise InputError(f"{name} = {value!r} is not allowed: give three finite numbers.")
-    return triple
-
-
-def _direction(value: Any) -> Any:
-    direction = _triple("direction", value)
-    if isinstance(direction, tuple) and not any(direction):
-        raise InputError("direction = (0, 0, 0) points nowhere: give a vector of any other length.")
-    return direction
-
-
-def _attenuation(value: Any) -> tuple[Any, ...]:
-    """Return three checked numbers; if one is a Dr.Jit value, none is checked."""
-    coefficients = tuple(value) if isinstance(value, Sequence) else ()
-    if len(coefficients) == 3 and any(map(dr.is_array_v, coefficients)):
-        return coefficients
-    are_numbers = all(isinstance(c, Real) and isfinite(c) and float(c) >= 0 for c in coefficients)
-    if len(coefficients) != 3 or not are_numbers or not any(coefficients):
-        raise InputError(
-            f"attenuation = {value!r} is not allowed: give three numbers k0, k1, k2, finite, 0 or"
-            " more, and not all 0."
-        )
-    return coefficients
-
-
-def _number(name: str, is_allowed: Callable[[Any], bool], allowed: str, value: Any) -> Any:
-    number = numerics.plain(value)
-    if number is None or (isinstance(number, Real) and not is_allowed(number)):
-        raise InputError(f"{name} = {value!r} is not allowed: give {allowed}.")
-    return number
-
-
-def _intensity(name: str, value: Any) -> Any:
-    is_omitted = value is None and name != "intensity"
-    return None if is_omitted else materials.checked_colour(name, value)
-
-
-CHECKS: dict[str, Callable[[Any], Any]] = {
-    "position": partial(_triple, "position"),
-    "direction": _direction,
-    **{name: partial(_intensity, name) for name in INTENSITIES},
-    "cutoff": partial(
-        _number,
-        "cutoff",
-        lambda degrees: 0 < degrees < 180,
-        "an angle between 0 and 180 degrees, both excluded",
-    ),
-    "exponent": partial(
-        _number,
-        "exponent",
-        lambda m: 0 <= m <= numerics.LARGEST_EXPONENT,
-        f"a finite value of 0 or more, at most {numerics.LARGEST_EXPONENT:.2g}",
-    ),
-    "attenuation": _attenuation,
-    "shell": partial(_number, "shell", lambda r: 0 <= r < inf, "a finite radius of 0 or more"),
-    "clamped": partial(materials.checked_flag, "clamped"),
-}

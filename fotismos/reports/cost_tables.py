@@ -82,8 +82,6 @@ def lines(record: Cost) -> Iterator[str]:
     if record.at:
         title = f"Predicted times at {sized(record.at)}; errors are not predicted"
         yield from _section(title, predicted(record))
-    if record.measured:
-        yield from _section("Predicted and measured there, fewest samples", off(record))
 
 
 def lines_of_pictures(record: EngineCost, within: float) -> Iterator[str]:
@@ -191,35 +189,6 @@ def _passes_at(setting: EngineSetting) -> float | str:
 def predicted(record: Cost) -> Table:
     """Return the times that are predicted for another size."""
     return Table(_timed(), record.predicted)
-
-
-def off(record: Cost) -> Table:
-    """Return how far off the predicted times are, and errors at both sizes."""
-    forecasts = {(point.method, point.spp): point for point in record.predicted}
-
-    def forecast(point: Point) -> Point:
-        return forecasts[point.method, point.spp]
-
-    def error_before(point: Point) -> float:
-        return forecast(point).error.value
-
-    def ratio(point: Point) -> float:
-        return forecast(point).seconds.value / point.seconds.value - 1
-
-    columns = (
-        Column("method", "method"),
-        Column("time", "seconds.value", seconds),
-        Column("predicted", lambda point: forecast(point).seconds.value, seconds),
-        Column("off", ratio, "{:+.0%}".format),
-        Column(f"mean {LEADING.label}", "error.value", "{:.3f}".format),
-        Column(
-            "at",
-            lambda point: forecast(point).error.value,
-            "{:.3f}".format,
-            detail=sized(record.resolution),
-        ),
-    )
-    return Table(columns, record.measured)
 
 
 def attribution(record: Cost, named: Callable[[str], str] = str) -> Table:

@@ -1,6 +1,7 @@
 """The technical terms of the page, each with one sentence: its help, and its list of terms."""
 
 from fotismos.comparisons.departure.metrics import METRICS, RATIO
+from fotismos.reference.planning import effects
 
 Terms = dict[tuple[str, ...], str]
 """A sentence by the names under which a term is shown."""
@@ -112,29 +113,9 @@ PLANS: Terms = {
 }
 
 EFFECTS: Terms = {
-    ("occlusion",): "Shadows: surfaces that hide a light. The textbook’s light passes them.",
-    ("interreflection",): (
-        "Light that reaches a surface from other surfaces. The textbook has ambient light instead."
-    ),
-    ("bumps", "shadows or layers of bumps"): (
-        "Shadows that bumps cast on themselves, and maps over maps. The textbook has neither."
-    ),
-    ("microfacets and Fresnel",): (
-        "Highlights of rough, transparent coats, stronger at grazing angles. Phong’s are not."
-    ),
-    ("extended lights",): "Lights with an area, and so soft shadows. The textbook’s are points.",
-    (
-        "environment",
-        "environment light",
-    ): "Light from all around. The textbook has one ambient colour.",
-    ("spectral", "spectral light"): "Light by wavelength in place of three colours.",
-    ("polygon interpolation",): "Flat and Gouraud shading, which interpolate over polygons.",
-    ("transmission",): "Light that passes through surfaces, which the textbook’s cannot.",
-    ("distance attenuation",): "How light weakens with distance: physically, with its square.",
-    ("one intensity",): (
-        "Physical light has one intensity. The textbook’s may have one for each kind of reflection."
-    ),
-    ("spot cone",): "How a spot light weakens towards the edge of its cone.",
+    (effect.label, effect.noun) if effect.noun else (effect.label,): effect.meaning
+    for effect in effects.EFFECTS
+    if effect.meaning
 }
 
 METHODS: Terms = {

@@ -233,12 +233,12 @@ def plan(asked: OnScene) -> PlanReport:
 def cost(asked: Cost) -> CostRecord | EngineCost:
     """Return what each step of accuracy costs: seconds and ΔE2000 by method and samples.
 
-    ``at`` is a width and height in pixels to predict for, where ``measure`` also measures. ``spp``
-    is the largest number of samples, ``rounds`` how often each method is timed. It takes about a
-    minute. ``pictures`` are settings of another renderer, ``{"name @ 1.2ms": picture}``: a file, a
-    pattern, an array (H, W, 3) of linear colours, or several of them. ``machine`` and
-    ``kernel_time`` are what their times are of, as in the command. With a ``reference``, no scene
-    is needed. Other arguments and errors are those of :func:`compare`.
+    ``at`` is a width and height in pixels to predict for. ``spp`` is the largest number of samples,
+    ``rounds`` how often each method is timed. It takes about a minute. ``pictures`` are settings of
+    another renderer, ``{"name @ 1.2ms": picture}``: a file, a pattern, an array (H, W, 3) of linear
+    colours, or several of them. ``machine`` and ``kernel_time`` are what their times are of, as in
+    the command. With a ``reference``, no scene is needed. Other arguments and errors are those of
+    :func:`compare`.
     """
     if asked.scene is None and asked.reference and asked.engine:
         asked.require_no_scene()

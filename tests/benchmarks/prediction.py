@@ -1,9 +1,9 @@
 """Predicted against measured: the time of each method at a larger size, and errors at both sizes.
 
-Predicted from a study of 128 pixels and measured in one run (``fotismos cost SCENE --at WxH
---measure``), on an idle machine. A scene is within the bound in time if the median of its methods
-is, since a burst of another program hits a single one. Errors are not predicted: the table shows
-how far they move with the size, where those that differ by less than anyone sees count as equal.
+One study of 128 pixels predicts, as ``fotismos cost SCENE --at WxH`` does, and one at that size
+measures, on an idle machine. A scene is within the bound in time if the median of its methods is,
+since a burst of another program hits a single one. Errors are not predicted: the table shows how
+far they move with the size, where those that differ by less than anyone sees count as equal.
 """
 
 from statistics import median
@@ -15,8 +15,8 @@ from fotismos.comparisons.case import open_case
 
 from fotismos.comparisons.options import Options  # isort: skip  it finds LLVM first
 
-from fotismos.comparisons.cost.cost import cost
-from fotismos.comparisons.cost.measure import Effort
+from fotismos.comparisons.cost.front import at_size
+from fotismos.comparisons.cost.measure import Effort, measure_ladder
 
 SCENES = ("fig-8-9", "fig-6-10", "plastic-spheres", "cornell-box")
 TARGET = 1280, 720
@@ -56,22 +56,29 @@ def summary(found):
     )
 
 
-def _deviations(name, rounds):
+def _deviations(name, rounds, target=TARGET):
+    """Compare the study's prediction with a study at the target, both with the fewest samples."""
     case = open_case(name, Options())
-    effort = Effort(rounds=rounds, is_short=True)
-    record = cost(case.source, case.options, effort, at=TARGET, is_measured=True).record
-    known = {(point.method, point.spp): point for point in record.predicted}
+    effort = Effort(rounds=rounds, largest=4, is_short=True)
+    at_target = case.options.changed(resolution=target)
+    small = measure_ladder(case.source, case.options, effort, silent, at=target)
+    whole = measure_ladder(case.source, at_target, effort, silent)
+    predicted = {point.method: point for point in at_size(small.points, small.methods, target)}
     found = []
-    for point in record.measured:
-        said, error = known[point.method, point.spp], point.error.value
+    for point in whole.points:
+        said = predicted[point.method]
         found.append(
             {
                 "method": point.method,
                 "time": said.seconds.value / point.seconds.value - 1,
-                "error": _deviation(said.error.value, error),
+                "error": _deviation(said.error.value, point.error.value),
             }
         )
     return found
+
+
+def silent(*_):
+    """Report no progress."""
 
 
 def _deviation(predicted, error):

@@ -123,7 +123,9 @@ def test_the_environment_is_the_same_in_glsl(rgb, written):
         if "map" in name:
             turn = np.array(emitter["to_world"].matrix)[:3, :3] if "turned" in name else np.eye(3)
             expected = 1.5 * interpolated(TEXELS, toward @ turn)
-        np.testing.assert_allclose(shown, expected, rtol=1e-5, atol=1e-5, err_msg=name)
+        # OpenGL's angles; beside the sun a sky's texels differ most.
+        atol = 1e-4 if "sunsky" in name else 1e-5
+        np.testing.assert_allclose(shown, expected, rtol=1e-5, atol=atol, err_msg=name)
 
 
 def test_without_an_environment_it_is_the_ambient_light(rgb, written):

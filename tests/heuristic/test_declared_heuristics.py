@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.heuristic import kernel, tessellation
+from fotismos.heuristic import heuristics, kernel, tessellation
 from fotismos.heuristic.declared import Declared
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import HEURISTICS, PHONG, Heuristic, Parameter, declare, named
@@ -205,6 +205,24 @@ def test_packages_declare_by_entry_points_that_are_loaded_once(monkeypatch):
     entry.load = lambda: 1 / 0
     with pytest.raises(InputError, match=r"late: the entry point package:LATE .*division by zero"):
         Declared("heuristic", "fotismos.toys").get("other")
+
+
+def read(word):
+    return f"{word} is read"
+
+
+def test_packages_read_files_of_other_suffixes_by_entry_points(monkeypatch):
+    entry = SimpleNamespace(name=".toy", value=f"{__name__}:read")
+    for module in ("declared", "heuristics"):
+        monkeypatch.setattr(f"fotismos.heuristic.{module}.entry_points", lambda group: [entry])
+    monkeypatch.setattr(heuristics, "readers", heuristics.readers.__wrapped__)
+    assert named("folder/mine.toy") == "folder/mine.toy is read"
+    assert heuristics.in_file("mine.toy") == ("mine.toy", "")
+    assert heuristics.in_file("mine.other") is None
+    # It is no heuristic itself.
+    assert list(Declared("heuristic", "fotismos.toys", phong="fotismos.heuristic:PHONG")) == [
+        "phong"
+    ]
 
 
 def test_a_pair_says_what_its_heuristic_shades_with(rgb, declared):

@@ -14,8 +14,11 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.heuristic import glsl, program, user_shaders
+from fotismos.heuristic import program, user_shaders
 from fotismos.heuristic.errors import InputError, InstallationError
+from fotismos.heuristic.glsl import opengl as contexts
+from fotismos.heuristic.glsl import shader as glsl
+from fotismos.heuristic.glsl import source
 from fotismos.heuristic.heuristics import INPUTS, Heuristic, named
 from fotismos.reports.run import doctor
 from tests.shared.opengl import opengl
@@ -119,7 +122,7 @@ def shown(colour):
 
 FIELDS = (
     [(name, name) for name in ("position", "normal", "view", "ambient")]
-    + [(f"material.{name}", f"material.{name}") for name in glsl.MATERIAL]
+    + [(f"material.{name}", f"material.{name}") for name in source.MATERIAL]
     + [
         (f"lights[{number}].{name}", f"lights[{number}].{name}")
         for number in (0, 1)
@@ -196,7 +199,7 @@ def test_other_colours_than_rgb_are_refused(variant):
 def test_a_record_says_that_the_gpu_is_software(monkeypatch, written):
     name = written(returning("0.5"), "mine.glsl")
     for renderer, is_software in (("llvmpipe (LLVM 15)", True), ("NVIDIA L4", False)):
-        monkeypatch.setattr(glsl, "device", lambda shown=(renderer, is_software): shown)
+        monkeypatch.setattr(contexts, "device", lambda shown=(renderer, is_software): shown)
         monkeypatch.setattr(glsl, "_known", {})
         case = open_case("fig-8-9", Options(heuristic=name, **SMALL))
         assert ("software GPU" in named(name).label) == is_software
@@ -206,9 +209,9 @@ def test_a_record_says_that_the_gpu_is_software(monkeypatch, written):
 
 def test_without_moderngl_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "moderngl", None)
-    monkeypatch.setattr(glsl, "_kept", glsl.threading.local())
+    monkeypatch.setattr(contexts, "_kept", contexts.threading.local())
     with pytest.raises(InstallationError, match=re.escape(program.installation("moderngl"))):
-        glsl.opengl()
+        contexts.context()
     assert "pip install" in doctor.shaded()
     pool = SimpleNamespace(do=lambda task: task.function(*task.arguments))
     monkeypatch.setattr(doctor, "rendered", lambda _: "renders")
@@ -224,9 +227,9 @@ def test_without_a_driver_it_says_what_to_install(monkeypatch):
         raise OSError("libEGL.so is not there")
 
     monkeypatch.setattr(moderngl, "create_context", fail)
-    monkeypatch.setattr(glsl, "_kept", glsl.threading.local())
+    monkeypatch.setattr(contexts, "_kept", contexts.threading.local())
     with pytest.raises(InstallationError, match="apt-get install libegl1 libgl1-mesa-dri"):
-        glsl.opengl()
+        contexts.context()
 
 
 WRAPPED = """uniform float wrap = 0.5;  // 0 to 1

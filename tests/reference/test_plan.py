@@ -177,3 +177,9 @@ def test_the_table_of_the_environment_agrees_with_sampling(rgb):
         weight = np.array(bsdf.sample(mi.BSDFContext(), si, rng.next_float32(), point)[1][0], float)
         error = weight.std() / count**0.5
         assert abs(np.array(table.at(mi.Float(mu)))[0, 0] - weight.mean()) < 5 * error + 2e-4
+
+
+def test_an_effect_in_which_the_halves_differ_has_its_own_colour_and_its_sentence():
+    differing = [effect for effect in EFFECTS if effect.colour]
+    assert len({effect.colour for effect in differing}) == len(differing) > 0
+    assert [bool(effect.meaning) for effect in EFFECTS] == [bool(e.colour) for e in EFFECTS]

@@ -1,5 +1,7 @@
 """Passes after the first replay its kernels: the images must be those of tracing each pass."""
 
+import drjit as dr
+import drjit.ast
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -107,3 +109,23 @@ def test_edits_between_passes_show(rgb, parameter, value):
     for seed, old, new in zip(SEEDS, before, after, strict=True):
         assert new.mean() < 0.7 * old.mean()
         assert np.array_equal(new, traced(renderer, seed))
+
+
+def test_a_switch_of_the_variant_transforms_no_code_twice_and_leaves_drjit_as_it_is(
+    rgb, monkeypatch
+):
+    with variant("llvm_ad_spectral"):
+        pass
+    transformed = []
+
+    def syntax(function=None, **options):
+        transformed.append(function)
+        return drjit.ast.syntax(function, **options)
+
+    monkeypatch.setattr(dr, "syntax", syntax)
+    with variant("llvm_ad_spectral"):
+        assert dr.syntax is syntax
+    assert dr.syntax is syntax
+    assert not transformed
+    mi.set_variant("llvm_ad_spectral")
+    assert transformed  # Mitsuba's own switch

@@ -2,14 +2,14 @@
 
 import pytest
 
-from fotismos.heuristic import glsl
 from fotismos.heuristic.errors import InstallationError
+from fotismos.heuristic.glsl.opengl import context
 
 
 def without_opengl():
     """Return why no shader can be run here; empty where one can."""
     try:
-        glsl.opengl()
+        context()
     except InstallationError as error:
         return str(error)
     return ""

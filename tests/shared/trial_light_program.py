@@ -9,7 +9,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.plain_scene import plain_scene
 from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
-from fotismos.reference.pairing import emitters, lights
+from fotismos.reference.pairing import kinds, lights
 from fotismos.reference.scene.graph import properties
 from fotismos.reports.files.export_files import gltf
 
@@ -41,11 +41,10 @@ def refusal(function, *arguments):
 
 
 if __name__ == "__main__":
-    emitters.trial_to_physical = trial_to_physical
     trial = lights.LightKind(
-        plugins=(), model=TrialLight, to_physical="emitters:trial_to_physical", exact=True
+        plugins=(), model=TrialLight, to_physical=trial_to_physical, exact=True
     )
-    lights.BY_PLUGIN |= lights.by_plugin([trial])
+    kinds.BY_PLUGIN |= kinds.by_plugin([trial])
     record = fotismos.compare(scene((0, 0, 1)), why=False, spp=4).comparison.record
     (paired,) = record.pairing.emitters
     print(paired.given, "is paired as", paired.derived)

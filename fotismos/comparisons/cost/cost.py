@@ -14,14 +14,12 @@ from fotismos.comparisons.cost import engine
 from fotismos.comparisons.cost.engine import Study
 from fotismos.comparisons.cost.front import at_size, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import (
-    LARGEST_CERTAIN,
     QUICK,
     QUICK_WIDTH,
     WIDTH,
     Effort,
     Measurements,
     Size,
-    measure_at,
     measure_ladder,
     reduced,
     requested,
@@ -40,7 +38,6 @@ from fotismos.reference.pairing.settings import film_size
 from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import Machine, Pixels
 from fotismos.reference.rendering.passes import Progress
-from fotismos.reference.rendering.renderer import LARGEST_PASS, require_memory
 from fotismos.reference.scene.source import Source
 
 SPP = 64
@@ -54,7 +51,6 @@ def cost(
     progress: Progress | None = None,
     command: str = "",
     at: Size | None = None,
-    is_measured: bool = False,
     causes: Causes | None = None,
     alone: AbstractContextManager[Any] | None = None,
     engine_times: EngineTimes | None = None,
@@ -65,9 +61,9 @@ def cost(
     :func:`fotismos.comparisons.compare.compare`, and
     :func:`fotismos.comparisons.cost.measure.measure_ladder` for an omitted resolution,
     ``options.spp`` and ``alone``. ``at`` is a size to predict for: times follow from overhead and
-    time per sample, while errors are not predicted. If ``is_measured``, methods also
-    render there. ``causes`` are those of the scene, if known. With ``engine_times``, pictures of
-    another renderer are judged, too, and their size becomes that of the study.
+    time per sample, while errors are not predicted. ``causes`` are those of the scene, if known.
+    With ``engine_times``, pictures of another renderer are judged, too, and their size becomes that
+    of the study.
     """
     progress = progress or (lambda *_: None)
     options = options or Options()
@@ -86,14 +82,13 @@ def cost(
         options = given.sized(film_size(source.parse(), options.sensor), options)
     if at:
         size = options.resolution or reduced(source, options.changed(resolution=at), WIDTH)
-        require(source.name, at, size, is_measured)
+        require_shape(at, size)
     found = measure_ladder(source, options, effort=effort, progress=progress, at=at, alone=alone)
     options = found.options
     ready = found.ready
     ladder = found.ladder
     counted = ready.counted
     predicted = at_size(found.points, found.methods, at) if at else ()
-    measured = measure_at(found, at, progress) if at and is_measured else ()
     ladder.forget()  # its scenes would slow later work
     judged = engine.judged(given, engine_times, truth(found)) if engine_times else None
     known = causes or find(ready, progress, most=found.size[0])
@@ -122,7 +117,6 @@ def cost(
         guard=ready.guard or Guard(),
         at=at,
         predicted=fronted(predicted),
-        measured=measured,
         left_out=ladder.left_out,
         engine=judged,
     )
@@ -168,22 +162,14 @@ def quick(
     return cost(source, small, QUICK, progress, command, whole, causes=causes, alone=alone)
 
 
-def require(name: str, target: Size, size: Size, is_measured: bool) -> None:
-    """Reject a size of another shape than the study's, or one that is too large to measure."""
+def require_shape(target: Size, size: Size) -> None:
+    """Reject a size of another shape than the study's."""
     (width, height), (wide, high) = sorted([size, target])
     if abs(high * width / wide - height) > 1:  # a pixel of the smaller one is tolerated
         raise InputError(
             f"{width}x{height} and {wide}x{high} differ in shape: give `resolution` the shape of"
             " `at`, or omit it."
         )
-    if is_measured:
-        most = LARGEST_PASS // LARGEST_CERTAIN
-        if target[0] * target[1] > most:
-            raise InputError(
-                f"{target[0]}x{target[1]} is too large to measure: at most {most} pixels are"
-                " allowed. Omit `measure` to predict it."
-            )
-        require_memory(name, width=target[0], height=target[1])
 
 
 def attribution(found: Measurements, causes: Causes) -> CostAttribution:

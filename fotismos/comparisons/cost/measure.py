@@ -31,8 +31,6 @@ from fotismos.comparisons.records.departure import Viewing
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
-from fotismos.reference.records import Interval
-from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.rendering.passes import Progress, Stream, passes
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, warm
 from fotismos.reference.rendering.sums import (
@@ -53,9 +51,6 @@ SURE = NormalDist().inv_cdf(0.975)
 
 LARGEST_CERTAIN = 16
 """Most samples per pixel of methods without random numbers: only the pixel filter needs them."""
-
-MEASURED_ROUNDS = 7
-"""Rounds at the size of a prediction."""
 
 WIDTH = 128
 QUICK_WIDTH = 64
@@ -246,17 +241,21 @@ def converged(
     ready: Prepared,
     seed: int,
     progress: Progress | None,
-    size: Size | None = None,
     total: Accumulator | None = None,
 ) -> Estimate:
     """Render the reference into a sum, with seeds that no method has."""
-    size = size or ready.size
-    renderer = ready.reference.sampled(_reference_spp(size))
+    renderer = ready.reference.sampled(_reference_spp(ready.size))
     total = total or Accumulator()
     count = max(REFERENCE_PASSES, ready.plan.passes)
     stream = Stream.OTHER_SIDE
     for rendered in passes(
-        [renderer], seed, count, size=size, stream=stream, progress=progress, stage="reference"
+        [renderer],
+        seed,
+        count,
+        size=ready.size,
+        stream=stream,
+        progress=progress,
+        stage="reference",
     ):
         total.add(rendered[0])
     return total.estimate()
@@ -365,36 +364,3 @@ def timed_method(
         first_s=first.times[0],
         prepare_s=getattr(first.integrator, "preparation", 0.0),
     )
-
-
-def measure_at(found: Measurements, size: Size, progress: Progress) -> tuple[Point, ...]:
-    """Render each method with its fewest samples at another size."""
-    scene = found.ready.scene
-    options = found.options
-    reference = converged(found.ready, options.seed, progress=progress, size=size)
-    judge = judge_by(reference, gbuffer(scene, size, film=size).hit, options.viewing)
-    renderers = {
-        (method.name, spp): found.ladder.renderer(method, spp, size)
-        for method in found.methods
-        for spp in found.effort.counts(method)[:1]
-    }
-    for renderer in renderers.values():
-        warm(renderer)
-    errors, _ = rendered(
-        renderers, judge, renderers, MEASURED_ROUNDS, options.seed, progress, "measuring"
-    )
-    points = []
-    for (name, spp), renderer in renderers.items():
-        took = renderer.times[-MEASURED_ROUNDS:]
-        error, tolerance = errors[name, spp]
-        points.append(
-            Point(
-                method=name,
-                spp=spp,
-                # Other programs only add time: the shortest round is the time.
-                seconds=Interval(value=min(took), low=min(took), high=max(took)),
-                error=error,
-                tolerance=tolerance,
-            )
-        )
-    return tuple(points)

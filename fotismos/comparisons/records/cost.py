@@ -182,8 +182,8 @@ class Cost(Record):
     processor_share
         Processor time that samples took, as a share of what these threads could take: the rest
         went to other programs.
-    at, predicted, measured
-        A larger size, what is predicted there, and what was measured there.
+    at, predicted
+        A larger size, and what is predicted there.
     left_out
         Methods that the scene does not allow, and why.
     engine
@@ -217,7 +217,6 @@ class Cost(Record):
     guard: Guard | None = None
     at: Resolution | None = None
     predicted: tuple[Point, ...] = ()
-    measured: tuple[Point, ...] = ()
     left_out: dict[str, str]
     engine: Engine | None = None
 

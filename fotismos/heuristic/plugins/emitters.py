@@ -59,24 +59,28 @@ import mitsuba as mi
 
 from fotismos.heuristic import convention, terms
 from fotismos.heuristic.convention import Colour, Interaction, Mask, Number, Properties, Sample
-from fotismos.heuristic.lights import FAR, INTENSITIES, PLUGINS, UNATTENUATED, Extent, Light
+from fotismos.heuristic.lights import (
+    FAR,
+    INTENSITIES,
+    PLUGINS,
+    UNATTENUATED,
+    Derivative,
+    Extent,
+    Light,
+    light_fields,
+)
 from fotismos.heuristic.plugins.coefficients import coefficient, emitted
 
 
 def define() -> dict[str, Any]:
     """Return the classes for the current variant, by the plugins' names."""
-    parameters = {
-        "scale": (mi.Float, 1.0),
-        "position": (mi.Point3f, mi.ScalarPoint3f(0)),
-        "direction": (mi.Vector3f, mi.ScalarVector3f(0, 0, 1)),
-        "cutoff": (mi.Float, 30.0),
-        "exponent": (mi.Float, 0.0),
-    }
     coefficients = dict(zip(("k0", "k1", "k2"), map(float, UNATTENUATED), strict=True))
 
-    # As in Mitsuba's own lights: `prb` takes no derivative of the direction in which light arrives.
-    marks = dict.fromkeys(("position", "cutoff", "shell"), mi.ParamFlags.NonDifferentiable)
-    marks["direction"] = mi.ParamFlags.Differentiable | mi.ParamFlags.Discontinuous
+    flags = {
+        Derivative.SMOOTH: mi.ParamFlags.Differentiable,
+        Derivative.EDGES: mi.ParamFlags.Differentiable | mi.ParamFlags.Discontinuous,
+        Derivative.NONE: mi.ParamFlags.NonDifferentiable,
+    }
 
     class HeuristicLight(mi.Emitter):
         """One of the kinds in :data:`fotismos.heuristic.lights.PLUGINS`, never hit by a ray."""
@@ -92,19 +96,19 @@ def define() -> dict[str, Any]:
             }
             self.numbers: list[str] = []  # names of the parameters that are opaque numbers
             self.names = signature(self.model).parameters.keys()
-            for name, (kind, default) in parameters.items():
-                if name in self.names or name == "scale":
-                    self._keep(props, name, kind, default)
+            self._keep(props, "scale", mi.Float, 1.0)
+            self.fields = light_fields(self.model)
+            for name, field in self.fields.items():
+                if field.adds_nothing_at_0 and not props.get(name, 0.0) > 0:
+                    setattr(self, name, 0)
+                elif field.parameter:
+                    self._keep(props, name, getattr(mi, field.parameter), field.default)
             if "attenuation" in self.names:
                 self.clamped = props.get("clamped", False)
                 # Without attenuation in the scene, the kernel holds none until an edit.
                 self.unattenuated = all(props.get(k, d) == d for k, d in coefficients.items())
                 for name, default in coefficients.items():
                     self._keep(props, name, mi.Float, default)
-            # Without a shell it stays a plain 0, which adds no instruction.
-            self.shell = 0
-            if "shell" in self.names and props.get("shell", 0.0) > 0:
-                self._keep(props, "shell", mi.Float, 0.0)
             if "extent" in self.names:
                 self.extent = Extent(
                     radius=mi.Float(props.get("radius", 0.0)),
@@ -125,10 +129,9 @@ def define() -> dict[str, Any]:
         def traverse(self, callback: Any) -> None:
             numbers = {name: getattr(self, name) for name in self.numbers}
             for name, value in (self.intensities | numbers).items():
-                flags = marks.get(name, mi.ParamFlags.Differentiable)
-                if name == "direction" and self.model.parallel:
-                    flags = mi.ParamFlags.NonDifferentiable
-                callback.put(name, value, +flags)
+                # `scale` and the coefficients of the attenuation are no fields.
+                field = self.fields.get(name)
+                callback.put(name, value, +flags[field.derivative if field else Derivative.SMOOTH])
 
         def light(self, it: Interaction, active: Mask = True) -> Light:
             """Return the kernel's form of this light, at the wavelengths of an interaction."""

@@ -15,23 +15,16 @@ Physical light has one intensity. A textbook light of two (6.6, 6.8) is paired b
 which determines the irradiance; its ``L_s`` is recorded as lost.
 """
 
-import pkgutil
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
 
-from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
-from fotismos.reference.pairing import lights
+from fotismos.reference.pairing import kinds
 from fotismos.reference.pairing.factors import Convention, Replacements
-from fotismos.reference.pairing.lights import (
-    SECOND_INTENSITY,
-    LightNode,
-    heuristic,
-    is_heuristic,
-    level,
-)
+from fotismos.reference.pairing.lights import LightNode, is_heuristic
+from fotismos.reference.pairing.pairing_record import SECOND_INTENSITY
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph, properties
 
@@ -64,11 +57,11 @@ def to_heuristic(
             hide_emitters=hide_emitters,
             replaced=replaced,
         )
-        kind = lights.of(light.plugin)
-        if not kind.to_heuristic or kind.on_shape != (shape is not None):
+        kind = kinds.of(light.plugin)
+        if kind.to_heuristic is None or kind.on_shape != (shape is not None):
             light.leave_out()
             continue
-        glow = _rule(kind.to_heuristic)(light)
+        glow = kind.to_heuristic(light)
         if glow is not None:
             ambient = glow if ambient is None else values.total_emission(graph, ambient, glow)
     return ambient
@@ -81,49 +74,12 @@ def to_physical(graph: Graph, surface: Callable[[], Any], replaced: Replacements
         if len(set(light.intensities())) > 1:
             nearest = "its diffuse intensity L_d, for all reflection"
             replaced.lose(light.label, light.plugin, SECOND_INTENSITY, nearest)
-        rule = lights.of(light.plugin).to_physical
-        if not rule:
+        rule = kinds.of(light.plugin).to_physical
+        if rule is None:
             raise NotImplementedError(
                 f"{light.plugin} has no physical form. Name one in its `LightKind`."
             )
-        _rule(rule)(light)
-
-
-def _rule(name: str) -> Callable[[LightNode], Any]:
-    """Return a rule of pairing; its module is loaded here, since most scenes have points alone."""
-    rule: Callable[[LightNode], Any] = pkgutil.resolve_name(f"{__package__}.{name}")
-    return rule
-
-
-def point_to_heuristic(light: LightNode) -> None:
-    """Replace a point by the heuristic's."""
-    position = mi.ScalarPoint3d(light.position())
-    intensity = light.value("intensity", 1.0)
-    light.replace(heuristic("heuristic_point", position=position, intensity=intensity))
-
-
-def point_to_physical(light: LightNode) -> None:
-    """Replace a heuristic point by Mitsuba's."""
-    factor, note = level(light, lambda travel: 1.0, lambda travel: 1.0, 1.0)
-    position = mi.ScalarPoint3d(light.position())
-    intensity = light.scaled_intensity(factor)
-    props = properties("point", position=position, intensity=intensity)
-    light.replace(props, factor, not note, note)
-
-
-def directional_to_heuristic(light: LightNode) -> None:
-    """Replace parallel light by the heuristic's."""
-    travel = mi.ScalarVector3f(light.travel())
-    intensity = light.value("irradiance", 1.0)
-    light.replace(heuristic("heuristic_directional", direction=travel, intensity=intensity))
-
-
-def directional_to_physical(light: LightNode) -> None:
-    """Replace heuristic parallel light by Mitsuba's."""
-    travel = light.value("direction", mi.ScalarVector3f(0, 0, 1))
-    irradiance = light.scaled_intensity(IRRADIANCE_PER_INTENSITY)
-    props = properties("directional", direction=travel, irradiance=irradiance)
-    light.replace(props, IRRADIANCE_PER_INTENSITY)
+        rule(light)
 
 
 def _physical(graph: Graph) -> Iterator[tuple[int | None, str, int]]:

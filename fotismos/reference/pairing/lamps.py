@@ -21,21 +21,23 @@ import mitsuba as mi
 import numpy as np
 
 from fotismos.heuristic import meshes
+from fotismos.heuristic.lights import DirectionalLight, PointLight, SpotLight
 from fotismos.reference.pairing import probe
 from fotismos.reference.pairing.factors import CLOSED_LIGHT_FACTOR, INTENSITY_FACTOR
-from fotismos.reference.pairing.lights import GLOWING, LightNode, heuristic, level
+from fotismos.reference.pairing.lights import (
+    GLOWING,
+    LightKind,
+    LightNode,
+    at_point,
+    heuristic,
+    level,
+)
 from fotismos.reference.rendering.gbuffer import GBuffer
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Reference, properties
 
 BSDF = mi.ObjectType.BSDF
 EMITTER = mi.ObjectType.Emitter
-
-
-def constant_to_ambient(light: LightNode) -> Any:
-    """Return the radiance of an even environment."""
-    light.becomes_ambient()
-    return light.value("radiance", 1.0)
 
 
 def environment_to_ambient(light: LightNode) -> Any:
@@ -92,14 +94,14 @@ def area_to_heuristic(light: LightNode) -> Any:
     if flatness > FLATNESS:
         # On its axis L times the projected area, and pi L A in all: I_0 2 pi / (m + 1) of 6.4.
         flatness = 1.0 if flatness > FLAT else flatness
-        plugin = "heuristic_spot"
+        plugin = SpotLight.plugin
         factor = INTENSITY_FACTOR * extent.area * flatness
         form = ""
         exponent = 2 * flatness - 1
         axis = mi.ScalarVector3f(extent.normal)
         cone = {"direction": axis, "cutoff": 90.0, "exponent": exponent}
     else:
-        plugin = "heuristic_point"
+        plugin = PointLight.plugin
         factor = CLOSED_LIGHT_FACTOR * extent.area
         form = "closed, "
         exponent = 0.0
@@ -210,7 +212,7 @@ def sky_to_ambient(light: LightNode) -> Any:
     if sun is not None:
         intensity, direction = sun
         props = properties(
-            "heuristic_directional", direction=mi.ScalarVector3f(direction), intensity=intensity
+            DirectionalLight.plugin, direction=mi.ScalarVector3f(direction), intensity=intensity
         )
         props.set_id(f"sun of {light.label}")
         node = light.graph.add(mi.ObjectType.Emitter, props)
@@ -334,7 +336,7 @@ def spot_to_heuristic(light: LightNode) -> None:
         intensity = probe.as_value(light.graph, level, emitted=True)
         fall_off = "the mean fall-off of its picture"
     props = heuristic(
-        "heuristic_spot",
+        SpotLight.plugin,
         factor,
         position=mi.ScalarPoint3d(light.position()),
         direction=mi.ScalarVector3f(light.column(2)),
@@ -377,3 +379,23 @@ def spot_to_physical(light: LightNode) -> None:
         beam_width=beam_width,
     )
     light.replace(props, factor, exact=False, note=f"{fitted}; {rule or 'same flux'}")
+
+
+AREA = LightKind(
+    plugins=("area",), colour="radiance", to_heuristic=area_to_heuristic, on_shape=True
+)
+ENVIRONMENT = LightKind(plugins=("envmap",), to_heuristic=environment_to_ambient, surrounds=True)
+SKY = LightKind(plugins=("sunsky", "timed_sunsky"), to_heuristic=sky_to_ambient, surrounds=True)
+SPOT = LightKind(
+    plugins=("spot",),
+    model=SpotLight,
+    colour="intensity",
+    to_heuristic=spot_to_heuristic,
+    to_physical=spot_to_physical,
+    place=at_point,
+    exact=True,
+)
+PROJECTOR = LightKind(plugins=("projector",))
+
+KINDS = (AREA, ENVIRONMENT, SKY, SPOT, PROJECTOR)
+"""The kinds that :mod:`fotismos.reference.pairing.kinds` does not have."""

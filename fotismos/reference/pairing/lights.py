@@ -1,6 +1,6 @@
-"""The kinds of lights, and a light of a graph that the rules of pairing read and replace."""
+"""What a kind of light declares, and a light of a graph that its rules read and replace."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
@@ -12,19 +12,14 @@ from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
 from fotismos.heuristic.lights import (
     INVERSE_SQUARE,
     PLUGINS,
-    DirectionalLight,
     Light,
-    PointLight,
-    SpotLight,
+    has_field,
 )
 from fotismos.reference.pairing.factors import INTENSITY_FACTOR, Replacements
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph, properties
 
 FALLOFF_OF_MITSUBA = dict(zip(("k0", "k1", "k2"), map(float, INVERSE_SQUARE), strict=True))
-
-SECOND_INTENSITY = "specular intensity L_s"
-"""What a light of two intensities loses."""
 
 GLOWING = "{}_glowing"
 """The id of the textbook material of a lamp, by the lamp's label."""
@@ -131,10 +126,9 @@ class LightNode:
 class LightKind:
     """A kind of light, and how it is paired.
 
-    ``to_heuristic`` and ``to_physical`` are rules: functions of a :class:`LightNode`, each named by
-    its module in this folder and its name. The first replaces a light by its nearest form in the
-    textbook half, and returns the radiance that becomes ``I_a``, if any; a kind without it is left
-    out. The second replaces its heuristic form, if there is one, by the nearest physical light.
+    ``to_heuristic`` and ``to_physical`` are rules. The first replaces a light by its nearest form
+    in the textbook half, and returns the radiance that becomes ``I_a``, if any; a kind without it
+    is left out. The second replaces its heuristic form by the nearest physical light.
 
     ``plugins`` are Mitsuba's emitters of this kind, ``model`` its class in
     :mod:`fotismos.heuristic.lights`; None if the heuristic has no light of this kind. ``colour`` is
@@ -147,97 +141,27 @@ class LightKind:
     plugins: tuple[str, ...]
     model: type[Light] | None = None
     colour: str = ""
-    to_heuristic: str = ""
-    to_physical: str = ""
+    to_heuristic: Callable[[LightNode], Any] | None = None
+    to_physical: Callable[[LightNode], None] | None = None
     place: Callable[[LightNode], dict[str, Any]] = lambda light: {}
     on_shape: bool = False
     exact: bool = False
     surrounds: bool = False
     uniform: bool = False
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its plugins in either half."""
+        return self.plugins if self.model is None else (*self.plugins, self.model.plugin)
+
     def has(self, name: str) -> bool:
         """Return whether its heuristic form has a field, such as ``attenuation`` or ``cutoff``."""
-        return self.model is not None and name in vars(self.model)["__dataclass_fields__"]
+        return self.model is not None and has_field(self.model, name)
 
 
-def _at_point(light: LightNode) -> dict[str, Any]:
+def at_point(light: LightNode) -> dict[str, Any]:
+    """Return the position of a light that shines from a point."""
     return {"position": light.position()}
-
-
-ENVIRONMENT = LightKind(
-    plugins=("envmap",), to_heuristic="lamps:environment_to_ambient", surrounds=True
-)
-
-KINDS = (
-    LightKind(
-        plugins=("area",), colour="radiance", to_heuristic="lamps:area_to_heuristic", on_shape=True
-    ),
-    ENVIRONMENT,
-    LightKind(
-        plugins=("constant",),
-        colour="radiance",
-        to_heuristic="lamps:constant_to_ambient",
-        surrounds=True,
-        uniform=True,
-    ),
-    LightKind(
-        plugins=("sunsky", "timed_sunsky"), to_heuristic="lamps:sky_to_ambient", surrounds=True
-    ),
-    LightKind(
-        plugins=("point",),
-        model=PointLight,
-        colour="intensity",
-        to_heuristic="emitters:point_to_heuristic",
-        to_physical="emitters:point_to_physical",
-        place=_at_point,
-        exact=True,
-    ),
-    LightKind(
-        plugins=("directional",),
-        model=DirectionalLight,
-        colour="irradiance",
-        to_heuristic="emitters:directional_to_heuristic",
-        to_physical="emitters:directional_to_physical",
-        place=lambda light: {"toward": -light.travel()},
-        exact=True,
-    ),
-    LightKind(
-        plugins=("spot",),
-        model=SpotLight,
-        colour="intensity",
-        to_heuristic="lamps:spot_to_heuristic",
-        to_physical="lamps:spot_to_physical",
-        place=_at_point,
-        exact=True,
-    ),
-    LightKind(plugins=("projector",)),
-)
-
-
-def by_plugin(kinds: Sequence[LightKind]) -> dict[str, LightKind]:
-    """Return the kind of each plugin, of either half.
-
-    Raises ``ValueError`` if two kinds name the same plugin: one of them would never be used.
-    """
-    result: dict[str, LightKind] = {}
-    for kind in kinds:
-        heuristic = () if kind.model is None else (kind.model.plugin,)
-        for plugin in (*kind.plugins, *heuristic):
-            if plugin in result:
-                raise ValueError(f"Two kinds of light have the plugin {plugin}. Remove one.")
-            result[plugin] = kind
-    return result
-
-
-BY_PLUGIN = by_plugin(KINDS)
-
-
-def of(plugin: str) -> LightKind:
-    """Return the kind of an emitter, of either half, by the name of its plugin.
-
-    An unknown one counts as an environment, about which premises may assume the least.
-    """
-    return BY_PLUGIN.get(plugin, ENVIRONMENT)
 
 
 def is_heuristic(plugin: str) -> bool:
@@ -256,7 +180,7 @@ def give_one_intensity(graph: Graph) -> None:
 
 def heuristic(plugin: str, scale: float = INTENSITY_FACTOR, **values: Any) -> mi.Properties:
     """Return the properties of a textbook light with the fall-off of Mitsuba's."""
-    falloff = FALLOFF_OF_MITSUBA if of(plugin).has("attenuation") else {}
+    falloff = FALLOFF_OF_MITSUBA if has_field(PLUGINS[plugin], "attenuation") else {}
     return properties(plugin, scale=scale, **values, **falloff)
 
 

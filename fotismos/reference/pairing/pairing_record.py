@@ -6,6 +6,9 @@ from msgspec import Meta
 
 from fotismos.reference.records import Record
 
+SECOND_INTENSITY = "specular intensity L_s"
+"""What a light of two intensities loses."""
+
 
 class Miss(Record):
     """A quantity that no partner reaches."""

@@ -7,7 +7,7 @@ import mitsuba as mi
 
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.lights import INTENSITIES
-from fotismos.reference.pairing import bsdfs, lights
+from fotismos.reference.pairing import bsdfs, kinds, lights
 from fotismos.reference.pairing.pairing_record import Override
 from fotismos.reference.rendering.integrators import PATHS
 from fotismos.reference.scene import checks, values
@@ -62,7 +62,7 @@ def complete(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) 
         values.check_colours(graph, index, bsdfs.COLOURS.get(graph.plugin(index), ()))
     for index in graph.nodes(mi.ObjectType.Emitter):
         plugin = graph.plugin(index)
-        colours = INTENSITIES if lights.is_heuristic(plugin) else (lights.of(plugin).colour,)
+        colours = INTENSITIES if lights.is_heuristic(plugin) else (kinds.of(plugin).colour,)
         values.check_colours(graph, index, colours)
     checks.check(graph)
     for shape in graph.nodes(SHAPE):

@@ -18,10 +18,17 @@ import numpy as np
 from fotismos.heuristic import meshes
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.heuristic.materials import COEFFICIENTS
-from fotismos.reference.pairing import lights
-from fotismos.reference.pairing.bsdfs import REFLECTANCES, TRANSMITTANCES, is_mirror
+from fotismos.reference.pairing import kinds, lights
+from fotismos.reference.pairing.bsdfs import (
+    LAYERED_BUMPS,
+    REFLECTANCES,
+    TRANSMITTANCES,
+    WRAPPERS,
+    has_bump_shadows,
+    is_mirror,
+)
 from fotismos.reference.pairing.halves import Pair
-from fotismos.reference.pairing.lights import LightNode
+from fotismos.reference.pairing.lights import LightKind, LightNode
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph
 
@@ -429,10 +436,73 @@ class Facts:
         )
 
     @property
+    def has_mirror(self) -> bool:
+        """Whether a textbook material is a mirror."""
+        return any(map(is_mirror, self.materials))
+
+    @property
+    def variant(self) -> str:
+        """Mitsuba's variant."""
+        return str(mi.variant())
+
+    @cached_property
+    def bsdfs(self) -> list[str]:
+        """The plugins of the physical half's materials, sorted."""
+        graph = self.pair.physical
+        return sorted({graph.plugin(index) for index in graph.nodes(BSDF)})
+
+    @property
+    def has_microfacets(self) -> bool:
+        """Whether a material of the physical half is more than diffuse."""
+        return bool({*self.bsdfs} - {"diffuse", "null", *WRAPPERS})
+
+    @staticmethod
+    def is_wrapper(plugin: str) -> bool:
+        """Return whether a material is made of others."""
+        return plugin in WRAPPERS
+
+    @staticmethod
+    def has_bump_shadows(material: mi.Properties) -> bool:
+        """Return whether a material's bumps have shadows."""
+        return has_bump_shadows(material)
+
+    def only_reflects(self, index: int) -> bool:
+        """Return whether a material of the physical half is known to let no light through."""
+        return sides(self.pair.physical, index)[0]
+
+    @cached_property
+    def layered_bumps(self) -> set[int]:
+        """The materials of which the textbook half has only one of several maps."""
+        graph = self.pair.physical
+        names = {
+            loss.name
+            for loss in self.pair.unrepresentable
+            if (loss.lost, loss.nearest) in LAYERED_BUMPS
+        }
+        return {index for index in graph.nodes(BSDF) if graph.label(index) in names}
+
+    @cached_property
+    def surrounding_lamps(self) -> list[str]:
+        """The labels of the shapes whose light is ambient light in the textbook half."""
+        pairs = self.pair.pairing.emitters
+        return [
+            light.name for light in pairs if (light.given, light.derived) == ("area", "ambient")
+        ]
+
+    def surrounds(self, material: mi.Properties) -> bool:
+        """Return whether a textbook material is that of a lamp around the scene."""
+        return material.id() in map(lights.GLOWING.format, self.surrounding_lamps)
+
+    @staticmethod
+    def light_kind(plugin: str) -> LightKind:
+        """Return the kind of a light of either half."""
+        return kinds.of(plugin)
+
+    @property
     def light_kinds(self) -> str:
         """The kinds of the physical half's lights, as evidence."""
-        kinds = {light.kind for light in self.lights}
-        return f"lights: {', '.join(sorted(kinds)) or 'none'}"
+        plugins = {light.kind for light in self.lights}
+        return f"lights: {', '.join(sorted(plugins)) or 'none'}"
 
     @property
     def sees_through_lamps(self) -> bool:
@@ -471,5 +541,5 @@ def _lights(graph: Graph) -> Iterator[LightFacts]:
         if index in owners:
             yield LightFacts(name, plugin, shape=owners[index])
         else:
-            location: dict[str, Any] = lights.of(plugin).place(LightNode(graph, index))
+            location: dict[str, Any] = kinds.of(plugin).place(LightNode(graph, index))
             yield LightFacts(name, plugin, **location)

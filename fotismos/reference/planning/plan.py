@@ -32,7 +32,7 @@ from msgspec.structs import replace
 
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.heuristics import Interpolation
-from fotismos.reference.pairing import lights
+from fotismos.reference.pairing import kinds
 from fotismos.reference.pairing.halves import Pair
 from fotismos.reference.planning.effects import EFFECTS, INTERREFLECTION
 from fotismos.reference.planning.facts import BSDF, Facts
@@ -98,10 +98,10 @@ def _reference(facts: Facts) -> Plan:
     # Without this rule nothing is known to replace Mitsuba's own integrator.
     if not LIGHT_BY_LIGHT.check(facts).applies:
         return stock
-    kinds = [lights.of(light.kind) for light in facts.lights]
+    present = [kinds.of(light.kind) for light in facts.lights]
     if stock.calls_for(INTERREFLECTION) and pair.max_depth != 2:
         is_diffuse = all(graph.plugin(i) in ("diffuse", "twosided") for i in graph.nodes(BSDF))
-        if sum(kind.exact for kind in kinds) > 1 and is_diffuse:
+        if sum(kind.exact for kind in present) > 1 and is_diffuse:
             return replace(stock, integrator="direct_all", rr_depth=RR_DEPTH)
         # Behind hidden lamps only the stock integrator is right.
         return stock if facts.sees_through_lamps else replace(stock, integrator="path")
@@ -110,7 +110,7 @@ def _reference(facts: Facts) -> Plan:
     is_random = (
         mi.is_spectral
         or facts.camera.plugin not in ("perspective", "orthographic")
-        or not all(kind.exact or (tabulated and kind.uniform) for kind in kinds)
+        or not all(kind.exact or (tabulated and kind.uniform) for kind in present)
     )
     return replace(
         stock.directly(),

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import mitsuba as mi
 import numpy as np
 
-from fotismos.reference.pairing import lights
+from fotismos.reference.pairing import kinds
 from fotismos.reference.planning.decisions import RuleResult
 from fotismos.reference.planning.facts import (
     BSDF,
@@ -318,8 +318,8 @@ def _not_one(facts: Facts) -> str | None:
 
 
 def _not_uniform(facts: Facts) -> str | None:
-    kinds = [lights.of(light.kind) for light in facts.lights]
-    extended = [kind for kind in kinds if not kind.exact]
+    present = [kinds.of(light.kind) for light in facts.lights]
+    extended = [kind for kind in present if not kind.exact]
     if len(extended) == 1 and extended[0].uniform:
         return None
     return f"{facts.light_kinds}: not one constant environment plus points and directions"

@@ -207,8 +207,12 @@ def variant(name: str) -> Iterator[None]:
     if name == mi.variant():
         yield
         return
-    with mi.scoped_set_variant(name):
+    before = mi.variant()
+    _switch(name)
+    try:
         yield
+    finally:
+        _switch(before)
 
 
 @contextmanager
@@ -223,29 +227,35 @@ def _no_collection() -> Iterator[None]:
             gc.enable()
 
 
-_transform = dr.syntax
 _transformed: dict[tuple[str, CodeType], CodeType] = {}
 
 
-def syntax(f: FunctionType | None = None, **options: Any) -> Callable[..., Any]:
-    """Do what ``drjit.syntax`` does, once for each function's code.
+def _switch(name: str) -> None:
+    """Make a variant the current one, for less than Mitsuba takes.
 
-    With each switch of the variant Mitsuba loads its Python integrators again, and Dr.Jit would
-    transform the same functions again: 0.1 s, as long as a pass.
+    With each switch Mitsuba loads its Python integrators again, and Dr.Jit would transform the same
+    functions again. Ten scenes of two variants each then take twice the processor time.
+    So each function's code is transformed once, by what ``drjit.syntax`` is during the switch only.
     """
-    if f is None or options:
-        decorated: Callable[..., Any] = _transform(f, **options)
-        return decorated
-    key = f.__code__.co_filename, f.__code__
-    if key not in _transformed:
-        _transformed[key] = _transform(f).__code__
-    # Only the code is shared: globals and defaults are those of the module just loaded.
-    copy = FunctionType(_transformed[key], f.__globals__)
-    copy.__defaults__ = f.__defaults__
-    return copy
+    transform = dr.syntax
 
+    def syntax(f: FunctionType | None = None, **options: Any) -> Callable[..., Any]:
+        if f is None or options:
+            decorated: Callable[..., Any] = transform(f, **options)
+            return decorated
+        key = f.__code__.co_filename, f.__code__
+        if key not in _transformed:
+            _transformed[key] = transform(f).__code__
+        # Only the code is shared: globals and defaults are those of the module just loaded.
+        copy = FunctionType(_transformed[key], f.__globals__)
+        copy.__defaults__ = f.__defaults__
+        return copy
 
-dr.syntax = syntax  # for Mitsuba's modules, which look it up when they are loaded
+    dr.syntax = syntax  # Mitsuba's modules look it up when they are loaded
+    try:
+        mi.set_variant(name)
+    finally:
+        dr.syntax = transform
 
 
 def _rendered(scene: Any, integrator: Any, spp: int, size: Size, seed: int) -> Any:

@@ -186,6 +186,31 @@ class Graph:
             if isinstance(value, Reference) and self.kind(value.index()) == kind
         ]
 
+    def shapes(self) -> list[int]:
+        """Return the indices of the shapes in use."""
+        return self.nodes(mi.ObjectType.Shape)
+
+    def emitters(self) -> list[int]:
+        """Return the indices of the lights in use."""
+        return self.nodes(mi.ObjectType.Emitter)
+
+    def emitters_of(self, index: int) -> list[tuple[str, int]]:
+        """Return ``(key, index)`` of the lights of a shape, or of the scene, which is node 0."""
+        return self.children(index, mi.ObjectType.Emitter)
+
+    def bsdfs_of(self, index: int) -> list[tuple[str, int]]:
+        """Return ``(key, index)`` of the materials of a shape, or within a material."""
+        return self.children(index, mi.ObjectType.BSDF)
+
+    def materials_of(self, shape: int) -> list[int]:
+        """Return the indices of a shape's materials, and of all that are nested in them."""
+        return [
+            index
+            for _, bsdf in self.bsdfs_of(shape)
+            for index in self.nodes_in_use(bsdf)
+            if self.kind(index) == mi.ObjectType.BSDF
+        ]
+
     def add(self, kind: Any, props: Any) -> int:
         """Add a node, and return its index."""
         node = Parser.SceneNode()
@@ -193,6 +218,14 @@ class Graph:
         node.props = props
         self.state.nodes.append(node)
         return len(self.state.nodes) - 1
+
+    def graft(self, other: "Graph", index: int) -> int:
+        """Copy a node of another graph with all that it refers to, and return its index here."""
+        props = mi.Properties(other.props(index))
+        for key, value in list(props.items()):
+            if isinstance(value, Reference):
+                props[key] = Reference(self.graft(other, value.index()))
+        return self.add(other.kind(index), props)
 
     def attach(self, parent: int, key: str, child: int) -> None:
         """Make a node the child of another, replacing any under that key."""
@@ -270,12 +303,3 @@ def properties(plugin: str, **values: Any) -> Any:
     for key, value in values.items():
         props[key] = mi.ScalarColor3f(value) if isinstance(value, tuple) else value
     return props
-
-
-def graft(graph: Graph, other: Graph, index: int) -> int:
-    """Copy a node of another graph with everything it refers to, and return its index here."""
-    props = mi.Properties(other.props(index))
-    for key, value in list(props.items()):
-        if isinstance(value, Reference):
-            props[key] = Reference(graft(graph, other, value.index()))
-    return graph.add(other.kind(index), props)

@@ -53,7 +53,7 @@ class Cost(OnScene, frozen=True):
     argument = "[SCENE]"
     below = "cost/SCENE"
     options_shown = (
-        "rounds", "at", "measure", "pictures", "machine", "kernel_time", SCENES, PICTURES,
+        "rounds", "at", "pictures", "machine", "kernel_time", SCENES, PICTURES,
         "tone_map", "output", "quiet", "verbose", "as_json", "within", "timeout",
     )  # fmt: skip
     own_defaults: ClassVar[dict[str, str]] = {
@@ -64,7 +64,6 @@ class Cost(OnScene, frozen=True):
     at: Annotated[
         tuple[Side, Side] | None, option("Predict the times at this size.", metavar="WxH")
     ] = None
-    measure: Annotated[bool, option("With --at: measure at it, too.")] = False
     pictures: Annotated[
         Settings,
         option(
@@ -97,13 +96,11 @@ class Cost(OnScene, frozen=True):
         """Refuse options of a scene, where pictures are judged without one."""
         from fotismos.comparisons.pictures import require_no_scene  # loaded late: it loads NumPy
 
-        of_scenes = ("rounds", "at", "measure", "kernel_time")
+        of_scenes = ("rounds", "at", "kernel_time")
         require_no_scene(self.options, [name for name in of_scenes if getattr(self, name)])
 
     def run(self, terminal: Terminal) -> int:
         """Study one scene, or pictures without one, and print the table or the record."""
-        if self.measure and self.at is None:
-            raise InputError("--measure needs a size: give one with --at, such as --at 1920x1080.")
         engine = self.engine
         if engine is None:
             self.refuse_reading("--picture")
@@ -148,11 +145,8 @@ class Cost(OnScene, frozen=True):
             case.options,
             effort=Effort() if self.rounds is None else Effort(rounds=self.rounds),
             progress=progress,
-            command=case.command(
-                "cost", rounds=self.rounds, at=size, measure=self.measure or None, **given
-            ),
+            command=case.command("cost", rounds=self.rounds, at=size, **given),
             at=self.at,
-            is_measured=self.measure,
             engine_times=times,
         )
 

@@ -10,8 +10,9 @@ from fotismos.comparisons.departure import definitions
 from fotismos.comparisons.gallery.builtin import builtin
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
-from fotismos.heuristic import glsl, llvm
+from fotismos.heuristic import llvm
 from fotismos.heuristic.errors import InstallationError
+from fotismos.heuristic.glsl import opengl, shader
 from fotismos.heuristic.mitsuba_version import other_version
 from fotismos.heuristic.program import __version__, installation
 from fotismos.reference.scene.graph import set_variant
@@ -61,10 +62,10 @@ def shaded() -> str:
         return f"is an extra that only --heuristic FILE.glsl needs. To install it: {command}"
 
     try:
-        renderer, is_software = glsl.device()
+        renderer, is_software = opengl.device()
     except InstallationError as error:
         return f"cannot be run; only --heuristic FILE.glsl needs it: {error}"
-    glsl.of_text("doctor.glsl", "vec3 shade(Point point) { return vec3(0.5); }")
+    shader.of_text("doctor.glsl", "vec3 shade(Point point) { return vec3(0.5); }")
     return f"runs on {renderer}{', a software GPU' if is_software else ''}"
 
 

@@ -1,0 +1,1 @@
+"""Shaders in GLSL: their text, OpenGL, and the heuristic that joins the two."""
