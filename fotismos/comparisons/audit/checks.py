@@ -382,11 +382,13 @@ def disagreement(centre: float, shade: Any) -> float:
     if dr.grad_enabled(value):
         dr.set_grad(number, 1.0)
         automatic = np.array(dr.forward_to(value), float)
+
     # Richardson's extrapolation of two central differences.
-    wide, narrow = (
-        (shaded(centre + step) - shaded(centre - step)) / (2 * step)
-        for step in (STEP * centre, STEP / 2 * centre)
-    )
+    def central(step: float) -> Floats:
+        return (shaded(centre + step) - shaded(centre - step)) / (2 * step)
+
+    wide = central(STEP * centre)
+    narrow = central(STEP / 2 * centre)
     finite = np.broadcast_to((4 * narrow - wide) / 3, len(automatic))
     # Relative to the larger of the two, a difference is at most 2.
     size = np.maximum(np.abs(automatic), np.abs(finite))

@@ -243,7 +243,7 @@ def shaded(
     hides a light. ``values`` are those of its parameters, if not the defaults.
     """
     count = max(vector.shape[1] for vector in point)
-    position, normal, view = (np.broadcast_to(vector, (3, count)) for vector in point)
+    position, normal, view = [np.broadcast_to(vector, (3, count)) for vector in point]
     known = dict.fromkeys(COLOURS, 0.0) | {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
     # Opaque, as in a scene: Dr.Jit drops products with a literal 0, even of NaN.
     opaque = {name: _opaque(value) for name, value in (known | dict(material)).items()}

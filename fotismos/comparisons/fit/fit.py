@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from fotismos.comparisons.departure import marks
 from fotismos.comparisons.departure.criterion import share_above
-from fotismos.comparisons.departure.metrics import LEADING, drawn, leading_distance
+from fotismos.comparisons.departure.metrics import LEADING, Metric, drawn, leading_distance
 from fotismos.comparisons.departure.statistics import noise_floor, summarise
 from fotismos.comparisons.fit.model import OwnModel, PhongModel, see
 from fotismos.comparisons.fit.search import LOSSES, Loss, Model, Objective, identify, search
@@ -99,10 +99,10 @@ class RenderedHalves:
         """Return what is between the halves before and after a fit, by metric."""
         by_metric = {}
         for name, metric in drawn().items():
-            before, left = (
-                metric.mean(metric(image, self.reference, self.viewing)[self.counted])
-                for image in (self.before, after)
-            )
+
+            def departure(image: Floats, metric: Metric = metric) -> float:
+                return metric.mean(metric(image, self.reference, self.viewing)[self.counted])
+
             floor = noise_floor(
                 metric,
                 self.reference,
@@ -110,7 +110,9 @@ class RenderedHalves:
                 mask=self.counted,
                 viewing=self.viewing,
             )
-            by_metric[name] = FitDeparture(before=before, after=left, noise_floor=floor)
+            by_metric[name] = FitDeparture(
+                before=departure(self.before), after=departure(after), noise_floor=floor
+            )
         return by_metric
 
     def summary(self, image: Floats) -> Summary:

@@ -142,8 +142,10 @@ def _interval(parameter: FittedParameter) -> str:
     """Return the interval of a parameter, or that it is narrower than the value's last digit."""
     if not parameter.interval:
         return ""
-    low, high = (f"{end:.4g}" for end in parameter.interval)
-    return "below the last digit" if low == high else f"{low} to {high}"
+    low, high = parameter.interval
+    if f"{low:.4g}" == f"{high:.4g}":
+        return "below the last digit"
+    return f"{low:.4g} to {high:.4g}"
 
 
 def described(reference: Mapping[str, Any]) -> str:
