@@ -17,6 +17,7 @@ from inspect import signature
 from os import PathLike
 from pathlib import Path
 from typing import Any
+from xml.parsers.expat import ExpatError, ParserCreate, errors
 
 import mitsuba as mi
 import numpy as np
@@ -41,7 +42,7 @@ UNUSED = re.compile(r"Found unused parameters:\s*- \$(\w+)=")
 """In Mitsuba's message on a value for which a file has no placeholder: its name."""
 
 
-DEFAULT = re.compile(r"<default\s[^>]*name=[\"'](\w+)")
+DEFAULT = re.compile(r"<default\s[^<>]*name=[\"'](\w+)")
 UNDEFINED = "undefined parameter"
 NOT_XML = "Parsing of XML file"
 """Words of Mitsuba's messages, and a placeholder's own value in a file."""
@@ -242,14 +243,22 @@ class Source:
         return InputError(f"{self.name}: {shown} without a value: give {options}.")
 
 
+ENDS_EARLY = {
+    errors.codes[errors.XML_ERROR_NO_ELEMENTS],
+    errors.codes[errors.XML_ERROR_UNCLOSED_TOKEN],
+    errors.codes[errors.XML_ERROR_UNCLOSED_CDATA_SECTION],
+}
+"""Codes of Expat where a text ends within an element, a tag, a comment or a section."""
+
+
 def _cut_off(files: Iterable[Path]) -> Path | None:
-    """Return the first file that does not end with the end of its outermost element."""
+    """Return the first file that ends before its outermost element does."""
     for path in files:
-        text = re.sub(r"<!--.*?-->|<\?.*?\?>", "", text_of(path), flags=re.DOTALL).strip()
-        outermost = re.match(r"<(\w+)", text)
-        is_empty = re.fullmatch(r"<[^<>]*/>", text)
-        if outermost and not is_empty and not text.endswith(f"</{outermost[1]}>"):
-            return path
+        try:
+            ParserCreate().Parse(text_of(path), True)
+        except ExpatError as error:
+            if error.code in ENDS_EARLY:
+                return path
     return None
 
 
