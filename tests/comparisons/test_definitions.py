@@ -47,7 +47,7 @@ def test_the_record_says_how_far_its_colour_differences_are_and_at_how_many_pixe
     assert min(found.largest.values()) > 0
     assert max(found.largest.values()) < AGREEMENT
     assert not usual.record.warnings
-    monkeypatch.setattr(fotismos.comparisons.compare, "COMPUTED_TWICE", 5)
+    monkeypatch.setattr(fotismos.comparisons.compare, "PIXELS_COMPUTED_TWICE", 5)
     assert compared().record.colour_science.pixels == 5
 
 

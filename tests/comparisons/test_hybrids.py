@@ -130,14 +130,15 @@ def test_in_fog_the_causes_are_said_to_be_unknown(rgb):
 
 
 @pytest.mark.thorough
-def test_a_pane_counts_as_an_obstacle(rgb):
+def test_a_pane_is_looked_through(rgb):
     """As docs/reading.md says, with numbers."""
     case = open_case(ROOT / "docs/scenes/pane.xml", Options())
     ready = guarded(case.source, case.options)
     record = attribution.find(ready).record
     removed = {entry.effect: entry.removes.value for entry in record.effects}
-    expected = {"occlusion": -11, "interreflection": 6, "extended lights": 6, "transmission": 0}
-    assert removed == pytest.approx(expected, abs=2)
+    assert set(removed) == {"occlusion", "interreflection", "extended lights", "transmission"}
+    assert removed["occlusion"] == pytest.approx(5, abs=1)
+    assert max(abs(removed[name]) for name in removed if name != "occlusion") < 2
 
 
 @pytest.mark.guarantee(

@@ -190,7 +190,7 @@ def test_what_a_lamp_around_the_scene_changes_is_called_environment(rgb, tmp_pat
         integrator={"type": "path", "max_depth": 2, "hide_emitters": hide},
     )  # fmt: skip
     small = Options(resolution=(16, 16), spp=64)
-    found = compare(Source("dome", scene), small, then=steps(small, True)).record.why
+    found = compare(Source("dome", scene), small, then=steps(True)).record.why
     assert {each.effect for each in found.effects} == {"occlusion", "environment"}
     errors = [each.error for each in found.hybrids]
     assert abs(errors[-1]) < 0.2 < 1 < errors[0]

@@ -122,7 +122,7 @@ def test_a_shape_seen_through_both_sides_of_a_hidden_lamp_is_warned_of(rgb):
         source = Source("a test", seen_through_a_ball(flip_normals=flip_normals, body="sphere"))
         ready = prepare(source)
         assert ready.plan.integrator == "volpath"
-        assert "through both sides of a hidden lamp" in ready.caution()
+        assert "through both sides of a hidden lamp" in ready.doubt()
         assert "integrator" in {entry.what for entry in ready.overridden}
     record = compare(source, Options(spp=4, resolution=(16, 16))).record
     assert verdict.headline([record]).startswith("a test: The reference is wrong at")
@@ -132,7 +132,7 @@ def test_a_shape_seen_through_both_sides_of_a_hidden_lamp_is_warned_of(rgb):
         seen_through_a_ball(body="sphere", aside=9.0),
     ):
         ready = prepare(Source("a test", described))
-        assert ready.caution() == ""
+        assert ready.doubt() == ""
         is_override = "integrator" in {entry.what for entry in ready.overridden}
         assert is_override is (ready.plan.integrator == "volpath")
 

@@ -11,7 +11,8 @@
  * @typedef {{name: string, k_i: number[], k_a: number[], k_d: number[], k_s: number[], n: number,
  * form: string, ambient: number[]}} Material
  * @typedef {{name: string, intensity: number[], specular_intensity: number[]}} Lamp
- * @typedef {{grid: Manifest | null, columns: number[], rows: number[],
+ * @typedef {{grid: null, missing: string}} NoPoints
+ * @typedef {{grid: Manifest, columns: number[], rows: number[],
  * tops: Record<string, number>, materials: Material[], lights: Lamp[], missing: string}} Terms
  */
 
@@ -36,8 +37,8 @@
  * @property {Manifest | null} images
  * @property {Effects | null} effects
  * @property {Board | null} board
- * @property {Terms | null} terms
- * @property {Live | null} live
+ * @property {Terms | NoPoints | null} terms
+ * @property {Live | NoPoints | null} live
  * @property {undefined} [failed]
  */
 

@@ -6,8 +6,7 @@
  * @typedef {{name: string, intensity: number[], diffuse_intensity: number[], specular_intensity:
  * number[], position?: number[], direction?: number[], attenuation?: number[], clamped?: boolean[],
  * cutoff?: number[], exponent?: number[], shell?: number[]}} Source
- * @typedef {{grid: Manifest | null, columns: number[], rows: number[],
- * tops: Record<string, number>, materials: Material[], lights:
+ * @typedef {{grid: Manifest, tops: Record<string, number>, materials: Material[], lights:
  * Source[], missing: string, rays: number[][][], is_flat: boolean, fit: number[] | null}} Live
  * @typedef {{materials: Material[], lights: Source[], is_flat: boolean}} Settings
  * @typedef {{material: Uint16Array, position: Float64Array, view: Float64Array, normal:
