@@ -249,7 +249,7 @@ PARAMETERS = (1, 3, 4, 5, 7)
 def of_profile(profile: bytes, is_grey: bool = False) -> ColourSpace:
     """Return the space of an ICC profile: of three primaries and curves, or of one curve of grey.
 
-    Profiles with tables (``A2B0``), such as those of printers, are refused by name.
+    Profiles with tables (``A2B0``), such as those of printers, are refused with a message.
     """
     tags = _tags(profile)
     name = _description(tags.get("desc", b""))

@@ -182,10 +182,6 @@ def settings(engine: Engine, within: float = TOLERANCE) -> Table:
     return Table(columns, engine.settings)
 
 
-def _passes_at(setting: EngineSetting) -> float | str:
-    return "none" if setting.passes_at is None else setting.passes_at
-
-
 def predicted(record: Cost) -> Table:
     """Return the times that are predicted for another size."""
     return Table(_timed(), record.predicted)

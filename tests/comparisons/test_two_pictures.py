@@ -211,7 +211,7 @@ def test_a_factor_is_named_however_small(factor):
 
 
 def test_a_factor_is_named_as_the_round_number_that_its_reading_allows():
-    """8 bits know a factor to about a percent; a factor of 3 in floats is no factor of pi."""
+    """8 bits know a factor to about a percent; a factor of 3 in floats is not pi."""
     image = 0.4 * landscape()
     codes = from_srgb(np.round(255 * to_srgb(0.5 * image)) / 255)
     for given, words in (

@@ -243,15 +243,15 @@ def shaded(
     hides a light. ``values`` are those of its parameters, if not the defaults.
     """
     count = max(vector.shape[1] for vector in point)
-    position, normal, view = [np.broadcast_to(vector, (3, count)) for vector in point]
+    position, normal, view = point
     known = dict.fromkeys(COLOURS, 0.0) | {"n": 1.0, "alpha": 1.0, "ior": 1.0, "metallic": 0.0}
     # Opaque, as in a scene: Dr.Jit drops products with a literal 0, even of NaN.
     opaque = {name: _opaque(value) for name, value in (known | dict(material)).items()}
     opaque |= {name: mi.Spectrum(opaque[name]) for name in COLOURS}
     arguments = ShadingArguments(
-        position=mi.Vector3f(_single(position)),
-        normal=mi.Vector3f(_single(normal)),
-        view=mi.Vector3f(_single(view)),
+        position=mi.Vector3f(_single(np.broadcast_to(position, (3, count)))),
+        normal=mi.Vector3f(_single(np.broadcast_to(normal, (3, count)))),
+        view=mi.Vector3f(_single(np.broadcast_to(view, (3, count)))),
         material=PairedMaterial(**opaque, form=heuristic.form or "phong"),
         lights=lights,
         ambient=mi.Spectrum(ambient),

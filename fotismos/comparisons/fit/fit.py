@@ -272,7 +272,7 @@ def render(ready: Prepared, progress: Progress | None) -> RenderedHalves:
 def _fitted(
     model: Model, rendered: RenderedHalves, loss: Loss, physical: dict[str, dict[str, Any]]
 ) -> tuple[FormFit, Floats]:
-    """Return the record of a fit, and its image (H, W, 3); ``physical`` materials are by name."""
+    """Return the record of a fit, and its image (H, W, 3); ``physical`` maps names to materials."""
     counted = rendered.counted
     objective = Objective(model, rendered.reference[counted], loss=loss, viewing=rendered.viewing)
     x, least, converged = search(objective)

@@ -83,7 +83,7 @@ class PointsView(Record):
 class CostView(Record):
     """A page's data of a study.
 
-    ``record`` is a :class:`fotismos.comparisons.cost.cost_record.Cost`, or an ``EngineCost``
+    ``record`` is a :class:`fotismos.comparisons.records.cost.Cost`, or an ``EngineCost``
     without a scene, whose types few pages need to load. ``images`` are small WebP files by the
     methods' names, ``reference`` is one. Pixels of given pictures differ visibly above the ΔE2000
     ``within``.
