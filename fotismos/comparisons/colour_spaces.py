@@ -20,6 +20,7 @@ from PIL import ExifTags, Image
 
 from fotismos.comparisons.departure.colour import (
     BT709,
+    BT2020,
     CHROMATICITIES,
     Array,
     from_pq,
@@ -39,12 +40,12 @@ GAMMA_OF_SRGB = 1 / 2.2
 
 GAMMA_OF_ADOBE_RGB = 563 / 256
 
-D65 = (0.3127, 0.3290)
+D65 = BT709[-1]
 P3 = (0.680, 0.320, 0.265, 0.690, 0.150, 0.060)
 
 PRIMARIES: dict[str, tuple[float, ...]] = {
     "BT.709": CHROMATICITIES,
-    "BT.2020": (0.708, 0.292, 0.170, 0.797, 0.131, 0.046, *D65),
+    "BT.2020": tuple(value for point in BT2020 for value in point),
     "Display P3": (*P3, *D65),
     "DCI-P3": (*P3, 0.314, 0.351),
     "BT.601 of 625 lines": (0.640, 0.330, 0.290, 0.600, 0.150, 0.060, *D65),
