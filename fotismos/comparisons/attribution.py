@@ -43,7 +43,6 @@ from fotismos.comparisons.records.comparison import (
     ComparisonRecord,
     Contribution,
     Hybrid,
-    MeanError,
     ObjectContribution,
 )
 from fotismos.comparisons.records.departure import Region, Viewing, VisibleShare
@@ -396,7 +395,7 @@ def attribute(
         record=Attribution(
             effects=contributions,
             departure=float(departure[0].mean()),
-            closure=MeanError(value=closure.value, low=closure.low, high=closure.high),
+            closure=Interval(value=closure.value, low=closure.low, high=closure.high),
             implementation=float(rounding.mean()),
             resolution=meter.counted.shape[::-1],
             spp=images.replicate_spp,

@@ -26,11 +26,12 @@ VERSION = 4
 OLDER = (2, 3)
 CHANGES = (
     "version 3 calls rungs `methods` and prices `attribution`, and `visible` holds shares of pixels"
-    " with their intervals; version 4 holds the ratio of times in `price`"
+    " with their intervals; version 4 holds the ratio of times in `price`, and calls the `mean` of"
+    " an interval `value`"
 )
 """Older versions, and what changed since; records in which nothing changed are still read."""
 
-CHANGED = ("rung", "method", "price", "attribution", "visible", "ratio")
+CHANGED = ("rung", "method", "price", "attribution", "visible", "ratio", "`mean`")
 """Parts of the names of fields that changed: an error about one of them means an older record."""
 
 Kind = TypeVar("Kind")

@@ -19,9 +19,9 @@ from fotismos.comparisons.cost.methods import BUILT_IN, Ladder, declare
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.comparisons.records.comparison import MeanError
 from fotismos.comparisons.records.cost import Cost, Method
 from fotismos.heuristic.errors import InputError
+from fotismos.reference.records import Interval
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reference.scene.source import Source
 from fotismos.reports import cost_tables
@@ -266,11 +266,11 @@ def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does
     assert {sample["threshold"] for sample in made["price"]["samples"]} >= {10.0}
     assert sentence.startswith("At 64x64: ")
     assert ": measured at 12x12, 5 % of the pixels exceed ΔE2000" in sentence
-    best, full, chosen = (made[name]["tolerance"]["mean"] for name in ("best", "full", "chosen"))
+    best, full, chosen = (made[name]["tolerance"]["value"] for name in ("best", "full", "chosen"))
     assert 0 < best <= full < 10 > chosen
     assert made["chosen"]["seconds"]["low"] <= made["full"]["seconds"]["high"]
     assert {"shadow map", "hemisphere ambient"} <= made["left_out"].keys()
-    none = MeanError(value=20.0, low=19.0, high=21.0)
+    none = Interval(value=20.0, low=19.0, high=21.0)
     points = tuple(structs.replace(point, tolerance=none) for point in found.points)
     monkeypatch.setattr(studies, "measure_ladder", lambda *_, **__: replace(found, points=points))
     code, said, _ = run(*words, "--within", 10)

@@ -10,7 +10,6 @@ from msgspec import structs
 from fotismos.comparisons import timing
 from fotismos.comparisons.cost.front import beats, fronted, reach, sufficient
 from fotismos.comparisons.cost.measure import timed, tried
-from fotismos.comparisons.records.comparison import MeanError
 from fotismos.comparisons.records.cost import Point
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering.passes import passes
@@ -138,8 +137,8 @@ def made(method, spp, seconds, error, spread=0.0):
         method=method,
         spp=spp,
         seconds=about(float(seconds), spread),
-        error=about(float(error), spread, MeanError),
-        tolerance=about(3.0 * error, spread, MeanError),
+        error=about(float(error), spread, Interval),
+        tolerance=about(3.0 * error, spread, Interval),
     )
 
 
@@ -186,7 +185,7 @@ def by_law(name, left, noise, per_sample, counts=(4, 16, 64)):
     for spp in counts:
         tolerance = np.hypot(left, noise / np.sqrt(spp))
         point = made(name, spp, per_sample * spp, 1.0, 0.01)
-        near = MeanError(value=tolerance, low=0.99 * tolerance, high=1.01 * tolerance)
+        near = Interval(value=tolerance, low=0.99 * tolerance, high=1.01 * tolerance)
         found.append(structs.replace(point, tolerance=near))
     return found
 

@@ -10,8 +10,8 @@ import pytest
 import vl_convert
 from msgspec import convert, structs
 
-from fotismos.comparisons.records.comparison import MeanError
 from fotismos.comparisons.records.cost import Point
+from fotismos.reference.records import Interval
 from fotismos.reports import cost_tables, sentences
 from fotismos.reports.charts import cost_charts
 from fotismos.reports.page import page
@@ -90,7 +90,7 @@ def test_page_and_terminal_say_which_sample_count_would_pass(study):
 
 def test_the_page_has_what_is_predicted_and_the_table_marks_the_cheapest(study):
     record = study.record
-    right = structs.replace(record.points[2], tolerance=MeanError(value=1.0, low=0.9, high=1.1))
+    right = structs.replace(record.points[2], tolerance=Interval(value=1.0, low=0.9, high=1.1))
     points = (*record.points[:2], right)
     predicted = structs.replace(record, at=(1920, 1080), points=points, predicted=points)
     html = Page(shown(replace(study, record=predicted))).text

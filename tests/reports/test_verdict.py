@@ -12,7 +12,6 @@ from fotismos.comparisons.processes.pool import Task
 from fotismos.comparisons.records import cost as cost_records
 from fotismos.comparisons.records.comparison import (
     EffectsThatPass,
-    MeanError,
     Price,
     SamplesThatPass,
     Saving,
@@ -62,8 +61,8 @@ def study(*points):
             method=name,
             spp=spp,
             seconds=Interval(value=ms / 1e3, low=0.95 * ms / 1e3, high=1.05 * ms / 1e3),
-            error=MeanError(value=1.0, low=1.0, high=1.0),
-            tolerance=MeanError(value=tolerance, low=tolerance, high=1.01 * tolerance),
+            error=Interval(value=1.0, low=1.0, high=1.0),
+            tolerance=Interval(value=tolerance, low=tolerance, high=1.01 * tolerance),
         )
         for name, spp, ms, tolerance in (kernel, *points)
     ]

@@ -26,7 +26,7 @@ HYBRIDS = {
 }
 """Error of the hybrids that were rendered, by the effects that are simulated."""
 
-CLOSURE = {"mean": 0.0123, "low": -0.0145, "high": 0.0391}
+CLOSURE = {"value": 0.0123, "low": -0.0145, "high": 0.0391}
 
 
 def study(scene="fig-8-9"):
@@ -42,7 +42,7 @@ def with_engine(study, machine="RTX 3060", kernel_s=0.0021, names=("PCSS low", "
         {
             "method": name,
             "seconds": interval(0.0063 + 0.0028 * place, 0),
-            "error": {"mean": 4.567 - place, "low": 4.321 - place, "high": 4.765 - place},
+            "error": {"value": 4.567 - place, "low": 4.321 - place, "high": 4.765 - place},
             "front": True,
             "visible": [
                 {"threshold": t, "value": 0.0421 / t, "low": 0.0311 / t, "high": 0.0987 / t}
@@ -198,8 +198,8 @@ def point(method, spp, time, error, **more):
         "method": method,
         "spp": spp,
         "seconds": interval(time, 0.07 * time),
-        "error": {"mean": error, "low": 0.97 * error, "high": 1.03 * error},
-        "tolerance": {"mean": 2.9 * error, "low": 2.8 * error, "high": 3.1 * error},
+        "error": {"value": error, "low": 0.97 * error, "high": 1.03 * error},
+        "tolerance": {"value": 2.9 * error, "low": 2.8 * error, "high": 3.1 * error},
     }
 
 

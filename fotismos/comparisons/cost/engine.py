@@ -41,7 +41,6 @@ from fotismos.comparisons.pictures import (
     same_files,
     unknown_noise,
 )
-from fotismos.comparisons.records.comparison import MeanError
 from fotismos.comparisons.records.departure import Summary, Viewing, VisibleShare
 from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting
 from fotismos.comparisons.records.images import Images, Light
@@ -217,7 +216,7 @@ def _setting(
     return EngineSetting(
         method=picture.name,
         seconds=Interval(value=picture.seconds, low=picture.seconds, high=picture.seconds),
-        error=MeanError(value=error.value, low=max(error.low, 0.0), high=error.high),
+        error=Interval(value=error.value, low=max(error.low, 0.0), high=error.high),
         visible=visible,
         passes_at=min(passing, default=None),
         p95=float(np.mean([one.p95 for one in summaries])),

@@ -25,12 +25,12 @@ from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import Prepared, guarded
-from fotismos.comparisons.records.comparison import MeanError
 from fotismos.comparisons.records.cost import Converged, Method, Point, TimedMethod
 from fotismos.comparisons.records.departure import Viewing
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.pairing.settings import film_size
+from fotismos.reference.records import Interval
 from fotismos.reference.rendering.passes import Progress, Stream, passes
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, warm
 from fotismos.reference.rendering.sums import (
@@ -308,7 +308,7 @@ def rendered(
     seed: int,
     progress: Progress | None,
     stage: str,
-) -> tuple[dict[Key, tuple[MeanError, MeanError]], dict[Key, Floats]]:
+) -> tuple[dict[Key, tuple[Interval, Interval]], dict[Key, Floats]]:
     """Render in turn, at least twice; the renderers note their times.
 
     Returns the errors of those that are ``judged``, mean and tolerance, and their last images.
@@ -324,15 +324,15 @@ def rendered(
     return {key: _mean_errors(values) for key, values in errors.items()}, images
 
 
-def _mean_errors(errors: ArrayLike) -> tuple[MeanError, MeanError]:
+def _mean_errors(errors: ArrayLike) -> tuple[Interval, Interval]:
     values = np.asarray(errors)
     # Rows are rounds; columns are the mean error and the tolerance.
     means = values.mean(axis=0)
     halves = SURE * values.std(axis=0, ddof=1) / sqrt(len(values))
     lows = means - halves
     highs = means + halves
-    error = MeanError(value=float(means[0]), low=float(lows[0]), high=float(highs[0]))
-    tolerance = MeanError(value=float(means[1]), low=float(lows[1]), high=float(highs[1]))
+    error = Interval(value=float(means[0]), low=float(lows[0]), high=float(highs[0]))
+    tolerance = Interval(value=float(means[1]), low=float(lows[1]), high=float(highs[1]))
     return error, tolerance
 
 

@@ -2,7 +2,6 @@
 
 from typing import Annotated, Literal
 
-import msgspec
 from msgspec import Meta
 
 from fotismos.comparisons.records.departure import (
@@ -162,12 +161,6 @@ class NoiseTarget(Record):
     limit_spp: Annotated[int, Meta(ge=2, description="Samples per pixel that end a run.")]
 
 
-class MeanError(Interval):
-    """A mean ΔE2000 with its 95 % interval; without noise it may come out below 0."""
-
-    value: float = msgspec.field(name="mean")
-
-
 class Contribution(Record):
     """What simulating one effect removes.
 
@@ -245,7 +238,7 @@ class Attribution(Record):
 
     effects: tuple[Contribution, ...]
     departure: float
-    closure: MeanError
+    closure: Interval
     implementation: Amount
     resolution: Resolution
     spp: Size

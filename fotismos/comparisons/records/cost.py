@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from fotismos.comparisons.records.comparison import Contribution, MeanError, Price
+from fotismos.comparisons.records.comparison import Contribution, Price
 from fotismos.comparisons.records.departure import Viewing
 from fotismos.comparisons.records.engine import Engine, FrontPoint, Reach
 from fotismos.heuristic.heuristics import Interpolation
@@ -121,7 +121,7 @@ class Point(FrontPoint):
     """
 
     spp: Size
-    tolerance: MeanError
+    tolerance: Interval
 
 
 class Converged(Record):
@@ -206,7 +206,7 @@ class Cost(Record):
     points: tuple[Point, ...]
     attribution: CostAttribution
     closure: Annotated[
-        MeanError,
+        Interval,
         Meta(description="What remains with all effects simulated: only a fault can leave any."),
     ]
     viewing: Viewing

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from fotismos.comparisons.records.comparison import Agreement, MeanError, PictureFiles
+from fotismos.comparisons.records.comparison import Agreement, PictureFiles
 from fotismos.comparisons.records.departure import Viewing, VisibleShare
 from fotismos.reference.records import (
     VERSION,
@@ -38,7 +38,7 @@ class FrontPoint(Record):
 
     method: str
     seconds: Interval
-    error: MeanError
+    error: Interval
     front: bool = False
     ties: tuple[str, ...] = ()
 
