@@ -12,8 +12,7 @@ from tempfile import TemporaryDirectory
 import msgspec
 import numpy as np
 
-from docs.figures import density, light_counts
-from docs.figures import findings as findings_page
+from docs.figures import density, light_counts, phong_roughplastic
 from docs.figures.documents import DOCS, ROOT, fact, replace, run, write_table
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import open_case
@@ -41,7 +40,7 @@ def write() -> None:
     density.write()
     light_counts.write()
     baselines()
-    findings()
+    shipped_study()
     write_table("noise", fact("intervals_in_noise"))
     write_table("fits", fits())
     replace("../README.md", "cost", attribution())
@@ -70,7 +69,7 @@ def fits() -> Iterator[tuple[str, ...]]:
         yield record.scene, best.form, *(f"{each:z.2f}" for each in errors)
 
 
-def findings() -> None:
+def shipped_study() -> None:
     """Study Phong against roughplastic, and write its dataset, its figures and their page."""
     file = ROOT / "studies/phong-roughplastic.toml"
     with TemporaryDirectory() as folder:
@@ -79,8 +78,8 @@ def findings() -> None:
         table = dataset.read(made / f"{file.stem}.parquet")
         atomic.write(file.with_suffix(".parquet"), dataset.file_of(table))
         for figure in (made / "figures").glob("*.svg"):
-            atomic.write(DOCS / "findings" / figure.name, figure.read_bytes())
-    atomic.write(DOCS / "findings.md", findings_page.page(design.read(file), table))
+            atomic.write(DOCS / file.stem / figure.name, figure.read_bytes())
+    atomic.write(DOCS / f"{file.stem}.md", phong_roughplastic.page(design.read(file), table))
 
 
 def attribution() -> Iterator[str]:

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from scipy.special import erf
 
-from docs.figures import findings
+from docs.figures import phong_roughplastic
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.processes.pool import Pool
 from fotismos.comparisons.study import dataset, design, running, scenes, sheet
@@ -381,7 +381,7 @@ def test_a_study_sweeps_declared_parameters(rgb, written):
 # --- The shipped study ----------------------------------------------------------------------------
 
 FILE = ROOT / "studies/phong-roughplastic.toml"
-PAGE = ROOT / "docs/findings.md"
+PAGE = ROOT / "docs/phong-roughplastic.md"
 
 
 @pytest.fixture(scope="module")
@@ -421,10 +421,10 @@ def test_the_shipped_dataset_is_that_of_its_study(shipped, rgb):
 def test_the_page_says_what_the_dataset_says(shipped):
     study, table = shipped
     text = PAGE.read_text()
-    assert findings.page(study, table) == text
+    assert phong_roughplastic.page(study, table) == text
     column = table.column_names.index("dE2000")
     changed = table.set_column(column, table.schema.field("dE2000"), table["rmse"])
-    assert findings.page(study, changed) != text
+    assert phong_roughplastic.page(study, changed) != text
     shown = re.findall(r"!\[Figure (\d+): .*?\]\((.*?)\)", text)
     assert [int(number) for number, _ in shown] == list(range(1, len(study.figures) + 1))
     assert all("<svg" in (PAGE.parent / path).read_text() for _, path in shown)

@@ -1,4 +1,4 @@
-"""The page of findings: ``findings.md.j2`` with numbers out of the dataset of the shipped study."""
+"""The page on Phong and roughplastic: ``phong_roughplastic.md.j2`` with its numbers."""
 
 from pathlib import Path
 from typing import Any
@@ -58,7 +58,7 @@ class Facts:
 
     def picture(self, name: str, text: str) -> str:
         """Return the picture of a figure."""
-        return f"![{self.figure(name).capitalize()}: {text}](findings/{name}.svg)"
+        return f"![{self.figure(name).capitalize()}: {text}](phong-roughplastic/{name}.svg)"
 
     def _values(self, part: str, column: str, where: dict[str, Any]) -> list[Any]:
         rows = dataset.rows(self._table, part, where)
@@ -66,7 +66,7 @@ class Facts:
 
 
 def page(study: StudyFile, table: pa.Table) -> str:
-    """Return the page of findings."""
+    """Return the page."""
     facts = Facts(study, table)
     functions = {name: getattr(facts, name) for name in dir(facts) if not name.startswith("_")}
     environment = jinja2.Environment(
