@@ -106,9 +106,12 @@ class Options(
             default="the scene's own, else `variant`",
         ),
     ] = None
-    seed: Annotated[Seed, option("Seed of the run, from which each pass derives its own.")] = 0
+    seed: Annotated[
+        Seed, option("Seed of the run, from which each pass derives its own.", metavar="N")
+    ] = 0
     spp: Annotated[
-        Samples | None, option("Samples per pixel, over all passes.", default="the plan's")
+        Samples | None,
+        option("Samples per pixel, over all passes.", default="the plan's", metavar="N"),
     ] = None
     noise: Annotated[
         Error | None,
@@ -125,8 +128,8 @@ class Options(
         Shader,
         option(
             "The textbook shading: phong, blinn, one that engines use (such as shadow-map), one"
-            " that a package declares, or a function shade(point) in a file.",
-            metavar="NAME|FILE.py[:FUNCTION]|FILE.glsl",
+            " that a package declares, or FILE.glsl or FILE.py[:FUNCTION] with shade(point).",
+            metavar="NAME|FILE",
         ),
     ] = "phong"
     interpolation: Annotated[

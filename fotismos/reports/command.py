@@ -48,13 +48,31 @@ PROCESSES = ("timeout", "workers", "scheduler")
 Names = tuple["str | Names", ...]
 """Names of fields, in groups that several commands have."""
 
+USUAL = (
+    "resolution", "spp", "noise", "define", "heuristic", "interpolation", "image", "reference",
+    "max_visible", "output", "is_opened", "quiet",
+)  # fmt: skip
+"""The common options that ``--help`` shows after a command's own; ``--help-all`` shows all."""
+
+SETTINGS = (
+    *PROCESSES, "variant", "heuristic_variant", "tessellation", "vertex_weights", "pairing",
+    "pixels_per_degree", "colour_science", "allow_empty",
+)  # fmt: skip
+"""Options of a machine or a project, which ``[tool.fotismos]`` and variables set, too."""
+
+PICTURE_OPTIONS = {"image", "tone_map", *PICTURES}
+
 GROUPS = {
+    "Settings, also in [tool.fotismos] and as variables such as FOTISMOS_WORKERS": set(SETTINGS),
+    "Pictures of other renderers": PICTURE_OPTIONS,
     "What is rendered": set(Options.__struct_fields__),
     "Results": {"output", "as_json", "figures", "fresh", "is_opened", "quiet", "verbose"},
     "Bounds and CI": {"max_visible", "within", "junit", "summary"},
-    "Processes": set(PROCESSES),
 }
-"""The groups of options in help; a command's own options come first."""
+"""The groups of options in help, of which the first that has an option counts."""
+
+ORDER = ("Options", *reversed(GROUPS))
+"""The order in help: a command's own options come first."""
 
 
 class Command(Declaration, frozen=True):
@@ -63,7 +81,7 @@ class Command(Declaration, frozen=True):
     The command line has an ``argument``, which is the first field, and the ``options``: own fields
     and those of :class:`Options` and :class:`Terminal`. Results go ``below`` the folder
     ``output_folder``. ``own_defaults`` say what the command does where an option of others is
-    omitted, and ``table`` which keys of ``[tool.fotismos]`` set which fields.
+    omitted, and ``table`` which keys of ``[tool.fotismos]`` set which fields, beside SETTINGS.
     """
 
     argument: ClassVar[str] = ""
@@ -203,12 +221,18 @@ def _option(field: Field, kind: type[Command]) -> click.Option:
     is_shown = is_stated and not isinstance(value, bool)
     return click.Option(
         [*names, field.name],
+        envvar=variable(field.name) if field.name in SETTINGS else None,
         **_kind(field.type.type) | ({"type": more["type"]} if "type" in more else {}),
         default=value if is_stated else None,
         show_default=more.get("shown_default", is_shown),
         metavar=more.get("metavar"),
         help=as_typed(text + (f" [default: {default}]" if default else "")),
     )
+
+
+def variable(name: str) -> str:
+    """Return the environment's variable that sets a field."""
+    return f"FOTISMOS_{name.upper()}"
 
 
 PATH = click.Path(path_type=Path)
@@ -257,11 +281,11 @@ class Helped(click.Command):
         """Write the options, one group after the other."""
         rows: dict[str, list[tuple[str, str]]] = {}
         for parameter in self.get_params(context):
-            shown = parameter.get_help_record(context)
-            if shown and isinstance(parameter, click.Option):
+            record = parameter.get_help_record(context)
+            if record and isinstance(parameter, click.Option):
                 groups = (group for group, names in GROUPS.items() if parameter.name in names)
-                rows.setdefault(next(groups, "Options"), []).append(shown)
-        for group in ("Options", *GROUPS):
+                rows.setdefault(next(groups, "Options"), []).append(record)
+        for group in ORDER:
             if group in rows:
                 with formatter.section(group):
                     formatter.write_dl(rows[group])
@@ -272,16 +296,77 @@ class Helped(click.Command):
         return re.sub(r"(?m)(^ +|[`(])fotismos (?=\w)", rf"\1{program.command()} ", text)
 
 
+WHOLE_HELP = "fotismos.whole_help"
+"""Key of click's context: whether the help has all options."""
+
+EXAMPLES_SHOWN = 6
+"""Examples in the short help."""
+
+
+def _show_all(context: click.Context, parameter: click.Parameter, is_set: bool) -> None:
+    if is_set and not context.resilient_parsing:
+        context.meta[WHOLE_HELP] = True
+        click.echo(context.get_help())
+        context.exit()
+
+
+class ShortlyHelped(Helped):
+    """A command whose ``--help`` fits a screen, and whose ``--help-all`` says everything."""
+
+    declared: type[Command]
+
+    def get_params(self, context: click.Context) -> list[click.Parameter]:
+        """Return the parameters, with the option for the whole help."""
+        whole = click.Option(
+            ["--help-all"],
+            is_flag=True,
+            is_eager=True,
+            expose_value=False,
+            callback=_show_all,
+            help="Show all options, and what is written.",
+        )
+        return [*super().get_params(context), whole]
+
+    def format_options(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the usual options as one list, or all of them in groups."""
+        if WHOLE_HELP in context.meta:
+            super().format_options(context, formatter)
+            return
+        options = [
+            option for option in self.get_params(context) if isinstance(option, click.Option)
+        ]
+        common = {*Options.__struct_fields__, *Terminal.__struct_fields__}
+        own = [option for option in options if option.expose_value and option.name not in common]
+        by_name = {option.name: option for option in options}
+        usual = [by_name[name] for name in USUAL if name in by_name]
+        # Click's own option and that of the whole help are no values of the command.
+        helps = [
+            option for option in options if not (option.expose_value or option.name in VERBOSITY)
+        ]
+        records = [option.get_help_record(context) for option in (*own, *usual, *helps)]
+        with formatter.section("Options"):
+            formatter.write_dl([record for record in records if record])
+
+    def format_help_text(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the summary and examples, or the whole text."""
+        whole = self.help or ""
+        text, mark, examples = whole.partition("\b\nExamples")
+        if WHOLE_HELP not in context.meta and mark:
+            summary = text.partition("\n\n")[0]
+            lines = "\n".join(examples.rstrip().split("\n")[: 1 + EXAMPLES_SHOWN])
+            self.help = f"{summary}\n\n{mark}{lines}"
+        super().format_help_text(context, formatter)
+        self.help = whole
+
+
 # --- The table [tool.fotismos] ---------------------------------------------------------------
 
 FILE = "pyproject.toml"
 TABLE = "[tool.fotismos]"
 
 
-class Configured(Helped):
-    """A command whose defaults the table may set."""
-
-    declared: type[Command]
+class Configured(ShortlyHelped):
+    """A command whose defaults the table and the environment may set."""
 
     def make_context(
         self,
@@ -291,12 +376,12 @@ class Configured(Helped):
         **extra: Any,
     ) -> click.Context:
         """Read the table, then the command line."""
-        is_needed = not extra.get("resilient_parsing") and not {"-h", "--help"} & set(args)
-        found = _table(Path.cwd()) if self.declared.table and is_needed else None
-        if found is None:
-            return super().make_context(info_name, args, parent, **extra)
-        path, table = found
-        extra["default_map"] = _defaults(self.declared, path, table)
+        is_help = bool({"-h", "--help", "--help-all"} & set(args))
+        found = None if is_help or extra.get("resilient_parsing") else _table(Path.cwd())
+        path = None
+        if found is not None:
+            path, table = found
+            extra["default_map"] = _defaults(self.declared, path, table)
         try:
             return super().make_context(info_name, args, parent, **extra)
         except click.BadParameter as error:
@@ -304,6 +389,8 @@ class Configured(Helped):
             source = error.ctx and error.ctx.get_parameter_source(name)
             if source is ParameterSource.DEFAULT_MAP:
                 raise InputError(f"{path}: {TABLE} {name}: {error.message}") from error
+            if source is ParameterSource.ENVIRONMENT:
+                raise InputError(f"{variable(name)}: {error.message}") from error
             raise
 
 
@@ -330,12 +417,17 @@ def _table(folder: Path) -> tuple[Path, dict[str, Any]] | None:
 
 def _defaults(kind: type[Command], path: Path, table: dict[str, Any]) -> dict[str, str]:
     """Return the values of the table by the fields that they set, as the user would type them."""
-    fields = _fields(Terminal) | _fields(kind)
+    fields = _fields(Options) | _fields(Terminal) | _fields(kind)
+    shown = set(_flat(kind.options_shown))
+    keys = {name: name for name in SETTINGS if name in shown} | dict(kind.table)
     values = {}
     for key, value in table.items():
-        if key not in kind.table:
-            raise unknown(f"{path}: {TABLE} key", key, kind.table)
-        name = kind.table[key]
+        if key not in keys:
+            # A command without keys of its own leaves the others to the command that has them.
+            if kind.table and key not in SETTINGS:
+                raise unknown(f"{path}: {TABLE} key", key, {*kind.table, *SETTINGS})
+            continue
+        name = keys[key]
         is_folder = _kind(fields[name].type).get("type") == PATH
         if not isinstance(value, str if is_folder else (str, int, float)):
             allowed = "a folder" if is_folder else "a number or a text"

@@ -18,6 +18,9 @@ exit 3
 """
 
 
+SCENES = ("a.xml", "b.xml", "c d.py")
+
+
 @pytest.fixture
 def run_step(tmp_path):
     """Return a function that runs a step in a folder with three scenes."""
@@ -26,18 +29,22 @@ def run_step(tmp_path):
     (copy / "requirements.txt").write_text("x")
     (copy / "run").write_text(STUB)
     (copy / "run").chmod(0o755)
-    for name in ("a.xml", "b.xml", "c.py"):
+    for name in SCENES:
         (tmp_path / name).write_text("")
 
     def run(step, **variables):
-        given = {key.upper(): entry.get("default", "") for key, entry in ACTION["inputs"].items()}
+        given = {
+            key.upper().replace("-", "_"): entry.get("default", "")
+            for key, entry in ACTION["inputs"].items()
+        }
         given["PYTHON_WANTED"] = given.pop("PYTHON")
         outputs = tmp_path / "outputs"
-        places = {"GITHUB_ACTION_PATH": str(copy), "GITHUB_OUTPUT": str(outputs)}
+        outputs.unlink(missing_ok=True)
+        paths = {"GITHUB_ACTION_PATH": str(copy), "GITHUB_OUTPUT": str(outputs)}
         done = subprocess.run(
             ["bash", "-eo", "pipefail", "-c", step],
             cwd=tmp_path,
-            env={"PATH": os.environ["PATH"]} | places | given | variables,
+            env={"PATH": os.environ["PATH"]} | paths | given | variables,
             capture_output=True,
             text=True,
         )
@@ -46,26 +53,64 @@ def run_step(tmp_path):
     return run
 
 
+INPUTS = [
+    (
+        {"BASELINE": "kept here", "PICTURES": "hall=new_*.exr\nyard=yard $(touch evil)*.exr"},
+        ["check", "kept here", "--picture", "hall=new_*.exr", "--picture",
+         "yard=yard $(touch evil)*.exr", "--junit", "out/shading-check.xml"],
+        "out/shading-check",
+    ),
+    (
+        {"SCENES": "*.xml\nc d.py\nno*.xml\n", "MAX_VISIBLE": "5%", "ARTIFACT": "mine"},
+        ["compare", "a.xml", "b.xml", "c d.py", "no*.xml", "--max-visible", "5%",
+         "--junit", "out/mine.xml"],
+        "out/mine",
+    ),
+    (
+        {"PICTURES": "image=mine*.exr\nreference=truth*.exr", "OUTPUT": "there"},
+        ["compare", "--image", "mine*.exr", "--reference", "truth*.exr", "--junit", "there.xml"],
+        "there",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("inputs", "words", "folder"), INPUTS, ids=["check", "scenes", "pictures"])
+def test_inputs_become_words_without_quoting(inputs, words, folder, run_step, tmp_path):
+    code, said, _ = run_step(STEPS[1], **inputs)
+    assert (code, said) == (3, [*words, "-o", folder, "PYTHON="])
+    assert not (tmp_path / "evil").exists()
+    assert f"output={folder}" in (tmp_path / "outputs").read_text().splitlines()
+
+
 def test_arguments_become_words_and_nothing_in_them_is_executed(run_step, tmp_path):
-    words = "*.xml --max-visible 5% --picture hall=new_*.exr $(touch evil) ;touch evil"
+    words = "*.xml --max-visible 5% --junit x.xml $(touch evil) ;touch evil"
     code, said, _ = run_step(STEPS[1], COMMAND="compare", ARGUMENTS=words, PYTHON_WANTED="python9")
     assert code == 3
     assert said == [
-        "compare", "a.xml", "b.xml", "--max-visible", "5%", "--picture", "hall=new_*.exr",
-        "$(touch", "evil)", ";touch", "evil", "-o", "out", "PYTHON=python9",
+        "compare", "a.xml", "b.xml", "--max-visible", "5%", "--junit", "x.xml",
+        "$(touch", "evil)", ";touch", "evil", "-o", "out/shading-compare", "PYTHON=python9",
     ]  # fmt: skip
     assert not (tmp_path / "evil").exists()
-    code, said, message = run_step(STEPS[1], COMMAND="doctor; id", ARGUMENTS="x")
+
+
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ({"COMMAND": "doctor; id", "ARGUMENTS": "x"}, "give check or compare"),
+        ({"PICTURES": "hall=x.exr"}, "give image=PATTERN or reference=PATTERN"),
+    ],
+)
+def test_other_commands_and_halves_are_refused(inputs, message, run_step):
+    code, said, error = run_step(STEPS[1], **inputs)
     assert (code, said) == (2, [])
-    assert "give check or compare" in message
+    assert message in error
 
 
-def test_its_defaults_are_those_of_the_commands(run_step, tmp_path):
-    code, said, _ = run_step(STEPS[1], ARGUMENTS="baselines")
-    assert (code, said) == (3, ["check", "baselines", "-o", "out", "PYTHON="])
-    for name in ("check", "compare"):
+def test_its_words_are_those_of_the_commands(run_step, tmp_path):
+    for name, needed in {"check": {"--picture"}, "compare": {"--image", "--reference"}}.items():
         params = cli.get_command(None, name).params
-        assert "-o" in {word for option in params for word in option.opts}
+        known = {word for option in params for word in option.opts}
+        assert needed | {"-o", "--junit", "--max-visible"} <= known
     assert run_step(STEPS[0])[0] == 0
     venv, key = (tmp_path / "outputs").read_text().splitlines()
     assert venv == f"venv={tmp_path / 'copy'}/.venv"
@@ -78,4 +123,8 @@ def test_it_names_no_registry_and_only_actions_of_github():
     assert "://" not in text
     uses = [step["uses"] for step in ACTION["runs"]["steps"] if "uses" in step]
     assert all(name.startswith("actions/") for name in uses)
-    assert ACTION["runs"]["steps"][-1]["if"] == "failure()"
+    upload = ACTION["runs"]["steps"][-1]
+    assert "cancelled()" in upload["if"], "the page of a failure is kept"
+    assert upload["with"]["path"].split() == [
+        "${{", "steps.run.outputs.output", "}}", "${{", "steps.run.outputs.output", "}}.xml",
+    ]  # fmt: skip

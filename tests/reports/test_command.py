@@ -58,10 +58,10 @@ def trial(tmp_path, monkeypatch):
 
 
 def test_a_declaration_makes_options_with_their_help_and_bounds(trial):
-    shown = trial("--help").output
+    shown = trial("--help-all").output
     for words in (
         "--gain G", "How much.  [default: 1.5; 0<x<10]", "--way [down|up]",
-        "Which way. [default: neither]", "OUTPUT/trial", "Examples:\n", "--spp INTEGER RANGE",
+        "Which way. [default: neither]", "OUTPUT/trial", "Examples:\n", "--spp N",
     ):  # fmt: skip
         assert words in shown
     refused = trial("fig-8-9", "--gain", "10")

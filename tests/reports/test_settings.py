@@ -1,10 +1,11 @@
-"""The table ``[tool.fotismos]`` of pyproject.toml, which sets what ``check`` does by default."""
+"""The table ``[tool.fotismos]`` of pyproject.toml and variables, which set defaults of commands."""
 
 import pytest
 
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.cli import cli
 from fotismos.reports.commands.check import Check
+from fotismos.reports.commands.compare import Compare
 from tests.shared.programs import command_line
 
 TABLE = """\
@@ -86,3 +87,37 @@ def test_without_a_table_the_baselines_must_be_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     code, _, message = command_line("check")
     assert (code, "Missing argument 'BASELINE'" in message) == (2, True)
+
+
+@pytest.fixture
+def compared(tmp_path, monkeypatch):
+    """A function that runs ``compare`` below a table; it returns the command and its terminal."""
+    monkeypatch.chdir(tmp_path)
+    asked = []
+    monkeypatch.setattr(Compare, "run", lambda *given: asked.append(given) or 0)
+
+    def compare(table, *words):
+        (tmp_path / "pyproject.toml").write_text(table)
+        code, _, message = command_line("compare", "fig-8-9", *words)
+        assert code == 0, message
+        return asked.pop()
+
+    return compare
+
+
+def test_settings_come_from_the_words_then_a_variable_then_the_table(compared, monkeypatch):
+    table = "[tool.fotismos]\nworkers = 1\nvertex_weights = 'area'\nbaselines = 'kept'\n"
+    command, terminal = compared(table)
+    assert (command.vertex_weights, terminal.workers) == ("area", 1)
+    monkeypatch.setenv("FOTISMOS_WORKERS", "2")
+    monkeypatch.setenv("FOTISMOS_COLOUR_SCIENCE", "1")
+    command, terminal = compared(table)
+    assert (command.colour_science, terminal.workers) == (True, 2)
+    assert compared(table, "--workers", "3")[1].workers == 3
+
+
+def test_a_variable_that_is_not_allowed_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("FOTISMOS_WORKERS", "many")
+    code, _, message = command_line("compare", "fig-8-9")
+    assert (code, "FOTISMOS_WORKERS: 'many' is not" in message) == (2, True)

@@ -30,15 +30,14 @@ class Compare(OnScene, frozen=True):
     --------
       fotismos compare fig-8-9
       fotismos compare my_scene.xml cornell-box --resolution 640x480 -o results
+      fotismos compare my_scene.xml --heuristic my_shader.py
+      fotismos compare my_scene.xml --image theirs.exr
+      fotismos compare --reference 'theirs_*.exr' --image 'mine_*.exr' --max-visible 5%
       fotismos compare cornell-box --noise 0.5 --spp 2048
       fotismos compare fig-8-8a fig-8-9 --figures -q
       fotismos compare my_scene.xml -D roughness=0.2 --sensor 1
       fotismos compare plastic-spheres --no-why
-      fotismos compare my_scenes/*.xml
-      fotismos compare my_scene.xml --heuristic my_shader.py
-      fotismos compare my_scene.xml --image theirs.exr
       fotismos compare my_scene.xml --reference 'cycles_*.exr'
-      fotismos compare --reference 'theirs_*.exr' --image 'mine_*.exr' --max-visible 5%
       fotismos compare my_scenes/*.xml --max-visible 5% --summary summary.md
     """
 
