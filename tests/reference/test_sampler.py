@@ -1,5 +1,6 @@
 """The sampler: stratified as it says, and right in the mean however long paths are."""
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -8,8 +9,9 @@ from scipy import stats
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
+from fotismos.comparisons.prepared import prepare
 from fotismos.reference.rendering.integrators import SAMPLER
-from fotismos.reference.rendering.sampler import cells, register
+from fotismos.reference.rendering.sampler import cells, permuted, register
 from tests.shared.parts import camera
 
 COUNTS = (1, 2, 3, 4, 7, 16, 48, 64)
@@ -101,3 +103,26 @@ def test_the_reference_is_right_inside_a_bright_sphere(rgb, reflectance, spp):
     error = np.sqrt((error**2).sum()) / error.size * np.sqrt(3)  # channels are one number
     assert abs(mean / exact - 1) < 0.003
     assert abs(mean - exact) < 4 * error
+
+
+@pytest.mark.parametrize("count", [1, 2, 8, 64, 1024])
+def test_powers_of_two_are_permuted_as_mitsuba_does(rgb, count):
+    rng = np.random.default_rng(3)
+    index = mi.UInt32(rng.integers(0, count, 20_000).astype(np.uint32))
+    seed = mi.UInt32(rng.integers(0, 2**32, 20_000).astype(np.uint32))
+    found = permuted(index, dr.opaque(mi.UInt32, count - 1), seed)
+    assert dr.all(found == mi.permute_kensler(index, count, seed))
+
+
+def test_powers_of_two_of_samples_share_a_kernel_and_other_numbers_do_not(rgb):
+    ready = prepare(open_case(sphere(0.5, 16), Options(), name="sphere").source)
+    kernels = {}
+    for spp in (4, 16, 64, 6):
+        half = ready.reference.sampled(spp)
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            dr.eval(half.integrator.render(half.scene, seed=dr.opaque(mi.UInt32, 1), spp=spp))
+            history = dr.kernel_history([dr.KernelType.JIT])
+        kernels[spp] = {str(entry["hash"]) for entry in history if entry["size"] == 256 * spp}
+    assert len(kernels[4]) == 1
+    assert kernels[4] == kernels[16] == kernels[64] != kernels[6]

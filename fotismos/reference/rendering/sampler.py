@@ -11,13 +11,15 @@ albedo 0.9 with 16 samples per pixel. Here a random number rotates the strata ::
 
 which is uniform and independent for any permutation p. Pairs of dimensions are stratified in each
 axis and in cells, like correlated multi-jittered samples; the place within a cell is rotated in the
-same way. Any ``sample_count`` will do; best are two nearly equal factors.
+same way. Any ``sample_count`` will do; best are two nearly equal factors. All powers of two share a
+kernel: to it they are inputs, and any other count is a constant (:class:`Count`).
 
 Sources: A. Kensler, *Correlated multi-jittered sampling*, 2013, for p and the cells; R. Cranley and
 T. N. L. Patterson, *Randomization of number theoretic methods for multiple integration*, 1976, for
 the rotation.
 """
 
+from dataclasses import dataclass
 from functools import cache
 from math import isqrt
 from typing import Any
@@ -71,13 +73,19 @@ def _define(_variant: str) -> None:
             self.index: Any = None
             self.pixel: Any = None
             self.jitter: Any = None
+            self.strata: Any = None
+            self.columns: Any = None
+            self.rows: Any = None
 
         def seed(self, seed: Any, wavefront_size: int = 0xFFFFFFFF) -> None:
             super().seed(seed, wavefront_size)
             index = dr.arange(mi.UInt32, self.wavefront_size())
+            count = self.sample_count()
+            self.strata = Count.of(count)
+            self.columns, self.rows = map(Count.of, cells(count))
             # The samples of a pixel follow each other in the wavefront.
-            pixel = index // self.sample_count()
-            self.index = index - pixel * self.sample_count()
+            pixel = self.strata.quotient(index)
+            self.index = index - pixel * self.strata.number
             self.pixel, _ = mi.sample_tea_32(mi.UInt32(seed), pixel)
             # One stream per sample: the pairs of numbers differ wherever seed or place do.
             state, stream = mi.sample_tea_32(mi.UInt32(seed), index)
@@ -85,26 +93,26 @@ def _define(_variant: str) -> None:
             self.dimension = dr.opaque(mi.UInt32, 0)
 
         def next_1d(self, active: Any = True) -> Any:
-            count = self.sample_count()
             stratum, _, _ = self._stratum(active)
-            return _under_one((mi.Float(stratum) + self._within()) * (1 / count))
+            return _under_one((mi.Float(stratum) + self._within()) * self.strata.inverse)
 
         def next_2d(self, active: Any = True) -> Any:
-            columns, rows = cells(self.sample_count())
+            columns = self.columns
+            rows = self.rows
             stratum, permutation, turn = self._stratum(active)
             # Each sample has a cell; its column is split by rows, and its row by columns.
-            row = stratum // columns
-            column = stratum - row * columns
-            along = turned(row, rows, permutation * _ALONG, turn * _ALONG, active)
-            across = turned(column, columns, permutation * _ACROSS, turn * _ACROSS, active)
-            x = mi.Float(column) + (mi.Float(along) + self._within()) * (1 / rows)
-            y = mi.Float(row) + (mi.Float(across) + self._within()) * (1 / columns)
-            return mi.Point2f(_under_one(x * (1 / columns)), _under_one(y * (1 / rows)))
+            row = columns.quotient(stratum)
+            column = stratum - row * columns.number
+            along = rows.turned(row, permutation * _ALONG, turn * _ALONG, active)
+            across = columns.turned(column, permutation * _ACROSS, turn * _ACROSS, active)
+            x = mi.Float(column) + (mi.Float(along) + self._within()) * rows.inverse
+            y = mi.Float(row) + (mi.Float(across) + self._within()) * columns.inverse
+            return mi.Point2f(_under_one(x * columns.inverse), _under_one(y * rows.inverse))
 
         def _stratum(self, active: Any) -> Any:
             permutation, turn = mi.sample_tea_32(self.pixel, self.dimension)
             self.dimension += 1
-            stratum = turned(self.index, self.sample_count(), permutation, turn, active)
+            stratum = self.strata.turned(self.index, permutation, turn, active)
             return stratum, permutation, turn
 
         def _within(self) -> Any:
@@ -113,6 +121,7 @@ def _define(_variant: str) -> None:
         def clone(self) -> Any:
             copy = self.fork()
             if self.dimension is not None:
+                copy.strata, copy.columns, copy.rows = self.strata, self.columns, self.rows
                 copy.dimension, copy.index = mi.UInt32(self.dimension), mi.UInt32(self.index)
                 copy.pixel, copy.jitter = mi.UInt32(self.pixel), mi.PCG32(self.jitter)
             return copy
@@ -137,11 +146,65 @@ def _under_one(number: Any) -> Any:
     return dr.minimum(number, dr.one_minus_epsilon(mi.Float))
 
 
-def turned(index: Array, count: int, permutation: Array, turn: Array, active: Mask) -> Array:
-    """Return ``(p(index) + r) mod count`` for a hash of p, and one of r: integers below count."""
-    if count == 1:
-        return mi.UInt32(0)
-    # The high word of the product is uniform in 0 … count - 1, without a division.
-    cell = mi.permute_kensler(index, count, permutation, active) + dr.mul_hi(turn, count)
-    # Both terms are below count, so subtracting it once is enough.
-    return dr.select(cell >= count, cell - count, cell)
+@dataclass(frozen=True)
+class Count:
+    """A number of strata in a kernel, its logarithm to base 2 if it is a power of 2, and 1 over it.
+
+    A power of 2 is an input of the kernel, so that kernels of several numbers are one.
+    """
+
+    number: Any
+    logarithm: Any
+    inverse: Any
+
+    @classmethod
+    def of(cls, number: int) -> "Count":
+        """Return a number, at least 1, as it is in a kernel."""
+        if number & (number - 1):
+            return cls(number=number, logarithm=None, inverse=1 / number)
+        return cls(
+            number=dr.opaque(mi.UInt32, number),
+            logarithm=dr.opaque(mi.UInt32, number.bit_length() - 1),
+            inverse=dr.opaque(mi.Float, 1 / number),
+        )
+
+    def quotient(self, dividend: Array) -> Array:
+        """Return ``dividend // number``."""
+        return dividend // self.number if self.logarithm is None else dividend >> self.logarithm
+
+    def turned(self, index: Array, permutation: Array, turn: Array, active: Mask) -> Array:
+        """Return ``(p(index) + r) mod number`` for a hash of p, and one of r: integers below it."""
+        if self.logarithm is None:
+            cell = mi.permute_kensler(index, self.number, permutation, active)
+        else:
+            cell = permuted(index, self.number - 1, permutation)
+        # The high word of the product is uniform in 0 … number - 1, without a division.
+        cell += dr.mul_hi(turn, mi.UInt32(self.number))
+        # Both terms are below the number, so subtracting it once is enough.
+        return dr.select(cell >= self.number, cell - self.number, cell)
+
+
+def permuted(index: Array, mask: Array, seed: Array) -> Array:
+    """Return Kensler's permutation p(index) of a power of 2, ``mask`` + 1, as Mitsuba computes it.
+
+    Each step permutes the integers below the power on its own, so there is nothing to repeat.
+    """
+    value = index ^ seed
+    value *= 0xE170893D
+    value ^= seed >> 16
+    value ^= (value & mask) >> 4
+    value ^= seed >> 8
+    value *= 0x0929EB3F
+    value ^= seed >> 23
+    value ^= (value & mask) >> 1
+    value *= 1 | seed >> 27
+    value *= 0x6935FA69
+    value ^= (value & mask) >> 11
+    value *= 0x74DCB303
+    value ^= (value & mask) >> 2
+    value *= 0x9E501CC3
+    value ^= (value & mask) >> 2
+    value *= 0xC860A3DF
+    value &= mask
+    value ^= value >> 5
+    return (value + seed) & mask
