@@ -25,11 +25,11 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.blocks import ratio
+from fotismos.comparisons.departure.estimate import contrasts
 from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
 from fotismos.comparisons.departure.noise import (
     USUAL,
     Halves,
-    contrasts,
     distances_between,
     visible_shares,
     without_noise,

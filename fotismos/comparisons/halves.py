@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from fotismos.comparisons.departure import criterion
 from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.marks import NoiseShown
+from fotismos.comparisons.departure.estimate import NoiseShown
 from fotismos.comparisons.departure.metrics import METRICS, Metric, leading_distance
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.comparison import PictureFiles, Price

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from fotismos.comparisons import alignment, picture_mistakes
 from fotismos.comparisons.departure.colour import Array
+from fotismos.comparisons.departure.estimate import NoiseShown
 from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedReference
-from fotismos.comparisons.departure.marks import NoiseShown
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.tone_maps import TONE_MAPS, ToneMap
 from fotismos.comparisons.halves import Halves, PassSums

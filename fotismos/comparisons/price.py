@@ -25,8 +25,9 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons.departure.criterion import LIMIT
+from fotismos.comparisons.departure.estimate import shares_above
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS, Pixelwise
-from fotismos.comparisons.departure.noise import USUAL, shares_above
+from fotismos.comparisons.departure.noise import USUAL
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.records.comparison import (
     MOST_SPP,

@@ -39,7 +39,6 @@ pixels that differ by more than rounding differ.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -52,6 +51,7 @@ from fotismos.comparisons.departure.blocks import (
     spread_out,
 )
 from fotismos.comparisons.departure.colour import Array
+from fotismos.comparisons.departure.estimate import NoiseShown
 from fotismos.reference.rendering.finite import require_finite
 from fotismos.reference.rendering.sums import BLOCK, DifferenceEstimate
 
@@ -70,9 +70,6 @@ _NORMAL = 1e6
 """Degrees of freedom of variances that are practically known."""
 
 Distance = Callable[[Array, Array], Array]
-
-NoiseShown = Literal["all", "part", "none"]
-"""Whether the passes show the noise of both images, of one alone, or of none."""
 
 
 @dataclass(frozen=True)

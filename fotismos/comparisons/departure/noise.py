@@ -28,7 +28,8 @@ without a rare sample lacks: the mean of the groups less their median, over all 
 0 where halves are as far apart as the images. Shares are widened by the pixels whose halves differ
 visibly.
 
-The added noise is a contrast of the groups of passes (:func:`contrasts`). The intervals are
+The added noise is a contrast of the groups of passes, of
+:func:`fotismos.comparisons.departure.estimate.contrasts`. The intervals are
 Student's, by the jackknife over the groups. With too few groups, or for a metric of neighbourhoods,
 the triangle inequality gives a wider one: the error of a mean distance is at most the distance of
 the reference from the truth, the noise floor.
@@ -56,6 +57,7 @@ from numpy.typing import ArrayLike
 
 from fotismos.comparisons.departure.blocks import ratio
 from fotismos.comparisons.departure.colour import Array, linear
+from fotismos.comparisons.departure.estimate import contrasts, shares_above
 from fotismos.comparisons.departure.metrics import Distances, Metric, Pixelwise
 from fotismos.comparisons.records.departure import Viewing, VisibleShare
 from fotismos.heuristic.convention import Floats
@@ -63,9 +65,6 @@ from fotismos.reference.rendering.sums import Grouped, jackknife_error, student
 
 SPLITS = 2
 """Random splits of the groups into halves, and draws of single ones."""
-
-CONTRASTS = 3
-"""Noise is added in this many independent ways, and the results are averaged."""
 
 CURVATURE = 0.06
 """Uncertainty, as a share of the squared noise, from the curvature of colour spaces."""
@@ -154,13 +153,6 @@ def _visible(metric: Metric, shares: Array) -> tuple[VisibleShare, ...]:
             metric.visible, shares.T.tolist(), strict=True
         )
     )
-
-
-def shares_above(distances: Floats, thresholds: Sequence[float]) -> Array:
-    """Return the share of distances (N,) above each threshold, (T,), which rise; 0 of none."""
-    # Counts by the number of thresholds strictly below, summed from the top.
-    counts = np.bincount(np.searchsorted(thresholds, distances), minlength=len(thresholds) + 1)
-    return counts[:0:-1].cumsum()[::-1] / max(len(distances), 1)
 
 
 def debiased(
@@ -440,19 +432,3 @@ def sampling_error(added: Array, grouped: Grouped) -> Array:
     spread = np.sqrt((left**2).sum(axis=0) / max(len(left) - 1, 1))
     error: Array = np.sqrt(share * len(left)) * spread / pixels.sum()
     return error
-
-
-def contrasts(sizes: Array) -> Array:
-    """Return weights (m, K) of groups that make noise from their means, as large as the mean's.
-
-    They are orthogonal to each other and add up to 0; their squares over the sizes add up to one
-    over the number of passes.
-    """
-    count = len(sizes)
-    # In units of each group's own deviation the weights of the mean are as `√sizes`: QR keeps
-    # their direction as the first column, and makes the others orthogonal to it.
-    waves = np.cos(np.pi * np.outer(np.arange(count) + 0.5, np.arange(count)) / count)
-    waves[:, 0] = np.sqrt(sizes)
-    basis, _ = np.linalg.qr(waves)
-    weights: Array = basis[:, 1 : 1 + CONTRASTS] * np.sqrt(sizes / sizes.sum())[:, None]
-    return weights.T

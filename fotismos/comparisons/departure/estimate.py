@@ -1,0 +1,748 @@
+"""Is it more than noise, and how large is it without? The mean distance and the visible shares.
+
+Everything is said of *replicates*: K pictures of one difference (passes, repeats, groups of
+either) whose noise is independent. :func:`estimate` gives the mean distance and the share of pixels
+above each threshold, each with an interval that holds the truth in 95 % of the cases, and
+:func:`fotismos.comparisons.departure.criterion.decide` judges by such a share alone.
+
+A distance of noisy pictures is too large, by an unknown amount where noise is skewed or has heavy
+tails. A *signed* difference is right in the mean, whatever its noise is. All lower ends rest on
+that.
+
+**Directions.** Half of the replicates guess, at each pixel, in which direction and how far the
+pictures differ: ``h`` (3,). The other half is measured along it, ``g = h·G x / |h|`` with the
+difference ``x`` and the local metric ``G`` of the distance (``D² ≈ x·G x``, and never more than the
+chord). The guess is independent of the noise in ``x``. So the mean of ``g`` over any set of pixels
+that the guess selects is at most the mean of their true distances (Cauchy and Schwarz). Guesses are
+pooled over tiles of several sizes, as relative differences, since neighbours often depart alike.
+
+**Lower ends.** Of a set with mean ``m`` and variance ``v`` of ``g`` without noise, at least
+``(m - t)² / ((m - t)² + v)`` lie above ``t < m`` (Cantelli 1910). And a pixel measured above
+``t + k s``, ``s`` its noise, is above ``t``, or its noise is above ``k s``: the share measured
+there less that of such noise is proven, too. The largest bound of all sets and factors counts;
+constants below say by how many errors each is lowered. Light of rare samples may be missing from
+one picture: contributions as large as the largest residual ``e`` in ``n`` pixels of K replicates
+add ``e m/(nK)`` to the variance of a mean, as for a Poisson number of them.
+
+**Upper ends.** A pixel above ``t`` is measured above ``t - k s``, or its noise is above ``k s``.
+And at most the mean of ``D²/t²`` lies above ``t`` (Markov), of which products of different
+replicates are an estimate without bias. The mean is at most that of the roots of ``D²`` without
+noise, over pixels or over blocks; noise is taken out of ``D²`` by adding it once more (Cook and
+Stefanski, J. Am. Stat. Assoc. 89, 1994).
+
+**Together.** Mean and shares bound each other: ``mean >= ∫ share(t) dt``, ``t share(t) <= mean``,
+and ``mean <= t + share(t) (largest - t)``. Shares never rise with the threshold.
+
+**One replicate** shows no noise. Then cells of 4 x 4 pixels take turns as on a chessboard: half of
+them guess for the tile, the others are measured. That finds what is alike over a tile, as noise is
+not.
+
+Errors are those of sums over blocks of 8 x 8 and of 16 x 16 pixels, the larger of the two: a filter
+or a denoiser correlates neighbours. Large pictures are sampled in blocks, at most 16,384 pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import hypot, sqrt
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fotismos.comparisons.departure.colour import Array
+from fotismos.comparisons.departure.metrics import Pixelwise
+from fotismos.comparisons.records.departure import DEFAULT_VIEWING, Viewing, VisibleShare
+from fotismos.heuristic.convention import Floats
+from fotismos.reference.records import Interval
+from fotismos.reference.rendering.sums import BLOCK, Grouped, sample, student
+
+NoiseShown = Literal["all", "part", "none"]
+"""Whether replicates show the noise of both pictures, of one alone, or of none."""
+
+CONTRASTS = 3
+"""Noise is made of the replicates in this many independent ways, at most."""
+
+TILES = (1, 2, 4, 8, 16, 0)
+"""Sides in pixels of the tiles over which guesses are pooled; 0 is the whole picture."""
+
+LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
+"""A set holds the pixels whose guessed distance is at least one of these, over the threshold."""
+
+NOISY_LEVELS = ((0.5, 1.0), (0.5, 2.0), (0.5, 3.0), (1.0, 1.0), (1.0, 2.0), (1.0, 3.0))
+"""Further sets: so far above a level by so many errors of the guess."""
+
+FACTORS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
+"""How many deviations of a pixel's noise it is measured beyond a threshold."""
+
+FEWEST_PIXELS = 24
+"""Pixels of the smallest set: fewer have no normal mean."""
+
+CELL = 4
+"""Side in pixels of the chessboard's cells."""
+
+SHARE_ERRORS = 1.0
+MEAN_ERRORS = 3.5
+COUNT_ERRORS = 2.5
+UPPER_ERRORS = 2.0
+"""Standard errors by which ends are moved outwards: of shares by Cantelli's inequality, which
+leaves far more room than its errors take, of means, of counts, and of upper ends."""
+
+MEAN_HIGH = 2.6
+"""Standard errors of the upper end of a mean."""
+
+CURVED = 0.12
+"""Uncertainty of the noise in a mean square, as a share of it: colour spaces are curved."""
+
+TAILS = 3.0
+"""How much more often than elsewhere noise may be large at the pixels that differ."""
+
+STEP = 1e-3
+"""Relative step of the numerical derivative."""
+
+DARKEST = 0.02
+"""Light that is added to a pixel's, where differences are relative."""
+
+TINY = 1e-30
+
+
+@dataclass(frozen=True)
+class Replicates:
+    """K replicates of the difference of a test picture from a reference, at P pixels.
+
+    ``shown`` (P, 3) is the test picture there, ``differences`` (K, P, 3) are the replicates, each
+    the mean of ``sizes`` (K,) passes; ``rows`` and ``columns`` (P,) are the pixels. ``sampled`` is
+    the share of the picture's blocks that they are drawn from. ``noise_shown`` says whose noise
+    they show: what they do not show counts as a difference, and so it is in no lower end.
+    """
+
+    shown: Array
+    differences: Array
+    sizes: Array
+    rows: NDArray[Any]
+    columns: NDArray[Any]
+    sampled: float = 1.0
+    noise_shown: NoiseShown = "all"
+
+    @classmethod
+    def of(cls, test: Array, grouped: Grouped, noise_shown: NoiseShown = "all") -> Replicates:
+        """Return the groups of passes of a comparison; ``test`` (H, W, 3) is linear."""
+        rows, columns = np.divmod(grouped.places, test.shape[1])
+        return cls(
+            shown=test.reshape(-1, 3)[grouped.places].astype(np.float64),
+            differences=grouped.means,
+            sizes=np.asarray(grouped.sizes, float),
+            rows=rows,
+            columns=columns,
+            sampled=grouped.sampled / max(grouped.total, 1),
+            noise_shown=noise_shown,
+        )
+
+    @classmethod
+    def of_images(
+        cls,
+        test: ArrayLike,
+        reference: ArrayLike,
+        counted: NDArray[np.bool_],
+        noise_shown: NoiseShown = "all",
+    ) -> Replicates:
+        """Return replicates of pictures (K, H, W, 3), of which one may be single, (H, W, 3).
+
+        A single one is taken as given: its noise is a difference. Of two sides with K pictures,
+        those of one number belong together, so that common random numbers cancel.
+        """
+        places, blocks, total = sample(counted)
+        sides = [
+            np.reshape(np.asarray(side, float), (-1, counted.size, 3))[:, places]
+            for side in (test, reference)
+        ]
+        differences = sides[0] - sides[1]
+        rows, columns = np.divmod(places, counted.shape[1])
+        return cls(
+            shown=sides[0].mean(axis=0),
+            differences=differences,
+            sizes=np.ones(len(differences)),
+            rows=rows,
+            columns=columns,
+            sampled=len(np.unique(blocks)) / max(total, 1),
+            noise_shown=noise_shown,
+        )
+
+    @cached_property
+    def mean(self) -> Array:
+        """The mean difference (P, 3)."""
+        return np.asarray(np.average(self.differences, axis=0, weights=self.sizes))
+
+    @cached_property
+    def noise(self) -> Array:
+        """Noise (C, P, 3) as large as that of the mean; none (C = 0) of one replicate."""
+        return np.asarray(np.tensordot(contrasts(self.sizes), self.differences, 1))
+
+    @property
+    def as_one(self) -> Replicates:
+        """The mean, as if there were no replicates of it."""
+        return replace(self, differences=self.mean[None], sizes=np.ones(1))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean distance without noise, and the shares of pixels above thresholds, with intervals."""
+
+    mean: Interval
+    visible: tuple[VisibleShare, ...]
+
+
+def estimate(
+    metric: Pixelwise,
+    replicates: Replicates,
+    viewing: Viewing = DEFAULT_VIEWING,
+    measured: Floats | None = None,
+) -> Estimate:
+    """Return a metric's mean and shares without noise.
+
+    ``measured`` (N,) are the distances of all counted pixels, if replicates are a sample of them.
+    """
+    evidence = Evidence(metric=metric, viewing=viewing, replicates=replicates)
+    whole = evidence.measured if measured is None else np.asarray(measured)
+    return evidence.estimate(whole)
+
+
+def over_pictures(estimates: Sequence[Estimate]) -> Estimate:
+    """Return the mean of estimates of several pictures, whose noise is a part of their error.
+
+    Their own intervals hold an error that all share. What they scatter comes on top.
+    """
+    shares = zip(*(found.visible for found in estimates), strict=True)
+    mean = _of_all([found.mean for found in estimates])
+    visible = []
+    for of_threshold in shares:
+        share = _of_all(of_threshold)
+        visible.append(
+            VisibleShare(
+                threshold=of_threshold[0].threshold,
+                value=share.value,
+                low=max(share.low, 0.0),
+                high=min(share.high, 1.0),
+            )
+        )
+    low = max(mean.low, 0.0)
+    return Estimate(
+        mean=Interval(value=mean.value, low=low, high=mean.high), visible=tuple(visible)
+    )
+
+
+def _of_all(repeats: Sequence[Interval]) -> Interval:
+    value = float(np.mean([found.value for found in repeats]))
+    below = value - float(np.mean([found.low for found in repeats]))
+    above = float(np.mean([found.high for found in repeats])) - value
+    scatter = 0.0
+    if len(repeats) > 1:
+        deviation = float(np.std([found.value for found in repeats], ddof=1))
+        scatter = student(0.0, deviation / sqrt(len(repeats)), len(repeats)).high
+    return Interval(
+        value=value, low=value - hypot(below, scatter), high=value + hypot(above, scatter)
+    )
+
+
+@dataclass(frozen=True)
+class Selection:
+    """A set of pixels that some replicates select and others measure.
+
+    ``share`` is its part of the pixels, ``mean`` that of the measured distances, ``error`` its
+    standard error; ``variance`` is that of the distances without noise, ``variance_error`` its
+    error.
+    """
+
+    share: float
+    mean: float
+    error: float
+    variance: float
+    variance_error: float
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A guess of the difference and its measurement by others, (P,) each.
+
+    ``distance`` is guessed; ``measured`` and ``noise`` (C, P) lie along it; ``own`` is the variance
+    of the measured one, ``deviation`` the guess's own error, and ``used`` says which pixels were
+    measured.
+    """
+
+    distance: Array
+    measured: Array
+    noise: Array
+    own: Array
+    deviation: Array
+    used: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All that replicates prove of a metric's distances."""
+
+    metric: Pixelwise
+    viewing: Viewing
+    replicates: Replicates
+
+    def estimate(self, whole: Floats) -> Estimate:
+        """Return mean and shares; ``whole`` (N,) are the distances of all counted pixels."""
+        thresholds = np.asarray(self.metric.visible, float)
+        proven = self if self.replicates.noise_shown == "all" else self._of_one
+        if not len(self.replicates.shown) or self._is_exact:
+            mean = self.metric.mean(whole)
+            shares = shares_above(whole, thresholds)
+            return self._result(np.array([mean] * 3), np.array([shares] * 3))
+        value, high = self._mean_and_high(whole)
+        if self.metric.averages_squares or self.metric.squared:
+            low = 2.0 * value - high
+            ends = np.maximum([value, low, high], 0.0)
+            if self.metric.averages_squares:
+                ends = np.sqrt(ends)
+            return self._result(ends, np.zeros((3, 0)))
+        low = min(proven.mean_low(), high)
+        margin = self._sampling_errors(thresholds)
+        shares = np.array(
+            [
+                self._shares_without_noise(whole, thresholds),
+                np.maximum(proven.shares_low(thresholds) - margin, 0.0),
+                np.minimum(self.shares_high(whole, thresholds) + margin, 1.0),
+            ]
+        )
+        return self._result(np.array([value, low, high]), self._joined(shares, low, high))
+
+    def _joined(self, shares: Array, low: float, high: float) -> Array:
+        """Return shares (3, T): value, low, high, as mean and other thresholds allow them."""
+        thresholds = np.asarray(self.metric.visible, float)
+        value, least, most = shares
+        span = np.maximum(self._largest_distance - thresholds, TINY)
+        least = np.maximum(least, (low - thresholds) / span)
+        least = np.maximum.accumulate(least[::-1])[::-1]
+        most = np.minimum(most, high / thresholds)
+        most = np.minimum.accumulate(most)
+        most = np.maximum(most, least)
+        value = np.clip(np.minimum.accumulate(value), least, most)
+        return np.array([value, least, most])
+
+    def _result(self, mean: Array, shares: Array) -> Estimate:
+        """Return mean (3,) and shares (3, T): value, low, high."""
+        value, low, high = mean.tolist()
+        steps = np.diff(self.metric.visible, prepend=0.0)
+        if shares.size:
+            # Of a distance, the mean is the integral of the shares above it.
+            low = max(low, float(shares[1] @ steps))
+            high = max(low, high)
+        return Estimate(
+            mean=Interval(value=min(max(value, low), high), low=low, high=high),
+            visible=tuple(
+                VisibleShare(threshold=threshold, value=share, low=least, high=most)
+                for threshold, (share, least, most) in zip(
+                    self.metric.visible, shares.T.tolist(), strict=bool(shares.size)
+                )
+            ),
+        )
+
+    # --- Distances --------------------------------------------------------------------------------
+
+    @property
+    def _of_one(self) -> Evidence:
+        return replace(self, replicates=self.replicates.as_one)
+
+    @property
+    def _is_exact(self) -> bool:
+        replicates = self.replicates
+        return len(replicates.differences) > 1 and not replicates.noise.any()
+
+    @cached_property
+    def _batch(self) -> tuple[Array, Array]:
+        """Squared distances (6, P) along steps, and distances (1 + 2 C, P) of noisy means."""
+        replicates = self.replicates
+        directions = np.concatenate([np.eye(3), np.eye(3)[[0, 0, 1]] + np.eye(3)[[1, 2, 2]]])
+        steps = directions[:, None] * self._step[:, None]
+        mean = replicates.mean
+        noisy = [mean[None], mean + replicates.noise, mean - replicates.noise]
+        references = replicates.shown - np.concatenate([steps, *noisy])
+        found = self.metric.coordinates(references, self.viewing)
+        shown = self.metric.coordinates(replicates.shown, self.viewing)
+        distances = self.metric.difference(found, np.broadcast_to(shown, found.shape))
+        if self.metric.squared:
+            distances = np.sqrt(distances)
+        return np.square(distances[:6] / self._step), distances[6:]
+
+    @property
+    def _step(self) -> Array:
+        return np.asarray(STEP * (self.replicates.shown.mean(axis=-1) + DARKEST))
+
+    @property
+    def measured(self) -> Array:
+        """The distances (P,) of the mean."""
+        _, distances = self._batch
+        plain: Array = distances[0]
+        return plain
+
+    @property
+    def _noisier(self) -> Array:
+        """The distances (2, C, P) with noise added to the mean, and taken off it."""
+        _, distances = self._batch
+        return distances[1:].reshape(2, -1, distances.shape[1])
+
+    @cached_property
+    def _tensor(self) -> Array:
+        """The local metric (P, 3, 3): ``D² = x·G x`` of small ``x``."""
+        squares, _ = self._batch
+        tensor = np.zeros((squares.shape[1], 3, 3))
+        for axis in range(3):
+            tensor[:, axis, axis] = squares[axis]
+        for number, (i, j) in enumerate(((0, 1), (0, 2), (1, 2)), start=3):
+            mixed = (squares[number] - squares[i] - squares[j]) / 2.0
+            tensor[:, i, j] = mixed
+            tensor[:, j, i] = mixed
+        return tensor
+
+    def _sizes(self, differences: Array) -> Array:
+        """Return the lengths (...) of differences (..., P, 3) in the local metric."""
+        squares = np.einsum("...i,...i->...", differences, self._through(differences))
+        return np.asarray(np.sqrt(np.maximum(squares, 0.0)))
+
+    def _through(self, differences: Array) -> Array:
+        """Return ``G x`` of differences (..., P, 3)."""
+        return np.asarray(np.einsum("pij,...pj->...pi", self._tensor, differences))
+
+    @cached_property
+    def _bend(self) -> Array:
+        """How much shorter (P,) the distance of the mean is than along the tangent; at most 1."""
+        straight = self._sizes(self.replicates.mean)
+        return np.minimum(1.0, self.measured / np.maximum(straight, TINY))
+
+    @cached_property
+    def _noise_sizes(self) -> Array:
+        """The lengths (C, P) of the noise."""
+        return self._sizes(self.replicates.noise)
+
+    @cached_property
+    def _largest_residual(self) -> float:
+        """The largest residual of a replicate: one contribution that others may lack."""
+        differences = self.replicates.differences
+        count = len(differences)
+        if count < 2:
+            return 0.0
+        residuals = differences - differences.mean(axis=0)
+        return float(self._sizes(residuals).max()) * sqrt(count / (count - 1))
+
+    @property
+    def _largest_distance(self) -> float:
+        """The largest distance that a pixel may have."""
+        return float(self.measured.max() + self._noise_sizes.max(initial=0.0))
+
+    # --- The mean ---------------------------------------------------------------------------------
+
+    @cached_property
+    def _squares(self) -> Array:
+        """Squared distances (P,) without noise, which may be negative."""
+        before: Array = np.square(self.measured)
+        if not len(self.replicates.noise):
+            return before
+        return np.asarray(2.0 * before - np.square(self._noisier).mean(axis=(0, 1)))
+
+    def _mean_and_high(self, whole: Floats) -> tuple[float, float]:
+        """Return the mean without noise and its upper end; of squares if the metric's are."""
+        is_square = self.metric.averages_squares or self.metric.squared
+        plain = np.square(self.measured) if is_square else self.measured
+        squares_given = self.metric.averages_squares
+        raw = float(np.mean(np.square(whole) if squares_given else whole, dtype=np.float64))
+        count = len(plain)
+        if not len(self.replicates.noise):
+            return raw, raw
+        added, taken = np.square(self._noisier) if is_square else self._noisier
+        own = self._block_squares((added - taken) / 2.0) / count**2
+        if is_square:
+            bias = plain - self._squares
+            error = sqrt(own + self._scatter(bias))
+            # Light itself is not curved.
+            value = raw - float(bias.mean())
+            return value, value + MEAN_HIGH * error + CURVED * max(float(bias.mean()), 0.0)
+        roots = [_root(self._squares), _root(_pooled(self._squares, self._tiles(BLOCK)))]
+        least = plain - np.maximum(roots[0].mean(), roots[1].mean())
+        error = sqrt(own + self._scatter(plain - roots[1]))
+        value = raw - float(plain.mean() - (roots[0].mean() + roots[1].mean()) / 2.0)
+        high = min(raw - float(least.mean()) + MEAN_HIGH * error, raw + MEAN_HIGH * sqrt(own))
+        return max(value, 0.0), max(high, 0.0)
+
+    def mean_low(self) -> float:
+        """Return a lower bound of the mean distance."""
+        products = [found.share * (found.mean - MEAN_ERRORS * found.error)
+                    for found in self._evidence[0]]  # fmt: skip
+        return max([0.0, *products])
+
+    # --- Shares -----------------------------------------------------------------------------------
+
+    def shares_low(self, thresholds: Array) -> Array:
+        """Return lower bounds (T,) of the shares of pixels above thresholds."""
+        selections, counts = self._evidence
+        bounds = [np.zeros(len(thresholds)), *counts]
+        for found in selections:
+            beyond = np.maximum(found.mean - SHARE_ERRORS * found.error - thresholds, 0.0) ** 2
+            variance = found.variance + SHARE_ERRORS * found.variance_error
+            bounds.append(found.share * beyond / np.maximum(beyond + variance, TINY))
+        return np.asarray(np.max(bounds, axis=0))
+
+    def shares_high(self, whole: Floats, thresholds: Array) -> Array:
+        """Return upper bounds (T,) of the shares of pixels above thresholds."""
+        pixels = len(self.measured)
+        if not len(self.replicates.noise):
+            shares = shares_above(whole, thresholds)
+            binomial = np.sqrt(np.maximum(shares, 1.0 / pixels) / pixels)
+            return np.minimum(shares + UPPER_ERRORS * binomial, 1.0)
+        deviation = np.sqrt(_pooled(np.square(self._noise_sizes).mean(axis=0), self._tiles(BLOCK)))
+        correlation = self._correlation(self._noise_sizes)
+        bounds = []
+        for factor in FACTORS:
+            chance = TAILS * float((self._noise_sizes > factor * deviation).mean())
+            if chance < 0.5:
+                shares = shares_above(self.measured + factor * deviation, thresholds)
+                spread = np.maximum(shares, 1.0 / pixels) * max(chance, 1.0 / pixels)
+                error = np.sqrt(correlation * spread / pixels)
+                bounds.append((shares + UPPER_ERRORS * error) / (1.0 - chance))
+        bounds.append(self._mean_square_high() / thresholds**2)
+        return np.asarray(np.min([np.ones(len(thresholds)), *bounds], axis=0))
+
+    def _mean_square_high(self) -> float:
+        """Return an upper end of the mean squared distance, by products of replicates."""
+        differences = self.replicates.differences
+        count = len(differences)
+        mean = differences.mean(axis=0)
+        own = np.square(self._sizes(differences)).sum(axis=0)
+        squares = (np.square(count * self._sizes(mean)) - own) / (count * (count - 1))
+        along = 2.0 * np.einsum("pi,cpi->cp", self._through(mean), self.replicates.noise)
+        error = sqrt(self._block_squares(along)) / len(squares)
+        return max(float(squares.mean()), 0.0) + UPPER_ERRORS * error
+
+    def _shares_without_noise(self, whole: Floats, thresholds: Array) -> Array:
+        """Return the shares (T,) whose distances, shrunk towards their blocks', are above."""
+        plain = self.measured
+        noise = self._noisier
+        if not noise.size:
+            return shares_above(whole, thresholds)
+        blocks = self._tiles(BLOCK)
+        squares = self._squares
+        # How much of the scatter within a block is noise: Stein's factor.
+        odd = (np.square(noise[0]) - np.square(noise[1])) / 2.0
+        variance = _pooled(np.square(odd).mean(axis=0), blocks)
+        variance += 2.0 * _pooled(np.square(plain**2 - squares), blocks)
+        middle = _pooled(squares, blocks)
+        scatter = _pooled(np.square(squares - middle), blocks)
+        kept = np.clip(1.0 - variance / np.maximum(scatter, TINY), 0.0, 1.0)
+        clean = _root(middle + kept * (squares - middle))
+        added = shares_above(plain, thresholds) - shares_above(clean, thresholds)
+        return np.clip(shares_above(whole, thresholds) - added, 0.0, 1.0)
+
+    def _sampling_errors(self, thresholds: Array) -> Array:
+        """Return the errors (T,) of shares because only some blocks are measured."""
+        if self.replicates.sampled >= 1.0:
+            return np.zeros(len(thresholds))
+        blocks = np.unique(self._tiles(BLOCK), return_inverse=True)[1]
+        sizes = np.bincount(blocks)
+        left = []
+        for threshold in thresholds:
+            above = self.measured > threshold
+            left.append(np.bincount(blocks, above) - sizes * above.mean())
+        scatter = np.square(left).sum(axis=1) * (1.0 - self.replicates.sampled)
+        return UPPER_ERRORS * np.asarray(np.sqrt(scatter)) / len(self.measured)
+
+    # --- Guesses ----------------------------------------------------------------------------------
+
+    @cached_property
+    def _evidence(self) -> tuple[list[Selection], list[Array]]:
+        """The sets of all tiles and levels that hold enough pixels, and shares (T,) by counts."""
+        selections = []
+        counts: list[Array] = []
+        is_single = len(self.replicates.differences) == 1
+        tolerance = 2.0 if self.metric.visible else max(float(self.measured.mean()), TINY)
+        for side in TILES:
+            if is_single and 0 < side < 2 * CELL:
+                continue
+            guesses = [self._guess(side, *turn) for turn in self._turns]
+            levels = [(level, 0.0) for level in LEVELS]
+            if not is_single:
+                levels += NOISY_LEVELS
+                counts += self._counts(guesses)
+            for level, errors in levels:
+                chosen = [
+                    guess.used & (guess.distance >= level * tolerance + errors * guess.deviation)
+                    for guess in guesses
+                ]
+                if sum(map(np.count_nonzero, chosen)) >= FEWEST_PIXELS * len(guesses):
+                    selections.append(self._selection(guesses, chosen))
+        return selections, counts
+
+    def _selection(self, guesses: list[Guess], chosen: list[NDArray[np.bool_]]) -> Selection:
+        """Return the sums over a set, of all turns together."""
+        turns = len(guesses)
+        pairs = list(zip(guesses, chosen, strict=True))
+        pixels = sum(np.count_nonzero(inside) for inside in chosen)
+        used = sum(np.count_nonzero(guess.used) for guess in guesses)
+        mean = sum(guess.measured[inside].sum() for guess, inside in pairs) / pixels
+        square = sum((guess.measured**2 - guess.own)[inside].sum() for guess, inside in pairs)
+        noise = np.sum([guess.noise * inside for guess, inside in pairs], axis=0)
+        # The variance of the sum, and how much more it is than that of independent pixels.
+        spread = self._block_squares(noise)
+        own = [np.mean(guess.noise**2, axis=0)[inside] for guess, inside in pairs]
+        correlation = max(1.0, spread / max(turns * sum(v.sum() for v in own), TINY))
+        # Of squares of normal variables: `4 g² σ² + 2 σ⁴`.
+        of_squares = sum(
+            (4.0 * np.maximum(guess.measured[inside] ** 2 - v, 0.0) * v + 2.0 * v**2).sum()
+            for (guess, inside), v in zip(pairs, own, strict=True)
+        )
+        count = len(self.replicates.differences)
+        missing = self._largest_residual * max(mean, 0.0) * turns / (pixels * count)
+        return Selection(
+            share=pixels / used,
+            mean=float(mean),
+            error=sqrt(spread / pixels**2 + missing),
+            variance=max(float(square / pixels - mean**2), 0.0),
+            variance_error=sqrt(correlation * of_squares * turns) / pixels,
+        )
+
+    def _counts(self, guesses: list[Guess]) -> list[Array]:
+        """Return lower bounds (T,) of shares, by pixels measured beyond a threshold and noise."""
+        measured = np.mean([guess.measured for guess in guesses], axis=0)
+        noise = np.sqrt(np.mean([np.square(guess.noise) for guess in guesses], axis=0))
+        deviation = np.sqrt(_pooled(np.square(noise).mean(axis=0), self._tiles(BLOCK)))
+        correlation = self._correlation(guesses[0].noise)
+        pixels = len(measured)
+        unseen = 3.0 * self._largest_residual / (len(self.replicates.differences) * pixels)
+        thresholds = self.metric.visible
+        found = []
+        for factor in FACTORS:
+            chance = float((noise > factor * deviation).mean())
+            shares = shares_above(measured - factor * deviation - unseen, thresholds)
+            error = sqrt(2.0 * correlation * max(chance, 1.0 / pixels) / pixels)
+            bound = shares - chance - COUNT_ERRORS * error
+            found.append(bound / max(1.0 - chance, TINY))
+        return found
+
+    @cached_property
+    def _turns(self) -> list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
+        """Which replicates (K,) guess, and at which pixels (P,); all others are measured."""
+        replicates = self.replicates
+        count = len(replicates.differences)
+        if count == 1:
+            cells = (replicates.rows // CELL + replicates.columns // CELL) % 2 == 0
+            none = np.zeros(1, bool)
+            return [(none, cells), (none, ~cells)]
+        numbers = np.arange(count)
+        everywhere = np.ones(len(replicates.rows), bool)
+        splits = [numbers % 2 == 0]
+        if count >= 4:
+            splits.append(numbers // 2 % 2 == 0)
+        return [(half, everywhere) for first in splits for half in (first, ~first)]
+
+    def _guess(self, side: int, guessing: NDArray[np.bool_], seen: NDArray[np.bool_]) -> Guess:
+        """Let some replicates, or some pixels of one, guess; measure the others."""
+        replicates = self.replicates
+        tiles = self._tiles(side)
+        is_single = len(replicates.differences) == 1
+        source = replicates.differences if is_single else replicates.differences[guessing]
+        light = replicates.shown + DARKEST
+        guess = _pooled(source.mean(axis=0) / light, tiles, weight=seen) * light
+        through = self._through(guess)
+        length = np.sqrt(np.maximum(np.einsum("pi,pi->p", guess, through), 0.0))
+        # The distance bends: along the guess, never more than its tangent or its chord.
+        direction = through * (self._bend / np.maximum(length, 1e-12))[:, None]
+        along = np.einsum("pi,kpi->kp", direction, replicates.differences[~guessing])
+        measured = along.mean(axis=0)
+        if is_single:
+            wide = self._tiles(2 * BLOCK)
+            noise = np.where(~seen, measured - _pooled(measured, wide, weight=~seen), 0.0)[None]
+            return Guess(
+                distance=length * self._bend,
+                measured=measured,
+                noise=noise,
+                own=np.zeros(len(seen)),
+                deviation=np.zeros(len(seen)),
+                used=~seen,
+            )
+        noise = np.einsum("pi,cpi->cp", direction, replicates.noise)
+        count = len(along)
+        near = _pooled(np.mean(noise**2, axis=0), self._tiles(BLOCK))
+        near *= len(replicates.differences) / count
+        return Guess(
+            distance=length * self._bend,
+            measured=measured,
+            noise=noise,
+            own=along.var(axis=0, ddof=1) / count if count > 1 else near,
+            deviation=np.sqrt(near) / max(side, 1),
+            used=seen,
+        )
+
+    # --- Tiles ------------------------------------------------------------------------------------
+
+    def _tiles(self, side: int) -> NDArray[np.int64]:
+        """Return the number of each pixel's tile, (P,); 0 is the side of the whole picture."""
+        replicates = self.replicates
+        if not side:
+            return np.zeros(len(replicates.rows), np.int64)
+        across = int(replicates.columns.max()) // side + 1
+        return np.asarray(replicates.rows // side * across + replicates.columns // side)
+
+    def _block_squares(self, noise: Array) -> float:
+        """Return the variance of the sum of noise (C, P), by blocks whose noise is independent."""
+        found = 0.0
+        is_single = len(self.replicates.differences) == 1
+        for side in (CELL, BLOCK) if is_single else (BLOCK, 2 * BLOCK):
+            tiles = self._tiles(side)
+            sums = np.array([np.bincount(tiles, weights=values) for values in noise])
+            found = max(found, float(np.square(sums).sum(axis=1).mean()))
+        return found
+
+    def _correlation(self, noise: Array) -> float:
+        """Return the variance of the sum of noise (C, P) over that of independent pixels; >= 1."""
+        centred = noise - noise.mean(axis=1, keepdims=True)
+        own = max(float(np.square(centred).sum(axis=1).mean()), TINY)
+        return max(1.0, self._block_squares(centred) / own)
+
+    def _scatter(self, values: Array) -> float:
+        """Return the variance of the mean of values (P,) by that of their sums over blocks."""
+        sums = np.bincount(self._tiles(BLOCK), weights=values - values.mean())
+        return float(np.square(sums).sum()) / len(values) ** 2
+
+
+def shares_above(distances: Floats, thresholds: Sequence[float] | Array) -> Array:
+    """Return the share of distances (N,) above each threshold, (T,), which rise; 0 of none."""
+    # Counts by the number of thresholds strictly below, summed from the top.
+    counts = np.bincount(np.searchsorted(thresholds, distances), minlength=len(thresholds) + 1)
+    return np.asarray(counts[:0:-1].cumsum()[::-1] / max(len(distances), 1))
+
+
+def contrasts(sizes: Array) -> Array:
+    """Return weights (m, K) of groups that make noise from their means, as large as the mean's.
+
+    They are orthogonal to each other and add up to 0; their squares over the sizes add up to one
+    over the number of passes.
+    """
+    count = len(sizes)
+    # In units of each group's own deviation the weights of the mean are as `√sizes`: QR keeps
+    # their direction as the first column, and makes the others orthogonal to it.
+    waves = np.cos(np.pi * np.outer(np.arange(count) + 0.5, np.arange(count)) / count)
+    waves[:, 0] = np.sqrt(sizes)
+    basis, _ = np.linalg.qr(waves)
+    weights: Array = basis[:, 1 : 1 + CONTRASTS] * np.sqrt(sizes / sizes.sum())[:, None]
+    return weights.T
+
+
+def _root(squares: Array) -> Array:
+    """Return roots with the sign of what they are of."""
+    return np.asarray(np.sign(squares) * np.sqrt(np.abs(squares)))
+
+
+def _pooled(
+    values: Array, tiles: NDArray[np.int64], weight: NDArray[np.bool_] | None = None
+) -> Array:
+    """Return the mean over each pixel's tile, of values (P, ...) at the pixels that count."""
+    weights = np.ones(len(values)) if weight is None else weight.astype(float)
+    pixels = np.maximum(np.bincount(tiles, weights=weights), 1e-12)
+    columns = values.reshape(len(values), -1).T
+    sums = np.stack([np.bincount(tiles, weights=weights * column) for column in columns], axis=-1)
+    return np.asarray((sums / pixels[:, None])[tiles].reshape(values.shape))
