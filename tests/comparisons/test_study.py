@@ -269,7 +269,7 @@ class Ending:
     def __init__(self, count):
         self.count = count
 
-    def each(self, tasks):
+    def each(self, tasks, told=None):
         for number, done in enumerate(Pool(0).each(tasks)):
             if number == self.count:
                 raise KeyboardInterrupt

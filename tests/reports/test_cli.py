@@ -9,10 +9,14 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from io import StringIO
+from itertools import accumulate
+from random import Random
 
 import jsonschema
 import pytest
+from rich.console import Console
 
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.cost import measure
@@ -250,60 +254,108 @@ class Terminal(StringIO):
         return True
 
 
-def test_progress_has_stages_time_left_and_colours_unless_no_color_is_set(monkeypatch):
+def test_a_terminal_shows_stages_a_bar_and_the_time_left_in_colours_unless_no_color_is_set(
+    monkeypatch,
+):
     for name in ("NO_COLOR", "FORCE_COLOR", "COLORTERM"):
         monkeypatch.delenv(name, raising=False)
     for name, value in {"TERM": "xterm-256color", "COLUMNS": "100"}.items():
         monkeypatch.setenv(name, value)
+    tasks = [Task(f"scene-{number}", rendering, (number,), tells=True) for number in range(3)]
     for is_coloured in (True, False):
-        clock = itertools.count()
         monkeypatch.setattr(sys, "stderr", Terminal())
-        monkeypatch.setattr("rich.console.monotonic", clock.__next__)
-        with progress.shown() as bar:
-            update = bar.of("cornell-box", ("rendering", "causes"))
-            for done in (0, 2, 5):
-                update("rendering", done, 10)
-        shown = sys.stderr.getvalue()
-        assert "cornell-box: rendering 5 of 10 passes, causes next" in shown
-        assert re.search(r"\d:\d\d:\d\d", shown)
-        assert ("\x1b[38;5;" in shown or "\x1b[3" in shown) is is_coloured
+        with Pool(0) as pool, progress.shown(pool, "scenes") as shown:
+            shown.clock = itertools.count().__next__
+            for task, _ in shown.each(tasks):
+                shown.rows = ["scene", task.name]
+        said = sys.stderr.getvalue()
+        for words in ("rendering 5 of 10", "scenes", r"2 of 3, 1 failed, \d:\d\d left"):
+            assert re.search(words, said)
+        assert ("\x1b[38;5;" in said or "\x1b[3" in said) is is_coloured
         monkeypatch.setenv("NO_COLOR", "1")
 
 
-def work(number, report=None):
+def rendering(number, report):
+    for done in (0, 5):
+        report("rendering", done, 10)
+        time.sleep(0.3)
     if number == 1:
         raise InputError("no")
-    return number
 
 
-@pytest.mark.parametrize("count", [1, 3])
-def test_a_pipe_gets_a_line_for_each_task_of_several_and_a_terminal_a_bar(monkeypatch, count):
-    monkeypatch.setenv("TERM", "xterm-256color")
-    for stream in (StringIO(), Terminal()):
-        monkeypatch.setattr(sys, "stderr", stream)
-        with Pool(0) as pool, progress.shown() as bar:
-            tasks = [
-                Task(name, work, (number,), progress=bar.of(name))
-                for number, name in enumerate(f"scene-{number}" for number in range(count))
-            ]
-            uncounted = Task("hard cases", work, (2,))
-            assert len([*bar.each(pool, [*tasks, uncounted], "scenes")]) == count + 1
-        shown = stream.getvalue()
-        if stream.isatty():
-            assert ("scenes, 3 of 3" in shown, "scenes" in shown) == (count == 3, count == 3)
-        else:
-            lines = ["scene-0: finished", "scene-1: failed", "scene-2: finished"]
-            numbered = [f"{line}, {n} of 3\n" for n, line in enumerate(lines, start=1)]
-            assert shown == ("".join(numbered) if count == 3 else "")
+@pytest.mark.parametrize("height", [4, 10, 24, 45])
+def test_the_bar_of_all_is_the_last_line_at_any_height(height):
+    """With more tasks than lines that run, and more rows than lines."""
+    found = progress.Progress(Pool(0), "scenes", total=99, done=30, begin=-60.0)
+    found.clock = lambda: 0.0
+    found.rows = ["heading", *(f"row {number}" for number in range(30))]
+    for running in (2, 40):
+        names = [f"scene-{number}" for number in range(running)]
+        found.running = {name: progress.Running(-1.0, "causes", 1, 9) for name in names}
+        console = Console(width=80, file=StringIO())
+        console.print(found.lines(80, height))
+        lines = console.file.getvalue().splitlines()
+        assert len(lines) <= height - 1
+        assert lines[-1].startswith("scenes ")
+        assert "30 of 99, 2:" in lines[-1]
+        if len(lines) > running + 2:
+            assert lines[0] == "heading"
+            assert lines[-running - 2] == "row 29"
 
 
-def test_a_pipe_gets_ten_lines_on_the_points_of_a_study(capsys):
-    with progress.shown("points") as bar:
-        update = bar.of("gloss")
-        for done in range(401):
-            update("points", done, 400)
-    lines = capsys.readouterr().err.splitlines()
-    assert lines == [f"gloss: {done} of 400 points" for done in range(40, 401, 40)]
+def test_the_time_left_never_triples_even_where_long_tasks_come_late():
+    """For tasks in any order, or the shortest first, whose times differ as those of scenes do."""
+    for seed in range(40):
+        seconds = Random(seed).choices([3, 5, 8, 13, 21], k=30)
+        if seed % 2:
+            seconds.sort()
+        found = progress.Progress(Pool(0), "scenes", total=len(seconds))
+        ends = [seconds.pop(0) for _ in range(2)]
+        found.running = {str(n): progress.Running(0.0) for n in range(2)}
+        told = []
+        for now in range(1, 1000):
+            found.clock = lambda now=now: now
+            for number, end in enumerate(ends):
+                if end == now and str(number) in found.running:
+                    del found.running[str(number)]
+                    found.done += 1
+                    if seconds:
+                        found.running[str(number)] = progress.Running(float(now))
+                        ends[number] = now + seconds.pop(0)
+            if (left := found.seconds_left()) is not None:
+                told.append(left)
+            if not found.running:
+                break
+        assert told[-1] == 0
+        grown = [
+            later / least
+            for least, later in zip(accumulate(told, min), told, strict=True)
+            if least > 10
+        ]
+        assert max(grown) < 3
+
+
+def test_a_pipe_gets_a_line_with_the_count_every_ten_seconds_at_most(capsys):
+    """Here each task takes four seconds; hard cases are no scene."""
+    now = [0.0]
+
+    def work(number):
+        now[0] += 4
+        if number == 1:
+            raise InputError("no")
+
+    for count, lines in (
+        (1, []),
+        (6, ["3 of 6, 1 failed, 0:12 left", "5 of 6, 1 failed, 0:05 left"]),
+    ):
+        now[0] = 0
+        tasks = [Task(f"scene-{number}", work, (number,)) for number in range(count)]
+        tasks.insert(3, Task("hard cases", work, (9,), is_counted=False))
+        with Pool(0) as pool, progress.shown(pool, "scenes") as shown:
+            shown.clock = lambda: now[0]
+            assert len([*shown.each(tasks)]) == count + 1
+        said = capsys.readouterr().err.splitlines()
+        assert said == [f"scenes: {line}" for line in lines]
 
 
 def test_help_of_costs_and_fits_states_their_own_defaults(run):

@@ -1,6 +1,5 @@
 """The verdict on a scene and on a run: one sentence for each case, on made-up records."""
 
-from concurrent.futures import Future
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +7,6 @@ import pytest
 from msgspec import structs
 
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.processes.pool import Task
 from fotismos.comparisons.records import cost as cost_records
 from fotismos.comparisons.records.comparison import (
     EffectsThatPass,
@@ -20,7 +18,6 @@ from fotismos.comparisons.records.departure import VisibleShare
 from fotismos.heuristic.heuristics import HEURISTICS, Interpolation, Point
 from fotismos.reference.records import Interval
 from fotismos.reports import verdict
-from fotismos.reports.terminal import progress
 from tests.shared import records
 from tests.shared.small_scene import PLAIN
 
@@ -287,20 +284,6 @@ def test_two_pictures_are_judged_once_and_without_noise_that_is_not_known(run, t
     page = (tmp_path / "out/index.html").read_text()
     assert "The noise of single pictures is not known." in page
     assert "is not moved; its" in page
-
-
-def test_the_progress_counts_scenes_alone(capsys):
-    def each(tasks):
-        for task in tasks:
-            outcome = Future()
-            outcome.set_result(None)
-            yield task, outcome
-
-    with progress.shown() as bar:
-        scenes = [Task(name, print, (), progress=bar.of(name)) for name in "ab"]
-        tasks = [scenes[0], Task("hard cases", print, ()), scenes[1]]
-        assert len(list(bar.each(SimpleNamespace(each=each), tasks, "scenes"))) == 3
-    assert capsys.readouterr().err.splitlines() == ["a: finished, 1 of 2", "b: finished, 2 of 2"]
 
 
 def test_a_run_ends_with_its_verdict_and_finds_causes(

@@ -7,14 +7,14 @@ makes in its worker persist.
 """
 
 import logging
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from itertools import islice
 from threading import Lock
 from typing import Any
 from uuid import uuid4
 
-from fotismos.comparisons.processes.pool import Pool, Task, once
+from fotismos.comparisons.processes.pool import Ended, Pool, Task, Told, once, silent
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import FotismosError, InstallationError, LostProcessError
 
@@ -37,10 +37,6 @@ def work(set_up: Callable[[], object], function: Callable[..., Any], *arguments:
         return function(*arguments)
 
 
-def silent(*arguments: object) -> None:
-    """Discard progress."""
-
-
 class Cluster(Pool):
     """Does tasks on a Dask cluster, as a pool does in processes here.
 
@@ -59,12 +55,8 @@ class Cluster(Pool):
         """Release all tasks."""
         self._client.close()
 
-    def each(self, tasks: Iterable[Task]) -> Iterator[tuple[Task, Future[Any]]]:
-        """Do tasks; yield each with its outcome when it finishes.
-
-        The outcome returns what the function returned, or raises the `FotismosError` that it
-        raised, or a `LostProcessError` for any other exception. A lost scheduler raises one here.
-        """
+    def each(self, tasks: Iterable[Task], told: Told = silent) -> Ended:
+        """Do tasks, see :class:`Runner`; they tell nothing. A lost scheduler raises here."""
         from distributed import as_completed
         from distributed.client import FutureCancelledError
 
@@ -74,9 +66,7 @@ class Cluster(Pool):
         def submit(some: Iterable[Task]) -> list[Any]:
             futures = []
             for task in some:
-                arguments = task.arguments
-                if task.progress is not None:
-                    arguments = (*arguments, silent)
+                arguments = (*task.arguments, silent) if task.tells else task.arguments
                 # Dask treats tasks with equal keys as one, whoever submits them.
                 key = f"{task.name}-{uuid4()}"
                 futures.append(

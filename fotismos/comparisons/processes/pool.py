@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import islice
 from math import inf
 from multiprocessing import connection, get_context, parent_process, resource_tracker
@@ -50,19 +50,50 @@ def once(set_up: Callable[[], object]) -> None:
 class Task:
     """A call of ``function(*arguments)``, both of them picklable.
 
-    ``name`` appears in messages. ``progress``, if given, is called in the parent; the function
-    takes a callable that forwards to it as its last argument. If it runs a user's script, which may
-    change its process, it ``ends_process``: other tasks need a clean one.
+    ``name`` appears in messages. If it ``tells`` of its progress, the function takes a callable as
+    its last argument, whose calls reach the one that waits (:meth:`Runner.each`). If it runs a
+    user's script, which may change its process, it ``ends_process``: other tasks need a clean one.
+    Some are not counted in what users see of the progress.
     """
 
     name: str
     function: Callable[..., Any]
     arguments: tuple[Any, ...]
-    progress: Callable[..., None] | None = None
+    tells: bool = False
     ends_process: bool = False
+    is_counted: bool = True
 
 
-class Pool:
+Told = Callable[..., object]
+"""Called as ``told(task, *state)`` with what a task tells."""
+
+Ended = Iterator[tuple[Task, Future[Any]]]
+"""Tasks in the order in which they end, each with its outcome."""
+
+
+def silent(*_: object) -> None:
+    """Discard what a task tells."""
+
+
+class Runner:
+    """Whatever does tasks: processes here, a cluster, or one of these with a display."""
+
+    def each(self, tasks: Iterable[Task], told: Told = silent) -> Ended:
+        """Do tasks; yield each with its outcome when it ends.
+
+        The outcome returns what the function returned, or raises the `FotismosError` that it
+        raised. If tasks are done elsewhere, it raises a `LostProcessError` for any other exception,
+        for a process that ended, and when the time is up.
+        """
+        raise NotImplementedError
+
+    def do(self, task: Task) -> Any:
+        """Do one task, and return what it returned, or raise what it raised."""
+        ((_, outcome),) = self.each([task])
+        return outcome.result()
+
+
+class Pool(Runner):
     """Does tasks in separate processes; a context that ends the processes.
 
     At most ``count`` processes run at the same time. With 0 the tasks are done in this process, one
@@ -90,27 +121,15 @@ class Pool:
         while len(self._idle) + len(self._busy) < self._count:
             self._idle.append(Worker(self._set_up))
 
-    def do(self, task: Task) -> Any:
-        """Do one task, and return what it returned, or raise what it raised."""
-        ((_, outcome),) = self.each([task])
-        return outcome.result()
-
-    def each(self, tasks: Iterable[Task]) -> Iterator[tuple[Task, Future[Any]]]:
-        """Do tasks; yield each with its outcome when it finishes.
-
-        The outcome returns what the function returned, or raises the `FotismosError` that it
-        raised. In a separate process it raises a `LostProcessError` for any other exception, for a
-        process that ended, and when the time is up.
-        """
+    def each(self, tasks: Iterable[Task], told: Told = silent) -> Ended:
+        """Do tasks, see :meth:`Runner.each`."""
         if self._count == 0:
             self._set_up()
             for task in tasks:
                 outcome: Future[Any] = Future()
-                arguments = task.arguments
-                if task.progress is not None:
-                    arguments = (*arguments, task.progress)
+                more = (partial(told, task),) if task.tells else ()
                 try:
-                    outcome.set_result(task.function(*arguments))
+                    outcome.set_result(task.function(*task.arguments, *more))
                 except Exception as error:
                     outcome.set_exception(error)
                 yield task, outcome
@@ -118,7 +137,7 @@ class Pool:
         waiting = iter(tasks)
         self._fill(waiting)
         while self._busy:
-            finished = self._finished()
+            finished = self._finished(told)
             self._fill(waiting)  # no process waits while the caller handles results
             yield from finished
 
@@ -138,7 +157,7 @@ class Pool:
             self._busy.append(worker)
             worker.give(task, self._limit_s)
 
-    def _finished(self) -> list[tuple[Task, Future[Any]]]:
+    def _finished(self, told: Told) -> list[tuple[Task, Future[Any]]]:
         """Wait for messages or the next deadline; return the tasks that are over."""
         first = min(worker.deadline for worker in self._busy)
         pause = max(0.0, min(LOOK_S, first - monotonic()))
@@ -147,7 +166,7 @@ class Pool:
         for worker in self._busy:
             # Messages first: a process may have ended just after its answer.
             if worker.pipe in ready:
-                worker.receive(self._limit_s)
+                worker.receive(self._limit_s, told)
             elif not worker.process.is_alive():
                 worker.lose()
             elif worker.deadline <= monotonic():
@@ -183,10 +202,10 @@ class Worker:
         """Send a task, which has ``limit_s`` seconds until its first sign of progress."""
         self.task, self.outcome, self.deadline = task, Future(), monotonic() + limit_s
         with suppress(ConnectionError):  # a process that is gone is noticed in `receive`
-            self.pipe.send((task.function, task.arguments, task.progress is not None))
+            self.pipe.send((task.function, task.arguments, task.tells))
 
-    def receive(self, limit_s: float) -> None:
-        """Take one message, which may be the outcome of the task."""
+    def receive(self, limit_s: float, told: Told) -> None:
+        """Take one message: the outcome of the task, or what it tells."""
         try:
             kind, content = self.pipe.recv()
         except (EOFError, OSError):
@@ -203,8 +222,8 @@ class Worker:
                 self.outcome.set_result(content)
             case "failure":
                 self.outcome.set_exception(content)
-            case "progress" if self.task.progress:
-                self.task.progress(*content)
+            case "told":
+                told(self.task, *content)
 
     def lose(self, reason: str = "") -> None:
         """End the process, and fail its task for a reason, or because the process ended."""
@@ -257,8 +276,8 @@ def _work(pipe: Any, set_up: Callable[[], object]) -> NoReturn:
             call = pipe.recv()
         except (EOFError, OSError):
             os._exit(0)  # the parent is gone
-        function, arguments, with_progress = call
-        kind, content = _answer(pipe, set_up, function, arguments, with_progress)
+        function, arguments, tells = call
+        kind, content = _answer(pipe, set_up, function, arguments, tells)
         _send(pipe, kind, content)
         del call, function, arguments, content  # what a task had must not outlive it
 
@@ -275,11 +294,11 @@ def _answer(
     set_up: Callable[[], object],
     function: Callable[..., Any],
     arguments: tuple[Any, ...],
-    with_progress: bool,
+    tells: bool,
 ) -> tuple[str, Any]:
     """Do a task; return the kind of the message about it, ``result`` or ``failure``, and which."""
-    if with_progress:
-        arguments = (*arguments, lambda *state: _send(pipe, "progress", state))
+    if tells:
+        arguments = (*arguments, lambda *state: _send(pipe, "told", state))
     try:
         once(set_up)
         return "result", function(*arguments)

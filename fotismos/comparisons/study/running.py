@@ -23,7 +23,7 @@ from fotismos.comparisons.atomic import Entry
 from fotismos.comparisons.case import RGB, open_case
 from fotismos.comparisons.names import is_script
 from fotismos.comparisons.prepared import guarded
-from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.comparisons.processes.pool import Pool, Runner, Task
 from fotismos.comparisons.study import dataset, scenes, sheet
 from fotismos.comparisons.study.dataset import STEPS, Row, measure
 from fotismos.comparisons.study.design import OWN, StudyFile, StudyPart
@@ -37,7 +37,7 @@ from fotismos.reference.planning.effects import EFFECTS, PRUNED
 from fotismos.reference.planning.plan import physical_integrator
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.rendering import direct
-from fotismos.reference.rendering.passes import Progress, passes
+from fotismos.reference.rendering.passes import passes
 from fotismos.reference.rendering.renderer import Renderer
 from fotismos.reference.rendering.sums import Accumulator
 from fotismos.reference.scene.graph import Graph, set_variant
@@ -133,16 +133,14 @@ def _check(part: StudyPart, points: list[Point]) -> None:
 def run(
     study: StudyFile,
     folder: str | Path,
-    pool: Pool | None = None,
-    progress: Progress | None = None,
+    runner: Runner | None = None,
     points: list[StudyPoint] | None = None,
 ) -> tuple[pa.Table, int]:
     """Do the points of a study that are not done yet; return the dataset, and how many it did.
 
-    Points that failed in an earlier run are done again. A pool, or a cluster, does the points; if
-    omitted, this process. ``folder`` keeps finished points, in ``points/``; ``progress(stage, done,
-    total)`` is called with numbers of points; ``points`` are those of :func:`all_points`, if it was
-    called elsewhere.
+    Points that failed in an earlier run are done again. A ``runner`` does the points; if omitted,
+    this process. ``folder`` keeps finished points, in ``points/``; ``points`` are those of
+    :func:`all_points`, if it was called elsewhere.
     """
     points = all_points(study) if points is None else points
     store = Path(folder) / POINTS
@@ -153,10 +151,6 @@ def run(
     saved = {key: (entry.load() or {}).get("row") for key, entry in entries.items()}
     results = {key: row for key, row in saved.items() if row and row["error"] is None}
     left = {point.key: point for point in points if point.key not in results}
-    total = len(points)
-    report = progress or (lambda *_: None)
-    begin = total - len(left)
-    report("points", begin, total)
     sheets = {part.name: sheet.sheet_of(part) for part in study.parts}
     shown = {
         point.key
@@ -172,7 +166,7 @@ def run(
         )
         for point in left.values()
     ]
-    for done, (task, outcome) in enumerate((pool or Pool(0)).each(tasks), start=begin + 1):
+    for task, outcome in (runner or Pool(0)).each(tasks):
         (point,) = task.arguments
         error = outcome.exception()
         if error:
@@ -183,7 +177,6 @@ def run(
                 sheet.save(store / f"{point.key}.npy", pictures)
         if point.reusable:
             entries[point.key].save({"row": results[point.key]})
-        report("points", done, total)
     # A row that parts share gets the name and number of each.
     return dataset.table(study, [point.row(results[point.key]) for point in points]), len(left)
 

@@ -382,18 +382,18 @@ def _each(
 ) -> list[tuple[CheckRecord, SceneView | Before | None]]:
     """Return the result of each baseline, in order; its path is the first argument."""
     results = {}
-    with progress.shown() as bar:
-        tasks = [
-            Task(
-                name=call[0].name,
-                function=function,
-                arguments=call,
-                progress=bar.of(call[0].stem),
-                ends_process=baselines.may_run_script(call[0]),
-            )
-            for call in calls
-        ]
-        for task, outcome in bar.each(pool, tasks, "baselines"):
+    tasks = [
+        Task(
+            name=call[0].name,
+            function=function,
+            arguments=call,
+            tells=True,
+            ends_process=baselines.may_run_script(call[0]),
+        )
+        for call in calls
+    ]
+    with progress.shown(pool, "baselines") as shown:
+        for task, outcome in shown.each(tasks):
             path = task.arguments[0]
             error = outcome.exception()
             results[path] = (failed(path, error), None) if error else outcome.result()

@@ -62,5 +62,10 @@ class Report(WithOptions, frozen=True):
         with terminal.processes(len(SCENES)) as pool:
             from fotismos.reports.run import batch, scene  # loaded late
 
-            cases = Task("hard cases", scene.hard_cases, (terminal.output,))
+            cases = Task(
+                name="hard cases",
+                function=scene.hard_cases,
+                arguments=(terminal.output,),
+                is_counted=False,
+            )
             return batch.compare_all(pool, scene.subjects(tuple(SCENES)), job, terminal, cases)

@@ -121,9 +121,9 @@ class Batch:
             self.on_page(path)
             self.on_page = None
 
-    def show(self, target: str, view: SceneView) -> None:
-        """Write the page with the first view of a scene, which is measured in part."""
-        self.first_views[target] = view
+    def show(self, task: Task, view: SceneView) -> None:
+        """Put the first view of a scene on the page, which is measured in part."""
+        self.first_views[task.name] = view
         self.grow_page()
 
     def withdraw(self) -> None:
@@ -172,15 +172,14 @@ class Subjects:
     """What a command compares: words that name it, the name and file of each, and how.
 
     ``compare(word, folder, place, job, progress)`` returns the view and the seconds by stage.
-    ``libraries`` are those that the results depend on. If subjects ``are_shown_early``, ``compare``
-    runs in this process, and takes :meth:`Batch.show` before the progress.
+    It calls ``progress`` with its stages, and with a first view once there are pictures.
+    ``libraries`` are those that the results depend on.
     """
 
     words: tuple[str, ...]
     files: tuple[tuple[str, Path | None], ...]
     compare: Comparing
     libraries: Sequence[str] = LIBRARIES
-    are_shown_early: bool = False
 
 
 def compare_all(
@@ -215,29 +214,21 @@ def compare_all(
             libraries=subjects.libraries,
         )
         batch.stages["start-up"] = perf_counter() - START
-        stages = ("rendering", "causes") if job.with_causes else ("rendering",)
-        shows = (batch.show,) if subjects.are_shown_early else ()
+        tasks = [
+            Task(
+                name=target,
+                function=subjects.compare,
+                arguments=(word, folder, target, replace(job, options=options_by_scene[word])),
+                tells=True,
+                ends_process=is_script(word),
+            )
+            for target, word in places.items()
+        ]
+        if hard_cases:
+            tasks.append(hard_cases)
         try:
-            with progress.shown() as bar:
-                tasks = [
-                    Task(
-                        name=target,
-                        function=subjects.compare,
-                        arguments=(
-                            word,
-                            folder,
-                            target,
-                            replace(job, options=options_by_scene[word]),
-                            *shows,
-                        ),
-                        progress=bar.of(target, stages),
-                        ends_process=is_script(word),
-                    )
-                    for target, word in places.items()
-                ]
-                if hard_cases:
-                    tasks.append(hard_cases)
-                for task, outcome in bar.each(pool, tasks, "scenes"):
+            with progress.shown(pool, "scenes") as shown:
+                for task, outcome in shown.each(tasks, batch.show):
                     if task is hard_cases:
                         batch.hard_cases, batch.stages[task.name] = outcome.result()
                     else:

@@ -26,16 +26,18 @@ def results_of(
     subjects: list[tuple[str, Path | None]] = list(zip(scenes, files, strict=False))
     if not files:
         subjects = [(name_of(scene), file_of(scene)) for scene in scenes]
-    with results.hold_results(folder, subjects, command_line()) as places, progress.shown() as bar:
+    with (
+        results.hold_results(folder, subjects, command_line()) as places,
+        progress.shown(pool, "scenes") as shown,
+    ):
         tasks = [
             Task(
                 name=target.name,
                 function=work,
                 arguments=(scene, target),
-                progress=bar.of(target.name),
+                tells=True,
                 ends_process=not files and is_script(scene),
             )
             for target, scene in zip(places, scenes, strict=True)
         ]
-        ended = bar.each(pool, tasks, "scenes")
-        return {folder / task.name: done.result() for task, done in ended}
+        return {folder / task.name: done.result() for task, done in shown.each(tasks)}

@@ -1,6 +1,5 @@
 """Two pictures of a command: compared and written."""
 
-from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -25,28 +24,22 @@ def subjects(options: Options) -> Subjects:
         files=((path.stem, path),),
         compare=compared,
         libraries=PICTURE_LIBRARIES,
-        are_shown_early=True,
     )
 
 
 def compared(
-    word: str,
-    folder: Path,
-    target: str,
-    job: Job,
-    show: Callable[[str, SceneView], None],
-    progress: Any,
+    word: str, folder: Path, target: str, job: Job, progress: Any
 ) -> tuple[SceneView, dict[str, float]]:
     """Compare the pictures of a job, and write their files to ``folder/target``.
 
-    ``show`` puts them on the page before the slow part.
+    The page shows them before the slow part.
     """
     begin = perf_counter()
     halves = two_pictures(job.options, word)
     first = look(halves, job.options.command("compare", ""))
     view = scene_files.view_of(first)
     seconds = {"pictures": perf_counter() - begin}
-    show(target, view)
+    progress(view)
     begin = perf_counter()
     comparison = finish(first, halves, steps(why=False))
     seconds["pictures"] += perf_counter() - begin

@@ -37,10 +37,9 @@ def show_fastest(
 ) -> int:
     """Print a scene's price and fastest method within a tolerance; 1 if no method passes."""
     arguments = (scene, options, within)
-    with progress.shown() as bar:
-        of_scene = bar.of(scene)
-        record: ComparisonRecord = pool.do(Task(scene, priced, arguments, progress=of_scene))
-        choice: Choice = pool.do(Task(scene, chosen, arguments, progress=of_scene))
+    with progress.shown(pool, "scenes") as shown:
+        record: ComparisonRecord = shown.do(Task(scene, priced, arguments, tells=True))
+        choice: Choice = shown.do(Task(scene, chosen, arguments, tells=True))
     choice = structs.replace(choice, price=record.price)
     lines = [*sentences.price_lines(record, within), *sentences.choice_lines(choice)]
     terminal.show(choice, lines)

@@ -47,8 +47,8 @@ def show(pool: Pool, file: Path, terminal: Terminal) -> None:
         tasks = len(points) // running.WORTH_A_PROCESS + 1
         for part in (folder / FIGURES, folder / running.POINTS):
             own(part)  # a study replaces only its own results
-        with terminal.pool(tasks) as renderers, progress.shown("points") as bar:
-            table, done = running.run(chosen, folder, renderers, bar.of(chosen.name), points)
+        with terminal.pool(tasks) as pool, progress.shown(pool, "points") as shown:
+            table, done = running.run(chosen, folder, shown, points)
         written = write(chosen, table, points, folder)
     tell([*summary(chosen, table, done), ""])
     for path in written:
