@@ -46,15 +46,20 @@ def cores() -> int:
 
 def versions(libraries: Iterable[str] = LIBRARIES) -> dict[str, str]:
     """Return the versions that a result depends on, and with Dr.Jit LLVM's."""
-    from importlib import metadata  # loaded late: help needs no versions
-
     numbers = {"fotismos": __version__, "python": platform.python_version()}
-    numbers |= {library: metadata.version(library) for library in libraries}
+    numbers |= {library: _version(library) for library in libraries}
     if "drjit" in numbers:
         import drjit as dr  # loaded late: two pictures are compared without it
 
         numbers["LLVM"] = ".".join(map(str, dr.detail.llvm_version()))
     return numbers
+
+
+@lru_cache
+def _version(library: str) -> str:
+    from importlib import metadata  # loaded late: help needs no versions
+
+    return metadata.version(library)
 
 
 def program() -> list[str]:

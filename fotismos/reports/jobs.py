@@ -188,7 +188,9 @@ class ProcessSetup:
         divert_messages(partial(echo, err=True) if self.level > 0 else lambda _: None)
         if self.level > 0:
             logging.basicConfig(level=logging.INFO)
-        import fotismos.comparisons.compare  # noqa: F401  part of start-up
+        # Part of start-up: what each scene needs.
+        import fotismos.comparisons.compare
+        import fotismos.comparisons.prepared  # noqa: F401
 
         gc.freeze()  # modules stay: garbage collections need not look at them
 

@@ -114,7 +114,7 @@ def z_test(before, after):
 
 def flip(before, after):
     pairs = zip(np.moveaxis(after.mean, -1, 0), np.moveaxis(before.mean, -1, 0), strict=True)
-    return np.array([ldr_flip(*pair, DEFAULT_VIEWING).mean() > 0.05 for pair in pairs])
+    return np.array([ldr_flip([new], old, DEFAULT_VIEWING)[0].mean() > 0.05 for new, old in pairs])
 
 
 def measured(draw, count, runs, *gates):

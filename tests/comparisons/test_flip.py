@@ -96,6 +96,6 @@ def test_no_reference_ends_the_process_or_the_range():
         start, stop = exposures(np.minimum(reference, LARGEST))
         assert 0.0 <= stop - start <= 39.1
         for function in (hdr_flip, ldr_flip):
-            found = function(test, reference, DEFAULT_VIEWING)
+            (found,) = function([test], reference, DEFAULT_VIEWING)
             assert found.shape == SIZE[:2]
             assert ((found >= 0.0) & (found <= 1.0)).all()

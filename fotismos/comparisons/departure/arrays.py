@@ -7,6 +7,7 @@ time. But two pictures are compared without loading it, and where it cannot be i
 
 import sys
 from collections.abc import Callable, Sequence
+from functools import cache
 from importlib import import_module
 from typing import Any, TypeAlias
 
@@ -35,7 +36,7 @@ def _function(name: str, of_numpy: Callable[..., Any]) -> Callable[..., Any]:
     def function(*arguments: Any) -> Any:
         if any(isinstance(argument, np.ndarray) for argument in arguments):
             return of_numpy(*arguments)
-        return getattr(import_module("drjit"), name)(*arguments)
+        return getattr(sys.modules["drjit"], name)(*arguments)
 
     return function
 
@@ -46,7 +47,6 @@ cbrt = _function("cbrt", np.cbrt)
 clip = _function("clip", np.clip)
 cos = _function("cos", np.cos)
 exp = _function("exp", np.exp)
-hypot = _function("hypot", np.hypot)
 log = _function("log", np.log)
 maximum = _function("maximum", np.maximum)
 minimum = _function("minimum", np.minimum)
@@ -60,7 +60,6 @@ total = _function("sum", lambda colours: colours.sum(axis=0))
 """``total(colours)`` is the sum of their three components."""
 with_sign = _function("mulsign", np.copysign)
 """``with_sign(size, other)`` is a size ≥ 0 with the sign of another number."""
-evaluate = _function("eval", lambda *values: None)
 
 
 def colours(*components: Numbers) -> Colours:
@@ -72,27 +71,33 @@ def colours(*components: Numbers) -> Colours:
     return (llvm.Array3f64 if is_double else llvm.Array3f)(*components)
 
 
-def constant(value: float, is_single: bool = False) -> Any:
+def constant(value: float) -> Any:
     """Return a number as an input of the kernel, not a part of it: one kernel serves all."""
-    if not is_compiled():
-        return float(value)
-    llvm = import_module("drjit.llvm")
-    kind = llvm.Float32 if is_single else llvm.Float64
-    return import_module("drjit").opaque(kind, float(value))
+    return _opaque(float(value)) if is_compiled() else float(value)
 
 
-def single(pixels: NDArray[Any]) -> Colours:
-    """Return pixels (..., 3) as colours in single precision."""
-    if not is_compiled():
-        return np.ascontiguousarray(pixels.reshape(-1, 3).T, np.float32)
-    llvm = import_module("drjit.llvm")
-    flat = llvm.Float32(np.ascontiguousarray(pixels, np.float32).ravel())
-    return import_module("drjit").unravel(llvm.Array3f, flat)
+@cache
+def _opaque(value: float) -> Any:
+    return import_module("drjit").opaque(import_module("drjit.llvm").Float64, value)
 
 
-def single_numbers(plane: NDArray[np.float32]) -> Numbers:
-    """Return a plane (H, W) in single precision as numbers."""
-    return import_module("drjit.llvm").Float32(plane.ravel()) if is_compiled() else plane.ravel()
+def planes(formula: Formula, *given: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return what a formula makes of planes of one shape (...), in single precision: (K, ...).
+
+    The formula takes a number of each plane, and returns K numbers.
+    """
+    flat = [plane.reshape(-1) for plane in given]
+    count = len(flat[0])
+    if is_compiled():
+        kind = import_module("drjit.llvm").Float32
+        numbers = formula(*(kind(np.ascontiguousarray(plane)) for plane in flat))
+        import_module("drjit").eval(numbers)
+        shown = np.stack([np.array(number) for number in numbers])
+    else:
+        shown = _in_parts(
+            lambda part: np.stack(formula(*(plane[part] for plane in flat))), count, np.float32
+        )
+    return shown.reshape(-1, *given[0].shape)
 
 
 def computed(formula: Formula, *pixels: NDArray[Any]) -> NDArray[np.float64]:
@@ -124,12 +129,24 @@ def _by_drjit(formula: Formula, pixels: Sequence[NDArray[Any]]) -> NDArray[np.fl
 
 
 def _by_numpy(formula: Formula, pixels: Sequence[NDArray[Any]]) -> NDArray[np.float64]:
-    count = len(pixels[0])
-    parts = []
+    def values(part: slice) -> NDArray[np.float64]:
+        inputs = [np.ascontiguousarray(each[part].T, np.float64) for each in pixels]
+        return np.atleast_2d(formula(*inputs))
+
+    shown = _in_parts(values, len(pixels[0]), np.float64)
+    return np.ascontiguousarray(shown.T)
+
+
+def _in_parts(values: Callable[[slice], NDArray[Any]], count: int, kind: type) -> NDArray[Any]:
+    """Return values (K, count), computed for :data:`PIXELS` at a time."""
+    shown: NDArray[Any] | None = None
     # The branch that `select` drops may divide by 0.
     with np.errstate(all="ignore"):
         for start in range(0, count, PIXELS):
-            block = [each[start : start + PIXELS] for each in pixels]
-            inputs = [np.ascontiguousarray(each.T, np.float64) for each in block]
-            parts.append(np.ascontiguousarray(formula(*inputs).T))
-    return np.concatenate(parts)
+            part = slice(start, start + PIXELS)
+            found = values(part)
+            if shown is None:
+                shown = np.empty((len(found), count), kind)
+            shown[:, part] = found
+    assert shown is not None, "there are pixels"
+    return shown

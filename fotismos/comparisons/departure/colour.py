@@ -271,9 +271,12 @@ class Distance:
 
     formula: Formula
 
+    def after(self, convert: Formula) -> "Distance":
+        """Return the distance of a colour from what ``convert`` makes of a second one."""
+        return Distance(lambda first, second: self.formula(first, convert(second)))
+
     def __call__(self, a: ArrayLike, b: ArrayLike) -> Array:
-        a = np.asarray(a)
-        b = np.asarray(b)
+        a, b = np.broadcast_arrays(a, b)
         if not a.size:
             return np.zeros(a.shape[:-1])
         return arrays.computed(self.formula, a, b)

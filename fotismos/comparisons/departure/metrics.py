@@ -13,7 +13,7 @@ Every image is a float array (H, W, 3) of linear light with the sRGB primaries (
 """
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import InitVar, dataclass
 from math import log10
 from types import EllipsisType
@@ -25,6 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 from fotismos.comparisons.departure.colour import (
     RELATIVE_EPSILON,
     Array,
+    Distance,
+    Space,
     cam16ucs,
     ciede2000,
     euclidean,
@@ -136,6 +138,13 @@ class Metric:
 
         return distances
 
+    def of_several(
+        self, tests: Sequence[Array], reference: Array, where: Where, viewing: Viewing
+    ) -> list[Floats]:
+        """Return the distances (N,) of several images, each as :meth:`against` has it."""
+        distances = self.against(reference, where, viewing)
+        return [distances(test) for test in tests]
+
     def mean(self, values: Floats) -> float:
         """Return the metric's mean of distances; 0 if there are none."""
         if not values.size:
@@ -162,14 +171,41 @@ class Pixelwise(Metric):
     difference: Callable[[Array, Array], Array]
 
     def against(self, reference: Array, where: Where, viewing: Viewing) -> Distances:
-        """Return a function like `Metric.against`; images may be lists of pixels (N, 3)."""
+        """Return a function like `Metric.against`; images may be lists of pixels (N, 3).
+
+        If ``where`` is all of them, a test image may also be a stack (..., N, 3).
+        """
         fixed = self.coordinates(reference[where], viewing)
+        if isinstance(self.coordinates, Space) and isinstance(self.difference, Distance):
+            # In one step: the test image's coordinates are not kept.
+            from_fixed = self.difference.after(self.coordinates.formula(viewing))
+            return lambda test: from_fixed(fixed, test[where])
 
         def distances(test: Array) -> Array:
-            pixels = np.asarray(test[where], np.float64)
-            return self.difference(fixed, self.coordinates(pixels, viewing))
+            shown = self.coordinates(np.asarray(test[where], np.float64), viewing)
+            return self.difference(np.broadcast_to(fixed, shown.shape), shown)
 
         return distances
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shared(Metric):
+    """A distance of images, of which the reference's part is computed once for several.
+
+    ``functions(tests, reference, viewing)`` returns a map (H, W) for each test image (H, W, 3).
+    """
+
+    functions: Callable[[Sequence[Array], Array, Viewing], Sequence[Floats]]
+
+    def against(self, reference: Array, where: Where, viewing: Viewing) -> Distances:
+        """Return a function like `Metric.against`."""
+        return lambda test: self.of_several([test], reference, where, viewing)[0]
+
+    def of_several(
+        self, tests: Sequence[Array], reference: Array, where: Where, viewing: Viewing
+    ) -> list[Floats]:
+        """Return the distances (N,) of several images."""
+        return [distances[where] for distances in self.functions(tests, reference, viewing)]
 
 
 METRICS: Declared[Metric] = Declared("metric", "fotismos.metrics")
@@ -330,7 +366,7 @@ METRICS.own(
 )
 
 METRICS.own(
-    Metric(
+    Shared(
         name="ldr_flip",
         label="LDR-FLIP",
         unit="from 0 to 1, the distance of green and blue",
@@ -340,11 +376,11 @@ METRICS.own(
         caution="It holds for one distance from the screen. Values above white look alike to it.",
         map_range=(0.0, 1.0),
         rounding=1e-4,
-        function=ldr_flip,
+        functions=ldr_flip,
     )
 )
 METRICS.own(
-    Metric(
+    Shared(
         name="hdr_flip",
         label="HDR-FLIP",
         unit="from 0 to 1, the distance of green and blue",
@@ -355,7 +391,7 @@ METRICS.own(
         map_range=(0.0, 1.0),
         rounding=1e-4,
         drawn=False,
-        function=hdr_flip,
+        functions=hdr_flip,
     )
 )
 

@@ -70,9 +70,10 @@ def summarise(
             images[2] = np.add(reference[rows], grain[rows], dtype=wide)
         # Equal pixels are 0 apart: the surroundings of a figure's objects cost nothing.
         measured = mask[rows] | (not is_pixelwise or (test[rows] != reference[rows]).any(axis=-1))
-        distances = metric.against(reference[rows], measured, viewing)
-        for number, image in images.items():
-            maps[number][rows][measured] = distances(image)
+        where = ... if measured.all() else measured
+        distances = metric.of_several([*images.values()], reference[rows], where, viewing)
+        for number, values in zip(images, distances, strict=True):
+            maps[number][rows][where] = values
     values = maps[0][mask]
     exposed = maps[1][mask]
     noise_alone = maps[2][mask]
@@ -190,10 +191,11 @@ def best_exposure(
     """
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
-    if not isinstance(metric, Pixelwise):
-        return least_squares_factor(test[mask], reference[mask])
-    if metric.averages_squares and metric.coordinates is linear:
-        return least_squares_factor(test[mask], reference[mask])
+    if not isinstance(metric, Pixelwise) or (
+        metric.averages_squares and metric.coordinates is linear
+    ):
+        counted = ... if mask.all() else mask
+        return least_squares_factor(test[counted], reference[counted])
     lit = [(mask & (image > 0.0).any(axis=-1)).any() for image in (test, reference)]
     if not all(lit):
         return 1.0
@@ -212,8 +214,7 @@ def best_exposure(
     # The bracket: all whole stops at once, (13, n, 3), on fewer pixels.
     whole_stops = np.arange(-EXPOSURE_STOPS, EXPOSURE_STOPS + 1.0)
     bracketing = 2.0 ** whole_stops[:, None, None] * shown[:_BRACKET_PIXELS]
-    some = np.broadcast_to(truth[:_BRACKET_PIXELS], bracketing.shape)
-    at_stops = metric.against(some, ..., viewing)(bracketing)
+    at_stops = metric.against(truth[:_BRACKET_PIXELS], ..., viewing)(bracketing)
     start = whole_stops[np.argmin([metric.mean(at_stop) for at_stop in at_stops])]
     low = max(start - 1.0, -EXPOSURE_STOPS)
     high = min(start + 1.0, EXPOSURE_STOPS)

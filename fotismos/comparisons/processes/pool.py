@@ -271,6 +271,8 @@ def _work(pipe: Any, set_up: Callable[[], object]) -> NoReturn:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent gets it too, and ends this process
     # The mask comes from the parent, which held signals back at the start.
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    with suppress(Exception):  # the first task meets it, too, and answers with it
+        once(set_up)
     while True:
         try:
             call = pipe.recv()
