@@ -12,7 +12,7 @@ from functools import cached_property
 from itertools import repeat
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from msgspec import structs
@@ -30,6 +30,7 @@ from fotismos.comparisons.picture_files import PictureFile, read_file
 from fotismos.comparisons.picture_mistakes import Mending, Names, NoisyImage
 from fotismos.comparisons.records.comparison import Agreement, PictureFiles
 from fotismos.comparisons.records.images import Comparison, Images, Light
+from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Times
 from fotismos.reference.rendering.passes import Size, Stream
@@ -67,6 +68,13 @@ class Pictures:
     times: list[float] = field(default_factory=list)
     variant: str = ""
     preparation: float = 0.0
+
+    @classmethod
+    def of(cls, name: str, image: Floats) -> Self:
+        """Return the half that an image (H, W, 3) is, opaque and without rounding."""
+        opaque = np.ones(image.shape[:2], bool)
+        file = PictureFile(image=image, opaque=opaque, digest="", rounding=np.zeros(3))
+        return cls(names=(name,), files=(file,))
 
     @property
     def size(self) -> Size:

@@ -2,9 +2,11 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 from PIL import Image
 from scipy.special import erf
 
@@ -14,7 +16,7 @@ from fotismos.comparisons.processes.pool import Pool
 from fotismos.comparisons.study import dataset, design, running, scenes, sheet
 from fotismos.heuristic import user_shaders
 from fotismos.heuristic.errors import InputError
-from fotismos.reports.charts import study_charts
+from fotismos.reports.charts import study_charts, vega
 from tests.shared.programs import ROOT
 from tests.shared.quadrature import dot, integral
 from tests.witnesses.fresnel import dielectric
@@ -55,7 +57,15 @@ def test_a_drawn_design_fills_its_ranges_evenly():
     assert (counts == 16).all()  # the points are a net
 
 
-FIGURE = "[[figure]]\nname = 'f'\ntitle = 't'\npart = 'lobe'\nkind = 'map'\nx = 'alpha'\n"
+FIGURE = """[[figure]]
+name = 'f'
+title = 't'
+part = 'lobe'
+where = {{alpha = {0}}}
+[figure.chart]
+mark = "{1}"
+encoding.x = {{field = "{2}", type = "quantitative"}}
+"""
 MISTAKES = (
     ("", "there are no parts"),
     ("parts = []", "'parts' is not known .did you mean part"),
@@ -75,11 +85,21 @@ MISTAKES = (
     (part("alpha = 0.1") * 2, "each its own"),
     (part("alpha = 0.1", "lobe", "heuristic = 'mine.py'"), "is not rendered.*mine.py on sphere or"),
     (part("alpha = 0.1", "lobe", "name = '../../evil'"), "name = '../../evil': .*slash"),
-    (part("alpha = 0.1") + FIGURE + "values = ['dE2000']", "a map needs y"),
-    (part("alpha = 0.1") + FIGURE + "values = []\nwhere = {alpha = 'x'}", "got `str`.*where"),
-    (part("alpha = 0.1") + FIGURE + "y = 'n'\nvalues = ['dE2000']", "'n' is not known"),
-    (part("alpha = 0.1") + FIGURE.replace("'f'", "'../evil'") + "values = []", "'../evil'.*slash"),
-    (part("alpha = 0.1") + FIGURE.replace("'lobe'", "'nix'") + "values = []", "part = 'nix'"),
+    (part("alpha = 0.1") + FIGURE.format("'x'", "line", "alpha"), "got `str`.*where"),
+    (
+        part("alpha = 0.1") + FIGURE.replace("alpha =", "n =").format(1, "line", "alpha"),
+        "'n' is no",
+    ),
+    (part("alpha = 0.1") + FIGURE.replace("'f'", "'../evil'").format(0.1, "", ""), "'../evil'.*sl"),
+    (part("alpha = 0.1") + FIGURE.replace("'lobe'", "'nix'").format(0.1, "", ""), "part = 'nix'"),
+    (
+        part("alpha = 0.1") + FIGURE.format(0.1, "", "") + "data.url = 'a.csv'",
+        "url = 'a.csv'.*Omit",
+    ),
+    (
+        part("alpha = 0.1") + FIGURE.format(0.1, "", "").replace("[figure.chart]", "kind = 'map'"),
+        "kind",
+    ),
 )
 
 
@@ -313,8 +333,8 @@ def test_a_point_that_fails_is_a_row_that_says_why(rgb, tmp_path, monkeypatch):
     study = design.parse(part("alpha = [0.1, 0.2, 0.3]"))
     lobe = scenes.lobe
 
-    def fails_once(point, convention):
-        return 1 / 0 if point["alpha"] == 0.2 else lobe(point, convention)
+    def fails_once(point, options):
+        return 1 / 0 if point["alpha"] == 0.2 else lobe(point, options)
 
     with monkeypatch.context() as patch:
         patch.setattr(scenes, "lobe", fails_once)
@@ -348,14 +368,14 @@ def test_the_command_writes_dataset_and_figures(run, tmp_path):
 @pytest.mark.parametrize(
     ("shown", "message"),
     [
-        ("values = ['dE200']", "figure 'f': column 'dE200' is not known (did you mean dE2000?)"),
-        ("values = ['dE2000']\nwhere = {alpha = [0.3]}", "no point has alpha = [0.3]"),
+        ((0.2, "line", "dE200"), "figure 'f': column 'dE200' is not known (did you mean dE2000?)"),
+        (("[0.3]", "line", "dE2000"), "no point has alpha = [0.3]"),
+        ((0.2, "lines", "dE2000"), "figure 'f': chart: 'lines' is an invalid value for `mark`"),
     ],
 )
 def test_a_figure_of_nothing_is_refused_before_anything_runs(run, tmp_path, shown, message):
     file = tmp_path / "small.toml"
-    lines = FIGURE.replace("'map'", "'lines'") + shown
-    file.write_text(part("alpha = [0.2, 0.4]") + lines)
+    file.write_text(part("alpha = [0.2, 0.4]") + FIGURE.format(*shown))
     code, printed, messages = run("study", file, "-o", tmp_path / "out")
     assert (code, printed) == (2, "")
     assert message in messages
@@ -437,14 +457,28 @@ def test_every_figure_has_its_points_and_says_what_it_averages(shipped):
         assert spec["title"]["text"] == figure.title
         assert len(spec["data"]["values"]) >= 12
         assert "http" not in str({key: spec[key] for key in spec if key != "$schema"})
-    figure = design.StudyFigure(
-        name="f", title="t", part="energy", kind="map", x="k_s", y="n", values=("dE2000",)
-    )
+    error = {"field": "dE2000", "aggregate": "mean", "type": "quantitative"}
+    chart = {"mark": "line", "encoding": {"x": {"field": "k_s", "type": "ordinal"}, "y": error}}
+    figure = design.StudyFigure(name="f", title="t", part="energy", chart=chart)
     spec = study_charts.chart(figure, table, study)
-    assert spec["title"]["subtitle"] == "mean over light angle"
-    cell = spec["data"]["values"][9]
-    found = dataset.rows(table, "energy", {"k_s": cell["x"], "n": cell["y"]})
-    assert cell["value"] == pytest.approx(np.mean([row["dE2000"] for row in found]))
+    assert spec["title"]["subtitle"] == "mean over n, light angle"
+    assert spec["encoding"]["y"] == error | {"title": "ΔE2000"}
+    spec = study_charts.chart(structs.replace(figure, where={"light_angle": 45}), table, study)
+    assert spec["title"]["subtitle"] == "mean over n"
+    assert {row["light_angle"] for row in spec["data"]["values"]} == {45}
+
+
+@pytest.mark.parametrize("design_of", ["grid", "sobol"])
+def test_a_part_without_a_figure_shows_its_error_over_its_parameters(shipped, design_of):
+    study, table = shipped
+    kept = tuple(part for part in study.parts if part.design == design_of)
+    for figure in study_charts.all_figures(replace(study, parts=kept, figures=())):
+        spec = study_charts.chart(figure, table, study)
+        study_charts.check_charts(replace(study, figures=(figure,)))
+        marks = {"grid": "rect", "sobol": "circle"}
+        assert spec["mark"] == marks[design_of]
+        assert spec["encoding"]["color"]["field"] == "dE2000"
+        assert b"<svg" in vega.paper(spec)
 
 
 # --- Contact sheets -------------------------------------------------------------------------------

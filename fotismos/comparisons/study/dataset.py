@@ -11,14 +11,13 @@ from math import isclose
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-import numpy as np
 from msgspec.structs import replace
 
 from fotismos.comparisons.atomic import require_regular
-from fotismos.comparisons.departure import statistics
 from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO
 from fotismos.comparisons.records.departure import DEFAULT_VIEWING
-from fotismos.comparisons.study.design import OWN, StudyFile
+from fotismos.comparisons.records.images import Comparison
+from fotismos.comparisons.study.design import OWN, StudyFile, stated
 from fotismos.comparisons.study.scenes import PHONG, ROUGHPLASTIC, SCENES
 from fotismos.heuristic.errors import InputError, InstallationError, unknown
 from fotismos.heuristic.program import installation, versions
@@ -97,26 +96,13 @@ def results() -> dict[str, Column]:
 # --- Measures -------------------------------------------------------------------------------------
 
 
-def measure(
-    heuristic: np.ndarray,
-    reference: np.ndarray,
-    counted: np.ndarray,
-    noise: np.ndarray | None = None,
-) -> Row:
-    """Return the columns of images.
-
-    The images (H, W, 3) are linear; ``noise`` is that of their difference, ``counted`` (H, W).
-    """
-    summary, _ = statistics.summarise(
-        LEADING, heuristic, reference=reference, mask=counted, noise=noise
-    )
-    ratio, _ = statistics.summarise_log2_luminance(heuristic, reference, counted)
-    test = heuristic[counted]
-    truth = reference[counted]
-    means = {
-        name: metric.mean(metric.against(reference, counted, DEFAULT_VIEWING)(heuristic))
-        for name, metric in METRICS.items()
-    }
+def measures(comparison: Comparison) -> Row:
+    """Return the columns of a comparison whose metrics are all computed."""
+    record = comparison.record
+    images = comparison.images
+    summary = record.metrics[LEADING.name]
+    test = images.heuristic[images.counted]
+    truth = images.reference[images.counted]
     # Both models are linear in the light: less of it is a lower exposure of both images.
     levels = {part: replace(DEFAULT_VIEWING, exposure=factor) for part, factor in DIMMED.items()}
     dimmed = {
@@ -124,15 +110,15 @@ def measure(
         for part, viewing in levels.items()
     }
     return {
-        "heuristic": float(test.mean()),
-        "reference": float(truth.mean()),
-        **means,
+        "heuristic": float(test.mean(dtype=float)),
+        "reference": float(truth.mean(dtype=float)),
+        **{name: metric.mean for name, metric in record.metrics.items()},
         f"{LEADING.name}_p95": summary.p95,
         f"{LEADING.name}_noise": summary.noise_floor,
         f"{LEADING.name}_shape": summary.after_exposure.mean,
         **dimmed,
         "exposure": summary.after_exposure.exposure,
-        RATIO.name: ratio.mean,
+        RATIO.name: record.log2_luminance.mean,
     }
 
 
@@ -222,8 +208,8 @@ def check_figures(study: StudyFile) -> None:
     for figure in study.figures:
         where = f"figure {figure.name!r}:"
         part = next(part for part in study.parts if part.name == figure.part)
-        known = {*part.levels, *IDENTITY, *PARAMETERS, *results()}
-        for column in figure.values:
+        known = {*part.levels, *IDENTITY, *PARAMETERS, *results(), *stated(figure.chart, "as")}
+        for column in stated(figure.chart, "field"):
             if column not in known:
                 raise unknown(f"{where} column", column, sorted(known))
         for name, allowed in figure.where.items():

@@ -18,16 +18,15 @@
 
     [[figure]]
     name = "departure"             # of the file
-    title = "Departure over roughness and incidence"
+    title = "Error over roughness and incidence"
     part = "lobe"
-    kind = "map"                   # or "lines"
-    x = "light_angle"
-    y = "alpha"                    # maps
-    values = ["dE2000"]            # one column for a map, one or more for lines
-    series = "int_ior"             # lines: one for each value of this parameter
-    where = { int_ior = [1.5, 2] } # the points that are shown
-    rule = 1.0                     # lines: a horizontal line
-    log = ["x", "y"]               # lines: logarithmic axes
+    where = { int_ior = [1.5, 2] } # the points that are shown; all if omitted
+
+    [figure.chart]                 # in Vega-Lite, over the columns of the dataset
+    mark = "line"
+    encoding.x = { field = "light_angle", type = "quantitative" }
+    encoding.y = { field = "dE2000", aggregate = "mean", type = "quantitative" }
+    encoding.color = { field = "alpha", type = "ordinal" }
 
 Omitted keys have their defaults; ``heuristic.NAME`` is a parameter that the heuristic declares. A
 part whose scene is rendered may also set ``resolution``, ``spp`` (over all passes) and ``seed``.
@@ -130,19 +129,13 @@ class StudyPart:
 
 
 class StudyFigure(Record):
-    """A figure of a study; for its keys see above."""
+    """A figure of a study: a chart in Vega-Lite of a part's points, or of those of ``where``."""
 
     name: str
     title: str
     part: str
-    kind: Literal["map", "lines"]
-    x: str
-    values: tuple[str, ...]
-    y: str | None = None
-    series: str | None = None
+    chart: dict[str, Any]
     where: dict[str, float | list[float]] = msgspec.field(default_factory=dict)
-    rule: float | None = None
-    log: tuple[Literal["x", "y"], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -343,16 +336,27 @@ def _check_size(part: StudyPart, where: str) -> None:
 
 
 def _check_figure(figure: StudyFigure, parts: dict[str, StudyPart]) -> None:
-    """Ensure that a figure is complete, and that its part and parameters exist."""
+    """Ensure that a figure has a name for files, a part, and data of that part alone."""
     where = f"figure {figure.name!r}"
     atomic.file_name(figure.name, "a figure")
     if figure.part not in parts:
         raise unknown(f"{where}: part =", figure.part, parts)
-    if figure.kind == "map" and (figure.y is None or len(figure.values) != 1):
-        raise InputError(f"{where}: a map needs y, and one column in values.")
-    if not figure.values:
-        raise InputError(f"{where}: values = []: give at least one column.")
     levels = parts[figure.part].levels
-    for name in (figure.x, figure.y, figure.series, *figure.where):
-        if name is not None and name not in levels:
+    for name in figure.where:
+        if name not in levels:
             raise unknown(f"{where}: parameter", name, levels)
+    if addresses := stated(figure.chart, "url"):
+        raise InputError(
+            f"{where}: url = {addresses[0]!r}: a chart shows the points of its part. Omit it."
+        )
+
+
+def stated(content: Any, key: str) -> list[Any]:
+    """Return what a key has as values anywhere in tables and lists."""
+    if isinstance(content, list):
+        return [value for item in content for value in stated(item, key)]
+    if not isinstance(content, dict):
+        return []
+    own = content.get(key, [])
+    inside = [value for item in content.values() for value in stated(item, key)]
+    return [*(own if isinstance(own, list) else [own]), *inside]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from hashlib import sha256
 from itertools import pairwise
@@ -21,11 +21,13 @@ import numpy as np
 
 from fotismos.comparisons.atomic import Entry
 from fotismos.comparisons.case import RGB, open_case
+from fotismos.comparisons.compare import finish, look
 from fotismos.comparisons.names import is_script
-from fotismos.comparisons.prepared import guarded
+from fotismos.comparisons.prepared import Prepared, guarded
 from fotismos.comparisons.processes.pool import Pool, Runner, Task
+from fotismos.comparisons.records.images import Images
 from fotismos.comparisons.study import dataset, scenes, sheet
-from fotismos.comparisons.study.dataset import STEPS, Row, measure
+from fotismos.comparisons.study.dataset import STEPS, Row
 from fotismos.comparisons.study.design import OWN, StudyFile, StudyPart
 from fotismos.comparisons.study.scenes import RENDERED, SCENES, Point, bsdf, largest_miss
 from fotismos.heuristic import plugins
@@ -39,7 +41,7 @@ from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.rendering import direct
 from fotismos.reference.rendering.passes import passes
 from fotismos.reference.rendering.renderer import Renderer
-from fotismos.reference.rendering.sums import Accumulator
+from fotismos.reference.rendering.sums import MEAN, Accumulator
 from fotismos.reference.scene.graph import Graph, set_variant
 from fotismos.reference.scene.source import Source, digest
 from fotismos.reference.scene.values import COLOURS
@@ -198,73 +200,91 @@ def row(point: StudyPoint) -> Row:
 def evaluated(point: StudyPoint) -> tuple[Row, sheet.Pictures | None]:
     """Return the row of a point, and small pictures of it if it is rendered and did not fail."""
     _set_up()
+    part = point.part
+    columns: Row = {"error": None}
     pictures = None
     try:
-        convention = Convention(point.part.options.pairing)
-        if point.part.scene == "lobe":
-            columns, image, truth = scenes.lobe(point.values, convention)
-            columns |= measure(image, truth, np.ones(image.shape[:2], bool))
+        if part.scene == "lobe":
+            more, halves = scenes.lobe(point.values, part.options)
+            columns |= more
         else:
-            columns, pictures = _rendered(point)
-        if point.part.scene in SCENES:
-            columns |= scenes.columns(point.values, convention)
+            halves = _prepared(point)
+        comparison = finish(look(halves), halves, then=())
+        columns |= dataset.measures(comparison)
+        if isinstance(halves, Prepared):
+            columns |= _steps(halves, comparison.images)
+            columns["miss"] = largest_miss(halves.pair.pairing.misses)
+            pictures = sheet.small(comparison.images.heuristic, comparison.images.reference)
+        if part.scene in SCENES:
+            columns |= scenes.columns(point.values, Convention(part.options.pairing))
     # A failing point must not end a study of thousands.
     except Exception as failure:
         kind = "" if isinstance(failure, FotismosError) else f"{type(failure).__name__}: "
         return point.row({"error": f"{kind}{failure}"}), None
-    return point.row(columns | {"error": None}), pictures
+    return point.row(columns), pictures
 
 
 # --- Renderings --------------------------------------------------------------------------------
 
 
-def _rendered(point: StudyPoint) -> tuple[Row, sheet.Pictures]:
-    """Render both halves with the same camera rays, and the steps between them.
+def _prepared(point: StudyPoint) -> Prepared:
+    """Return the scene of a point, ready to be rendered in :data:`PASSES` passes.
 
-    The columns :data:`fotismos.comparisons.study.dataset.STEPS` are the root mean square changes of
-    the image as each step is added; ``dominant`` names the largest. The scene is read once while
-    its ``identity`` stays.
+    The scene is read once while its ``identity`` stays. Nothing asks for its price or its causes.
     """
     part = point.part
-    # The pair, with the point's values in the scene.
     tuned, in_scene = split(point.values)
     source = source_of(part, point.values, point.identity)
     if part.scene not in SCENES:
         source = source.edited(partial(set_values, values=in_scene))
     ready = guarded(source, part.options)
     spp = max(1, (part.options.spp or 0) // PASSES)
-    scene = ready.scene
     heuristic = ready.heuristic.sampled(spp)
+    reference = ready.reference.sampled(spp)
     # The heuristic's own parameters are the integrator's.
     parameters = mi.traverse(heuristic.integrator)
     for name, value in tuned.items():
         parameters[name] = value
     parameters.update()
-    # The textbook half, then one image per step; the last is the reference.
-    renderers = [heuristic]
-    plans = _plans(ready.plan)
-    for stage in plans.values():
-        integrator = physical_integrator(stage, scene, ready.pair.hide_emitters)
-        renderer = Renderer(
-            scene, integrator, pass_spp=spp, label="physical picture", size=ready.size
+    return replace(
+        ready,
+        passes=PASSES,
+        heuristic=heuristic,
+        reference=reference,
+        first=heuristic,
+        second=reference,
+        has=frozenset(),
+    )
+
+
+def _steps(ready: Prepared, images: Images) -> Row:
+    """Render what is between the halves, with the same camera rays, and return the changes.
+
+    The columns :data:`fotismos.comparisons.study.dataset.STEPS` are the root mean square changes of
+    the image as each step is added; ``dominant`` names the largest.
+    """
+    *stages, last = _plans(ready.plan).items()
+    renderers = [
+        Renderer(
+            ready.scene,
+            physical_integrator(plan, ready.scene, ready.pair.hide_emitters),
+            pass_spp=ready.reference.pass_spp,
+            label="physical picture",
+            size=ready.size,
         )
-        renderers.append(renderer)
-    sums = [Accumulator() for _ in renderers]
-    difference = Accumulator()
-    for rendered in passes(renderers, part.options.seed, PASSES):
+        for _, plan in stages
+    ]
+    sums = [Accumulator(MEAN) for _ in renderers]
+    for rendered in passes(renderers, ready.options.seed, PASSES):
         for total, image in zip(sums, rendered, strict=True):
             total.add(image)
-        difference.add(rendered[0] - rendered[-1])
-    images = [total.estimate().mean for total in sums]
-    result = measure(images[0], images[-1], ready.counted, difference.estimate().noise)
+    between = [images.heuristic, *(total.mean() for total in sums), images.reference]
     # Steps that change nothing have no image, and keep 0.
     sizes = dict.fromkeys(STEPS, 0.0)
-    for name, (before, after) in zip(plans, pairwise(images), strict=True):
-        change = (after - before).mean(axis=2)[ready.counted]
+    for (name, _), (before, after) in zip((*stages, last), pairwise(between), strict=True):
+        change = (after - before).mean(axis=2)[images.counted]
         sizes[name] = float(np.sqrt(np.mean(change**2)))
-    result |= sizes | {"dominant": max(sizes, key=sizes.__getitem__)}
-    result["miss"] = largest_miss(ready.pair.pairing.misses)
-    return result, sheet.small(images[0], images[-1])
+    return sizes | {"dominant": max(sizes, key=sizes.__getitem__)}
 
 
 def split(point: Point) -> tuple[Point, Point]:

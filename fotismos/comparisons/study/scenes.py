@@ -21,6 +21,9 @@ from numpy.typing import ArrayLike
 
 from fotismos.comparisons.audit import furnace
 from fotismos.comparisons.audit.subjects import shaded
+from fotismos.comparisons.halves import Halves
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.pictures import FEWEST, Pictures
 from fotismos.heuristic import heuristics
 from fotismos.heuristic.lights import DirectionalLight
 from fotismos.reference.pairing.albedo import RoughPlastic, to_phong, to_roughplastic
@@ -305,12 +308,12 @@ def albedo(radiance: np.ndarray, light_angle: float) -> float:
     return float(hemisphere()[1] @ radiance / np.cos(np.deg2rad(light_angle)))
 
 
-def lobe(point: Point, convention: Convention) -> tuple[dict[str, float], np.ndarray, np.ndarray]:
-    """Return albedos and peaks of the specular part, and the images (1, V, 3) of both halves.
+def lobe(point: Point, options: Options) -> tuple[dict[str, float], Halves]:
+    """Return albedos and peaks of the specular part, and the halves, images (1, V, 3).
 
     The views have equal projected solid angles.
     """
-    phong, plastic, _ = material(tuple(point.items()), convention)
+    phong, plastic, _ = material(tuple(point.items()), Convention(options.pairing))
     angle = point["light_angle"]
     # All directions in one call: images, albedos, the plane of incidence, the mirror's.
     plane = direction(np.arange(0, 90, PEAK_STEP), 0.0)
@@ -320,14 +323,14 @@ def lobe(point: Point, convention: Convention) -> tuple[dict[str, float], np.nda
     light = np.broadcast_to(direction(angle, 180.0), view.shape)
     splits = np.cumsum([part.shape[1] for part in parts])[:-1]
     result = {}
-    images = []
+    sources = []
     for half, (total, lobe_alone) in (
         ("heuristic", heuristic_radiance(phong, light, view)),
         ("reference", reference_radiance(plastic, light, view)),
     ):
         seen, everywhere, _, _ = np.split(total, splits)
         _, specular, in_plane, mirrored = np.split(lobe_alone, splits)
-        images.append(np.repeat(seen[None, :, None], 3, axis=2))
+        sources.append(Pictures.of(half, np.repeat(seen[None, :, None], 3, axis=2)))
         result[f"albedo_{half}"] = albedo(everywhere, angle)
         result[f"specular_albedo_{half}"] = albedo(specular, angle)
         result[f"specular_{half}"] = float(mirrored[0])
@@ -336,8 +339,16 @@ def lobe(point: Point, convention: Convention) -> tuple[dict[str, float], np.nda
         # n = 0 has no peak, and k_s = 0 no lobe.
         if in_plane.max() > 0 and np.count_nonzero(highest) * PEAK_STEP < 1:
             result[f"peak_{half}"] = float(np.argmax(in_plane)) * PEAK_STEP
-    test, truth = images
-    return result, test, truth
+    return result, Halves(
+        name="lobe",
+        options=options,
+        first=sources[0],
+        second=sources[1],
+        passes=FEWEST,
+        has=frozenset(),
+        where=sources[0].opaque,
+        is_exact=True,
+    )
 
 
 def largest_miss(misses: Iterable[Miss]) -> float:

@@ -1,33 +1,30 @@
 """The figures of a study: charts, and contact sheets of its pictures.
 
-For the keys of charts see :mod:`fotismos.comparisons.study.design`. Points that differ in other
-parameters are averaged, and the subtitle says over which. Colours are viridis and magma, whose
-lightness rises steadily: they also work in grey.
+A chart is a specification of Vega-Lite, to which the rows of its part, titles with units, and a
+subtitle that says over what it averages are added.
 """
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import altair as alt
 import numpy as np
+from altair.utils.schemapi import SchemaValidationError
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.study import dataset
-from fotismos.comparisons.study.dataset import Row
-from fotismos.comparisons.study.design import StudyFigure, StudyFile, StudyPart
+from fotismos.comparisons.study.design import StudyFigure, StudyFile, StudyPart, stated
 from fotismos.comparisons.study.sheet import Pictures, Sheet
+from fotismos.heuristic.errors import InputError
 from fotismos.reports.charts.figures import FONT_SIZE, drawn
-from fotismos.reports.charts.vega import FAINT, Spec, specification
+from fotismos.reports.charts.vega import Spec
 
 if TYPE_CHECKING:
     import pyarrow as pa  # loaded late: it is an extra
-
-Cell: TypeAlias = dict[str, Any]
-"""A mark of a chart: ``x``, perhaps ``y``, and ``value``."""
 
 SYMBOLS = {
     "alpha": "α",
@@ -39,11 +36,9 @@ SYMBOLS = {
     "k_s": "k_s",
     "log2_luminance": "luminance ratio",
 }
-WORDS = ("#fde725", "#5ec962", "#5aa0c8", "#c9b6e4")
-"""Colours for words, light enough for the word's first letter, which each cell shows too."""
 
-DASHES = ([1, 0], [6, 3], [2, 2], [8, 2, 2, 2])
-"""Dashes of lines of several columns."""
+SIZE = {"width": 460, "height": 300}
+"""Pixels of a chart that states none."""
 
 CELL = 1.1
 """Inches of a cell's width: both halves."""
@@ -52,144 +47,100 @@ DOTS_PER_INCH = 150
 
 
 def all_figures(study: StudyFile) -> Iterator[StudyFigure]:
-    """Yield a study's figures; a part without one gets the error over its parameters."""
+    """Yield a study's figures; a part without one gets the error over its parameters.
+
+    That is a map of two parameters, a circle for each point that was drawn, or a line over one.
+    """
     yield from study.figures
     shown = {figure.part for figure in study.figures}
     for part in study.parts:
-        if part.name not in shown and (names := part.varying):
-            is_map = len(names) > 1
+        if part.name not in shown and part.varying:
             yield StudyFigure(
-                name=part.name,
-                title=part.name,
-                part=part.name,
-                kind="map" if is_map else "lines",
-                x=names[-1],
-                y=names[0] if is_map else None,
-                values=("dE2000",),
+                name=part.name, title=part.name, part=part.name, chart=_error_over(part)
             )
 
 
+def _error_over(part: StudyPart) -> Spec:
+    """Return the chart of the mean error over a part's parameters."""
+    *others, across = part.varying
+    error = {"field": LEADING.name, "aggregate": "mean", "type": "quantitative"}
+    axes = {"x": across} | ({"y": others[0]} if others else {})
+    is_grid = bool(others) and part.design == "grid"
+    encoding: Spec = {
+        axis: {
+            "field": name,
+            "type": "ordinal" if is_grid else "quantitative",
+            "sort": "descending" if is_grid and axis == "y" else "ascending",
+            "scale": {"type": "log"} if part.levels[name].is_log and not is_grid else {},
+        }
+        for axis, name in axes.items()
+    }
+    if not others:
+        return {"mark": "line", "encoding": encoding | {"y": error}}
+    colour = error | {"scale": {"scheme": "magma"}}
+    if not is_grid:
+        del colour["aggregate"]
+    return {"mark": "rect" if is_grid else "circle", "encoding": encoding | {"color": colour}}
+
+
+def check_charts(study: StudyFile) -> None:
+    """Ensure that charts are in Vega-Lite; `InputError` says what is not."""
+    for figure in study.figures:
+        try:
+            alt.TopLevelSpec(SIZE | figure.chart | {"data": {"values": []}}).to_dict()
+        except SchemaValidationError as error:
+            reason = " ".join(str(error).split())
+            raise InputError(f"figure {figure.name!r}: chart: {reason}") from error
+
+
 def chart(figure: StudyFigure, table: pa.Table, study: StudyFile) -> Spec:
-    """Return the Vega-Lite specification of a figure.
+    """Return the Vega-Lite specification of a figure, with its data.
 
     ``InputError`` if a column does not exist, or no point is to be shown.
     """
-    for column in figure.values:
-        dataset.require(table, column)
     part = next(part for part in study.parts if part.name == figure.part)
     data = dataset.rows(table, figure.part, figure.where)
-    shown = {figure.x, figure.y, figure.series, *figure.where}
-    over = [name for name in part.varying if name not in shown]
-    title = {"text": figure.title}
+    shown = {*stated(figure.chart, "field"), *figure.where}
+    for column in stated(figure.chart, "field"):
+        if column not in stated(figure.chart, "as"):
+            dataset.require(table, column)
+    over = [label(name) for name in part.varying if name not in shown]
+    title: Spec = {"text": figure.title}
     if over and part.design == "grid":
-        title["subtitle"] = f"mean over {', '.join(map(label, over))}"
-    make = {"map": _map, "lines": _lines}[figure.kind]
-    spec = specification(make(figure, table, part, data))
-    return spec | {"title": title, "description": figure.title, "padding": 8}
+        title["subtitle"] = f"mean over {', '.join(over)}"
+    return {
+        "$schema": alt.SCHEMA_URL,
+        **SIZE,
+        **_titled(figure.chart, table),
+        "data": {"values": data},
+        "title": title,
+        "description": figure.title,
+        "padding": 8,
+    }
 
 
-def _scaled(axis: Any, is_log: bool) -> Any:
-    return axis.scale(type="log" if is_log else "linear", nice=not is_log)
+def _titled(content: Any, table: pa.Table, is_channel: bool = False) -> Any:
+    """Return a part of a chart, in which each channel has the label and unit of its column."""
+    if isinstance(content, list):
+        return [_titled(item, table) for item in content]
+    if not isinstance(content, dict):
+        return content
+    titles: Spec = {}
+    if is_channel and content.get("field") in table.column_names:
+        titles["title"] = with_unit(content["field"], table)
+    inside = {
+        key: {name: _titled(channel, table, is_channel=True) for name, channel in value.items()}
+        if key == "encoding"
+        else _titled(value, table)
+        for key, value in content.items()
+    }
+    return titles | inside
 
 
-def _map(
-    figure: StudyFigure, table: pa.Table, part: StudyPart, data: Sequence[Row]
-) -> alt.TopLevelMixin:
-    (column,) = figure.values
-    names = (figure.x, str(figure.y))
-    is_grid = part.design == "grid"
-    is_word = isinstance(data[0][column], str)
-    if is_grid:
-        cells = _mean(data, names, column)
-    else:
-        cells = [{"x": row[names[0]], "y": row[names[1]], "value": row[column]} for row in data]
-    if is_word:
-        cells = [cell | {"letter": cell["value"][0].upper()} for cell in cells]
-        categories = sorted({cell["value"] for cell in cells})
-        scale = alt.Scale(domain=categories, range=WORDS[: len(categories)])
-        colour = alt.Color("value:N", title=column, scale=scale)
-    else:
-        scale = alt.Scale(scheme="magma" if column.startswith("dE") else "viridis")
-        # A title as a list has a line for each word, which keeps the legend narrow.
-        colour = alt.Color("value:Q", title=label(column).split(" "), scale=scale)
-    x = _axis(alt.X, table, names[0])
-    y = _axis(alt.Y, table, names[1])
-    if is_grid:
-        x = x.type("ordinal").sort("ascending").axis(labelOverlap="greedy", labelAngle=0)
-        y = y.type("ordinal").sort("descending").axis(labelOverlap="greedy")
-    else:
-        logs = [part.levels[name].is_log for name in names]
-        x = _scaled(x, logs[0])
-        y = _scaled(y, logs[1])
-    chart = alt.Chart(alt.Data(values=cells)).encode(x=x, y=y)
-    marks = chart.mark_rect() if is_grid else chart.mark_circle(size=60, opacity=1)
-    layers = [marks.encode(color=colour)]
-    if is_word and is_grid:
-        layers.append(chart.mark_text(color="black").encode(text="letter:N"))
-    return alt.layer(*layers).properties(width=420, height=300)
-
-
-def _lines(
-    figure: StudyFigure, table: pa.Table, part: StudyPart, data: Sequence[Row]
-) -> alt.TopLevelMixin:
-    columns = figure.values
-    series = figure.series
-    keys = (figure.x, series) if series else (figure.x,)
-    values = [
-        {**cell, "quantity": label(column)}
-        for column in columns
-        for cell in _mean(data, keys, column)
-    ]
-    # Of several columns, the words that their names share, such as `albedo` of both halves.
-    parts_of_names = [column.split("_") for column in columns]
-    shared = [word for word in parts_of_names[0] if all(word in other for other in parts_of_names)]
-    named = label(columns[0]) if len(columns) == 1 else " ".join(shared) or "value"
-    scales: list[Spec] = [
-        {"type": "log"} if axis in figure.log else {"zero": axis == "y"} for axis in "xy"
-    ]
-    y = alt.Y("value:Q", title=_with_unit(named, table, columns[0])).scale(**scales[1])
-    x = _axis(alt.X, table, figure.x).scale(nice=False, **scales[0])
-    chart = alt.Chart().mark_line(strokeWidth=2).encode(x=x, y=y)
-    if series:
-        # Viridis without its light end, which is invisible on white.
-        inks = alt.Scale(scheme=alt.SchemeParams("viridis", extent=[0, 0.8]))
-        title = _with_unit(label(series), table, series)
-        chart = chart.encode(color=alt.Color("y:O", title=title, scale=inks))
-    if len(columns) > 1:
-        dash = alt.StrokeDash("quantity:N", title=None, sort=[label(name) for name in columns])
-        dash = dash.scale(range=DASHES[: len(columns)]).legend(labelLimit=300, symbolSize=400)
-        chart = chart.encode(strokeDash=dash)
-    layers = [chart]
-    if figure.rule is not None:
-        # One row of its own, or Vega-Lite would draw the rule once for each point.
-        rule = alt.Chart(alt.Data(values=[{}])).mark_rule(strokeDash=[3, 3], color=FAINT)
-        layers.append(rule.encode(y=alt.datum(figure.rule)))
-    return alt.layer(*layers, data=alt.Data(values=values)).properties(width=460, height=300)
-
-
-def _mean(data: Sequence[Row], keys: Sequence[str], column: str) -> list[Cell]:
-    """Return a column's mean for each combination of keys; of words, the most frequent."""
-    groups: dict[tuple[Any, ...], list[Any]] = defaultdict(list)
-    for row in data:
-        if row[column] is not None:
-            groups[tuple(row[key] for key in keys)].append(row[column])
-    cells = []
-    for key, group in sorted(groups.items()):
-        is_word = isinstance(group[0], str)
-        value = max(sorted(set(group)), key=group.count) if is_word else sum(group) / len(group)
-        cells.append(dict(zip(("x", "y"), key, strict=False)) | {"value": value})
-    return cells
-
-
-def _axis(channel: Any, table: pa.Table, name: str) -> Any:
-    field = {alt.X: "x", alt.Y: "y"}[channel]
-    title = _with_unit(label(name), table, name)
-    return channel(f"{field}:Q", title=title).axis(format=".3~g", tickCount=8, labelFlush=False)
-
-
-def _with_unit(name: str, table: pa.Table, column: str) -> str:
+def with_unit(column: str, table: pa.Table) -> str:
+    """Return how charts call a column, with its unit if it has one."""
     unit = dataset.unit(table, column)
-    return f"{name} ({unit})" if unit not in ("", "1") else name
+    return f"{label(column)} ({unit})" if unit not in ("", "1") else label(column)
 
 
 def label(column: str) -> str:

@@ -38,6 +38,7 @@ def show(pool: Pool, file: Path, terminal: Terminal) -> None:
     dataset.arrow()  # before anything is rendered
     chosen = design.read(file)
     dataset.check_figures(chosen)
+    study_charts.check_charts(chosen)
     with hold_results(terminal.output / "study", [(chosen.name, file)], command_line()) as (
         folder,
     ):
