@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
+from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.comparison import (
@@ -15,13 +16,13 @@ from fotismos.comparisons.records.comparison import (
     NoiseTarget,
     PictureFiles,
 )
-from fotismos.comparisons.records.departure import Summary
 from fotismos.reference.pairing.pairing_record import Pairing
 from fotismos.reference.planning.plan_record import Plan
 from fotismos.reference.records import plain
+from fotismos.reports import verdict
 from fotismos.reports.files import results
-from fotismos.reports.terminal.table import Column, Table, comma_separated, printed
-from fotismos.reports.terminal.words import number, percent, seconds
+from fotismos.reports.terminal.table import Column, Table, comma_separated, printed, room
+from fotismos.reports.terminal.words import difference, number, percent, seconds
 
 if TYPE_CHECKING:  # only checks load it
     from fotismos.comparisons.records.check import Move
@@ -76,19 +77,20 @@ def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 
 def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> Iterator[str]:
-    """Yield a line for each scene: pixels that differ, departure, noise, shape, and times."""
+    """Yield a line for each scene, worst first, and what is special about single ones."""
     for record in records:
         if record.agreement:
             yield from _pictures(record, record.agreement)
-    yield from printed(_scenes(records, threshold))
-    yield f"differ: above {LEADING.label} {threshold:g}; shape: the mean at the best exposure"
-    if not all(record.agreement for record in records):
-        yield "time: what a sample of the physical half takes, over one of the textbook's"
-    prices = [record.price for record in records if record.price and not record.picture]
-    reasons = {price.reason for price in prices} - {""}
-    yield from (f"time ?: {reason}" for reason in sorted(reasons))
+    yield from printed(scenes(records, threshold), room())
+    decisions = {verdict.decision(record, threshold) for record in records}
+    doubt = "; ?: undecided" if "undecided" in decisions else ""
+    yield f"differs visibly: above {LEADING.label} {threshold:g}{doubt}; mean: {LEADING.label}"
+    if any(verdict.samples(record, threshold) for record in records):
+        yield "samples, time: of a physical picture that looks right"
     # What is special about single scenes.
     for record in records:
+        if record.caution and len(records) > 1:
+            yield f"{record.scene}: {record.caution}"
         if record.heuristic != Options().heuristic and not record.picture:
             line = f"{record.scene}: shading {record.heuristic}"
             if record.textbook is not None:
@@ -109,34 +111,36 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
             )
 
 
-def _scenes(records: Sequence[ComparisonRecord], threshold: float) -> Table:
-    """Return the table of scenes: pixels that differ, errors, and times."""
+def scenes(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> Table:
+    """Return the table of scenes, worst first: how far they are, why, and what they take.
 
-    def lead(record: ComparisonRecord) -> Summary:
-        return record.metrics[LEADING.name]
+    It is the same on a terminal and on a page.
+    """
 
-    def differ(record: ComparisonRecord) -> float:
-        return share_above(lead(record).visible, threshold).value
-
-    def noise(record: ComparisonRecord) -> float | None:
-        return lead(record).noise_floor if record.is_noise_known else None
+    def at(what: Callable[[ComparisonRecord, float], Any]) -> Callable[[ComparisonRecord], Any]:
+        return lambda record: what(record, threshold)
 
     columns = (
-        Column("scene", "scene"),
-        Column("differ", differ, percent, is_right=True),
-        Column(f"mean {LEADING.label}", lambda r: lead(r).mean, number, is_right=True),
-        Column("noise", noise, number, is_right=True),
-        Column("shape", lambda r: lead(r).after_exposure.mean, number, is_right=True),
-        Column("time", lambda r: "" if r.agreement else time_ratio(r), is_right=True),
+        Column("scene", "scene", fold=24),
+        Column("differs visibly", at(_differs), percent, is_right=True),
+        Column("mean", lambda r: r.metrics[LEADING.name].mean, difference, is_right=True, rank=1),
+        Column("because of", at(verdict.because), rank=2, fold=24),
+        Column("needs", at(verdict.needs), rank=5, fold=24),
+        Column("samples", at(verdict.samples), is_right=True, rank=3),
+        Column("time", at(verdict.time), is_right=True, rank=4),
     )
-    return Table(columns, records)
+    return Table(columns, sorted(records, key=partial(extent, threshold=threshold), reverse=True))
 
 
-def time_ratio(record: ComparisonRecord) -> str:
-    """Return the ratio of the times of both halves, or "?"."""
-    if record.price is None or record.price.ratio is None:
-        return "?"
-    return f"x {number(record.price.ratio.value)}"
+def extent(record: ComparisonRecord, threshold: float = TOLERANCE) -> tuple[float, float]:
+    """Return by what scenes are ordered: the share of pixels that differ, then the mean error."""
+    return verdict.share(record, threshold).value, record.metrics[LEADING.name].mean
+
+
+def _differs(record: ComparisonRecord, threshold: float) -> tuple[Any, ...]:
+    """Return the share of the pixels that differ visibly, with a mark if it is undecided."""
+    is_undecided = verdict.decision(record, threshold) == "undecided"
+    return "? " if is_undecided else "", verdict.share(record, threshold).value
 
 
 def _pictures(record: ComparisonRecord, found: Agreement) -> Iterator[str]:
@@ -170,6 +174,14 @@ def _files(scene: str, half: str, picture: PictureFiles) -> Iterator[str]:
 def details(record: ComparisonRecord) -> Iterator[str]:
     """Yield the verbose lines of a scene: simulation, pairing, losses, warnings, times."""
     yield f"{record.scene}:{_simulation(record.plan) if record.plan else ''}"
+    lead = record.metrics[LEADING.name]
+    noise = number(lead.noise_floor) if record.is_noise_known else "not known"
+    at_best = f"at the best exposure {number(lead.after_exposure.mean)}"
+    yield f"  mean {LEADING.label} {number(lead.mean)}, noise {noise}, {at_best}"
+    if record.price and not record.picture:
+        ratio = record.price.ratio
+        times = f"{number(ratio.value)} times the textbook's" if ratio else record.price.reason
+        yield f"  time of a physical sample: {times}"
     if record.pairing:
         yield from _pairing(record.pairing)
     for loss in record.unrepresentable:

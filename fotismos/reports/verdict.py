@@ -18,7 +18,12 @@ from typing import TYPE_CHECKING
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, decide, share_above
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.comparisons.records.comparison import MOST_SPP, ComparisonRecord, Price
+from fotismos.comparisons.records.comparison import (
+    MOST_SPP,
+    ComparisonRecord,
+    Price,
+    SamplesThatPass,
+)
 from fotismos.comparisons.records.departure import Verdict, VisibleShare
 from fotismos.heuristic import program
 from fotismos.reference.planning.effects import EFFECTS, MICROFACETS
@@ -206,16 +211,22 @@ def _brightness_suffices(record: ComparisonRecord, threshold: float) -> bool:
     return lead.after_exposure.p95 + NOISE * lead.noise_floor <= threshold
 
 
-def _effects_needed(record: ComparisonRecord, threshold: float) -> str:
-    """Return which effects a scene needs, and which may be left out; empty if that is unknown."""
+def _effects_that_pass(record: ComparisonRecord, threshold: float) -> tuple[str, ...]:
+    """Return the effects that make a scene look right; none if they are not known."""
     needed = record.price and record.price.needed_at(threshold)
     if not needed or not record.why or _impossible_albedo(record):
-        return ""
-    if not needed.effects:
+        return ()
+    return needed.effects
+
+
+def _effects_needed(record: ComparisonRecord, threshold: float) -> str:
+    """Return which effects a scene needs, and which may be left out; empty if that is unknown."""
+    needed = _effects_that_pass(record, threshold)
+    if not needed or not record.why:
         return ""
     all_effects = [contribution.effect for contribution in record.why.effects]
-    rest = [effect for effect in all_effects if effect not in needed.effects]
-    sentence = f"It needs {_joined(needed.effects, 'and')}"
+    rest = [effect for effect in all_effects if effect not in needed]
+    sentence = f"It needs {_joined(needed, 'and')}"
     return f"{sentence}, but not {_joined(rest, 'or')}." if rest else f"{sentence}."
 
 
@@ -240,6 +251,69 @@ def _samples_needed(record: ComparisonRecord, threshold: float) -> str:
         count = f"{count} ({found.low:,} to {found.high:,})"
     time = _time_of(price, found.value)
     return f"{count} pass{time}."
+
+
+# What a row of a table says of a scene, in a few words.
+
+
+def because(record: ComparisonRecord, threshold: float = TOLERANCE) -> str:
+    """Return what a scene lacks most if it does not look right; empty if that is not known."""
+    if record.caution or record.picture_mistakes or decision(record, threshold) == "pass":
+        return ""
+    if record.mistakes:
+        return "mistakes of the shader"
+    largest = next(iter(missing(record)), "")
+    if largest == MICROFACETS.label and _impossible_albedo(record):
+        return "an impossible material"
+    return noun(largest)
+
+
+def needs(record: ComparisonRecord, threshold: float = TOLERANCE) -> str:
+    """Return what makes a scene look right; empty if that is not known."""
+    looks = decision(record, threshold)
+    if record.caution:
+        return "a look at the pictures"
+    if looks == "pass":
+        return "nothing"
+    if record.mistakes:
+        return "a correct shader"
+    if record.picture_mistakes:
+        return ""
+    if looks == "undecided":
+        return "more repeats" if record.given else "more samples"
+    if _brightness_suffices(record, threshold):
+        factor = record.metrics[LEADING.name].after_exposure.exposure
+        return f"brightness × {number(factor)}"
+    return ", ".join(map(noun, _effects_that_pass(record, threshold)))
+
+
+def _samples_that_pass(record: ComparisonRecord, threshold: float) -> SamplesThatPass | None:
+    """Return the samples of a physical picture that passes, of a scene that needs one."""
+    needs_none = decision(record, threshold) == "pass" or _brightness_suffices(record, threshold)
+    if needs_none or record.caution or record.mistakes or not record.price:
+        return None
+    return record.price.samples_at(threshold)
+
+
+def samples(record: ComparisonRecord, threshold: float = TOLERANCE) -> str:
+    """Return with how many samples physics passes; empty if it is not known, or not needed."""
+    found = _samples_that_pass(record, threshold)
+    if not found:
+        return ""
+    if found.value is None:
+        return f"> {MOST_SPP:,}"
+    if found.high is None:
+        return f"≥ {found.value:,}"
+    return f"{found.low:,}" if found.low == found.high else f"{found.low:,} to {found.high:,}"
+
+
+def time(record: ComparisonRecord, threshold: float = TOLERANCE) -> str:
+    """Return the time of the picture with these samples; empty if it is not known."""
+    found = _samples_that_pass(record, threshold)
+    if not found or found.value is None or not record.price:
+        return ""
+    taken = record.price.seconds(found.value)
+    return "" if taken is None else seconds(taken)
 
 
 def _time_of(price: Price, spp: int) -> str:

@@ -101,15 +101,14 @@ def test_the_record_has_the_ratio_that_is_shown(rgb):
     record = comparison()
     price = plain(record)["price"]
     assert price["reason"] == ("" if price["ratio"] else timing.TOO_WIDE.reason)
-    printed = "\n".join(tables.summary([record]))
+    printed = "\n".join(tables.details(record))
     if price["ratio"]:
-        assert f"x {number(price['ratio']['value'])}" in printed
+        assert f"sample: {number(price['ratio']['value'])} times the textbook's" in printed
         assert price["ratio"]["low"] <= price["ratio"]["value"] <= price["ratio"]["high"]
 
 
-def test_a_table_without_a_ratio_says_why(rgb, monkeypatch):
+def test_verbose_lines_say_why_there_is_no_ratio(rgb, monkeypatch):
     monkeypatch.setattr(timing, "WIDEST", 0.0)
     record = comparison()
     assert plain(record)["price"]["ratio"] is None
-    *_, last = tables.summary([record])
-    assert last == f"time ?: {timing.TOO_WIDE.reason}"
+    assert f"  time of a physical sample: {timing.TOO_WIDE.reason}" in tables.details(record)

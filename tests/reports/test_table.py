@@ -5,14 +5,16 @@ from io import StringIO
 from operator import itemgetter
 
 import pytest
+from msgspec import structs
 
+from fotismos.comparisons.departure.metrics import THRESHOLDS
 from fotismos.comparisons.records.departure import VisibleShare
 from fotismos.reference.records import Interval
-from fotismos.reports import cost_tables, sentences
+from fotismos.reports import cost_tables, sentences, tables
 from fotismos.reports.ci import summary
 from fotismos.reports.page.templating import environment
 from fotismos.reports.terminal.table import Column, Piece, Table, comma_separated, markdown, printed
-from tests.shared import cost_records
+from tests.shared import cost_records, records
 from tests.shared.pages import HOSTILE, Page
 
 TABLE = Table(
@@ -83,3 +85,55 @@ def test_terminal_and_page_have_the_same_sentences():
     """The terminal's lines take them from the module that pages take them from."""
     for name in ("answer", "closure", "together", "judgements", "stated"):
         assert getattr(cost_tables, name) is getattr(sentences, name)
+
+
+RANKED = Table(
+    (
+        Column("scene", itemgetter(0), fold=10),
+        Column("mean", itemgetter(1), is_right=True, rank=1),
+        Column("why", itemgetter(2), rank=3, fold=8),
+        Column("time", itemgetter(3), rank=2),
+        Column("empty", itemgetter(4), rank=9),
+    ),
+    [("cornell-box", "12.3", "no light between surfaces", "4 ms", "")],
+)
+
+
+@pytest.mark.parametrize(
+    ("width", "headings", "left_out"),
+    [
+        (120, "scene mean why time", ""),
+        (32, "scene mean why time", ""),
+        (31, "scene mean time", "why: "),
+        (21, "scene mean", "time, why: "),
+        (9, "scene", "mean, time, why: "),
+    ],
+)
+def test_columns_are_left_out_by_rank_where_they_do_not_fit(width, headings, left_out):
+    first, *others = printed(RANKED, width)
+    assert first.split() == headings.split()
+    table = others[:-1] if left_out else others
+    assert max(map(len, [first, *table])) <= width
+    assert others[-1].startswith(left_out)
+    assert (f"not in {width} characters, but in 120" in others[-1]) is bool(left_out)
+
+
+@pytest.mark.parametrize("share", [0.01, 0.05, 0.4])
+def test_the_table_of_scenes_fits_and_marks_what_is_undecided(share):
+    """As a terminal of 120 or 80 characters shows it."""
+    lead = records.summary(3.0)
+    spread = 0.02 if share == 0.05 else 0.0
+    shares = tuple(
+        VisibleShare(threshold=t, value=share, low=share - spread, high=share + spread)
+        for t in THRESHOLDS
+    )
+    lead = structs.replace(lead, visible=shares)
+    made = [
+        records.record(scene="scenes/" + "x" * length, metrics={"dE2000": lead})
+        for length in (3, 90)
+    ]
+    for width in (120, 80):
+        lines = [*printed(tables.scenes(made, 2.0), width)]
+        assert max(map(len, lines)) <= width
+    assert any("? 5.00 %" in line for line in lines) is (share == 0.05)
+    assert ("nothing" in " ".join(printed(tables.scenes(made, 2.0)))) is (share == 0.01)

@@ -29,6 +29,7 @@ from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files
 from fotismos.reports.terminal import progress
+from fotismos.reports.terminal.table import printed, room
 from fotismos.reports.terminal.words import as_typed, remark, tell, tell_where
 
 if TYPE_CHECKING:  # a comparison has no hard cases
@@ -233,6 +234,8 @@ def compare_all(
                         batch.hard_cases, batch.stages[task.name] = outcome.result()
                     else:
                         batch.take(task.name, outcome)
+                        done = [view.record for view in batch.views.values()]
+                        shown.rows = [*printed(tables.scenes(done, job.within), room())]
         except KeyboardInterrupt:
             # No process may write while the results are put together.
             pool.end()
@@ -315,5 +318,6 @@ def _write(batch: Batch, is_interrupted: bool = False) -> None:
             verdict.savings(records),
         ]
         tell(filter(None, sentences))
-        tell(verdict.advice([view.studied for view in views], batch.within))
+        views.sort(key=lambda view: tables.extent(view.record, batch.within), reverse=True)
+        tell(verdict.advice([view.studied for view in views[: page.WORST]], batch.within))
     tell_where(folder / results.PAGE)

@@ -6,12 +6,15 @@ written as Markdown and CSV.
 
 import csv
 import re
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from operator import attrgetter, itemgetter
+from shutil import get_terminal_size
 from typing import Any, NamedTuple
 
+from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
@@ -21,6 +24,9 @@ from fotismos.reports.terminal.words import visible
 
 WIDTH = 120
 """Characters per line of a printed table; longer cells are folded."""
+
+GAP = 2
+"""Characters between two columns."""
 
 Form = Callable[[Any], str]
 """How the numbers of a column are written."""
@@ -41,6 +47,9 @@ class Column:
     number, an interval, of which both ends are shown, or several of these. On a terminal, columns
     stand left unless they are to stand right. On a page, numbers stand right, and texts left. The
     heading is a term of the glossary where it needs an explanation; its ``detail`` is none.
+
+    Where there is too little room, columns are left out, the largest ``rank`` first; those of rank
+    0 stay. A column with a ``fold`` needs no more characters than that, and folds longer cells.
     """
 
     heading: str
@@ -48,6 +57,8 @@ class Column:
     form: Form | None = None
     detail: str = ""
     is_right: bool = False
+    rank: int = 0
+    fold: int = WIDTH
 
     @property
     def is_text(self) -> bool:
@@ -114,19 +125,51 @@ class Table:
         return [[column.text(row) for column in self.columns] for row in self.rows]
 
 
-def printed(table: Table) -> Iterator[str]:
-    """Return the lines of a table, the same on a terminal and in a file."""
-    shown = RichTable(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-    for column in table.columns:
+def room() -> int:
+    """Return the characters per line: a terminal's, at most `WIDTH`, and `WIDTH` elsewhere."""
+    return min(get_terminal_size((WIDTH, 0)).columns, WIDTH) if sys.stdout.isatty() else WIDTH
+
+
+def printed(table: Table, width: int = WIDTH) -> Iterator[str]:
+    """Yield the lines of a table, the same on a terminal and in a file; what it leaves out, last.
+
+    Columns with a rank whose cells are all empty are left out without a word.
+    """
+    kept = [column for column in table.columns if not column.rank or _has_text(column, table.rows)]
+    left_out = []
+    while _needed(kept, table.rows) > width and (last := max(kept, key=lambda c: c.rank)).rank:
+        kept.remove(last)
+        left_out.append(last.title)
+    shown = RichTable(box=None, pad_edge=False, padding=(0, GAP, 0, 0))
+    for column in kept:
         justify: Any = "right" if column.is_right else "left"
-        shown.add_column(column.title, overflow="fold", justify=justify)
+        # Only what may be folded gives way.
+        is_firm = column.fold == WIDTH and any(other.fold < WIDTH for other in kept)
+        shown.add_column(column.title, overflow="fold", justify=justify, no_wrap=is_firm)
     # As Text, since rich would read brackets in a string as markup.
-    for row in table.texts():
+    for row in Table(kept, table.rows).texts():
         shown.add_row(*(Text(visible(cell)) for cell in row))
-    console = Console(width=WIDTH, color_system=None)
+    console = Console(width=width, color_system=None)
     with console.capture() as capture:
         console.print(shown)
-    return (line.rstrip() for line in capture.get().splitlines())
+    yield from (line.rstrip() for line in capture.get().splitlines())
+    if left_out:
+        names = ", ".join(reversed(left_out))
+        yield f"{names}: not in {width} characters, but in {WIDTH}, and on the page"
+
+
+def _has_text(column: Column, rows: Sequence[Any]) -> bool:
+    return any(column.text(row) for row in rows)
+
+
+def _needed(columns: Sequence[Column], rows: Sequence[Any]) -> int:
+    """Return the characters that columns need, as far as they do not fold."""
+    cells = [[column.title, *map(column.text, rows)] for column in columns]
+    widths = [
+        min(max(map(cell_len, texts)), column.fold)
+        for column, texts in zip(columns, cells, strict=True)
+    ]
+    return sum(widths) + GAP * (len(widths) - 1)
 
 
 def markdown(table: Table, texts: Sequence[Sequence[str]] | None = None) -> Iterator[str]:
