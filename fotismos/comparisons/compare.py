@@ -7,13 +7,12 @@ The seed of pass ``i`` is hashed from the run's seed and ``i``.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
 from threading import Thread
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec import structs
@@ -57,7 +56,6 @@ def compare(
     options: Options | None = None,
     progress: Progress | None = None,
     command: str = "",
-    alone: AbstractContextManager[Any] | None = None,
     then: Sequence[Step] = (),
 ) -> Comparison:
     """Compare the textbook half of a scene with the physical one, in the current variant.
@@ -66,8 +64,7 @@ def compare(
     after each pass; with a noise target, ``total`` is the limit. The steps ``then`` add to the
     comparison, one after the other (:mod:`fotismos.comparisons.steps`). Raises `InputError` if the
     scene cannot be read or paired, no pixel sees a surface, or both halves are black;
-    `NonFiniteError` for a NaN or an infinity in a rendering. Times are taken within the context
-    ``alone``.
+    `NonFiniteError` for a NaN or an infinity in a rendering.
     """
     from fotismos.comparisons.prepared import guarded  # loaded late: two pictures need no Mitsuba
     from fotismos.reference.scene.source import collect_messages, count_messages  # the same
@@ -76,7 +73,7 @@ def compare(
     printed: list[str] = []
     with collect_messages(printed):
         halves = guarded(source, options)
-        comparison = look(halves, command, progress, alone)
+        comparison = look(halves, command, progress)
     comparison = comparison.warned(count_messages([*source.messages, *printed]))
     return finish(comparison, halves, then, progress)
 
@@ -98,7 +95,6 @@ def look(
     halves: Halves,
     command: str = "",
     progress: Progress | None = None,
-    alone: AbstractContextManager[Any] | None = None,
 ) -> Comparison:
     """Take the passes of both halves, and measure what a page shows first; see :func:`compare`.
 
@@ -114,7 +110,7 @@ def look(
         stages[stage] = now - begin - elsewhere
         begin = now
 
-    # The passes, and their times.
+    # The passes.
     first = halves.first
     second = halves.second
     images, noise_target = render(halves, progress)
@@ -123,8 +119,6 @@ def look(
     done("sums of passes", sum(first.times) + sum(second.times))
     if first.preparation:
         stages["preparation"] = first.preparation
-    price = halves.price(alone)
-    done("timing")
 
     # The departure.
     if COMPUTED_TWICE.needs <= halves.has:
@@ -163,7 +157,6 @@ def look(
         pixels=Pixels(counted=int(counted.sum()), total=counted.size),
         regions=regions.find(maps[LEADING.name], counted),
         time=TimeSpent(heuristic=first.pass_times(), reference=second.pass_times(), stages=stages),
-        price=price,
         versions=versions(halves.libraries),
         command=command,
         caution=caution,
@@ -231,7 +224,9 @@ def _with_other_metrics(
     maps |= images.maps
     record = structs.replace(record, metrics={name: summaries[name] for name in METRICS})
     drawn = {name: maps[name] for name in (*METRICS, RATIO.name) if name in maps}
-    whole = replace(comparison, record=record, images=replace(images, maps=drawn, difference=None))
+    assert images.difference is not None, "not all is measured yet"
+    images = replace(images, maps=drawn, difference=None, grouped=images.difference.grouped)
+    whole = replace(comparison, record=record, images=images)
     return whole.timed("metrics", record.time.stages["metrics"] + perf_counter() - begin)
 
 

@@ -9,7 +9,6 @@ kind of source a half is.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -22,7 +21,7 @@ from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.estimate import NoiseShown
 from fotismos.comparisons.departure.metrics import METRICS, Metric, leading_distance
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.records.comparison import PictureFiles, Price
+from fotismos.comparisons.records.comparison import PictureFiles
 from fotismos.comparisons.records.images import Comparison, Images
 from fotismos.heuristic.program import PICTURE_LIBRARIES
 from fotismos.reference.rendering.passes import PassSource, Progress
@@ -162,10 +161,6 @@ class Halves:
     def fields(self, passes: int) -> dict[str, Any]:
         """Return the fields of the record that follow from the sources, after some passes."""
         return dict(self.pictures)
-
-    def price(self, alone: AbstractContextManager[Any] | None) -> Price | None:
-        """Return the times per sample of both halves; None of a second half that is a picture."""
-        return None
 
     def caution(self, test: np.ndarray, reference: np.ndarray) -> str:
         """Return why the error of linear images (H, W, 3) may mean nothing; often empty."""

@@ -2,7 +2,6 @@
 
 import gc
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from time import perf_counter
@@ -14,12 +13,10 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from fotismos.comparisons import timing
 from fotismos.comparisons.departure import regions
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.halves import Halves, Part
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.records.comparison import Price
 from fotismos.comparisons.records.images import Images
 from fotismos.heuristic import meshes
 from fotismos.heuristic.convention import Scene
@@ -222,19 +219,6 @@ class Prepared(Halves):
             "overridden": self.overridden,
             "warnings": tuple(self.warnings()),
         }
-
-    def price(self, alone: AbstractContextManager[Any] | None) -> Price | None:
-        if "physical" not in self.has:
-            return None
-        if "textbook" not in self.has:
-            return timing.untimed(self.reference)
-        return timing.measure(
-            self.heuristic,
-            self.reference,
-            everything=self.unpruned,
-            seed=self.options.seed,
-            alone=alone,
-        )
 
     def caution(self, test: np.ndarray, reference: np.ndarray) -> str:
         return self.doubt() or self.require_light(test, reference)

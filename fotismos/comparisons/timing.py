@@ -14,25 +14,17 @@ Intervals come from rounds drawn again with replacement, the same for all method
 for ratios and differences too. What no round shows, such as where the memory of a process lies,
 moves a time by :data:`UNSEEN`.
 
-A study of cost (:mod:`fotismos.comparisons.cost.measure`) times many methods so, and a comparison
-its halves, after compilation and with the processor's threads awake.
+A study of cost (:mod:`fotismos.comparisons.cost.measure`) times methods so.
 """
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fotismos.comparisons.records.comparison import FEWEST_SPP, Price
 from fotismos.heuristic.convention import Floats
-from fotismos.reference.records import Interval, Missing
-from fotismos.reference.rendering.gbuffer import size_of_width
-from fotismos.reference.rendering.passes import Size, Stream, passes
-from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, warm
+from fotismos.reference.records import Interval
 
 DRAWS = 400
 """Sets of rounds drawn for an interval."""
@@ -140,132 +132,3 @@ def difference(steps: Iterable[tuple[float, Line, Line]], samples: int) -> Inter
         total = total + weight * (after.per_sample - before.per_sample)
         unseen += [weight * line.per_sample[0] for line in (before, after)]
     return interval(samples * total, UNSEEN * samples * float(np.linalg.norm(unseen)))
-
-
-# --- The halves of a comparison -----------------------------------------------------------------
-
-WIDTH = 128
-"""Width of the pictures that are timed, whatever the film's is: a ratio is the same everywhere."""
-
-LONG_S = 0.015
-"""Seconds that the picture with more samples takes, at least, if the film allows so many."""
-
-BUDGET_S = 0.4
-FEWEST = 6
-MOST = 15
-ATTEMPTS = 4
-"""Seconds that all rounds take, their number, and how often they are repeated, if need be."""
-
-WIDEST = 0.3
-"""The widest interval that a ratio may have, over the ratio."""
-
-TOO_WIDE = Missing("passes too short, or the machine too busy, to time within 30 %")
-NOT_TIMED = Missing("a picture's time is not known")
-
-
-def measure(
-    heuristic: Renderer,
-    reference: Renderer,
-    everything: Renderer | None,
-    seed: int,
-    alone: AbstractContextManager[Any] | None = None,
-) -> Price:
-    """Return the times of both halves, their ratio, and what pruning saves.
-
-    ``everything`` renders the physical half with everything simulated, if its plan leaves out
-    something. Times are taken within the context ``alone``.
-    """
-    halves = {"heuristic": heuristic, "reference": reference}
-    if everything is not None:
-        halves["everything"] = everything
-    width, height = reference.size
-    size = size_of_width(reference.scene, reference.size, WIDTH)
-    pairs = {name: _pair(half, size) for name, half in halves.items()}
-    # Compiling is over: only what is timed needs the machine alone.
-    with alone or nullcontext():
-        found, of_halves = _of_pairs(pairs, size, seed)
-    is_known = _is_narrow(of_halves)
-    return Price(
-        ratio=of_halves if is_known else None,
-        reason="" if is_known else TOO_WIDE.reason,
-        heuristic_s=float(found["heuristic"].per_sample[0]),
-        reference_s=float(found["reference"].per_sample[0]),
-        everything_s=float(found["everything"].per_sample[0]) if everything else None,
-        pixels=width * height,
-    )
-
-
-def untimed(reference: Renderer) -> Price:
-    """Return the price of a physical half beside a picture, whose time is not known."""
-    width, height = reference.size
-    pixels = width * height
-    return Price(
-        ratio=None,
-        reason=NOT_TIMED.reason,
-        heuristic_s=None,
-        reference_s=min(reference.times) / (reference.pass_spp * pixels),
-        pixels=pixels,
-    )
-
-
-def _of_pairs(
-    pairs: Mapping[str, tuple[Renderer, Renderer]], size: Size, seed: int
-) -> tuple[dict[str, Line], Interval]:
-    """Time pairs of renderers until the ratio of the halves is known, or the machine too busy.
-
-    Returns the time of each pair as a line over samples, and the ratio.
-    """
-    renderers = [renderer for pair in pairs.values() for renderer in pair]
-    # What a round takes tells how many there are.
-    round_s = sum(renderer.times[-1] for renderer in renderers)
-    rounds = int(np.clip(BUDGET_S / round_s, FEWEST, MOST))
-    for renderer in renderers:
-        renderer.times.clear()
-        renderer.processor_times.clear()
-    for _ in range(ATTEMPTS):
-        for _ in passes(renderers, seed, rounds, size=size, stream=Stream.PROBE):
-            pass
-        found = lines(
-            {
-                name: {
-                    renderer.pass_spp * size[0] * size[1]: (
-                        renderer.times,
-                        renderer.processor_times,
-                    )
-                    for renderer in pair
-                }
-                for name, pair in pairs.items()
-            }
-        )
-        of_halves = ratio(found["reference"], found["heuristic"])
-        if _is_narrow(of_halves):
-            break
-    return found, of_halves
-
-
-def _is_narrow(found: Interval) -> bool:
-    """Return whether a ratio is known well enough to be stated."""
-    return found.high - found.low <= WIDEST * found.value
-
-
-def _pair(half: Renderer, size: Size) -> tuple[Renderer, Renderer]:
-    """Return a half with few and with more samples, at a size, both warm."""
-    fewer = more = _warm(half, FEWEST_SPP, size)
-    most = LARGEST_PASS // (size[0] * size[1])
-    # Powers of 4: each new count compiles.
-    while more.times[-1] < LONG_S:
-        steps = math.ceil(math.log(LONG_S / more.times[-1], 4))
-        spp = more.pass_spp * 4**steps
-        if spp > most:
-            break
-        more = _warm(half, spp, size)
-    if more is fewer:  # a slow scene, or a large film
-        more = _warm(half, 4 * FEWEST_SPP, size)
-    return fewer, more
-
-
-def _warm(half: Renderer, spp: int, size: Size) -> Renderer:
-    """Return a half with some samples per pixel, which is warm."""
-    renderer = half.sampled(spp)
-    warm(renderer, size)
-    return renderer

@@ -16,7 +16,7 @@ import click
 from msgspec import Meta
 
 from fotismos.comparisons.options import Declaration, Options, option
-from fotismos.comparisons.processes.pool import CAN_SHARE, Pool
+from fotismos.comparisons.processes.pool import HAS_GROUPS, Pool
 from fotismos.heuristic import llvm, program
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.program import cores
@@ -124,7 +124,7 @@ class Terminal(Declaration, frozen=True, kw_only=True):
         There are at most as many as ``tasks``, ``workers`` or else cores. A Dask cluster has its
         own limits. With no workers, this process does it all.
         """
-        if self.scheduler is None and (self.workers == 0 or not CAN_SHARE):
+        if self.scheduler is None and (self.workers == 0 or not HAS_GROUPS):
             return Pool(0, ProcessSetup(level(), None))
         if self.scheduler is None:
             workers = min(self.workers or cores(), max(1, tasks))

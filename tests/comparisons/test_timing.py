@@ -1,114 +1,113 @@
-"""Ratios of times: alternating order, intervals, and the refusal to name one."""
+"""Times per sample: turns of methods, their ratios and intervals, beside other work."""
 
 from contextlib import nullcontext
-from copy import copy
 
 import numpy as np
 import pytest
 
-from fotismos.comparisons import timing
+from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
+from fotismos.comparisons.ladder import turns
+from fotismos.comparisons.ladder.turns import TURNS, Time
 from fotismos.comparisons.options import Options
-from fotismos.reference.records import plain
-from fotismos.reference.scene.source import Source
+from fotismos.comparisons.prepared import prepare
+from fotismos.comparisons.steps import PRICE
 from fotismos.reports import tables
 from fotismos.reports.terminal.words import number
-from tests.shared.misplanned import DIFFUSE, lamp, scene
-from tests.shared.parts import moved
+
+SIZE = (64, 64)
+SPP = 64
 
 
 class Timed:
-    """A renderer whose pictures take an overhead and a time per sample, on a busy machine."""
+    """A renderer whose kernels take a time per sample, and Python an overhead.
 
-    def __init__(self, per_sample, busy, rng, spread=0.01):
+    Other work slows both halves of a turn by about the same factor, and single pictures by more.
+    """
+
+    variant = "llvm_ad_rgb"
+    pass_spp = SPP
+
+    def __init__(self, per_sample, busy, rng, burden):
         self.per_sample = per_sample
         self.busy = busy
         self.rng = rng
-        self.spread = spread
-        self.scene = None
-        self.size = (64, 64)
-        self.variant = "llvm_ad_rgb"
+        self.burden = burden
+        self.times = []
+        self.processor_times = []
+        self.kernel_times = []
 
     def active(self):
         return nullcontext()
 
-    def sampled(self, pass_spp):
-        other = copy(self)
-        other.pass_spp = pass_spp
-        other.times = []
-        other.processor_times = []
-        return other
-
     def passes(self, count, size, stream, seed):
-        for _ in range(count):
-            yield self.render(seed, size)
-
-    def render(self, seed, size):
-        seconds = 2e-3 + self.per_sample * self.pass_spp * size[0] * size[1]
-        seconds *= 1 + abs(self.rng.normal(0, self.spread))
-        other_work = self.rng.uniform(0, 2) if self.rng.random() < self.busy else 0.0
-        self.times.append(seconds * (1 + other_work))
-        # Other programs hardly change the time that two processors work.
-        self.processor_times.append(2 * seconds)
-
-
-@pytest.fixture
-def unscaled(monkeypatch):
-    """Renderers of a test have no film."""
-    monkeypatch.setattr(timing, "size_of_width", lambda scene, size, width: (width, width))
+        for turn in range(count):
+            kernel = self.per_sample * SPP * size[0] * size[1] * self.rng.normal(1, 0.01)
+            kernel *= self.burden[turn]
+            if self.rng.random() < self.busy / 4:
+                kernel *= self.rng.uniform(1, 3)
+            # The half that comes first after a pause pays for it, and the first picture compiles.
+            overhead = 2e-3 + self.rng.uniform(0, 5e-3) + (turn == 0)
+            self.kernel_times.append(kernel * (3 if turn == 0 else 1))
+            self.times.append(kernel + overhead)
+            self.processor_times.append(kernel + overhead)
+            yield None
 
 
-@pytest.mark.guarantee(
-    "attribution", "Ratios of a comparison's times are within their interval of 30 %, or absent."
-)
+def found(truth, busy, rng, per_sample=1e-8):
+    """The ratio of two renderers that took turns, and the time of the first."""
+    burden = 1 + busy * rng.uniform(0, 2, TURNS + 1)
+    seconds = {"textbook": per_sample, "plan": truth * per_sample}
+    halves = {name: Timed(time, busy, rng, burden) for name, time in seconds.items()}
+    for _ in turns.in_turn(halves, 0, TURNS, size=SIZE):
+        pass
+    times = {name: Time.of(half, SIZE, TURNS) for name, half in halves.items()}
+    return turns.ratio(times["plan"], times["textbook"]), times["textbook"]
+
+
+@pytest.mark.guarantee("attribution", "Ratios of times hold beside other work on the machine.")
 @pytest.mark.parametrize("busy", [0.0, 0.2, 0.5])
 @pytest.mark.parametrize("truth", [0.5, 1.0, 7.0])
-def test_a_ratio_is_the_true_one_or_absent(rgb, unscaled, busy, truth):
-    """Other work adds up to twice the time to a share of the pictures; overhead is the same."""
+def test_ratios_and_their_intervals_hold_beside_other_work(busy, truth):
+    """Other work adds up to the time itself to both, and up to twice the time to single ones."""
     rng = np.random.default_rng(0)
-    prices = []
-    for _ in range(60):
-        halves = [Timed(per_sample, busy, rng) for per_sample in (1e-8, truth * 1e-8)]
-        prices.append(timing.measure(*halves, everything=None, seed=0))
-    ratios = [price.ratio for price in prices if price.ratio is not None]
-    assert len(ratios) > 45
-    assert all(ratio.high - ratio.low <= timing.WIDEST * ratio.value for ratio in ratios)
-    assert np.mean([ratio.low < truth < ratio.high for ratio in ratios]) > 0.9
-    assert np.mean([abs(ratio.value / truth - 1) < 0.15 for ratio in ratios]) > 0.95
+    ratios = [found(truth, busy, rng)[0] for _ in range(100)]
+    assert np.mean([ratio.low < truth < ratio.high for ratio in ratios]) > 0.93
+    assert np.mean([abs(ratio.value / truth - 1) < 0.1 for ratio in ratios]) > 0.95
 
 
-def test_a_ratio_that_is_not_known_is_timed_again(rgb, unscaled, monkeypatch):
-    rng = np.random.default_rng(0)
-
-    def known():
-        halves = [[Timed(1e-8, 0.0, rng, spread=0.5) for _ in range(2)] for _ in range(30)]
-        prices = [timing.measure(*pair, everything=None, seed=0) for pair in halves]
-        return sum(price.ratio is not None for price in prices)
-
-    often = known()
-    monkeypatch.setattr(timing, "ATTEMPTS", 1)
-    assert known() < 0.7 * often
+def test_what_is_not_of_the_kernels_is_overhead():
+    ratio, time = found(1.0, 0.0, np.random.default_rng(1), per_sample=1e-9)
+    assert ratio.value == pytest.approx(1.0, rel=0.03)
+    assert np.median(time.per_sample) == pytest.approx(1e-9, rel=0.02)
+    assert 2e-3 < np.median(time.overhead) < 7e-3
 
 
-def comparison(spp=64):
-    floor = {"type": "rectangle", "to_world": moved((0, 0, -1), 4), "bsdf": DIFFUSE}
-    described = scene(floor=floor, lamp=lamp((0, -3, 0)))
-    return compare(Source("a test", described), Options(spp=spp)).record
+@pytest.mark.parametrize("count", [2, 3, 5, 6, 7, 15])
+def test_intervals_of_a_median_hold_it(count):
+    rng = np.random.default_rng(2)
+    held = 0
+    for _ in range(2000):
+        interval = turns.middle(rng.normal(5.0, 1.0, count))
+        held += interval.low <= 5.0 <= interval.high
+    assert held / 2000 > 0.93
 
 
-@pytest.mark.thorough
-def test_the_record_has_the_ratio_that_is_shown(rgb):
-    record = comparison()
-    price = plain(record)["price"]
-    assert price["reason"] == ("" if price["ratio"] else timing.TOO_WIDE.reason)
+def test_a_picture_of_any_size_takes_a_few_milliseconds_of_samples(rgb):
+    for size in ((2, 1), (40, 30), (64, 64), (512, 384)):
+        half = prepare(open_case("lambert-sphere", Options(resolution=size)).source).reference
+        half.size = size
+        timed, spp = turns.timed_size(half)
+        assert timed == size or timed[0] * timed[1] <= turns.PIXELS
+        assert turns.SAMPLES / 2 < timed[0] * timed[1] * spp <= turns.SAMPLES
+        assert timed[0] / timed[1] == pytest.approx(size[0] / size[1], rel=0.02)
+        assert spp & (spp - 1) == 0
+
+
+def test_the_lines_and_the_record_have_the_same_ratio(rgb):
+    case = open_case("lambert-sphere", Options(resolution=(24, 16), spp=16))
+    record = compare(case.source, case.options, then=[PRICE]).record
+    ratio = record.price.ratio
+    assert ratio.low <= ratio.value <= ratio.high
     printed = "\n".join(tables.details(record))
-    if price["ratio"]:
-        assert f"sample: {number(price['ratio']['value'])} times the textbook's" in printed
-        assert price["ratio"]["low"] <= price["ratio"]["value"] <= price["ratio"]["high"]
-
-
-def test_verbose_lines_say_why_there_is_no_ratio(rgb, monkeypatch):
-    monkeypatch.setattr(timing, "WIDEST", 0.0)
-    record = comparison()
-    assert plain(record)["price"]["ratio"] is None
-    assert f"  time of a physical sample: {timing.TOO_WIDE.reason}" in tables.details(record)
+    assert f"sample: {number(ratio.value)} times the textbook's" in printed

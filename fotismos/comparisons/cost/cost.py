@@ -1,6 +1,5 @@
 """Study what accuracy costs on one scene."""
 
-from contextlib import AbstractContextManager
 from typing import Any
 
 import drjit as dr
@@ -52,7 +51,6 @@ def cost(
     command: str = "",
     at: Size | None = None,
     causes: Causes | None = None,
-    alone: AbstractContextManager[Any] | None = None,
     engine_times: EngineTimes | None = None,
 ) -> Study[Cost]:
     """Study what accuracy costs on one scene, in the current variant.
@@ -60,7 +58,7 @@ def cost(
     For ``source``, ``options``, ``progress`` and ``command`` see
     :func:`fotismos.comparisons.compare.compare`, and
     :func:`fotismos.comparisons.cost.measure.measure_ladder` for an omitted resolution,
-    ``options.spp`` and ``alone``. ``at`` is a size to predict for: times follow from overhead and
+    ``options.spp``. ``at`` is a size to predict for: times follow from overhead and
     time per sample, while errors are not predicted. ``causes`` are those of the scene, if known.
     With ``engine_times``, pictures of another renderer are judged, too, and their size becomes that
     of the study.
@@ -83,7 +81,7 @@ def cost(
     if at:
         size = options.resolution or reduced(source, options.changed(resolution=at), WIDTH)
         require_shape(at, size)
-    found = measure_ladder(source, options, effort=effort, progress=progress, at=at, alone=alone)
+    found = measure_ladder(source, options, effort=effort, progress=progress, at=at)
     options = found.options
     ready = found.ready
     ladder = found.ladder
@@ -154,12 +152,11 @@ def quick(
     causes: Causes,
     progress: Progress,
     command: str,
-    alone: AbstractContextManager[Any],
 ) -> Study[Cost]:
     """Study a compared scene with less effort, and predict for its own size; see :func:`cost`."""
     whole = requested(source, options)
     small = options.changed(resolution=reduced(source, options, QUICK_WIDTH), spp=None)
-    return cost(source, small, QUICK, progress, command, whole, causes=causes, alone=alone)
+    return cost(source, small, QUICK, progress, command, whole, causes=causes)
 
 
 def require_shape(target: Size, size: Size) -> None:

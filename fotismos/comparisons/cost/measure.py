@@ -7,7 +7,6 @@ sample of it. Each round has its own seed, so the errors of the rounds are indep
 
 import gc
 from collections.abc import Callable, Collection, Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from itertools import count as count_from
 from itertools import takewhile
@@ -152,13 +151,11 @@ def measure_ladder(
     effort: Effort,
     progress: Progress,
     at: Size | None = None,
-    alone: AbstractContextManager[Any] | None = None,
 ) -> Measurements:
     """Measure every method of a scene's ladder, in the current variant.
 
     If ``options.resolution`` is omitted, that of ``at``, or of the film, is reduced to
-    :data:`WIDTH`. ``options.spp`` is the largest sample count of a Monte Carlo method. Times are
-    measured within the context ``alone``.
+    :data:`WIDTH`. ``options.spp`` is the largest sample count of a Monte Carlo method.
     """
     options.require_model("a study of cost")
     if options.resolution is None:
@@ -185,11 +182,9 @@ def measure_ladder(
         counts, pixels=size[0] * size[1], progress=progress,
     )  # fmt: skip
     judged = {(method.name, spp) for method in ladder.methods for spp in counts[method.name]}
-    # Compiling is over: only images that are timed need the machine alone.
-    with alone or nullcontext():
-        errors, images = rendered(
-            renderers, judge, judged, effort.rounds, options.seed, progress, "timing"
-        )
+    errors, images = rendered(
+        renderers, judge, judged, effort.rounds, options.seed, progress, "timing"
+    )
     found = timed(renderers, effort.rounds, size[0] * size[1], options.seed)
     methods = tuple(
         timed_method(

@@ -2,8 +2,7 @@
 
 A process does task after task, so its start-up is paid once. A new one replaces one that died, or
 that ran a user's script. Each leads its own process group, which ends as a whole: with the process,
-when its time is up, or when the parent ends in any way. The processes of a command take turns:
-while one measures times, the others wait.
+when its time is up, or when the parent ends in any way.
 """
 
 import logging
@@ -12,26 +11,20 @@ import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import islice
 from math import inf
 from multiprocessing import connection, get_context, parent_process, resource_tracker
-from pathlib import Path
 from time import monotonic, sleep
-from typing import Any, NoReturn, Self
+from typing import Any, NoReturn
 
 from fotismos.comparisons.processes.interruption import SIGNALS, held_back
 from fotismos.heuristic.errors import FotismosError, InputError, LostProcessError
 
-try:
-    import fcntl
-except ImportError:  # Windows, where tasks are done in one process
-    CAN_SHARE = False
-else:
-    CAN_SHARE = True
-"""Whether processes can take turns, and end with their groups."""
+HAS_GROUPS = hasattr(os, "killpg")
+"""Whether processes can end with their groups; on Windows, tasks are done in one process."""
 
 LOOK_S = 1.0
 """Seconds between checks that a process lives: its forks may hold its pipe open."""
@@ -319,62 +312,3 @@ def _send(pipe: Any, kind: str, content: Any) -> None:
     except Exception as error:  # pickling can raise anything
         reason = f"its result cannot be sent: {type(error).__name__}: {error}"
         pipe.send(("failure", LostProcessError(reason)))
-
-
-# --- Turns --------------------------------------------------------------------------------------
-
-
-class Turn:
-    """A turn of a process among those that share a folder; within this context it works.
-
-    Working processes share a lock on the folder. One that measures has it alone, and first takes
-    that of a subfolder: a process that begins to work waits there, so that it never comes first.
-    Where processes cannot share locks, there is only one.
-    """
-
-    def __init__(self, folder: Path, gate: Path) -> None:
-        self._folder = folder
-        self._gate = gate
-
-    def __enter__(self) -> Self:
-        if CAN_SHARE:
-            self._file = os.open(self._folder, os.O_RDONLY)
-            with self._at_gate():
-                fcntl.flock(self._file, fcntl.LOCK_SH)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if CAN_SHARE:
-            os.close(self._file)
-
-    def give_way(self) -> None:
-        """Wait while another process measures, or is about to."""
-        if not CAN_SHARE:
-            return
-        fcntl.flock(self._file, fcntl.LOCK_UN)
-        with self._at_gate():
-            fcntl.flock(self._file, fcntl.LOCK_SH)
-
-    @contextmanager
-    def alone(self) -> Iterator[None]:
-        """Wait until no other process works, and let none begin within this context."""
-        if not CAN_SHARE:
-            yield
-            return
-        # Two that kept their shared locks would wait for each other forever.
-        fcntl.flock(self._file, fcntl.LOCK_UN)
-        with self._at_gate():
-            fcntl.flock(self._file, fcntl.LOCK_EX)
-        try:
-            yield
-        finally:
-            fcntl.flock(self._file, fcntl.LOCK_SH)
-
-    @contextmanager
-    def _at_gate(self) -> Iterator[None]:
-        file = os.open(self._gate, os.O_RDONLY)
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX)
-            yield
-        finally:
-            os.close(file)

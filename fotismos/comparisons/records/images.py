@@ -13,7 +13,7 @@ from fotismos.comparisons.records.departure import Colour, VisibleShare
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Missing
-from fotismos.reference.rendering.sums import DifferenceEstimate
+from fotismos.reference.rendering.sums import DifferenceEstimate, Grouped
 
 Whole = NDArray[np.int64]
 
@@ -212,7 +212,8 @@ class Images:
     Two pictures without a scene have neither these nor ``position`` and ``normal``. ``light`` is
     the reference before its tone map, if it has one.
     ``terms`` are those of 8.10 in the textbook half, by layer, if it has any. ``difference`` is
-    that of the halves with its noise, until all is measured: it takes much memory.
+    that of the halves with its noise, until all is measured: it takes much memory. ``grouped`` are
+    its groups of passes at a sample of the pixels.
     """
 
     heuristic: np.ndarray
@@ -228,6 +229,7 @@ class Images:
     terms: dict[str, np.ndarray] = field(default_factory=dict)
     light: Light | None = None
     difference: DifferenceEstimate | None = None
+    grouped: Grouped | None = None
 
 
 NO_TERMS = Missing("Terms are traced with the causes, which were not asked for.")

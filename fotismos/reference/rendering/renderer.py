@@ -82,6 +82,7 @@ class Renderer:
         self.variant = mi.variant()
         self.times: list[float] = []
         self.processor_times: list[float] = []
+        self.kernel_times: list[float] = []
         self.compilation = 0.0
         self.warnings = warnings
         # A user's code may be impossible to record: NumPy ends the process. Mitsuba's tables of the
@@ -133,6 +134,7 @@ class Renderer:
             kernels = dr.kernel_history([dr.KernelType.JIT])
         # Dr.Jit counts milliseconds.
         self.compilation += sum(kernel["backend_time"] for kernel in kernels) / 1000
+        self.kernel_times.append(sum(kernel["execution_time"] for kernel in kernels) / 1000)
         # A variant of one channel.
         if image.shape[2] == 1:
             image = dr.repeat(image, 3, axis=2)
@@ -163,6 +165,7 @@ class Renderer:
         other.pass_spp = pass_spp
         other.times = []
         other.processor_times = []
+        other.kernel_times = []
         other.compilation = 0.0
         return other
 

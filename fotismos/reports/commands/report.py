@@ -65,7 +65,7 @@ class Report(WithOptions, frozen=True):
             cases = Task(
                 name="hard cases",
                 function=scene.hard_cases,
-                arguments=(terminal.output,),
+                arguments=(),
                 is_counted=False,
             )
             return batch.compare_all(pool, scene.subjects(tuple(SCENES)), job, terminal, cases)

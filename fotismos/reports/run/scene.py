@@ -11,7 +11,6 @@ from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.names import file_of, name_of, picture_parts
-from fotismos.comparisons.processes.pool import Turn
 from fotismos.comparisons.records.comparison import CAUSES, ComparisonRecord
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic import program
@@ -42,56 +41,48 @@ def compared(
     name: str, folder: Path, target: str, job: Job, progress: Any
 ) -> tuple[SceneView, Seconds]:
     """Compare a scene and write its files to ``folder/place``, unless it is finished there."""
-    with Turn(folder, folder / results.TABLES) as turn:
-        begin = perf_counter()
-        # A finished scene is recognised by its key.
-        case = open_case(name, job.options)
-        key = key_of(case, job)
-        view = None if job.fresh else scene_files.load(folder / target, key)
-        spent = {"finished scenes": perf_counter() - begin}
-        if view is not None:
-            return view, spent
+    begin = perf_counter()
+    # A finished scene is recognised by its key.
+    case = open_case(name, job.options)
+    key = key_of(case, job)
+    view = None if job.fresh else scene_files.load(folder / target, key)
+    spent = {"finished scenes": perf_counter() - begin}
+    if view is not None:
+        return view, spent
 
-        def in_turn(*state: Any) -> None:
-            """Show progress, after other processes have measured."""
-            turn.give_way()
-            progress(*state)
+    # Rendering, metrics and causes.
+    begin = perf_counter()
+    source = case.source
+    options = case.options
+    comparison = compare(
+        source,
+        options,
+        progress,
+        command=case.command(),
+        then=steps(why=job.with_causes),
+    )
+    spent = _stages(comparison.record, perf_counter() - begin)
+    # The costs of methods, for a few scenes.
+    costs = None
+    causes = comparison.causes
+    if case.word in job.ladders and causes:
+        from fotismos.comparisons.cost.cost import quick  # loaded late: for a handful of scenes
 
-        # Rendering, metrics and causes.
         begin = perf_counter()
-        source = case.source
-        options = case.options
-        comparison = compare(
+        command = case.command("cost")
+        costs = quick(
             source,
             options,
-            in_turn,
-            command=case.command(),
-            alone=turn.alone(),
-            then=steps(why=job.with_causes),
+            causes=causes,
+            progress=progress,
+            command=command,
         )
-        spent = _stages(comparison.record, perf_counter() - begin)
-        # The costs of methods, for a few scenes.
-        costs = None
-        causes = comparison.causes
-        if case.word in job.ladders and causes:
-            from fotismos.comparisons.cost.cost import quick  # loaded late: for a handful of scenes
-
-            begin = perf_counter()
-            command = case.command("cost")
-            costs = quick(
-                source,
-                options,
-                causes=causes,
-                progress=progress,
-                command=command,
-                alone=turn.alone(),
-            )
-            spent["methods"] = perf_counter() - begin
-        begin = perf_counter()
-        view = scene_files.write(
-            folder, target, comparison, costs=costs, key=key, with_figures=job.figures
-        )
-        return view, spent | {"files": perf_counter() - begin}
+        spent["methods"] = perf_counter() - begin
+    begin = perf_counter()
+    view = scene_files.write(
+        folder, target, comparison, costs=costs, key=key, with_figures=job.figures
+    )
+    return view, spent | {"files": perf_counter() - begin}
 
 
 def _stages(record: ComparisonRecord, seconds: float) -> Seconds:
@@ -100,23 +91,20 @@ def _stages(record: ComparisonRecord, seconds: float) -> Seconds:
     rendering = record.time.heuristic.total_s + record.time.reference.total_s
     spent = {
         "scenes and plans": stages["scene and pairing"] + stages["planning"] + stages["guard"],
-        "rendering": rendering
-        + stages.get("preparation", 0.0)
-        + stages["sums of passes"]
-        + stages["timing"],
+        "rendering": rendering + stages.get("preparation", 0.0) + stages["sums of passes"],
+        "times and samples": stages.get("price", 0.0),
         "terms": stages.get("terms", 0.0),
         CAUSES: stages.get(CAUSES, 0.0),
     }
     return spent | {"metrics": seconds - sum(spent.values())}
 
 
-def hard_cases(folder: Path) -> "tuple[HardCases, float]":
-    """Evaluate the hard cases; return them, and the seconds that it took in its turn."""
+def hard_cases() -> "tuple[HardCases, float]":
+    """Evaluate the hard cases; return them, and the seconds that it took."""
     from fotismos.comparisons.hard_cases import collect  # loaded late: only for a report
 
-    with Turn(folder, folder / results.TABLES):
-        begin = perf_counter()
-        return collect(), perf_counter() - begin
+    begin = perf_counter()
+    return collect(), perf_counter() - begin
 
 
 # --- Finished scenes -------------------------------------------------------------------------

@@ -1,0 +1,125 @@
+"""Time of a sample: methods take turns, and their kernels are timed.
+
+A picture takes an overhead and a time per sample. The kernels of a picture, timed by Dr.Jit, are
+the time of its samples; the rest of the picture's time, such as that of Python, is the overhead. So
+one number of samples is enough, and its kernel serves all others.
+
+In each turn every method renders one picture, in alternating order. Other work on the machine slows
+those that are next to each other alike, so a ratio is the median of the ratios of the turns. The
+first turn, which traces and compiles, is left out. Intervals are order statistics of the turns: the
+median lies between the least and the largest of n with a chance of ``1 − 2^(1 − n)``. With fewer
+turns than `FEWEST` that is too little, and they are Student's. What no turn shows, such as where
+the memory of a process lies, moves a time by :data:`UNSEEN`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import hypot, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fotismos.heuristic.convention import Floats
+from fotismos.reference.records import Interval
+from fotismos.reference.rendering.gbuffer import size_of_width
+from fotismos.reference.rendering.passes import Progress, Size, Stream, passes
+from fotismos.reference.rendering.renderer import Renderer
+from fotismos.reference.rendering.sums import student
+
+TURNS = 7
+"""Turns that are timed."""
+
+FEWEST = 6
+"""Turns from which on the least and the largest hold the median with 95 %."""
+
+PIXELS = 2**13
+"""Pixels of a timed picture, at most: larger films are reduced."""
+
+SAMPLES = 2**18
+"""Samples of a timed picture: enough for a kernel to take a few milliseconds."""
+
+UNSEEN = 0.02
+"""Half an interval of a time, at least, as a share of it: from one process to another."""
+
+
+@dataclass(frozen=True)
+class Time:
+    """Seconds of a method in each of T turns, (T,): of a sample, and of a picture beside them.
+
+    ``processors`` worked at once, in the median of the turns.
+    """
+
+    per_sample: Floats
+    overhead: Floats
+    processors: float
+
+    @classmethod
+    def of(cls, renderer: Renderer, size: Size, turns: int) -> Time:
+        """Return the time of the last turns of a renderer, with pictures of a size."""
+        kernels = np.array(renderer.kernel_times[-turns:])
+        whole = np.array(renderer.times[-turns:])
+        busy = np.array(renderer.processor_times[-turns:])
+        return cls(
+            per_sample=kernels / (renderer.pass_spp * size[0] * size[1]),
+            overhead=np.maximum(whole - kernels, 0.0),
+            processors=float(np.median(busy / whole)),
+        )
+
+
+def timed_size(renderer: Renderer) -> tuple[Size, int]:
+    """Return the size of a renderer's timed pictures, and their samples per pixel, a power of 2."""
+    columns, rows = renderer.size
+    size = renderer.size
+    if columns * rows > PIXELS:
+        width = max(1, int(sqrt(PIXELS * columns / rows)))
+        size = size_of_width(renderer.scene, size, width)
+    most = max(1, SAMPLES // (size[0] * size[1]))
+    return size, 2 ** (most.bit_length() - 1)
+
+
+def in_turn(
+    renderers: Mapping[str, Renderer],
+    seed: int,
+    turns: int,
+    *,
+    size: Size | None = None,
+    stream: Stream = Stream.PRICE,
+    progress: Progress | None = None,
+) -> Iterator[dict[str, Any]]:
+    """Yield the pictures of each turn, and of one before them, by the names of their methods."""
+    loop = passes(
+        [*renderers.values()],
+        seed,
+        turns + 1,
+        size=size,
+        stream=stream,
+        progress=progress,
+        stage="timing",
+    )
+    for images in loop:
+        yield dict(zip(renderers, images, strict=True))
+
+
+def middle(values: ArrayLike, unseen: float = 0.0) -> Interval:
+    """Return the median of turns with a 95 % interval, at least ``unseen`` to each side."""
+    ordered = np.sort(np.asarray(values, float))
+    count = len(ordered)
+    value = float(np.median(ordered))
+    below = value - float(ordered[0])
+    above = float(ordered[-1]) - value
+    if count < FEWEST:
+        error = float(np.std(ordered, ddof=1)) / sqrt(count)
+        below = above = student(0.0, error, count).high
+    # What turns show and what they cannot show are independent: squares add up.
+    return Interval(
+        value=value, low=value - hypot(below, unseen), high=value + hypot(above, unseen)
+    )
+
+
+def ratio(time: Time, to: Time) -> Interval:
+    """Return a time per sample over another's, from the same turns."""
+    values = time.per_sample / to.per_sample
+    return middle(values, 0.0 if time is to else UNSEEN * float(np.median(values)))
