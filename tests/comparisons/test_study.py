@@ -353,7 +353,7 @@ def test_the_command_writes_dataset_and_figures(run, tmp_path):
     file, out = tmp_path / "small.toml", tmp_path / "out"
     file.write_text(part("alpha = [0.2, 0.4]\nlight_angle = [0, 60]"))
     code, printed, messages = run("study", file, "-o", out)
-    assert (code, messages.splitlines()[-1]) == (0, "small: 4 of 4 points")
+    assert code == 0, messages
     assert dataset.read(out / "study/small/small.parquet").num_rows == 4
     assert "mean ΔE2000: least" in (out / "study/small/index.html").read_text(encoding="utf-8")
     assert "<svg" in (out / "study/small/figures/lobe.svg").read_text()
