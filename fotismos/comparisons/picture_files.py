@@ -37,7 +37,7 @@ from fotismos.comparisons.departure.colour import CHROMATICITIES, Array, from_sr
 from fotismos.comparisons.names import ARRAYS, PICTURES, picture_parts
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError, NonFiniteError, suggestion
-from fotismos.reference.rendering.finite import LARGEST_VALUE
+from fotismos.reference.rendering.passes import LARGEST_VALUE
 
 MOST_NEGATIVE = -1e-3
 """Below this, a negative value is more than rounding."""

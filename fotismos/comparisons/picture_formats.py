@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from fotismos.reference.rendering.finite import LARGEST_VALUE
+from fotismos.reference.rendering.passes import LARGEST_VALUE
 
 PFM_HEADER = re.compile(rb"(PF|Pf)\s+(\d{1,9})\s+(\d{1,9})\s+([-+.\deE]+)\s")
 """Kind, width, height and scale."""

@@ -32,6 +32,7 @@ from fotismos.reference.planning.guard import examine_plan
 from fotismos.reference.planning.plan import physical_integrator, plan
 from fotismos.reference.planning.plan_record import Guard, Plan
 from fotismos.reference.planning.rules import SAMPLED_AS_HIT
+from fotismos.reference.records import SAMPLER, STOCK_SAMPLER
 from fotismos.reference.rendering.direct import is_behind_two_lamps
 from fotismos.reference.rendering.gbuffer import (
     GBuffer,
@@ -40,7 +41,6 @@ from fotismos.reference.rendering.gbuffer import (
     image_size,
     require_surface,
 )
-from fotismos.reference.rendering.integrators import SAMPLER, STOCK_SAMPLER
 from fotismos.reference.rendering.passes import Size
 from fotismos.reference.rendering.renderer import LARGEST_PASS, Renderer, require_memory, variant
 from fotismos.reference.rendering.sampler import with_sampler

@@ -1,4 +1,4 @@
-"""Find LLVM, with which Dr.Jit compiles every kernel, and check it before use.
+"""Find LLVM, with which Dr.Jit compiles every kernel, and check it and Mitsuba before use.
 
 Dr.Jit reads ``DRJIT_LIBLLVM_PATH`` once, when first imported, and searches the system if the
 variable is not set. So `configure` runs before that import and points the variable at the installed
@@ -9,16 +9,24 @@ kernel aborts the whole process.
 import ctypes
 import importlib.metadata
 import os
+import re
 import sys
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
 from fotismos.heuristic.errors import InputError, InstallationError, unknown
-from fotismos.heuristic.mitsuba_version import require_mitsuba
+from fotismos.heuristic.program import installation
 
 VARIANTS = ("llvm_ad_rgb", "llvm_ad_spectral", "llvm_ad_mono")
 """The supported variants of Mitsuba."""
+
+MITSUBA_TESTED = (3, 9, 1)
+"""The version that the documentation's figures and this project's baselines were made with."""
+
+MITSUBA_VERSION = ".".join(map(str, MITSUBA_TESTED))
+MITSUBA_REQUIREMENT = f"mitsuba~={MITSUBA_VERSION}"
+"""What pip installs: this version, or a later one with the same first two numbers."""
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 WHEEL = "karellen-llvm-core"
@@ -195,3 +203,32 @@ def _description(llvm: LLVM) -> str:
     if _is_missing(llvm.path):
         return f"{path}, which is not a file"
     return f"{path}, which is not an LLVM library, or one older than 15"
+
+
+def require_mitsuba() -> None:
+    """Raise `InstallationError` unless the installed Mitsuba is one that fotismos works with."""
+    version = importlib.metadata.version("mitsuba")
+    numbers = _numbers(version)
+    if numbers < MITSUBA_TESTED or numbers[:2] != MITSUBA_TESTED[:2]:
+        major, minor, _ = MITSUBA_TESTED
+        raise InstallationError(
+            f"Mitsuba {version} is installed, and fotismos needs {MITSUBA_VERSION} or a later"
+            f" {major}.{minor}. Install it: {installation(MITSUBA_REQUIREMENT)}"
+        )
+
+
+def other_version() -> str:
+    """Return what to know of a Mitsuba that is not the tested one; empty if it is."""
+    version = importlib.metadata.version("mitsuba")
+    if version == MITSUBA_VERSION:
+        return ""
+    return (
+        f"The documentation's numbers are of Mitsuba {MITSUBA_VERSION}. With {version} the noise"
+        " may be another, and `check` may find that old baselines moved."
+    )
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """Return the numbers at the start of a version, such as (3, 9, 1) of ``3.9.1.post2``."""
+    start = re.match(r"\d+(\.\d+)*", version)
+    return tuple(map(int, start[0].split("."))) if start else ()

@@ -24,7 +24,7 @@ from fotismos.comparisons.departure.statistics import (
 from fotismos.comparisons.records.departure import Viewing
 from fotismos.heuristic.errors import InputError, InstallationError, NonFiniteError
 from fotismos.reference.records import plain
-from fotismos.reference.rendering.finite import require_finite
+from fotismos.reference.rendering.passes import require_finite
 from fotismos.reports.run import doctor
 
 pytestmark = pytest.mark.usefixtures("computed_by")

@@ -18,7 +18,6 @@ from fotismos.heuristic import program, user_shaders
 from fotismos.heuristic.errors import InputError, InstallationError
 from fotismos.heuristic.glsl import opengl as contexts
 from fotismos.heuristic.glsl import shader as glsl
-from fotismos.heuristic.glsl import source
 from fotismos.heuristic.heuristics import INPUTS, Heuristic, named
 from fotismos.reports.run import doctor
 from tests.shared.opengl import opengl
@@ -122,7 +121,7 @@ def shown(colour):
 
 FIELDS = (
     [(name, name) for name in ("position", "normal", "view", "ambient")]
-    + [(f"material.{name}", f"material.{name}") for name in source.MATERIAL]
+    + [(f"material.{name}", f"material.{name}") for name in glsl.MATERIAL]
     + [
         (f"lights[{number}].{name}", f"lights[{number}].{name}")
         for number in (0, 1)

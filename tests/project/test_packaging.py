@@ -7,7 +7,7 @@ from importlib import metadata
 import pytest
 
 from fotismos.comparisons.records.check import Change, CheckRecord
-from fotismos.heuristic import mitsuba_version
+from fotismos.heuristic import llvm
 from fotismos.heuristic.errors import InstallationError
 from fotismos.heuristic.program import __version__
 from fotismos.reports.ci import summary
@@ -38,8 +38,8 @@ def test_the_citation_has_the_version_and_its_date():
 
 
 def test_the_package_requires_the_range_that_is_checked():
-    assert mitsuba_version.REQUIREMENT in PROJECT["dependencies"]
-    pin = f"mitsuba=={mitsuba_version.NAME} "
+    assert llvm.MITSUBA_REQUIREMENT in PROJECT["dependencies"]
+    pin = f"mitsuba=={llvm.MITSUBA_VERSION} "
     for name in ("requirements.txt", "requirements-test.txt"):
         assert pin in (ROOT / name).read_text()
 
@@ -47,8 +47,8 @@ def test_the_package_requires_the_range_that_is_checked():
 @pytest.mark.parametrize("version", ["3.9.1", "3.9.2", "3.9.10", "3.9.1.post1"])
 def test_a_later_patch_of_mitsuba_is_allowed(version, installed):
     installed(version)
-    mitsuba_version.require_mitsuba()
-    assert bool(mitsuba_version.other_version()) == (version != "3.9.1")
+    llvm.require_mitsuba()
+    assert bool(llvm.other_version()) == (version != "3.9.1")
     (line,) = (line for line in doctor.version_lines() if line.startswith("mitsuba"))
     assert line.split() == ["mitsuba", version]
     said = " ".join(doctor.version_lines())
@@ -60,7 +60,7 @@ def test_another_mitsuba_is_refused_with_what_to_install(version, installed):
     installed(version)
     message = rf"Mitsuba {version} is installed.*needs 3\.9\.1 or a later 3\.9.*mitsuba~=3\.9\.1"
     with pytest.raises(InstallationError, match=message):
-        mitsuba_version.require_mitsuba()
+        llvm.require_mitsuba()
     code, _, said = command_line("doctor")
     assert (code, "Traceback" in said) == (2, False)
     assert re.search(message, said)

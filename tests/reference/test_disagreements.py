@@ -9,7 +9,7 @@ from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.reference.planning.facts import Facts
 from fotismos.reference.planning.rules import LIGHT_BY_LIGHT
-from fotismos.reference.rendering.integrators import RR_DEPTH
+from fotismos.reference.records import RR_DEPTH
 from fotismos.reference.scene.source import Source
 from fotismos.reports import verdict
 from tests.shared.misplanned import BLACK, DIFFUSE, TWO_SIDED, lamp, octahedron, scene

@@ -10,7 +10,7 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.reference.rendering.integrators import SAMPLER
+from fotismos.reference.records import SAMPLER
 from fotismos.reference.rendering.sampler import cells, permuted, register
 from tests.shared.parts import camera
 

@@ -52,7 +52,7 @@ from fotismos.comparisons.departure.blocks import (
 )
 from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.estimate import NoiseShown
-from fotismos.reference.rendering.finite import require_finite
+from fotismos.reference.rendering.passes import require_finite
 from fotismos.reference.rendering.sums import BLOCK, DifferenceEstimate
 
 LEVEL = 0.05

@@ -44,7 +44,7 @@ from fotismos.comparisons.records.departure import DEFAULT_VIEWING, Viewing
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.declared import Declared
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.rendering.finite import require_finite
+from fotismos.reference.rendering.passes import require_finite
 
 LOG2_EPSILON = 1e-4
 """Added to both luminances of `log2_luminance_ratio`; 1.0 is display white."""

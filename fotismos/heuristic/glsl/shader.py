@@ -21,12 +21,13 @@ import numpy as np
 from fotismos.heuristic import background, user_shaders
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError
-from fotismos.heuristic.glsl import opengl, source
-from fotismos.heuristic.glsl.opengl import Textures
+from fotismos.heuristic.glsl import opengl
+from fotismos.heuristic.glsl.opengl import GROUP, Textures
 from fotismos.heuristic.heuristics import (
     INPUTS,
     Heuristic,
     LightAtPoint,
+    Parameter,
     Point,
     content_digest,
 )
@@ -56,7 +57,7 @@ def from_file(word: str) -> Heuristic:
 def _read(word: str, path: Path) -> Heuristic:
     if not path.is_file():
         raise InputError(
-            f"{path}: there is no such file. Give a GLSL file with a function `{source.SIGNATURE}`."
+            f"{path}: there is no such file. Give a GLSL file with a function `{SIGNATURE}`."
         )
     size = path.stat().st_size
     if size > LARGEST:
@@ -75,10 +76,10 @@ def of_text(word: str, text: str) -> Heuristic:
     shader = Shader(word, text)
     if shader.line is None:
         raise InputError(
-            f"{word}: there is no function `{source.SIGNATURE}`. Add it; it returns a"
+            f"{word}: there is no function `{SIGNATURE}`. Add it; it returns a"
             " display-linear colour."
         )
-    if refused := source.refusal(text):
+    if refused := refusal(text):
         raise InputError(f"{word}, line {refused[0]}: {refused[1]}.")
     shader.compiled(2)
     files = shader.read_table()
@@ -88,7 +89,7 @@ def of_text(word: str, text: str) -> Heuristic:
         shade=shader,
         label=Path(word).stem + (", software GPU" if is_software else ""),
         needs=frozenset(name for name in INPUTS if name in shader.words),
-        parameters=source.uniforms(text),
+        parameters=uniforms(text),
         prepare=shader.prepare if shader.table or "environment" in shader.words else None,
         files=tuple(files),
         traced=False,
@@ -108,12 +109,12 @@ class Shader:
     def __init__(self, file: str, text: str) -> None:
         self.file = file
         self.text = text
-        code = source.bare(text)
+        code = bare(text)
         self.words = frozenset(re.findall(r"\b[A-Za-z_]\w*", code))
-        match = source.SHADE.search(code)
+        match = SHADE.search(code)
         self.line = match and code.count("\n", 0, match.start()) + 1
         self.__qualname__ = f"{file}, line {self.line}"  # its name in messages
-        matches = [found for line in text.splitlines() if (found := source.TABLE.match(line))]
+        matches = [found for line in text.splitlines() if (found := TABLE.match(line))]
         self.table = matches[0].groups() if matches else None  # its name and file
         self.make_table: Callable[[Scene], Any] | None = None
         self._programs: dict[int, tuple[Any, Any]] = {}
@@ -132,7 +133,7 @@ class Shader:
             )
         # The fields that the code may read, evaluated together.
         lights = point.lights if "lights" in self.words else ()
-        fields = source.fields_read(self.words, max(len(lights), 1))
+        fields = fields_read(self.words, max(len(lights), 1))
         values = {name: _value(point, lights, name) for name in fields}
         dr.eval(list(values.values()))
         rows = [row for name, size in fields.items() for row in _rows(values[name], size)]
@@ -194,9 +195,9 @@ class Shader:
                 f" {LIGHTS}. Write it in Python, or remove lights from the scene."
             )
         try:
-            compute = context.compute_shader(source.source(self.text, self.words, lights))
+            compute = context.compute_shader(whole_program(self.text, self.words, lights))
         except Exception as error:  # moderngl's own, which has the compiler's message
-            message = source.explained(str(error), self.file, self.text)
+            message = explained(str(error), self.file, self.text)
             raise InputError(f"{message}. It does not compile as GLSL 4.30.") from error
         self._programs[lights] = context, compute
         return compute
@@ -219,3 +220,184 @@ def _rows(value: Any, size: int) -> list[np.ndarray]:
     is_vector = dr.is_array_v(value) and dr.depth_v(value) == 2
     parts = list(value) if is_vector else [value] * size
     return [np.array(part, np.float32).reshape(-1) for part in parts]
+
+
+# --- The text of a shader: what it may hold, and the compute shader around it ------------------
+
+SIGNATURE = "vec3 shade(Point point)"
+
+POINT = {"position": 3, "normal": 3, "view": 3, "uv": 2, "ambient": 3}
+MATERIAL = {
+    "k_i": 3, "k_a": 3, "k_d": 3, "k_s": 3, "n": 1, "base_color": 3,
+    "alpha": 1, "ior": 1, "metallic": 1,
+}  # fmt: skip
+EXTENT = {"radius": 1, "u": 3, "v": 3}
+LIGHT = {
+    "toward": 3, "distance": 1, "intensity": 3, "diffuse_intensity": 3, "specular_intensity": 3,
+    "visible": 1,
+}  # fmt: skip
+"""Fields of the structures, and how many floats each is."""
+
+_TYPES = {1: "float", 2: "vec2", 3: "vec3"}
+_OURS = 1_000_001
+"""Our lines after the user's are numbered from here, so messages can be told apart. Mesa 22 gives
+the right number of the source string only in some of its messages.
+"""
+
+_ENVIRONMENT = """
+uniform sampler2D fotismos_map;
+uniform mat3 fotismos_to_local;
+vec3 environment(vec3 direction) {
+    vec3 d = fotismos_to_local * direction;
+    ivec2 size = textureSize(fotismos_map, 0);
+    float x = atan(d.x, -d.z) / 6.28318530718 * size.x - 0.5;
+    float y = atan(length(d.xz), d.y) / 3.14159265359 * (size.y - 1);
+    int left = int(floor(x)), top = clamp(int(y), 0, size.y - 2);
+    vec3 rows[2];
+    for (int row = 0; row < 2; ++row) {
+        ivec2 a = ivec2((left + size.x) % size.x, top + row);
+        ivec2 b = ivec2((left + 1 + size.x) % size.x, top + row);
+        vec3 first = texelFetch(fotismos_map, a, 0).rgb;
+        rows[row] = mix(first, texelFetch(fotismos_map, b, 0).rgb, x - left);
+    }
+    return mix(rows[0], rows[1], y - top);
+}
+"""
+"""What reads the background: float textures, interpolated by hand, since OpenGL may round weights.
+"""
+
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+SHADE = re.compile(r"\bvec3\s+shade\s*\(\s*(?:const\s+)?(?:in\s+)?Point\b")
+_PLACE = re.compile(r"(?<![\w.])\d+(?::(\d+)\(\d+\)|\((\d+)\)|:(\d+))\s*:\s*")
+_NUMBER = r"([-+]?[\d.]+(?:[eE][-+]?\d+)?)"
+_PARAMETER = re.compile(
+    rf"\s*uniform\s+float\s+(\w+)\s*=\s*{_NUMBER}\s*;\s*//\s*{_NUMBER}\s+to\s+{_NUMBER}\s*$"
+)
+TABLE = re.compile(r"\s*uniform\s+sampler2D\s+(\w+)\s*;\s*//\s*(\S.*\.py)\s*$")
+_UNIFORM = re.compile(r"\s*(?:layout\s*\(.*\)\s*)?uniform\b")
+_REFUSED = {
+    re.compile(r"(?m)^[ \t]*#[ \t]*include\b"): "a shader is one file here: paste the included"
+    " text in its place",
+    re.compile(r"\bvoid\s+main\s*\("): "leave out `main`: fotismos calls `shade` for each point",
+    re.compile(r"\b\w*fotismos_\w*"): "names with `fotismos_` are reserved: choose another one",
+}
+
+
+def bare(text: str) -> str:
+    """Return GLSL without its comments, with the same lines."""
+    return _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n") or " ", text)
+
+
+def uniforms(text: str) -> tuple[Parameter, ...]:
+    """Return the parameters: ``uniform float NAME = DEFAULT;  // LOW to HIGH``."""
+    matches = [match for line in text.splitlines() if (match := _PARAMETER.match(line))]
+    return tuple(
+        Parameter(name=name, default=float(default), low=float(low), high=float(high))
+        for name, default, low, high in (match.groups() for match in matches)
+    )
+
+
+def refusal(text: str) -> tuple[int, str] | None:
+    """Return the line of a forbidden word, and what to do; None if there is none."""
+    code = bare(text)
+    tables = 0
+    for number, (line, stripped) in enumerate(
+        zip(text.splitlines(), code.splitlines(), strict=False), 1
+    ):
+        is_table = TABLE.match(line) is not None
+        tables += is_table
+        if tables > 1:
+            return number, "a shader has one table: join them, side by side or as channels"
+        if _UNIFORM.match(stripped) and not (is_table or _PARAMETER.match(line)):
+            return number, (
+                "a uniform is a parameter: write its default and bounds, as in"
+                " `uniform float wrap = 0.5;  // 0 to 1`; or it is a table, as in"
+                " `uniform sampler2D table;  // table.py`"
+            )
+    for pattern, advice in _REFUSED.items():
+        if match := pattern.search(code):
+            return code.count("\n", 0, match.start()) + 1, advice
+    return None
+
+
+def explained(log: str, file: str, text: str) -> str:
+    """Return the compiler's first errors, with places in a user's text as ``FILE, line N``.
+
+    Compilers write a place as ``0:3(7)``, ``0(3)`` or ``0:3``: source, line, column. Of each line
+    only the first counts, since others follow from it.
+    """
+    messages: dict[str, str] = {}
+    for line in log.splitlines():
+        if "error" not in line.lower():
+            continue
+        match = _PLACE.search(line)
+        message = re.sub(r"(?i)^error:\s*", "", line[match.end() :] if match else line.strip())
+        number = int(next(filter(None, match.groups()))) if match else 0
+        position = f"{file}, line {number}" if number else file
+        if number > text.count("\n") + 1:
+            position = f"{file}, at its end"
+        messages.setdefault(position, message.strip())
+    shown = [f"{position}: {message}" for position, message in messages.items()]
+    return "; ".join(shown[:3]) or f"{file}: {' '.join(log.split())}"
+
+
+def _structure(name: str, fields: dict[str, int], more: str = "") -> str:
+    declared = " ".join(f"{_TYPES[size]} {field};" for field, size in fields.items())
+    return f"struct {name} {{ {declared} {more} }};"
+
+
+def fields_read(names: frozenset[str], lights: int) -> dict[str, int]:
+    """Return the fields of a point whose names code has, in the order of the buffer.
+
+    They are such as ``lights[0].toward``, each with the number of its floats.
+    """
+    owners = [("", POINT), ("material.", MATERIAL)]
+    for number in range(lights):
+        owners += [(f"lights[{number}].", LIGHT), (f"lights[{number}].extent.", EXTENT)]
+    return {
+        owner + name: size
+        for owner, fields in owners
+        for name, size in fields.items()
+        if name in names
+    }
+
+
+def whole_program(text: str, names: frozenset[str], lights: int) -> str:
+    """Return the compute shader that calls the user's ``shade`` for all points.
+
+    One buffer holds the floats, each for all points before the next.
+    """
+    readings = []
+    number = 0
+    for name, size in fields_read(names, lights).items():
+        parts = [f"fotismos_read({number + part}, index)" for part in range(size)]
+        is_mask = " > 0.5" if name.endswith(".visible") else ""
+        readings.append(f"    point.{name} = {_TYPES[size]}({', '.join(parts)}){is_mask};\n")
+        number += size
+    whole = re.sub(r"(?m)^[ \t]*#[ \t]*version\b.*$", "", text)
+    return f"""#version 430
+layout(local_size_x = {GROUP}) in;
+layout(std430, binding = 0) readonly buffer fotismos_In {{ float fotismos_values[]; }};
+layout(std430, binding = 1) writeonly buffer fotismos_Out {{ float fotismos_colours[]; }};
+uniform int fotismos_count;
+{_structure("Material", MATERIAL)}
+{_structure("Extent", EXTENT)}
+{_structure("Light", LIGHT, "Extent extent;").replace("float visible", "bool visible")}
+{_structure("Point", POINT, f"Material material; Light lights[{lights}];")}
+{_ENVIRONMENT if "environment" in names else ""}
+#line 1
+{whole}
+
+#line {_OURS}
+float fotismos_read(int number, int point) {{
+    return fotismos_values[number * fotismos_count + point];
+}}
+void main() {{
+    int index = int(gl_GlobalInvocationID.x);
+    if (index >= fotismos_count) return;
+    Point point;
+{"".join(readings)}
+    vec3 colour = shade(point);
+    for (int part = 0; part < 3; ++part) fotismos_colours[3 * index + part] = colour[part];
+}}
+"""

@@ -36,7 +36,7 @@ from typing import Any, Self
 import drjit as dr
 import mitsuba as mi
 
-from fotismos.heuristic import background, heuristics
+from fotismos.heuristic import heuristics
 from fotismos.heuristic.convention import (
     Colour,
     Direction,
@@ -152,7 +152,11 @@ def define() -> dict[str, Any]:
             """
             prepared = self.known(scene).prepared
             emitter = scene.environment()
-            behind = emitter and partial(background.radiance, emitter, at=si)
+            behind = None
+            if emitter is not None:
+                from fotismos.heuristic.background import radiance  # loaded late: many have none
+
+                behind = partial(radiance, emitter, at=si)
 
             def evaluate(*arguments: Any) -> Colour:
                 shading = ShadingArguments._make(arguments)

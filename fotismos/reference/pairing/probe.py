@@ -25,7 +25,7 @@ import numpy as np
 
 from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY, Colour, Number
 from fotismos.heuristic.errors import InputError
-from fotismos.reference.scene import spectra, values
+from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Graph
 
 SAMPLES = 8192
@@ -116,6 +116,8 @@ def measured(graph: Graph, index: int, **changes: Any) -> Albedos:
     """Same as :func:`with_values`; InputError for a BSDF that cannot be sampled."""
     response = with_values(graph, index, **changes)
     if response is None:
+        from fotismos.reference.scene import spectra  # loaded late: few scenes have such a BSDF
+
         cause = " ".join(spectra.short_tables(graph, index)) or "Check its parameters."
         raise InputError(
             f"{graph.name}: {graph.label(index)}: its albedo is not a number, or Mitsuba cannot"

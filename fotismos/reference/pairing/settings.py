@@ -9,7 +9,7 @@ from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.lights import INTENSITIES
 from fotismos.reference.pairing import bsdfs, kinds, lights
 from fotismos.reference.pairing.pairing_record import Override
-from fotismos.reference.rendering.integrators import PATHS
+from fotismos.reference.records import PATHS
 from fotismos.reference.scene import checks, values
 from fotismos.reference.scene.graph import Graph, Reference, properties
 

@@ -38,8 +38,8 @@ from fotismos.reference.planning.effects import EFFECTS, INTERREFLECTION
 from fotismos.reference.planning.facts import BSDF, Facts
 from fotismos.reference.planning.plan_record import PASSES, SPP, Plan
 from fotismos.reference.planning.rules import LIGHT_BY_LIGHT, RULES, TABULATED_ENVIRONMENT
+from fotismos.reference.records import PATHS, RR_DEPTH
 from fotismos.reference.rendering import direct
-from fotismos.reference.rendering.integrators import PATHS, RR_DEPTH
 from fotismos.reference.scene.graph import Graph
 from fotismos.reference.scene.values import plain
 

@@ -8,13 +8,16 @@ from msgspec.structs import replace
 
 from fotismos.reference.planning.decisions import Decision, RuleResult
 from fotismos.reference.planning.effects import EFFECTS, INTERREFLECTION, OCCLUSION, PRUNED, Effect
-from fotismos.reference.records import Amount, Count, Record, Size
-from fotismos.reference.rendering.integrators import (
+from fotismos.reference.records import (
     PATHS,
     RR_DEPTH,
     SAMPLER,
     STOCK_RR_DEPTH,
     STOCK_SAMPLER,
+    Amount,
+    Count,
+    Record,
+    Size,
 )
 
 Depth = Annotated[

@@ -41,7 +41,7 @@ import mitsuba as mi
 from fotismos.heuristic import numerics
 from fotismos.heuristic.convention import Colour, Mask, Scene
 from fotismos.heuristic.plugins.integrator import LAYERS
-from fotismos.reference.rendering.integrators import RR_DEPTH
+from fotismos.reference.records import RR_DEPTH
 from fotismos.reference.rendering.transport import (
     Transport,
     found_by_bsdf,

@@ -12,7 +12,7 @@ import numpy as np
 import fotismos.reference.scene  # noqa: F401  it gives Mitsuba a variant
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import InputError, NonFiniteError
-from fotismos.reference.rendering.finite import wrong_pixels
+from fotismos.reference.rendering.passes import wrong_pixels
 
 GRID = 192
 """Rays along each side for means over visible surfaces: some 37,000, enough for three digits."""

@@ -20,9 +20,15 @@ import numpy as np
 from fotismos.heuristic.convention import Scene
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.records import Times
-from fotismos.reference.rendering.finite import LARGEST_VALUE, require_finite, wrong_pixels
 from fotismos.reference.rendering.gbuffer import image_size, resize
-from fotismos.reference.rendering.passes import Size, Stream, pass_seed
+from fotismos.reference.rendering.passes import (
+    LARGEST_VALUE,
+    Size,
+    Stream,
+    pass_seed,
+    require_finite,
+    wrong_pixels,
+)
 from fotismos.reference.scene.messages import plain_message
 
 try:

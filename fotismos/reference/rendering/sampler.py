@@ -28,7 +28,7 @@ import drjit as dr
 import mitsuba as mi
 
 from fotismos.heuristic.convention import Array, Mask
-from fotismos.reference.rendering.integrators import SAMPLER
+from fotismos.reference.records import SAMPLER
 from fotismos.reference.scene.graph import Graph, properties
 
 _ALONG = 0x68BC21EB

@@ -23,7 +23,6 @@ import mitsuba as mi
 import numpy as np
 
 from fotismos.heuristic.errors import InputError, suggestion
-from fotismos.heuristic.user_code import contained
 from fotismos.reference.scene.graph import (
     SCRIPT,
     Graph,
@@ -83,6 +82,8 @@ class Script:
 
     def __call__(self) -> Any:
         """Run the file; ``InputError`` if it raises, has no scene, or takes other values."""
+        from fotismos.heuristic.user_code import contained  # loaded late: few scenes are scripts
+
         try:
             with contained(self.path):
                 scene = runpy.run_path(str(self.path)).get(SCRIPT)

@@ -25,9 +25,7 @@ IN_RGB = "Give the variant llvm_ad_rgb"
 
 
 def doubts(graph: Graph) -> Iterator[str]:
-    """Yield what the current variant reads otherwise than meant, each by the element's name."""
-    if not mi.is_spectral:
-        return
+    """Yield what a spectral variant reads otherwise than meant, each by the element's name."""
     of_lights = set()
     for index in graph.nodes_in_use():
         for key, child in graph.children(index, mi.ObjectType.Texture):

@@ -29,7 +29,7 @@ from fotismos.comparisons.picture_files import require_linear
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import in_file, known_as
 from fotismos.reference import records
-from fotismos.reference.rendering.finite import require_finite
+from fotismos.reference.rendering.passes import require_finite
 from fotismos.reference.rendering.sums import student
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines, checks, summary

@@ -13,7 +13,7 @@ from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic import llvm
 from fotismos.heuristic.errors import InstallationError
 from fotismos.heuristic.glsl import opengl, shader
-from fotismos.heuristic.mitsuba_version import other_version
+from fotismos.heuristic.llvm import other_version
 from fotismos.heuristic.program import __version__, installation
 from fotismos.reference.scene.graph import set_variant
 
