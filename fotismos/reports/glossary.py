@@ -45,14 +45,14 @@ RESULTS: Terms = {
         " a pixel it is the mean over a square of 2 by 2."
     ),
     ("share of error", "of the error"): "Its part of the sum of ΔE2000 over all pixels.",
-    ("mostly", "mostly missing", "effect", "worth most", "cause", "causes"): (
+    ("mostly", "mostly missing", "because of", "effect", "worth most", "cause", "causes"): (
         "The effect that adds most to the error there."
     ),
-    ("time", "price"): (
-        "The time of what makes the scene look right, over that of the textbook picture with 4"
-        " samples per pixel; 1 if that picture looks right."
+    ("needs",): (
+        "What makes the scene look right: the fewest effects, brightness, or samples that decide."
     ),
-    ("differ visibly", "pixels that differ visibly"): (
+    ("time",): "What the physical picture takes with the samples that make it look right.",
+    ("differ visibly", "differs visibly", "pixels that differ visibly"): (
         "The share of the pixels whose ΔE2000 is above the threshold."
     ),
 }

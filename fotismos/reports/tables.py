@@ -111,23 +111,32 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
             )
 
 
+CELLS: dict[str, Callable[[ComparisonRecord, float], str]] = {
+    "because of": verdict.because,
+    "needs": verdict.needs,
+    "samples": verdict.samples,
+    "time": verdict.time,
+}
+"""What the table of scenes says at a threshold, by its headings."""
+
+
 def scenes(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> Table:
     """Return the table of scenes, worst first: how far they are, why, and what they take.
 
     It is the same on a terminal and on a page.
     """
 
-    def at(what: Callable[[ComparisonRecord, float], Any]) -> Callable[[ComparisonRecord], Any]:
-        return lambda record: what(record, threshold)
+    def at(heading: str) -> Callable[[ComparisonRecord], str]:
+        return lambda record: CELLS[heading](record, threshold)
 
     columns = (
         Column("scene", "scene", fold=24),
-        Column("differs visibly", at(_differs), percent, is_right=True),
+        Column("differs visibly", partial(_differs, threshold), percent, is_right=True),
         Column("mean", lambda r: r.metrics[LEADING.name].mean, difference, is_right=True, rank=1),
-        Column("because of", at(verdict.because), rank=2, fold=24),
-        Column("needs", at(verdict.needs), rank=5, fold=24),
-        Column("samples", at(verdict.samples), is_right=True, rank=3),
-        Column("time", at(verdict.time), is_right=True, rank=4),
+        Column("because of", at("because of"), rank=2, fold=24),
+        Column("needs", at("needs"), rank=5, fold=24),
+        Column("samples", at("samples"), is_right=True, rank=3),
+        Column("time", at("time"), is_right=True, rank=4),
     )
     return Table(columns, sorted(records, key=partial(extent, threshold=threshold), reverse=True))
 
@@ -137,7 +146,7 @@ def extent(record: ComparisonRecord, threshold: float = TOLERANCE) -> tuple[floa
     return verdict.share(record, threshold).value, record.metrics[LEADING.name].mean
 
 
-def _differs(record: ComparisonRecord, threshold: float) -> tuple[Any, ...]:
+def _differs(threshold: float, record: ComparisonRecord) -> tuple[Any, ...]:
     """Return the share of the pixels that differ visibly, with a mark if it is undecided."""
     is_undecided = verdict.decision(record, threshold) == "undecided"
     return "? " if is_undecided else "", verdict.share(record, threshold).value

@@ -36,7 +36,7 @@ def test_the_page_begins_with_the_scene_and_leads_to_the_overview(tab, alone, tm
     assert tab.evaluate(SEEN) == "scene"
     tab.get_by_role("link", name="all scenes").click()
     tab.wait_for_function(f"() => {SEEN} === 'overview'")
-    assert tab.locator(".bars li:visible").count() == 1
+    assert tab.locator(".bars tbody tr:visible").count() == 1
     tab.get_by_role("link", name=EXACT).first.click()
     tab.wait_for_function(f"() => {SEEN} === 'scene'")
 

@@ -195,10 +195,13 @@ def test_the_worst_have_the_largest_mean_errors_and_do_not_look_alike(record):
     assert re.findall(r'data-scene="(\w+)"', cards) == ["first", "second", "third"]
 
 
-def test_the_overview_has_the_runs_size_samples_versions_and_machine(record):
-    shown = " ".join(Page(page.render([records.view(record)])).text.split())
+def test_the_overview_has_the_runs_size_and_samples_and_the_details_how_it_was_made(record):
+    view = records.view(record)
     width, height = record["resolution"]
-    assert f"{width} × {height} pixels; {record['plan']['spp']} samples per pixel" in shown
+    size = f"{width} × {height} pixels; {record['plan']['spp']} samples per pixel"
+    assert size in " ".join(Page(page.render([view])).text.split())
+    shown = " ".join(Page(page.details(records=[view.record])).text.split())
+    assert size in shown
     assert f"{Machine.here().processor}, {Machine.here().cores} cores" in shown
 
 

@@ -15,6 +15,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from datetime import date
+from functools import partial
 from time import time
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +33,7 @@ from fotismos.comparisons.departure.metrics import (
     declared,
 )
 from fotismos.reference.records import Machine
-from fotismos.reports import glossary, verdict
+from fotismos.reports import glossary, tables, verdict
 from fotismos.reports.files import images
 from fotismos.reports.files.results import DETAILS, Failure, RunRecord
 from fotismos.reports.page.scene_view import (
@@ -44,7 +45,7 @@ from fotismos.reports.page.scene_view import (
     WhyView,
     parts,
 )
-from fotismos.reports.page.templating import HELP, identifier, rendered
+from fotismos.reports.page.templating import HELP, environment, identifier, rendered
 from fotismos.reports.terminal.words import difference
 
 if TYPE_CHECKING:  # few pages need these
@@ -77,11 +78,20 @@ Runs = list[tuple[int, str]]
 """Texts by the place of the threshold from which each holds."""
 
 
+NEIGHBOURS = "<!-- the scenes beside it -->"
+"""Where a scene's section gets links to the scenes beside it, which its page knows."""
+
+
 class PageScene(SceneView):
-    """A scene in the page: its name in the address, and what the page's ``script`` has of it."""
+    """A scene as it is drawn once for the pages of a run.
+
+    ``id`` is its name in the address, ``script`` what the page's script has of it, and ``section``
+    its part of the page.
+    """
 
     id: str
     script: dict[str, Any]
+    section: str = ""
 
 
 def render(
@@ -95,16 +105,20 @@ def render(
 ) -> str:
     """One HTML page of all scenes, worst first, that begins at a threshold.
 
+    Views that :func:`drawn_scene` drew before are taken as they are: only new ones are work.
     `failures` are the scenes that could not be compared; `state` is a sentence on an unfinished
     run; `moved` are pictures without a scene that moved. The page ``reloads`` itself until one
     that does not takes its place, or until none was written for a while.
     """
     page_title = title or title_of([view.record for view in views])
-    taken: set[str] = set()
+    taken = {view.id for view in views if isinstance(view, PageScene)}
     usual = THRESHOLDS.index(threshold)
     records = [view.record for view in views]
-    scenes = [_scene(view, taken) for view in views]
-    scenes.sort(key=lambda scene: -scene.script["shares"][usual])
+    scenes = [
+        view if isinstance(view, PageScene) else drawn_scene(view, taken, threshold)
+        for view in views
+    ]
+    scenes.sort(key=lambda scene: tables.extent(scene.record, threshold), reverse=True)
     failed = {identifier(failure.scene, taken): failure for failure in failures}
     # On the page of a check, what moved takes the place of the verdict.
     since = [*(view.before for view in views if view.before), *moved]
@@ -133,16 +147,16 @@ def render(
         note=title,
         data=data,
         scenes=scenes,
+        columns=tables.scenes(records, threshold).columns,
+        neighbours=NEIGHBOURS,
         worst=_worst(scenes),
         legend=dict(sorted({part[:2] for view in views for part in parts(view.record)})),
-        settings=_settings(records) if records else "",
+        settings=_size(records) if records else "",
         failures=failed,
         usual=usual,
-        savings="" if since else verdict.savings(records),
         priced=[] if since or len(scenes) < 2 else scenes,
         charted=[scene for scene in scenes if scene.chart][:CHARTED],
         limit=LIMIT,
-        metrics=METRICS,
         leading=LEADING,
         details=DETAILS,
         state=state,
@@ -194,22 +208,25 @@ def _worst(scenes: Sequence[PageScene]) -> list[PageScene]:
     return chosen[:WORST]
 
 
-def _settings(records: Sequence[ComparisonRecord]) -> str:
-    """Return the size, samples, variants, versions, machine and date of a page, as words."""
+def _size(records: Sequence[ComparisonRecord]) -> str:
+    """Return the size, samples and variants of a page, as words."""
     sizes = dict.fromkeys("{} × {}".format(*record.resolution) for record in records)
     samples = dict.fromkeys(sorted(record.plan.spp for record in records if record.plan))
     variants = dict.fromkeys(record.variant for record in records if record.variant)
-    versions = records[0].versions.items()
-    computer = Machine.here()
     parts = (
         f"{', '.join(sizes)} pixels",
         f"{', '.join(map(str, samples))} samples per pixel" if samples else "",
         ", ".join(variants),
-        ", ".join(f"{name} {version}" for name, version in versions),
-        f"{computer.processor}, {computer.cores} cores",
-        date.today().isoformat(),
     )
     return f"{'; '.join(filter(None, parts))}."
+
+
+def _settings(records: Sequence[ComparisonRecord]) -> str:
+    """Return how a page was made: sizes, versions, machine and date, as words."""
+    computer = Machine.here()
+    versions = ", ".join(f"{name} {version}" for name, version in records[0].versions.items())
+    machine = f"{computer.processor}, {computer.cores} cores"
+    return f"{_size(records)[:-1]}; {versions}; {machine}; {date.today().isoformat()}."
 
 
 def _runs(text: Callable[[float], str]) -> Runs:
@@ -218,9 +235,21 @@ def _runs(text: Callable[[float], str]) -> Runs:
     return [(i, text) for i, text in enumerate(texts) if i == 0 or text != texts[i - 1]]
 
 
-def _scene(view: SceneView, taken: set[str]) -> PageScene:
+def drawn_scene(view: SceneView, taken: set[str], threshold: float = TOLERANCE) -> PageScene:
+    """Draw a scene for pages that begin at a threshold; its name is added to those `taken`."""
     name = identifier(view.record.scene, taken)
-    return PageScene(**structs.asdict(view), id=name, script=_script_data(name, view))
+    scene = PageScene(**structs.asdict(view), id=name, script=_script_data(name, view))
+    template = environment().get_template("scene.html.j2")
+    section = template.render(
+        scene=scene,
+        usual=THRESHOLDS.index(threshold),
+        metrics=METRICS,
+        leading=LEADING,
+        neighbours=NEIGHBOURS,
+        threshold=threshold,
+        epsilon=LOG2_EPSILON,
+    )
+    return structs.replace(scene, section=section)
 
 
 def _digits(price: float | None) -> float | None:
@@ -260,6 +289,7 @@ def _script_data(name: str, scene: SceneView) -> dict[str, Any]:
         "shares": [round(share.value, 5) for share in visible],
         "verdicts": "".join(verdict.decision(record, t)[0] for t in THRESHOLDS),
         "advice": _runs(lambda t: verdict.sentence(record, cost, t)),
+        "cells": {name: _runs(partial(what, record)) for name, what in tables.CELLS.items()},
         "prices": [_digits(verdict.price_at(record, t)) for t in THRESHOLDS],
         "regions": [
             {key: getattr(region, key) for key in ("x", "y", "width", "height")}

@@ -1,4 +1,4 @@
-// The first screen at a threshold: headline, order, pictures, prices, bars and what is needed.
+// The first screen at a threshold: headline, order, pictures, prices, and the table of scenes.
 
 const comparedScenes = /** @type {Scene[]} */ (page.scenes.filter(scene => !scene.failed));
 /** The scenes whose comparison did not fail, by their ids. */
@@ -11,7 +11,7 @@ function showOverview(t) {
   byId("missing").textContent = textAt(page.missing, place);
   const sizeOf = (/** @type {HTMLElement} */ item) =>
     compared.get(item.dataset.scene ?? "")?.shares[place] ?? -1;
-  const list = document.querySelector(".bars");
+  const list = document.querySelector(".bars tbody");
   const items = /** @type {HTMLElement[]} */ ([...(list?.children ?? [])]);
   list?.append(...items.sort((a, b) => sizeOf(b) - sizeOf(a)));
   for (const row of elementsIn("#overview [data-scene]")) {
@@ -72,6 +72,8 @@ function showScene(item, scene, place) {
   for (const part of item.querySelectorAll("[data-show=advice]")) {
     part.replaceChildren(...coded(textAt(scene.advice, place)));
   }
+  for (const cell of elementsIn("[data-cell]", item))
+    cell.textContent = textAt(scene.cells[cell.dataset.cell ?? ""], place);
   for (const part of item.querySelectorAll("[data-command]"))
     part.textContent = (part.textContent ?? "").replace(
       /--within \S+/,

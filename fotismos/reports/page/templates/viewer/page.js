@@ -32,6 +32,7 @@
  * @property {number[]} shares   of the pixels that differ visibly, by threshold
  * @property {string} verdicts   a letter by threshold: p(ass), f(ail) or u(ndecided)
  * @property {Runs} advice
+ * @property {Record<string, Runs>} cells   of the table of scenes, by heading
  * @property {(number | null)[]} prices   over the textbook's time, by threshold
  * @property {Region[]} regions
  * @property {Manifest | null} images
