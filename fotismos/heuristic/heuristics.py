@@ -378,6 +378,10 @@ HEURISTICS: Declared[Heuristic] = Declared(
     blinn="fotismos.heuristic.heuristics:BLINN",
     shadow_map="fotismos.heuristic.shadow_maps:MAP",
     hemisphere_ambient="fotismos.heuristic.indirect_light:HEMISPHERE",
+    vtk="fotismos.heuristic.plotting:VTK",
+    mujoco="fotismos.heuristic.plotting:MUJOCO",
+    matplotlib="fotismos.heuristic.plotting:MATPLOTLIB",
+    pygfx="fotismos.heuristic.plotting:PYGFX",
 )
 """All heuristics."""
 

@@ -173,7 +173,7 @@ def fitted_sky(scene: Any) -> tuple[Array, Array, list[float], bool]:
 
 
 def refuse(scene: Any) -> str:
-    """Return why the light cannot be gathered; empty if it can."""
+    """Return why there are no colours in RGB; empty if there are."""
     return f"{mi.variant()} has wavelengths in place of RGB" if mi.is_spectral else ""
 
 
