@@ -1,9 +1,11 @@
 """Hybrids: images in which some effects are simulated, the others as in the textbook half.
 
 The halves of a pair differ in a few effects. Any subset of them makes a scene: the physical half
-with the BSDFs, lights and environment of the heuristic one where an effect is left out. Emission
-and ambient light of the textbook half are not transported light. They are a pass of their own, of
-what a camera ray meets, which is added.
+with the BSDFs, lights and environment of the heuristic one where an effect is left out. Light adds
+up: one rendering traces paths with all lights of both halves, and keeps the light of those apart
+that an effect adds or replaces, with shadows and without, direct and all. Images of equal surfaces
+are sums of such parts. Emission and ambient light of the textbook half are not transported light.
+They are passes of their own, of what a camera ray meets, which are added.
 
 Every image is rendered in a few replicates, each with its own seed, which all images share. So
 differences between images keep little noise, and the spread of the replicates measures it.
@@ -13,6 +15,8 @@ samples, and the mean over a block of them is the pixel that the coarser film wo
 """
 
 from collections.abc import Iterable, Sequence, Set
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import mitsuba as mi
@@ -46,8 +50,8 @@ from fotismos.reference.rendering import direct
 from fotismos.reference.rendering.passes import Progress, Stream, passes
 from fotismos.reference.rendering.renderer import Renderer, variant
 from fotismos.reference.rendering.sampler import with_sampler
-from fotismos.reference.rendering.transport import Transport
-from fotismos.reference.scene.graph import properties
+from fotismos.reference.rendering.transport import LightGroups, Transport
+from fotismos.reference.scene.graph import Graph, Reference, properties
 
 REPLACED = tuple(effect for effect in EFFECTS if isinstance(effect, ReplacedEffect))
 IN_SCENE: frozenset[Effect] = frozenset(REPLACED)
@@ -137,14 +141,17 @@ class HybridScenes:
 
     def of(self, simulated: Set[Effect]) -> Scene:
         """Return the scene of some effects, without its emission pass."""
+        return self._scene_and_graph(simulated)[0]
+
+    def _scene_and_graph(self, simulated: Set[Effect]) -> tuple[Scene, Graph]:
         key = self.key(simulated)
         if key == self.key(set(self.differences)):
-            return self.scene
+            return self.scene, self.pair.physical
         graph = self.pair.physical.copy()
         for effect in REPLACED:
-            if effect not in simulated:
+            if effect in self.differences and effect not in simulated:
                 effect.put(graph, self.facts, effect.sites(self.facts))
-        return with_sampler(graph, self.plan.sampler).instantiate()
+        return with_sampler(graph, self.plan.sampler).instantiate(), graph
 
     def key(self, simulated: Set[Effect]) -> frozenset[Effect]:
         """Return the effects among them that change the scene."""
@@ -155,53 +162,106 @@ class HybridScenes:
 
         Where light passes surfaces, shadow rays are those of `volpath`, which makes one image.
         """
-        in_transport = frozenset(PRUNED) if self.facts.lets_straight_through else frozenset()
-        return self.key(simulated) | (in_transport & set(simulated))
+        if self.facts.lets_straight_through:
+            return self.key(simulated) | (frozenset(PRUNED) & set(simulated))
+        return self.key(simulated) - set(self._lights)
 
-    def transport(self, sets: Sequence[Set[Effect]], spp: int) -> Renderer:
-        """Return the renderer of transported light, with an image for each set of effects.
+    @cached_property
+    def _lights(self) -> dict[Effect, "ReplacedLights"]:
+        """The effects that change only lights, and which."""
+        physical = self.pair.physical
+        before = lights_of(physical)
+        surfaces = [(shape, physical.bsdfs_of(shape)) for shape in physical.shapes()]
+        found: dict[Effect, ReplacedLights] = {}
+        for effect in REPLACED:
+            if effect not in self.differences:
+                continue
+            graph = physical.copy()
+            effect.put(graph, self.facts, effect.sites(self.facts))
+            after = lights_of(graph)
+            left_out = frozenset(key for key in before if after.get(key) != before[key])
+            added = [index for key, index in after.items() if before.get(key) != index]
+            is_surface = surfaces != [(shape, graph.bsdfs_of(shape)) for shape in graph.shapes()]
+            if (left_out or added) and not is_surface:
+                found[effect] = ReplacedLights(
+                    left_out=left_out,
+                    added=tuple(graph.instantiate(index) for index in added),
+                    group=2 * len(found) + 1,
+                )
+        return found
 
-        All sets have the same scene; one integrator, which can leave out effects, renders them.
+    def transport(self, sets: Sequence[Set[Effect]], spp: int) -> "Parts":
+        """Return the renderer of transported light, and the parts that make each set's image.
+
+        All sets have the same surfaces; one integrator, which can leave out effects, renders them.
         """
-        scene = self.of(sets[0])
         # Every image has what the halves treat alike: only their differences are left out.
         alike = set(EFFECTS) - set(self.differences)
         plans = [self.plan.directly().simulating(alike | set(simulated)) for simulated in sets]
         if self.facts.lets_straight_through and plans[0].shadows:
+            scene = self.of(sets[0])
             through = replace(plans[0], integrator=self.plan.stock_integrator)
             integrator = physical_integrator(through, scene, self.pair.hide_emitters)
-            return Renderer(scene, integrator, pass_spp=spp, label="image of some effects")
-        integrator = physical_integrator(plans[0], scene, self.pair.hide_emitters)
-        integrator.transports = tuple(
-            Transport(plan.shadows, plan.bsdf_samples, plan.max_depth) for plan in plans
+            renderer = Renderer(scene, integrator, pass_spp=spp, label="image of some effects")
+            return Parts(renderer, count=1, images=((0,),))
+        # Lights that all images have, or none of them, need no group of their own.
+        kept = set.intersection(*map(set, sets))
+        apart = {
+            effect: change
+            for effect, change in self._lights.items()
+            if effect not in kept and any(effect in simulated for simulated in sets)
+        }
+        scene, graph = self._scene_and_graph(set(sets[0]) | set(apart))
+        numbers = {place: change.group for change in apart.values() for place in change.left_out}
+        groups = LightGroups(
+            scene,
+            numbers=[numbers.get(place, 0) for place in lights_of(graph)],
+            others={change.group + 1: change.added for change in apart.values() if change.added},
         )
+        known = {group for _, group in groups.members(scene)}
+        parts: dict[Transport, int] = {}
+        images = []
+        for simulated, plan in zip(sets, plans, strict=True):
+            held = {0} | {
+                change.group + (effect not in simulated) for effect, change in apart.items()
+            }
+            transports = [
+                Transport(
+                    shadows=plan.shadows,
+                    bsdf_samples=plan.bsdf_samples,
+                    max_depth=plan.max_depth,
+                    group=group,
+                )
+                for group in sorted(held & known)
+            ]
+            images.append(tuple(parts.setdefault(part, len(parts)) for part in transports))
+        integrator = physical_integrator(plans[0], scene, self.pair.hide_emitters)
+        integrator.transports = tuple(parts) or (Transport(),)
+        integrator.groups = groups
         # Without interreflection, clear surfaces are looked through, as by the kernel.
         integrator.looks_through = True
-        return Renderer(scene, integrator, pass_spp=spp, label="image of some effects")
+        renderer = Renderer(scene, integrator, pass_spp=spp, label="image of some effects")
+        return Parts(renderer, count=len(integrator.transports), images=tuple(images))
 
-    def emission(self, simulated: Set[Effect], spp: int) -> Renderer | None:
-        """Return the renderer of the emission pass: emission, ambient light and background.
+    def emission(self, effect: GlowingEffect, spp: int) -> Renderer | None:
+        """Return the renderer of what shines of itself without an effect; None if nothing does.
 
-        None if there are none. Its images are to be added to transported light of equal seeds.
+        Emission, ambient light and background. Its images are to be added to transported light of
+        equal seeds.
         """
-        left_out = [effect for effect in IN_EMISSION if effect not in simulated]
-        if not left_out:
-            return None
         graph = self.pair.heuristic.copy()
         # A background that is not simulated stays; all other lights go.
         for key, index in graph.children(0, EMITTER):
-            seen = not lights.is_heuristic(graph.plugin(index)) and ENVIRONMENT in left_out
+            seen = not lights.is_heuristic(graph.plugin(index)) and effect is ENVIRONMENT
             if not seen or self.pair.hide_emitters:
                 graph.detach(0, key)
         for shape in graph.nodes(SHAPE):
             for _, index in graph.children(shape, BSDF):
                 phong = graph.props(index)
-                emitted: dict[str, Any] = {}
-                for effect in left_out:
-                    emitted |= effect.emission(phong, self.facts)
+                emitted = effect.emission(phong, self.facts)
                 if emitted:
-                    emitted["twosided"] = phong.get("twosided", False)
-                    props = properties("heuristic_glow", **emitted)
+                    twosided = phong.get("twosided", False)
+                    props = properties("heuristic_glow", **emitted, twosided=twosided)
                     graph.attach(shape, "glow", graph.add(EMITTER, props))
         if not graph.nodes(EMITTER):
             return None
@@ -214,6 +274,51 @@ class HybridScenes:
         return Renderer(
             scene, integrator, pass_spp=spp, label="image of emission and ambient light"
         )
+
+
+@dataclass(frozen=True)
+class ReplacedLights:
+    """The lights of an effect: those that the physical half loses without it, and gets instead.
+
+    ``left_out`` are their nodes' parents and keys; ``group`` is their group, and the next that of
+    ``added``.
+    """
+
+    left_out: frozenset[tuple[int, str]]
+    added: tuple[Any, ...]
+    group: int
+
+
+@dataclass(frozen=True)
+class Parts:
+    """A renderer whose passes hold ``count`` parts, and which of them add up to each image."""
+
+    renderer: Renderer
+    count: int
+    images: tuple[tuple[int, ...], ...]
+
+    def added(self, parts: Sequence[Floats]) -> list[Floats]:
+        """Return the images, sums of the parts (..., 3)."""
+        dark = np.zeros_like(parts[0])
+        return [sum((parts[number] for number in image), dark) for image in self.images]
+
+
+def lights_of(graph: Graph) -> dict[tuple[int, str], int]:
+    """Return the nodes of lights by parent and key, in the order of Mitsuba's ``scene.emitters()``.
+
+    Mitsuba lists the scene's children in turn: lights, and shapes with theirs.
+    """
+    found = {}
+    for key, value in graph.props(0).items():
+        if not isinstance(value, Reference):
+            continue
+        index = value.index()
+        kind = graph.kind(index)
+        if kind == EMITTER:
+            found[0, key] = index
+        elif kind == SHAPE:
+            found |= {(index, name): light for name, light in graph.emitters_of(index)}
+    return found
 
 
 class HybridImages:
@@ -245,7 +350,7 @@ class HybridImages:
         self._variant = pairs.ready.reference.variant
         self._scenes = {self._variant: scenes}
         self._known: dict[frozenset[Effect], Floats] = {}
-        self._emission: dict[tuple[str, frozenset[Effect]], Floats | None] = {}
+        self._emission: dict[tuple[str, Effect], Floats | None] = {}
         self._kernels: dict[frozenset[Effect], Floats] = {}
         self.effects = pairs.effects(scenes.differences)
         rfilter = scenes.scene.sensors()[0].film().rfilter()
@@ -348,14 +453,22 @@ class HybridImages:
             physical = with_sampler(pair.physical, self._ready.plan.sampler).instantiate()
             self._scenes[mi.variant()] = HybridScenes(pair, self._ready.plan, physical)
         scenes = self._scenes[mi.variant()]
-        found = self._passes(scenes.transport(sets, self._pass_spp), len(sets), progress)
-        # A group has one scene, so all its sets have the same effects of emission.
-        key = mi.variant(), frozenset(IN_EMISSION) & sets[0]
+        parts = scenes.transport(sets, self._pass_spp)
+        transported = self._passes(parts.renderer, parts.count, progress)
+        images = []
+        for simulated, image in zip(sets, parts.added(transported), strict=True):
+            left_out = (effect for effect in IN_EMISSION if effect not in simulated)
+            shining = (self._emitted(scenes, effect) for effect in left_out)
+            images.append(sum((light for light in shining if light is not None), image))
+        return images
+
+    def _emitted(self, scenes: HybridScenes, effect: GlowingEffect) -> Floats | None:
+        """Return what shines of itself without an effect, in this variant; None if nothing does."""
+        key = mi.variant(), effect
         if key not in self._emission:
-            renderer = scenes.emission(sets[0], self._pass_spp)
+            renderer = scenes.emission(effect, self._pass_spp)
             self._emission[key] = self._passes(renderer)[0] if renderer else None
-        emission = self._emission[key]
-        return found if emission is None else [image + emission for image in found]
+        return self._emission[key]
 
     @property
     def _pass_spp(self) -> int:

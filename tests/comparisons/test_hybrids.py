@@ -13,15 +13,19 @@ from fotismos.comparisons.compare import compare
 from fotismos.comparisons.cost.methods import Ladder
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.comparisons.hybrids import HybridImages, HybridScenes
+from fotismos.comparisons.hybrids import IN_EMISSION, HybridImages, HybridScenes
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded, prepare
 from fotismos.comparisons.records.cost import Method
 from fotismos.comparisons.steps import steps
 from fotismos.reference.planning.effects import (
+    ATTENUATION,
     BUMPS,
+    CONE,
+    ENVIRONMENT,
     EXTENDED,
     INTERREFLECTION,
+    MICROFACETS,
     OCCLUSION,
     labelled,
 )
@@ -205,14 +209,15 @@ def test_intervals_of_attributions_hold_the_converged_value(rgb, monkeypatch):
 
 
 class Shown:
-    """Renders the hybrid of some effects: transported light, and the emission pass."""
+    """Renders the hybrid of some effects: transported light, and what shines of itself."""
 
     def __init__(self, scenes, simulated, spp):
-        made = scenes.transport([simulated], spp), scenes.emission(simulated, spp)
-        self.parts = [renderer for renderer in made if renderer is not None]
+        glow = [scenes.emission(effect, spp) for effect in IN_EMISSION if effect not in simulated]
+        transported = scenes.transport([simulated], spp).renderer
+        self.renderers = [transported, *(renderer for renderer in glow if renderer is not None)]
 
     def render(self, seed):
-        return sum(mi.TensorXf(part.render(seed)) for part in self.parts)
+        return sum(mi.TensorXf(renderer.render(seed)) for renderer in self.renderers)
 
 
 def hybrid_scenes(source, size=24):
@@ -258,20 +263,73 @@ def test_without_effects_clear_surfaces_are_looked_through_as_by_the_kernel(rgb)
     assert record.implementation < 1e-3
 
 
+def lit_by_all():
+    """A ball over a floor that an extended lamp, parallel light, three spots and a sky shine on."""
+    spots = {
+        f"spot-{number}": {
+            "type": "spot",
+            "to_world": mi.ScalarTransform4f().look_at((x, 0, 4), (x, 0, 0), (0, 1, 0)),
+            "intensity": rgb_of(4.0, 2.0, 1.0),
+            "cutoff_angle": 30.0,
+        }
+        for number, x in enumerate((-1.5, 0.0, 1.5))
+    }
+    plastic = {"type": "roughplastic", "diffuse_reflectance": rgb_of(0.6, 0.3, 0.2), "alpha": 0.2}
+    lamp = {"type": "sphere", "center": (-2, -1, 3), "radius": 0.5}
+    return spots | {
+        "type": "scene",
+        "sensor": camera((0, -5, 3), (0, 0, 0.5), size=24),
+        "floor": {"type": "rectangle", "to_world": moved(0, 4), "bsdf": DIFFUSE},
+        "ball": {"type": "sphere", "center": (0, 0, 1), "radius": 0.8, "bsdf": plastic},
+        "lamp": lamp | {"light": {"type": "area", "radiance": 3.0}},
+        "sun": {"type": "directional", "direction": (1, 1, -2), "irradiance": 0.5},
+        "bulb": {"type": "heuristic_point", "position": (2, -1, 3), "intensity": 2.0, "k2": 0.1},
+        "sky": {
+            "type": "sunsky",
+            "sun_direction": (0.4, -0.5, 0.6),
+            "sun_scale": 0.1,
+            "sky_scale": 0.1,
+        },
+    }
+
+
+def test_the_textbooks_sun_shines_only_in_place_of_a_sky(rgb):
+    _, scenes = hybrid_scenes(open_case(lit_by_all, Options()).source)
+    everything = set(scenes.differences)
+    for effect in (EXTENDED, MICROFACETS, ENVIRONMENT):
+        lights = [light.id() for light in scenes.of(everything - {effect}).emitters()]
+        assert ("sun of sky" in lights) is (effect is ENVIRONMENT)
+        assert ("sky" in lights) is (effect is not ENVIRONMENT)
+
+
 @pytest.mark.thorough
-def test_images_of_one_rendering_are_those_of_a_rendering_each(rgb):
+@pytest.mark.guarantee("attribution", "Parts of one trace add up to a rendering of each image.")
+@pytest.mark.parametrize(("scene", "count"), [("cornell-box", 1), (lit_by_all, 4)])
+def test_images_of_one_rendering_are_those_of_a_rendering_each(rgb, scene, count):
     """Alone, only the image with all effects draws the same random numbers: paths come first."""
-    _, scenes = hybrid_scenes(SCENES["cornell-box"].source())
-    more = set(), {OCCLUSION}, {INTERREFLECTION}, {OCCLUSION, INTERREFLECTION}
-    sets = [{EXTENDED} | each for each in more]
-    together = np.split(np.array(scenes.transport(sets, 64).render(3)), len(sets), axis=2)
-    for simulated, image in zip(sets, together, strict=True):
-        alone = np.array(scenes.transport([simulated], 64).render(3))
-        if simulated == sets[-1]:
-            np.testing.assert_allclose(image, alone, rtol=1e-4, atol=1e-5)
-        else:
-            assert image.mean() == pytest.approx(alone.mean(), rel=0.01)
-    assert min(abs(one - two).mean() for one, two in combinations(together, 2)) > 1e-3
+    case = open_case(scene, Options(resolution=(24, 24)))
+    _, scenes = hybrid_scenes(case.source)
+    lights = {ATTENUATION, CONE, ENVIRONMENT, EXTENDED} & set(scenes.differences)
+    assert len(lights) == count
+    surfaces = set(scenes.differences) & {MICROFACETS}
+    left_out = [{OCCLUSION}, {INTERREFLECTION}, lights, *({light} for light in lights)]
+    chosen = {frozenset(scenes.differences) - some - surfaces for some in (set(), *left_out)}
+    sets = sorted(chosen, key=repr)
+    assert len({scenes.rendered_alike(each) for each in sets}) == 1
+    parts = scenes.transport(sets, 256)
+    passes_of_all = [
+        np.split(np.array(parts.renderer.render(seed)), parts.count, axis=2) for seed in range(8)
+    ]
+    together = np.array([parts.added(found) for found in passes_of_all])
+    for number, simulated in enumerate(sets):
+        alone = scenes.transport([simulated], 256).renderer
+        found = np.array([np.array(alone.render(seed)) for seed in range(20, 28)])
+        of_passes = [each.mean(axis=(1, 2)) for each in (together[:, number], found)]
+        error = np.sqrt(sum(means.var(axis=0, ddof=1) / 8 for means in of_passes))
+        gap = abs(of_passes[0].mean(axis=0) - of_passes[1].mean(axis=0))
+        assert (gap < 5 * error + 1e-4).all(), simulated
+    means = together.mean(axis=0)
+    assert min(abs(one - two).mean() for one, two in combinations(means, 2)) > 1e-4
 
 
 @pytest.mark.guarantee("attribution", "With all effects simulated, no departure remains.")

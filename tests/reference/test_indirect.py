@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fotismos.reference.rendering.indirect import indirect_light
-from fotismos.reference.rendering.transport import Transport
+from fotismos.reference.rendering.transport import LightGroups, Transport
 
 ALBEDO = 0.6
 COUNT = 400_000
@@ -37,6 +37,7 @@ def estimate(max_depth, rr_depth=1000, **transport):
         max_depth=max_depth,
         rr_depth=rr_depth,
         active=mi.Bool(True),
+        groups=LightGroups(scene, [0]),
         transports=[Transport(**transport)],
     )
     values = np.array(mi.Color3f(light) + dr.zeros(mi.Color3f, COUNT))[0]

@@ -32,6 +32,7 @@ from fotismos.reference.pairing.lights import (
     heuristic,
     level,
 )
+from fotismos.reference.pairing.pairing_record import SUN
 from fotismos.reference.rendering.gbuffer import GBuffer
 from fotismos.reference.scene import values
 from fotismos.reference.scene.graph import Reference, properties
@@ -216,7 +217,7 @@ def sky_to_ambient(light: LightNode) -> Any:
         )
         props.set_id(f"sun of {light.label}")
         node = light.graph.add(mi.ObjectType.Emitter, props)
-        light.graph.attach(0, f"sun_of_{light.index}", node)
+        light.graph.attach(0, f"{SUN}{light.index}", node)
         note += "; the sun a directional light of its irradiance"
     ambient = probe.mean_radiance(light.graph, _only(light, "sun_scale"))
     light.becomes_ambient(note, "directions of the sky's light, and the sun's extent")

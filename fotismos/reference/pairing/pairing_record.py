@@ -9,6 +9,9 @@ from fotismos.reference.records import Record
 SECOND_INTENSITY = "specular intensity L_s"
 """What a light of two intensities loses."""
 
+SUN = "sun_of_"
+"""Key of the textbook's light in place of the sun of a sky, before the sky's node."""
+
 
 class Miss(Record):
     """A quantity that no partner reaches."""

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from fotismos.reference.pairing.pairing_record import SECOND_INTENSITY
+from fotismos.reference.pairing.pairing_record import SECOND_INTENSITY, SUN
 from fotismos.reference.planning.decisions import Decision, RuleResult
 
 if TYPE_CHECKING:
@@ -346,10 +346,15 @@ def put_far_lights(graph: Graph, facts: Facts, shapes: Sequence[int]) -> None:
     for shape in shapes:
         for key, _ in graph.emitters_of(shape):
             detach(graph, facts, [(shape, key)])
-    # The lights that only the textbook half has are those in place of shapes.
+    # The lights that only the textbook half has are those in place of shapes, and suns.
+    added = textbook_lights(facts)
+    put_lights(graph, facts, [key for key in added if not key.startswith(SUN)])
+
+
+def textbook_lights(facts: Facts) -> list[str]:
+    """Return the keys of the lights that only the textbook half has."""
     before = dict(facts.pair.physical.emitters_of(0))
-    emitters = facts.pair.heuristic.emitters_of(0)
-    put_lights(graph, facts, [key for key, _ in emitters if key not in before])
+    return [key for key, _ in facts.pair.heuristic.emitters_of(0) if key not in before]
 
 
 def own_light(phong: mi.Properties, facts: Facts) -> dict[str, Any]:
@@ -386,6 +391,12 @@ def surroundings(facts: Facts) -> list[tuple[int, str]]:
     ]
 
 
+def put_surroundings(graph: Graph, facts: Facts, sites: Sequence[tuple[int, str]]) -> None:
+    """Remove the lights that shine from everywhere; the textbook has a sun in place of a sky's."""
+    detach(graph, facts, sites)
+    put_lights(graph, facts, [key for key in textbook_lights(facts) if key.startswith(SUN)])
+
+
 def is_surrounded(facts: Facts) -> tuple[bool, str]:
     """Whether a light shines from everywhere."""
     kinds = (light.kind for light in facts.lights if light.shape is None)
@@ -414,7 +425,7 @@ ENVIRONMENT = GlowingEffect(
     colour="#009e73",
     sampled=True,
     sites=surroundings,
-    put=detach,
+    put=put_surroundings,
     emission=ambient_light,
 )
 

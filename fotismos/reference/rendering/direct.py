@@ -28,7 +28,8 @@ Parameter           Type (default)      Meaning
 ==================  ==================  ===========================================================
 
 One rendering can make several images, which share camera rays, paths and kernel: those of
-``transports``, set after construction. All but the first are AOVs, without the camera's weight.
+``transports``, set after construction, with the ``groups`` of lights that they hold. All but the
+first are AOVs, without the camera's weight.
 """
 
 from collections.abc import Callable, Sequence
@@ -43,9 +44,12 @@ from fotismos.heuristic.convention import Colour, Mask, Scene
 from fotismos.heuristic.plugins.integrator import LAYERS
 from fotismos.reference.records import RR_DEPTH
 from fotismos.reference.rendering.transport import (
+    LightGroups,
     Transport,
     found_by_bsdf,
     power_share,
+    sampled,
+    spread,
     sums,
     visibility,
 )
@@ -66,9 +70,16 @@ def _define(_variant: str) -> None:
 
         def __init__(self, props: Any) -> None:
             super().__init__(props)
-            defaults = Transport()._asdict()
-            given = {name: props.get(name, value) for name, value in defaults.items()}
-            self.transports = (Transport(**given),)
+            defaults = Transport()
+            self.transports = (
+                Transport(
+                    shadows=props.get("shadows", defaults.shadows),
+                    bsdf_samples=props.get("bsdf_samples", defaults.bsdf_samples),
+                    max_depth=props.get("max_depth", defaults.max_depth),
+                ),
+            )
+            self.groups: Any = None
+            """A `LightGroups`; if omitted, all lights are in group 0."""
             self.looks_through = props.get("looks_through", False)
             self.environment_albedo = None
             """An `AlbedoTable` (:mod:`fotismos.reference.pairing.probe`) in place of samples of the
@@ -77,13 +88,14 @@ def _define(_variant: str) -> None:
         def sample(
             self, scene: Scene, sampler: Any, ray: Any, medium: Any = None, active: Mask = True
         ) -> tuple[Colour, Mask, list[Any]]:
+            groups = self.groups or LightGroups(scene, [0] * len(scene.emitters()))
             # Lights at points and in directions are exact, the others are sampled.
-            delta: list[Any] = []
+            delta: list[tuple[Any, int]] = []
+            others: list[tuple[Any, int]] = []
             lamps = []
-            others: list[Any] = []
-            for emitter in scene.emitters():
+            for emitter, group in groups.members(scene):
                 is_delta = mi.has_flag(emitter.flags(), mi.EmitterFlags.Delta)
-                (delta if is_delta else others).append(emitter)
+                (delta if is_delta else others).append((emitter, group))
                 if mi.has_flag(emitter.flags(), mi.EmitterFlags.Surface):
                     lamps.append(emitter)
             # The surface that the camera sees, and the light that comes from it directly.
@@ -92,10 +104,11 @@ def _define(_variant: str) -> None:
             else:
                 si = scene.ray_intersect(ray, mi.RayFlags.All, True, active)
             looks_through = self.looks_through and _has(mi.BSDFFlags.Null, scene)
+            emitter = si.emitter(scene)
             colour = mi.Spectrum(0)
             if others or len(delta) <= UNROLLED:  # rays never hit points or directions
                 is_shown = active & (si.is_valid() | (not self.hide_emitters))
-                colour = dr.select(is_shown, si.emitter(scene).eval(si, is_shown), 0)
+                colour = dr.select(is_shown, emitter.eval(si, is_shown), 0)
             hit = active & si.is_valid()
             # The mask of valid samples becomes alpha: a visible environment fills the picture.
             environment = scene.environment() is not None and not self.hide_emitters
@@ -124,20 +137,25 @@ def _define(_variant: str) -> None:
                 "bsdf": bsdf,
                 "sampler": sampler,
                 "active": hit,
-                "transports": self.transports,
             }
+            # Each image begins with what the camera sees, and the exact lights.
+            colours = [
+                mi.Spectrum(dr.select(groups.holds(transport.group, emitter), colour, 0))
+                for transport in self.transports
+            ]
             # The environment from a table, if there is one; the other lights are sampled.
             extended = []
-            for emitter in others:
-                if self.environment_albedo is not None and emitter.is_environment():
+            for light, group in others:
+                if self.environment_albedo is not None and light.is_environment():
                     albedo = self.environment_albedo.at(si.wi.z)
-                    colour += dr.select(hit, albedo * emitter.eval(si, hit), 0)
+                    reflected = dr.select(hit, albedo * light.eval(si, hit), 0)
+                    own = [each for each in self.transports if each.group == group]
+                    colours = sums(colours, spread(self.transports, own, [reflected] * len(own)))
                 else:
-                    extended.append(emitter)
-            # Each image begins with what the camera sees, and the exact lights.
-            colours = [colour] * len(self.transports)
-            colours = sums(colours, _of_all(delta, True, **seen))
-            deep = [transport for transport in self.transports if transport.max_depth != 2]
+                    extended.append((light, group))
+            transports = self.transports
+            colours = sums(colours, _of_all(delta, True, transports=transports, **seen))
+            deep = [transport for transport in transports if transport.max_depth != 2]
             if deep:  # first, so that paths have the same random numbers whatever lights there are
                 # Loaded late: most plans have direct light alone.
                 from fotismos.reference.rendering.indirect import indirect_light
@@ -151,19 +169,22 @@ def _define(_variant: str) -> None:
                     max_depth=max_depth,
                     rr_depth=RR_DEPTH,
                     active=hit,
+                    groups=groups,
                     transports=deep,
                 )
-                colours = sums(colours, self.spread(deep, indirect))
-            looks = any(transport.bsdf_samples for transport in self.transports)
+                colours = sums(colours, spread(transports, deep, indirect))
+            looks = any(transport.bsdf_samples for transport in transports)
             takes_samples = extended and (looks or _has(mi.BSDFFlags.Delta, scene))
 
             def with_lamps(colours: list[Colour], **there: Any) -> list[Colour]:
                 """Add lights with an extent: a sample of each, and one of the BSDF for all."""
                 colours = sums(colours, _of_all(extended, False, **there))
-                return sums(colours, _from_bsdf(**there)) if takes_samples else colours
+                return (
+                    sums(colours, _from_bsdf(groups=groups, **there)) if takes_samples else colours
+                )
 
-            colours = with_lamps(colours, **seen)
-            shallow = [transport for transport in self.transports if transport.max_depth == 2]
+            colours = with_lamps(colours, transports=transports, **seen)
+            shallow = [transport for transport in transports if transport.max_depth == 2]
             if looks_through and shallow:
 
                 def direct(si: Any, sampler: Any, active: Mask) -> list[Colour]:
@@ -186,13 +207,8 @@ def _define(_variant: str) -> None:
                     light=direct,
                     nothing=[mi.Spectrum(0)] * len(shallow),
                 )
-                colours = sums(colours, self.spread(shallow, behind))
+                colours = sums(colours, spread(transports, shallow, behind))
             return colours[0], valid, [channel for image in colours[1:] for channel in image]
-
-        def spread(self, transports: Sequence[Transport], light: Sequence[Colour]) -> list[Colour]:
-            """Return the light of some images among those of all; 0 in the others."""
-            known = dict(zip(transports, light, strict=True))
-            return [known.get(transport, 0) for transport in self.transports]
 
         def aov_names(self) -> list[str]:
             channels = range(len(mi.Spectrum(0)))
@@ -275,7 +291,21 @@ def _has(flag: Any, scene: Any) -> bool:
 
 
 def _of_all(
-    lights: list[Any],
+    lights: Sequence[tuple[Any, int]], is_delta: bool, transports: Sequence[Transport], **there: Any
+) -> list[Any]:
+    """Return the light of lights, each with its group, in each image."""
+    colours = [mi.Spectrum(0)] * len(transports)
+    for group in dict.fromkeys(group for _, group in lights):
+        members = [light for light, number in lights if number == group]
+        own = [transport for transport in transports if transport.group == group]
+        if own:
+            light = _of_group(members, is_delta, transports=own, **there)
+            colours = sums(colours, spread(transports, own, light))
+    return colours
+
+
+def _of_group(
+    lights: Sequence[Any],
     is_delta: bool,
     scene: Any,
     si: Any,
@@ -311,17 +341,12 @@ def _of_all(
             colours.append(dr.select(visible, term, 0))
         return colours
 
-    targets = [partial(_sampled, light) for light in lights]
+    targets = [partial(sampled, light) for light in lights]
     nothing = [mi.Spectrum(0)] * len(transports)
     if len(lights) > UNROLLED:
         looped: list[Colour] = _looped(targets, of_light, sampler=sampler, nothing=nothing)
         return looped
     return reduce(sums, (of_light(target, sampler) for target in targets), nothing)
-
-
-def _sampled(light: Any, si: Any, sample: Any, active: Any) -> Any:
-    ds, weight = light.sample_direction(si, sample, active)
-    return ds.p, ds.d, ds.pdf, weight
 
 
 @dr.syntax
@@ -350,7 +375,13 @@ def _added(totals: list[Any], terms: list[Any]) -> list[Any]:
 
 
 def _from_bsdf(
-    scene: Any, si: Any, bsdf: Any, sampler: Any, active: Any, transports: Sequence[Transport]
+    scene: Any,
+    si: Any,
+    bsdf: Any,
+    sampler: Any,
+    active: Any,
+    groups: LightGroups,
+    transports: Sequence[Transport],
 ) -> list[Any]:
     """One sample of the BSDF, for the emitter that it happens to hit, for each image.
 
@@ -372,4 +403,6 @@ def _from_bsdf(
     # A delta direction has no rival.
     share = dr.select(is_delta, 1, power_share(bs.pdf, emitter_pdf))
     value = weight * emitter.eval(hit, active) * share
-    return found_by_bsdf(active, is_delta, value=value, transports=transports)
+    return found_by_bsdf(
+        active, is_delta, value=value, emitter=emitter, groups=groups, transports=transports
+    )
