@@ -126,7 +126,8 @@ def _correlations(seen: np.ndarray, edges: np.ndarray, reach: int) -> np.ndarray
     sides = [side + reach for side in edges.shape]
     spectrum = np.fft.rfft2(first, sides) * np.conj(np.fft.rfft2(second, sides))
     products = np.fft.irfft2(spectrum, sides)[down, right]
-    counts = np.maximum(_overlap_sums(np.ones(edges.shape), down, right), 1.0)
+    height, width = edges.shape
+    counts = np.maximum((height - np.abs(down)) * (width - np.abs(right)), 1.0)
     seen_sums = _overlap_sums(first, down, right)
     edge_sums = _overlap_sums(second, -down, -right)
     covariance = products - seen_sums * edge_sums / counts
@@ -145,12 +146,17 @@ def _correlations(seen: np.ndarray, edges: np.ndarray, reach: int) -> np.ndarray
 def _overlap_sums(values: np.ndarray, down: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Return sums of a map (H, W) over the part that shifted maps of its size overlap."""
     height, width = values.shape
-    # Sums of all pixels above and to the left of each corner.
-    corner = np.pad(values.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
-    top = np.clip(down, 0, height)
-    bottom = np.clip(height + down, 0, height)
-    left = np.clip(right, 0, width)
-    end = np.clip(width + right, 0, width)
+    top, bottom = np.clip(down, 0, height), np.clip(height + down, 0, height)
+    left, end = np.clip(right, 0, width), np.clip(width + right, 0, width)
+    # Sums of the cells between the corners, then of all cells above and to the left of each.
+    rows = np.unique([0, *top.ravel(), *bottom.ravel()])
+    columns = np.unique([0, *left.ravel(), *end.ravel()])
+    cells = values
+    for axis, starts in enumerate((rows, columns)):
+        cells = np.add.reduceat(cells, starts[starts < values.shape[axis]], axis=axis)
+    corner = np.pad(cells.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
+    top, bottom = np.searchsorted(rows, top), np.searchsorted(rows, bottom)
+    left, end = np.searchsorted(columns, left), np.searchsorted(columns, end)
     sums: np.ndarray = (
         corner[bottom, end] - corner[top, end] - corner[bottom, left] + corner[top, left]
     )
@@ -175,11 +181,11 @@ def is_doubtful(
     """Return whether noise may make a shift.
 
     ``by_noise`` is where the other half seems to be, which is in its place. Shifts that noise makes
-    also differ from half to half of the repeats (H, W, 3).
+    also differ from half to half of the repeats (H, W, 3), if there are several.
     """
     if by_noise is not None and 0 < place.gain <= DOUBTFUL * by_noise.gain:
         return True
-    if place.shift is None or len(repeats) == 1:
+    if place.shift is None or len(repeats) < 2:
         return False
     for first in range(2):
         shift = measure(np.mean(repeats[first::2], axis=0), expected).shift

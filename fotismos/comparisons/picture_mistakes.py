@@ -8,9 +8,10 @@ little.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import permutations
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,6 @@ from fotismos.comparisons import alignment, colour_spaces
 from fotismos.comparisons.departure.blocks import averaged, block_sums, shrunk
 from fotismos.comparisons.departure.colour import (
     BLACK,
-    Array,
     from_srgb,
     to_srgb,
 )
@@ -30,13 +30,14 @@ from fotismos.comparisons.departure.tone_maps import Curves, FittedCurve
 from fotismos.comparisons.records.images import Light
 from fotismos.heuristic.convention import Floats
 
-Mending = Callable[[Array], Array]
+Mending = Callable[[Floats], Floats]
 """A function from a picture (H, W, 3) to the one without a mistake."""
 
 BLOCK = 8
 ALONG = 8
-"""Side of the blocks whose means are compared, in pixels; and how many there are along a side, for
-which smaller ones are taken."""
+MOST_BLOCKS = 4096
+"""Side of the blocks whose means are compared, in pixels; how many there are along a side, for
+which smaller ones are taken; and at how many of them changes of colours are tried."""
 
 LIT = 0.02
 """Blocks darker than this times the median tell no ratio."""
@@ -189,16 +190,16 @@ class Factor:
 class NoisyImage:
     """An image (H, W, 3), and two halves of its repeats, whose difference shows its noise."""
 
-    mean: Array
-    halves: tuple[Array, Array] | None = None
+    mean: Floats
+    halves: tuple[Floats, Floats] | None = None
 
-    def noise(self, mend: Mending) -> Array | float:
+    def noise(self, mend: Mending) -> Floats | float:
         """Return how far noise moves the pixels of the mended image, in ΔE2000, (H, W)."""
         if self.halves is None:
             return 0.0
         first, second = self.halves
         # The halves are twice as far apart as their mean is from the truth.
-        apart: Array = LEADING(mend(first), mend(second)) / 2
+        apart: Floats = LEADING(mend(first), mend(second)) / 2
         return apart
 
 
@@ -206,19 +207,16 @@ class NoisyImage:
 class Blocks:
     """Mean colours (B, 3) of blocks of pixels: of a picture, and of the other half."""
 
-    picture: Array
-    other: Array
+    picture: Floats
+    other: Floats
 
     @classmethod
-    def of(cls, picture: Array, other: Array, counted: NDArray[np.bool_]) -> "Blocks":
+    def of(cls, picture: Floats, other: Floats, counted: NDArray[np.bool_]) -> "Blocks":
         """Average over the pixels that count, in whole blocks if there are any."""
-        side = max(1, min(BLOCK, min(counted.shape) // ALONG))
-        weights = block_sums(counted.astype(float), side)[..., None]
-        full = (weights[..., 0] >= 0.5 * weights.max()) & (weights[..., 0] > 0)
+        side, weights = _blocks(counted)
+        full = weights > 0
         means = [
-            (block_sums(np.where(counted[..., None], image, 0.0), side) / np.maximum(weights, 1))[
-                full
-            ]
+            block_sums(np.where(counted[..., None], image, 0.0), side)[full] / weights[full, None]
             for image in (picture, other)
         ]
         return cls(picture=means[0], other=means[1])
@@ -228,10 +226,67 @@ class Blocks:
         return float(LEADING(self.picture, self.other).mean()) if self.picture.size else 0.0
 
 
+def _blocks(counted: NDArray[np.bool_]) -> tuple[int, Floats]:
+    """Return the side of blocks, and the counted pixels (h, w) of each that is whole, else 0."""
+    side = max(1, min(BLOCK, min(counted.shape) // ALONG))
+    pixels = block_sums(counted.astype(float), side)
+    return side, np.where(pixels >= 0.5 * pixels.max(), pixels, 0.0)
+
+
+@dataclass(frozen=True)
+class Tiles:
+    """The pixels (B, n, 3) of whole blocks, :data:`MOST_BLOCKS` at most: changes are tried there.
+
+    ``shares`` (B, n, 1) are those of the pixels in the mean of their block.
+    """
+
+    picture: Floats
+    other: Floats
+    shares: Floats
+
+    @classmethod
+    def of(cls, picture: Floats, other: Floats, counted: NDArray[np.bool_]) -> "Tiles":
+        """Draw blocks as :class:`Blocks` has them, always the same."""
+        side, weights = _blocks(counted)
+        whole = np.flatnonzero(weights)
+        chosen = np.sort(np.random.default_rng(0).permutation(whole)[:MOST_BLOCKS])
+        down, right = np.divmod(chosen, weights.shape[1])
+        # Beyond the edge the last pixel repeats, and has no share.
+        y, x = np.divmod(np.arange(side * side), side)
+        rows = side * down[:, None] + y
+        columns = side * right[:, None] + x
+        inside = (rows < counted.shape[0]) & (columns < counted.shape[1])
+        at = np.minimum(rows, counted.shape[0] - 1), np.minimum(columns, counted.shape[1] - 1)
+        shares = (inside & counted[at]) / weights.ravel()[chosen, None]
+        return cls(
+            picture=picture[at].astype(float),
+            other=other[at].astype(float),
+            shares=shares[..., None],
+        )
+
+    @cached_property
+    def other_blocks(self) -> Floats:
+        """The mean colours (B, 3) of the other half's blocks."""
+        return self._means(self.other)
+
+    def blocks(self, mend: Mending) -> Blocks:
+        """Return the mean colours of the blocks of a mended picture, and the other half's."""
+        return Blocks(picture=self._means(mend(self.picture)), other=self.other_blocks)
+
+    def left(self, change: Mistake) -> float:
+        """Return the departure that the blocks have after a change is mended."""
+        return np.inf if change.mend is None else self.blocks(change.mend).departure()
+
+    def _means(self, pixels: Floats) -> Floats:
+        means: Floats = np.where(self.shares > 0, pixels * self.shares, 0.0).sum(axis=1)
+        return means
+
+
 def find(
     picture: NoisyImage,
     other: NoisyImage,
     counted: NDArray[np.bool_],
+    in_place: alignment.Place,
     locate: Callable[[Mending], alignment.Place],
     is_encoded: bool,
     names: Names,
@@ -240,25 +295,26 @@ def find(
 ) -> Iterator[Mistake]:
     """Yield the mistakes of a picture, each mended before the next one is looked for.
 
-    Images are linear; ``counted`` (H, W) are the pixels that count. ``locate`` tells where the
-    content of the picture is after it is mended. ``is_encoded`` says that the file ends at display
-    white, as a PNG does. ``light`` is that of the other image, before the tone map of that name.
+    Images are linear; ``counted`` (H, W) are the pixels that count. ``in_place`` is where the
+    content of the picture is, and ``locate`` tells where it is after a mending. ``is_encoded`` says
+    that the file ends at display white, as a PNG does. ``light`` is that of the other image, before
+    the tone map of that name.
     """
-    if min(image.mean[counted].max(initial=0.0) for image in (picture, other)) < BLACK:
+    if min(float(_largest(image.mean, counted)) for image in (picture, other)) < BLACK:
         return
     truth = other.mean
     mends: list[Mending] = []
 
-    def mended(image: Array) -> Array:
+    def mended(image: Floats) -> Floats:
         for mend in mends:
-            image = mend(image)
+            image = mend(np.asarray(image, float))
         return image
 
     def candidates() -> Iterator[Mistake | None]:
         # Codes of a bright picture may be equal, and their order says nothing.
-        if np.mean(LEADING(picture.mean, truth)[counted] > TOLERANCE) > LIMIT:
+        if _share_that_differs(Tiles.of(picture.mean, truth, counted)) > LIMIT:
             yield _turned(picture.mean, truth, counted, names)
-        place = locate(mended)
+        place = locate(mended) if mends else in_place
         if _is_of_other_scene(mended(picture.mean), truth, counted, place):
             yield Mistake(
                 sentence=(
@@ -294,6 +350,19 @@ def find(
         yield replace(mistake, sentence=f"{mistake.sentence} {after}", is_certain=left <= LIMIT)
 
 
+def _share_that_differs(tiles: Tiles) -> float:
+    """Return the share of the counted pixels of blocks that differ visibly."""
+    if not tiles.shares.size:
+        return 0.0
+    differs = LEADING(tiles.picture, tiles.other) > TOLERANCE
+    return float(differs[tiles.shares[..., 0] > 0].mean())
+
+
+def _largest(image: Floats, counted: NDArray[np.bool_]) -> Any:
+    """Return the largest value of the pixels that count, 0 at least."""
+    return image.max(axis=(0, 1), initial=0.0, where=counted[..., None]).max()
+
+
 def _percent(share: float) -> str:
     return f"{float(f'{100 * share:.2g}'):g} %"
 
@@ -306,9 +375,9 @@ PRIMARIES = ("BT.2020", "Display P3")
 """Colour spaces with the white of BT.709, whose values may have been read as those of BT.709."""
 
 
-def _times(matrix: Floats, image: Array) -> Array:
+def _times(matrix: Floats, image: Floats) -> Floats:
     """Return the colours of an image, each multiplied by a matrix (3, 3)."""
-    product: Array = image @ matrix.T
+    product: Floats = image @ matrix.T
     return product
 
 
@@ -346,8 +415,8 @@ CURES = {
 
 
 def _other_values(
-    picture: Array,
-    other: Array,
+    picture: Floats,
+    other: Floats,
     counted: NDArray[np.bool_],
     names: Names,
     light: Light,
@@ -418,19 +487,18 @@ TURNED: dict[str, Mending] = {
 
 
 def _turned(
-    picture: Array, other: Array, counted: NDArray[np.bool_], names: Names
+    picture: Floats, other: Floats, counted: NDArray[np.bool_], names: Names
 ) -> Mistake | None:
     """Return how a picture is turned; None if it is not, or if turning it back mends too little.
 
     What is brighter than what stays, whatever the values are.
     """
     lacking = {
-        how: 1.0 - _order_agreement(turn(picture), other, counted)
-        for how, turn in TURNED.items()
-        if turn(picture).shape == other.shape
+        how: 1.0 - _order_agreement(light, _light(other), counted)
+        for how, light in _views(picture, other.shape).items()
     }
     how = min(lacking, key=lacking.__getitem__)
-    before = 1.0 - _order_agreement(picture, other, counted)
+    before = 1.0 - _order_agreement(_light(picture), _light(other), counted)
     if before < LACKING or lacking[how] > TURNED_BACK * before:
         return None
     return Mistake(
@@ -438,42 +506,58 @@ def _turned(
     )
 
 
-def _order_agreement(picture: Array, other: Array, counted: NDArray[np.bool_]) -> float:
-    """Return Spearman's correlation of the brightness of small blocks; 1 if one is even."""
-    blocks = Blocks.of(picture, other, counted)
-    first = _ranks(blocks.picture.mean(axis=1))
-    second = _ranks(blocks.other.mean(axis=1))
+def _views(picture: Floats, shape: tuple[int, ...]) -> dict[str, Floats]:
+    """Return the brightness (H, W, 1) of a picture turned in each way that leads to a shape."""
+    views = {how: turn(_light(picture)) for how, turn in TURNED.items()}
+    return {how: view for how, view in views.items() if view.shape[:2] == shape[:2]}
+
+
+def _light(image: Floats) -> Floats:
+    """Return the mean (H, W, 1) of the channels of an image."""
+    light: Floats = image @ np.full((3, 1), 1 / 3, image.dtype)
+    return light
+
+
+def _order_agreement(light: Floats, other: Floats, counted: NDArray[np.bool_]) -> float:
+    """Return Spearman's correlation of the mean brightness of small blocks; 1 if one is even.
+
+    Both are of pixels, (H, W, 1).
+    """
+    blocks = Blocks.of(light, other, counted)
+    first = _ranks(blocks.picture[:, 0])
+    second = _ranks(blocks.other[:, 0])
     first = first - first.mean()
     second = second - second.mean()
     size = float(np.sqrt((first**2).sum() * (second**2).sum()))
     return float((first * second).sum()) / size if size else 1.0
 
 
-def _ranks(values: Array) -> Array:
+def _ranks(values: Floats) -> Floats:
     """Return the ranks of values (N,); equal ones share theirs."""
     _, places, counts = np.unique(values, return_inverse=True, return_counts=True)
-    ranks: Array = (np.cumsum(counts) - (counts - 1) / 2)[places]
+    ranks: Floats = (np.cumsum(counts) - (counts - 1) / 2)[places]
     return ranks
 
 
 def _is_of_other_scene(
-    picture: Array, other: Array, counted: NDArray[np.bool_], place: alignment.Place
+    picture: Floats, other: Floats, counted: NDArray[np.bool_], place: alignment.Place
 ) -> bool:
     """Return whether two pictures share neither edges nor, however turned, what is bright.
 
     Both must show much.
     """
+    if place.correlation > OTHER_EDGES:
+        return False
     at_end = picture.max(axis=-1)[counted] >= CLIPPED * picture[counted].max()
-    if place.correlation > OTHER_EDGES or np.mean(at_end) > MOSTLY:
+    if np.mean(at_end) > MOSTLY:
         return False
     if not all(_has_structure(image, counted) for image in (picture, other)):
         return False
-    views = [picture, *(turn(picture) for turn in TURNED.values())]
-    alike = [_order_agreement(view, other, counted) for view in views if view.shape == other.shape]
-    return max(alike) < OTHER_ORDER
+    views = [_light(picture), *_views(picture, other.shape).values()]
+    return max(_order_agreement(view, _light(other), counted) for view in views) < OTHER_ORDER
 
 
-def _has_structure(image: Array, counted: NDArray[np.bool_]) -> bool:
+def _has_structure(image: Floats, counted: NDArray[np.bool_]) -> bool:
     """Return whether blocks differ by far more than the pixels within them let expect of noise.
 
     That is the ratio of variances of an analysis of variance; it is 1 for independent noise.
@@ -485,7 +569,7 @@ def _has_structure(image: Array, counted: NDArray[np.bool_]) -> bool:
     return bool(blocks.picture.var() * size > STRUCTURE * within)
 
 
-def _moved(picture: Array, other: Array, place: alignment.Place, names: Names) -> Mistake | None:
+def _moved(picture: Floats, other: Floats, place: alignment.Place, names: Names) -> Mistake | None:
     """Return a shift or another size of the content; None if it is in its place."""
     # Where edges agree nearly wholly, no other size can agree far better.
     zoom = _zoom(picture, other) if place.correlation < 1 - ZOOMED else None
@@ -515,7 +599,7 @@ def _moved(picture: Array, other: Array, place: alignment.Place, names: Names) -
     )
 
 
-def _is_moved(picture: Array, other: Array, right: float, down: float) -> bool:
+def _is_moved(picture: Floats, other: Floats, right: float, down: float) -> bool:
     """Return whether moving a picture back mends more than moving it on; else it is only smoother.
 
     A parabola through the squared errors of both and of none has its least one ``x = (on - back) /
@@ -530,9 +614,9 @@ def _is_moved(picture: Array, other: Array, right: float, down: float) -> bool:
     return bool(on - back > 2 * MOVED * abs(on + back - 2 * error))
 
 
-def _image_of_ranks(image: Array) -> Array:
+def _image_of_ranks(image: Floats) -> Floats:
     """Return the rank of each pixel's brightness, (H, W, 1)."""
-    return _ranks(image.mean(axis=-1).ravel()).reshape(*image.shape[:2], 1)
+    return _ranks(image.mean(axis=-1, dtype=float).ravel()).reshape(*image.shape[:2], 1)
 
 
 def _in_pixels(shift: float, ahead: str, back: str) -> str:
@@ -543,15 +627,15 @@ def _in_pixels(shift: float, ahead: str, back: str) -> str:
     return f"{size:g} pixel{'' if size == 1 else 's'} {ahead if shift > 0 else back}"
 
 
-def _shifted(picture: Array, right: float, down: float) -> Array:
+def _shifted(picture: Floats, right: float, down: float) -> Floats:
     """Return a picture whose content is moved; its edges repeat beyond them."""
     from scipy import ndimage  # loaded late: few pictures are shifted
 
-    moved: Array = ndimage.shift(picture, (down, right, 0), order=1, mode="nearest")
+    moved: Floats = ndimage.shift(picture, (down, right, 0), order=1, mode="nearest")
     return moved
 
 
-def _zoom(picture: Array, other: Array) -> float | None:
+def _zoom(picture: Floats, other: Floats) -> float | None:
     """Return how much larger a picture's content is; None if no other size agrees far better."""
     height, width = picture.shape[:2]
     if min(height, width) < 2 * BLOCK:  # edges agree by chance
@@ -577,7 +661,7 @@ def _zoom(picture: Array, other: Array) -> float | None:
     return zoom
 
 
-def _agreement(picture: Array, other: Array) -> float:
+def _agreement(picture: Floats, other: Floats) -> float:
     """Return the highest correlation of the edges of two pictures over all cyclic shifts."""
     seen = alignment.picture_edges(picture)
     expected = alignment.picture_edges(other)
@@ -590,7 +674,7 @@ def _agreement(picture: Array, other: Array) -> float:
     return float(products.max() / size)
 
 
-def _zoomed(picture: Array, zoom: float) -> Array:
+def _zoomed(picture: Floats, zoom: float) -> Floats:
     """Return a picture whose content is larger by a factor, about its centre."""
     height, width = picture.shape[:2]
     half_width = width / (2 * zoom)
@@ -616,7 +700,9 @@ def _zoomed(picture: Array, zoom: float) -> Array:
 # --- Colours -----------------------------------------------------------------------------------
 
 
-def ratios(picture: Array, other: Array, counted: NDArray[np.bool_]) -> tuple[float, float, float]:
+def ratios(
+    picture: Floats, other: Floats, counted: NDArray[np.bool_]
+) -> tuple[float, float, float]:
     """Return how many times as strong a picture's red, green and blue are as the other half's.
 
     They are medians over blocks that are lit in both, and not clipped. A channel that the other
@@ -673,8 +759,8 @@ def reason_of(level: float) -> str:
 
 
 def _change_of_colours(
-    picture: Array,
-    other: Array,
+    picture: Floats,
+    other: Floats,
     counted: NDArray[np.bool_],
     names: Names,
     is_mapped: bool = False,
@@ -688,16 +774,17 @@ def _change_of_colours(
     before = blocks.departure()
     if before < noticed:
         return None
-    changes = dict(_readings(picture, other, counted, names, before))
+    tiles = Tiles.of(picture, other, counted)
+    changes = dict(_readings(tiles, names, before))
     ratio = np.array(ratios(picture, other, counted))
     ratio = np.maximum(ratio, LEAST_RATIO * ratio.max())
     if not is_mapped:
         changes = _changes(blocks, ratio, names, changes)
-        pixels = Blocks(picture=picture[counted], other=other[counted])
         # Blocks have less noise, and pixels no edges within.
+        pixels = _some_pixels(picture, other, counted)
         if powers := list(filter(None, (_power(blocks, names), _power(pixels, names)))):
-            changes["power"] = min(powers, key=lambda power: _left(power, picture, other, counted))
-    left = {kind: _left(change, picture, other, counted) for kind, change in changes.items()}
+            changes["power"] = min(powers, key=tiles.left)
+    left = {kind: tiles.left(change) for kind, change in changes.items()}
     allowed = SIMPLER * min(left.values()) + SLIGHT * before
     # The first of them is the simplest.
     chosen = next(kind for kind, departure in left.items() if departure <= allowed)
@@ -712,11 +799,14 @@ def _change_of_colours(
     return changes.get("white") if _is_even_tint(blocks) else None
 
 
-def _left(change: Mistake, picture: Array, other: Array, counted: NDArray[np.bool_]) -> float:
-    """Return the departure that the blocks have after a change is mended."""
-    if change.mend is None:
-        return np.inf
-    return Blocks.of(change.mend(picture), other, counted).departure()
+def _some_pixels(picture: Floats, other: Floats, counted: NDArray[np.bool_]) -> Blocks:
+    """Return the colours of pixels that count, at most as many as blocks of them have."""
+    places = np.flatnonzero(counted)
+    most = MOST_BLOCKS * BLOCK**2
+    if len(places) > most:
+        places = np.sort(np.random.default_rng(0).choice(places, most, replace=False))
+    drawn = [image.reshape(-1, 3)[places].astype(float) for image in (picture, other)]
+    return Blocks(picture=drawn[0], other=drawn[1])
 
 
 def _with_rivals(chosen: str, changes: dict[str, Mistake], left: dict[str, float]) -> Mistake:
@@ -734,9 +824,7 @@ def _with_rivals(chosen: str, changes: dict[str, Mistake], left: dict[str, float
     return replace(changes[chosen], sentence=" ".join(sentences))
 
 
-def _readings(
-    picture: Array, other: Array, counted: NDArray[np.bool_], names: Names, before: float
-) -> Iterator[tuple[str, Mistake]]:
+def _readings(tiles: Tiles, names: Names, before: float) -> Iterator[tuple[str, Mistake]]:
     """Yield other readings of a picture's values by their names, with a factor if that is all.
 
     ``before`` is the departure of the blocks.
@@ -747,22 +835,22 @@ def _readings(
             mend=undo,
             show=redo,
         )
-        brightness = _brightness(Blocks.of(undo(picture), other, counted))
+        brightness = _brightness(tiles.blocks(undo))
         brighter = replace(
             reading,
             sentence=f"{reading.sentence} It is then {brightness} times as bright.",
             mend=partial(_undone, undo, brightness.value),
             show=partial(_redone, redo, brightness.value),
         )
-        is_all = _left(brighter, picture, other, counted) < WHOLLY * before
+        is_all = tiles.left(brighter) < WHOLLY * before
         yield misreading, brighter if is_all and abs(brightness.value - 1) > TINT else reading
 
 
-def _undone(undo: Mending, factor: float, image: Array) -> Array:
+def _undone(undo: Mending, factor: float, image: Floats) -> Floats:
     return undo(image) / factor
 
 
-def _redone(redo: Mending, factor: float, image: Array) -> Array:
+def _redone(redo: Mending, factor: float, image: Floats) -> Floats:
     return redo(factor * image)
 
 
@@ -780,7 +868,7 @@ def _brightness(blocks: Blocks) -> Factor:
 
 
 def _changes(
-    blocks: Blocks, ratio: Array, names: Names, readings: dict[str, Mistake]
+    blocks: Blocks, ratio: Floats, names: Names, readings: dict[str, Mistake]
 ) -> dict[str, Mistake]:
     """Return changes of colours by their kind, the simplest first; ``readings`` are among them."""
     brightness = _brightness(blocks)
@@ -860,10 +948,10 @@ def _is_even_tint(blocks: Blocks) -> bool:
 
 
 def _clipped(
-    picture: Array, other: Array, counted: NDArray[np.bool_], names: Names
+    picture: Floats, other: Floats, counted: NDArray[np.bool_], names: Names
 ) -> Mistake | None:
     """Return where a picture ends at one value, and the other half does not."""
-    largest = float(picture[counted].max(initial=0.0))
+    largest = float(_largest(picture, counted))
     at_end = (picture >= (1 - 1e-4) * largest).any(axis=-1) & counted
     brighter = at_end & (other.max(axis=-1) > (1 + TINT) * largest)
     share = brighter.sum() / max(counted.sum(), 1)

@@ -5,7 +5,7 @@ They are read by :mod:`fotismos.comparisons.picture_files`, placed by
 :mod:`fotismos.comparisons.picture_mistakes`.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -19,9 +19,8 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons import alignment, picture_mistakes
-from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.estimate import NoiseShown
-from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedReference
+from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedReference, shown_by
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.departure.tone_maps import TONE_MAPS, ToneMap
 from fotismos.comparisons.halves import Halves, PassSums
@@ -34,6 +33,7 @@ from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Times
 from fotismos.reference.rendering.passes import Size, Stream
+from fotismos.reference.rendering.sums import without_noise
 
 FEWEST = 2
 """Passes of single pictures, which are equal."""
@@ -102,10 +102,7 @@ class Pictures:
     ) -> Iterator[np.ndarray]:
         """Yield ``count`` passes (H, W, 3), which are the same for all streams and seeds."""
         groups = min(count, len(self.files))
-        means = [
-            np.mean([file.image for file in self.files[number::groups]], axis=0)
-            for number in range(groups)
-        ]
+        means = [_mean(self.files[number::groups]) for number in range(groups)]
         for number in range(count):
             self.times.append(0.0)  # they were read before
             yield means[number % groups]
@@ -115,18 +112,16 @@ class Pictures:
         return Times.of(self.times, 0.0)
 
     @cached_property
-    def mean(self) -> Array:
+    def mean(self) -> Floats:
         """Their mean, (H, W, 3)."""
-        mean: Array = np.mean([file.image for file in self.files], axis=0)
-        return mean
+        return _mean(self.files)
 
     @property
-    def two_halves(self) -> tuple[Array, Array] | None:
+    def two_halves(self) -> tuple[Floats, Floats] | None:
         """The means of two halves, whose difference shows the noise; None for one picture."""
         if len(self.files) == 1:
             return None
-        images = [file.image for file in self.files]
-        return np.mean(images[0::2], axis=0), np.mean(images[1::2], axis=0)
+        return _mean(self.files[0::2]), _mean(self.files[1::2])
 
     @property
     def opaque(self) -> NDArray[np.bool_]:
@@ -146,6 +141,14 @@ class Pictures:
         )
 
 
+def _mean(files: Sequence[PictureFile]) -> Floats:
+    """Return the mean of pictures, (H, W, 3); of one it is the picture itself."""
+    if len(files) == 1:
+        return files[0].image
+    mean: Floats = np.mean([file.image for file in files], axis=0)
+    return mean
+
+
 class MappedPassSums(PassSums):
     """Running sums of passes, of which the reference is shown by a tone map."""
 
@@ -158,6 +161,44 @@ class MappedPassSums(PassSums):
     def images(self) -> Images:
         """Return the means so far, in single precision, like the files; nothing is marked yet."""
         return replace(super().images(), light=self._mapped.light())
+
+
+class StillSums(PassSums):
+    """Sums of two single pictures, whose passes are all alike: they show no noise.
+
+    The reference is shown by a tone map, if one is given.
+    """
+
+    def __init__(self, counted: NDArray[np.bool_], tone_map: ToneMap | None) -> None:
+        self.counted = counted
+        self.passes = 0
+        self._tone_map = tone_map
+        self._pictures: tuple[Floats, ...] = ()
+
+    def add(self, heuristic: Any, reference: Any) -> None:
+        """Count a pass; all are the first one."""
+        self._pictures = (heuristic, reference)
+        self.passes += 1
+
+    def noise_percentile(self, distance: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> float:
+        """Return 0: no noise is seen."""
+        return 0.0
+
+    def images(self) -> Images:
+        """Return the pictures; nothing is marked yet."""
+        picture, light = self._pictures
+        none = np.broadcast_to(np.float32(0.0), light.shape)
+        shown = light if self._tone_map is None else shown_by(self._tone_map, light)
+        return Images(
+            heuristic=picture,
+            reference=shown,
+            reference_stderr=none,
+            difference=without_noise(picture - shown, self.counted, passes=self.passes),
+            maps={},
+            significant=np.zeros(self.counted.shape),
+            counted=self.counted,
+            light=None if self._tone_map is None else Light(mean=light, standard_error=none),
+        )
 
 
 # --- Reading -----------------------------------------------------------------------------------
@@ -199,7 +240,11 @@ class GivenPictures:
     def pass_sums(self, counted: NDArray[np.bool_]) -> PassSums:
         """Return sums of passes, in which the reference is shown as the pictures show light."""
         name = self.image.tone_map if self.image else None
-        return PassSums(counted) if name is None else MappedPassSums(counted, TONE_MAPS[name])
+        tone_map = None if name is None else TONE_MAPS[name]
+        halves = [self.image, self.reference]
+        if all(half is not None and len(half.files) == 1 for half in halves):
+            return StillSums(counted, tone_map)
+        return PassSums(counted) if tone_map is None else MappedPassSums(counted, tone_map)
 
     def where(self) -> NDArray[np.bool_]:
         """Return the pixels (H, W) that count: in the mask, and opaque in all pictures."""
@@ -407,9 +452,8 @@ def agreement(
     ``expected`` are maps (H, W) of edges that they may contain, besides those of the other image.
     ``textbook`` is the textbook half that they replace, (H, W, 3).
     """
-    # In double precision, in which the squares of all values are finite.
-    picture = images.heuristic.astype(float)
-    other = images.reference.astype(float)
+    picture = images.heuristic
+    other = images.reference
     counted = images.counted
     edges = [*expected, alignment.picture_edges(other)]
     # The other half is in its place: what a shift gains there, noise and shading make.
@@ -418,7 +462,8 @@ def agreement(
     def locate(mend: Mending) -> alignment.Place:
         """Return where the content is after a mending; without a shift if noise may make it."""
         place = alignment.measure(mend(pictures.mean), edges)
-        repeats = [mend(np.asarray(file.image, float)) for file in pictures.files]
+        files = pictures.files
+        repeats = [mend(file.image) for file in files] if len(files) > 1 else []
         if alignment.is_doubtful(place, by_noise, repeats, edges):
             return replace(place, shift=None)
         return place
@@ -428,8 +473,9 @@ def agreement(
     mistakes = list(
         picture_mistakes.find(
             NoisyImage(picture, pictures.two_halves),
-            NoisyImage(other, (other + error, other - error)),
+            NoisyImage(other, (other + error, other - error) if error.any() else None),
             counted,
+            in_place=place,
             locate=locate,
             is_encoded=any(file.is_encoded for file in pictures.files),
             names=names,

@@ -234,7 +234,8 @@ def mistakes(picture, cornell):
     def locate(mend):
         return alignment.measure(mend(picture), expected)
 
-    found = picture_mistakes.find(*sides, counted, locate, False, Names(), light)
+    place = alignment.measure(picture, expected)
+    found = picture_mistakes.find(*sides, counted, place, locate, False, Names(), light)
     return [mistake.sentence for mistake in found]
 
 

@@ -193,6 +193,7 @@ def said(picture, light, counted, tone_map=None):
         NoisyImage(picture),
         NoisyImage(reference),
         counted,
+        in_place=place,
         locate=lambda mend: place,
         is_encoded=True,
         names=Names(),

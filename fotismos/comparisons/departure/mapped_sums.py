@@ -16,6 +16,7 @@ from fotismos.comparisons.departure.blocks import bands
 from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.tone_maps import ToneMap, derivative
 from fotismos.comparisons.records.images import Light
+from fotismos.heuristic.convention import Floats
 from fotismos.reference.rendering.sums import (
     DEVIATION,
     Accumulator,
@@ -47,9 +48,7 @@ class MappedReference(DifferenceSums):
 
     def mean(self, dtype: type = float) -> np.ndarray:
         """Return the mean of the passes so far, as shown."""
-        light = super().mean()
-        shown = [self._tone_map(light[rows]) for rows in bands(len(light))]
-        return np.concatenate(shown).astype(dtype, copy=False)
+        return shown_by(self._tone_map, super().mean()).astype(dtype, copy=False)
 
     def standard_error(self, dtype: type = float) -> np.ndarray:
         """Return the standard error of the mean, as shown."""
@@ -117,6 +116,12 @@ class MappedDifference(DifferenceSums):
             third=test.third - reference.third,
             grouped=replace(test.grouped, means=means),
         )
+
+
+def shown_by(tone_map: ToneMap, light: Floats) -> Floats:
+    """Return light (H, W, 3) as shown by a tone map, in the light's own precision."""
+    shown = [tone_map(light[rows].astype(float)) for rows in bands(len(light))]
+    return np.concatenate(shown, dtype=light.dtype)
 
 
 def _times(slopes: np.ndarray, change: Array) -> Array:

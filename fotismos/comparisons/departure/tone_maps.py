@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fotismos.comparisons.departure.colour import BT709, BT2020, Array, rgb_to_xyz, to_srgb
+from fotismos.comparisons.departure.colour import BT709, BT2020, rgb_to_xyz, to_srgb
 from fotismos.comparisons.departure.minimum import minimum
 from fotismos.comparisons.records.images import Light
+from fotismos.heuristic.convention import Floats
 
-ToneMap = Callable[[Array], Array]
+ToneMap = Callable[[Floats], Floats]
 Primaries = tuple[tuple[float, float], ...]
 
 # Hill's fit: to the primaries of ACES, AP1, with the desaturation of the reference rendering
@@ -55,18 +56,18 @@ _SHOULDER = 0.8 - _F90
 _DESATURATION = 0.15
 
 
-def reinhard(light: Array) -> Array:
+def reinhard(light: Floats) -> Floats:
     """Return ``L / (1 + L)`` of each channel, below 1.
 
     Reinhard et al., ACM Trans. Graph. 21(3), 2002, equation 3, define it for luminance; engines
     that name it so (three.js, Babylon.js) take each channel by itself.
     """
     light = np.maximum(light, 0.0)
-    shown: Array = light / (1.0 + light)
+    shown: Floats = light / (1.0 + light)
     return shown
 
 
-def aces(light: Array) -> Array:
+def aces(light: Floats) -> Floats:
     """Return Hill's fit to the reference and output transforms of ACES for an sRGB display.
 
     As published with Pettineo's and Neubelt's Baking Lab (``ACES.hlsl``), and used by Babylon.js
@@ -78,7 +79,7 @@ def aces(light: Array) -> Array:
     return np.asarray(np.clip((above / below) @ _FROM_ACES.T, 0.0, 1.0))
 
 
-def agx(light: Array) -> Array:
+def agx(light: Floats) -> Floats:
     """Return Sobotka's AgX without a look, in linear BT.2020 as Blender has it.
 
     The contrast is Wrensch's polynomial of degree 6, as in three.js (``AgXToneMapping``), whose
@@ -89,11 +90,11 @@ def agx(light: Array) -> Array:
     stops = np.log2(np.maximum(wide @ _INSET.T, _DARKEST))
     encoded = np.clip((stops - lowest) / (highest - lowest), 0.0, 1.0)
     contrast = np.polynomial.polynomial.polyval(encoded, _CONTRAST)
-    shown: Array = np.maximum(contrast @ _OUTSET.T, 0.0) ** 2.2
+    shown: Floats = np.maximum(contrast @ _OUTSET.T, 0.0) ** 2.2
     return np.clip(shown @ _between(BT2020, BT709).T, 0.0, 1.0)
 
 
-def neutral(light: Array) -> Array:
+def neutral(light: Floats) -> Floats:
     """Return Khronos' PBR Neutral: base colours stay, and highlights are compressed.
 
     Specification: KhronosGroup/ToneMapping, ``PBR_Neutral``. The toe takes off what a dielectric
@@ -121,7 +122,7 @@ TONE_MAPS: dict[str, ToneMap] = {
 """All tone maps, by the names of the option."""
 
 
-def derivative(tone_map: ToneMap, light: Array) -> Array:
+def derivative(tone_map: ToneMap, light: Floats) -> Floats:
     """Return how a tone map's channels change with those of light (..., 3): (..., 3, 3).
 
     Rows are the channels shown. Central differences, one-sided at 0.
@@ -137,7 +138,7 @@ def derivative(tone_map: ToneMap, light: Array) -> Array:
     return np.stack(columns, axis=-1)
 
 
-def _between(first: Primaries, second: Primaries) -> Array:
+def _between(first: Primaries, second: Primaries) -> Floats:
     """Return the matrix from linear RGB of one set of primaries to another's of the same white."""
     return np.asarray(np.linalg.solve(rgb_to_xyz(second), rgb_to_xyz(first)))
 

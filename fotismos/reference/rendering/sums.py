@@ -51,6 +51,21 @@ class Grouped:
     sampled: int
     total: int
 
+    @classmethod
+    def of(
+        cls, means: np.ndarray, sizes: np.ndarray, sample: tuple[np.ndarray, np.ndarray, int]
+    ) -> "Grouped":
+        """Put means of groups, three per pixel, to a sample of pixels as :func:`sample` draws."""
+        places, blocks, total = sample
+        return cls(
+            means=means.reshape(len(sizes), len(places), 3),
+            sizes=sizes,
+            places=places,
+            blocks=blocks,
+            sampled=int(blocks.max()) + 1 if len(blocks) else 0,
+            total=total,
+        )
+
     def by_block(self, values: np.ndarray) -> np.ndarray:
         """Return the sums (B, ...) over the sampled blocks of values (P, ...) of the pixels."""
         sums = np.zeros((self.sampled, *values.shape[1:]))
@@ -82,6 +97,22 @@ class DifferenceEstimate(Estimate):
 
     third: np.ndarray
     grouped: Grouped
+
+
+def without_noise(mean: np.ndarray, counted: np.ndarray, passes: int) -> DifferenceEstimate:
+    """Return the estimate of a difference (H, W, 3) that was the same in all passes."""
+    none = np.broadcast_to(np.float32(0.0), mean.shape)
+    places, _, _ = drawn = sample(counted)
+    sizes = _sizes(passes)
+    alike = mean.reshape(-1, 3)[places].astype(float)
+    return DifferenceEstimate(
+        mean=mean,
+        standard_error=none,
+        noise=none,
+        passes=passes,
+        third=none,
+        grouped=Grouped.of(np.stack([alike] * len(sizes)), sizes=sizes, sample=drawn),
+    )
 
 
 class NumPyDoubles:
@@ -259,23 +290,17 @@ class DifferenceSums(Accumulator):
         n = self.count
         # κ3 of a pass is n Σ/((n − 1)(n − 2)) without bias, and of the mean 1/n² of it.
         third *= 1.0 / (n * (n - 1) * (n - 2)) if n >= 4 else 0.0
-        sizes = np.bincount(np.arange(self.count) % GROUPS, minlength=GROUPS)
-        # With few passes the last groups are empty.
-        sizes = sizes[sizes > 0]
+        sizes = _sizes(self.count)
         means = self._groups[: len(sizes)] / sizes[:, None]
-        places, blocks, total = self._sample
-        shape = (len(sizes), len(places), 3)
-        sampled = int(blocks.max()) + 1 if len(blocks) else 0
-        grouped = Grouped(
-            means=means.reshape(shape),
-            sizes=sizes,
-            places=places,
-            blocks=blocks,
-            sampled=sampled,
-            total=total,
-        )
+        grouped = Grouped.of(means, sizes=sizes, sample=self._sample)
         plain = super().estimate(dtype)
         return DifferenceEstimate(**vars(plain), third=third, grouped=grouped)
+
+
+def _sizes(passes: int) -> np.ndarray:
+    """Return how many passes are in each group; with few there are fewer groups."""
+    sizes = np.bincount(np.arange(passes) % GROUPS, minlength=GROUPS)
+    return sizes[sizes > 0]
 
 
 def block_numbers(counted: np.ndarray) -> np.ndarray:
