@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import permutations
 from math import pi
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -300,7 +299,7 @@ def find(
     that the file ends at display white, as a PNG does. ``light`` is that of the other image, before
     the tone map of that name.
     """
-    if min(float(_largest(image.mean, counted)) for image in (picture, other)) < BLACK:
+    if min(_largest(image.mean, counted) for image in (picture, other)) < BLACK:
         return
     truth = other.mean
     mends: list[Mending] = []
@@ -358,9 +357,16 @@ def _share_that_differs(tiles: Tiles) -> float:
     return float(differs[tiles.shares[..., 0] > 0].mean())
 
 
-def _largest(image: Floats, counted: NDArray[np.bool_]) -> Any:
+def _largest(image: Floats, counted: NDArray[np.bool_]) -> float:
     """Return the largest value of the pixels that count, 0 at least."""
-    return image.max(axis=(0, 1), initial=0.0, where=counted[..., None]).max()
+    return float(_brightest(image)[counted].max(initial=0.0))
+
+
+def _brightest(image: Floats) -> Floats:
+    """Return the largest channel of each pixel, (H, W): faster than by a maximum of three."""
+    red, green, blue = np.moveaxis(image, -1, 0)
+    brightest: Floats = np.maximum(np.maximum(red, green), blue)
+    return brightest
 
 
 def _percent(share: float) -> str:
@@ -548,8 +554,8 @@ def _is_of_other_scene(
     """
     if place.correlation > OTHER_EDGES:
         return False
-    at_end = picture.max(axis=-1)[counted] >= CLIPPED * picture[counted].max()
-    if np.mean(at_end) > MOSTLY:
+    brightest = _brightest(picture)[counted]
+    if np.mean(brightest >= CLIPPED * brightest.max()) > MOSTLY:
         return False
     if not all(_has_structure(image, counted) for image in (picture, other)):
         return False
@@ -951,13 +957,13 @@ def _clipped(
     picture: Floats, other: Floats, counted: NDArray[np.bool_], names: Names
 ) -> Mistake | None:
     """Return where a picture ends at one value, and the other half does not."""
-    largest = float(_largest(picture, counted))
-    at_end = (picture >= (1 - 1e-4) * largest).any(axis=-1) & counted
-    brighter = at_end & (other.max(axis=-1) > (1 + TINT) * largest)
+    largest = _largest(picture, counted)
+    at_end = (_brightest(picture) >= (1 - 1e-4) * largest) & counted
+    brighter = at_end & (_brightest(other) > (1 + TINT) * largest)
     share = brighter.sum() / max(counted.sum(), 1)
     if share < PLATEAU or brighter.sum() < 0.5 * at_end.sum():
         return None
-    beyond = other.max(axis=-1)[brighter]
+    beyond = _brightest(other)[brighter]
     if beyond.std() < TINT * beyond.mean():  # a lamp, say: it is one value in both
         return None
     return Mistake(

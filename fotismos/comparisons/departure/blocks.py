@@ -19,11 +19,16 @@ def bands(height: int) -> Iterator[slice]:
     return (slice(start, min(start + _ROWS, height)) for start in range(0, height, _ROWS))
 
 
-def block_sums(image: Array, side: int = BLOCK) -> Array:
+def block_sums(image: NDArray[Any], side: int = BLOCK) -> Array:
     """Return block sums (h, w, ...) of an image (H, W, ...); edge blocks may be smaller."""
-    for axis in (0, 1):
-        image = np.add.reduceat(image, np.arange(0, image.shape[axis], side), axis=axis)
-    return image
+    rest = len(image) % side
+    whole = image[: len(image) - rest].reshape(-1, side, *image.shape[1:])
+    # Whole rows first: adding them needs no gathering.
+    rows = whole.sum(axis=1, dtype=np.float64)
+    if rest:
+        last = image[-rest:].sum(axis=0, keepdims=True, dtype=np.float64)
+        rows = np.concatenate([rows, last])
+    return np.add.reduceat(rows, np.arange(0, image.shape[1], side), axis=1)
 
 
 def neighbourhood(values: Array, first: int = 0) -> Array:

@@ -69,8 +69,10 @@ def summarise(
         if grain is not None:
             images[2] = np.add(reference[rows], grain[rows], dtype=wide)
         # Equal pixels are 0 apart: the surroundings of a figure's objects cost nothing.
-        measured = mask[rows] | (not is_pixelwise or (test[rows] != reference[rows]).any(axis=-1))
-        where = ... if measured.all() else measured
+        measured = mask[rows]
+        if is_pixelwise and not measured.all():
+            measured = measured | (test[rows] != reference[rows]).any(axis=-1)
+        where = measured if is_pixelwise and not measured.all() else ...
         distances = metric.of_several([*images.values()], reference[rows], where, viewing)
         for number, values in zip(images, distances, strict=True):
             maps[number][rows][where] = values
@@ -196,7 +198,7 @@ def best_exposure(
     ):
         counted = ... if mask.all() else mask
         return least_squares_factor(test[counted], reference[counted])
-    lit = [(mask & (image > 0.0).any(axis=-1)).any() for image in (test, reference)]
+    lit = [((image > 0.0) & mask[..., None]).any() for image in (test, reference)]
     if not all(lit):
         return 1.0
     # A random draw, not every n-th pixel: a stride would fall in step with the columns.

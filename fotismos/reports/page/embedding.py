@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons.departure import marks
+from fotismos.comparisons.departure.blocks import block_sums
 from fotismos.comparisons.departure.metrics import LEADING, declared
 from fotismos.reference.records import Record, plain
 from fotismos.reports.files.images import HALF_MAX
@@ -112,10 +113,6 @@ def _means(image: ArrayLike, block: int) -> NDArray[np.float64]:
     image = np.asarray(image, np.float64)
     if block == 1:
         return image
-    sums = image
-    areas = np.ones(image.shape)
-    for axis in (0, 1):
-        places = np.arange(0, image.shape[axis], block)
-        sums = np.add.reduceat(sums, places, axis=axis)
-        areas = np.add.reduceat(areas, places, axis=axis)
-    return sums / areas
+    heights = block_sums(np.ones((image.shape[0], 1)), block)
+    widths = block_sums(np.ones((image.shape[1], 1)), block)
+    return block_sums(image, block) / (heights * widths.T)
