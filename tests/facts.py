@@ -19,7 +19,6 @@ from fotismos.reference.scene.graph import set_variant
 from tests.benchmarks import kernel, prediction
 from tests.shared import noisy_scenes
 from tests.shared.verification import verify
-from tests.shared.wrong_shaders import WRONG
 from tests.witnesses import noise, page, povray, povray_scenes
 
 FINER = 4
@@ -40,11 +39,6 @@ def witnesses():
 def intervals_in_noise():
     """How many intervals hold the truth in scenes that are hard to sample."""
     return list(noise.table([noise.measured(make) for make in noisy_scenes.SCENES]))
-
-
-def mistakes():
-    """The names of shaders that are wrong on purpose."""
-    return [wrong.name for wrong in WRONG]
 
 
 def predictions(rounds):
@@ -80,7 +74,7 @@ def drawn(scene, side):
 
 FACTS = {
     fact.__name__: fact
-    for fact in (witnesses, intervals_in_noise, mistakes, predictions, speed, gains, drawn)
+    for fact in (witnesses, intervals_in_noise, predictions, speed, gains, drawn)
 }
 
 if __name__ == "__main__":

@@ -6,8 +6,9 @@ from functools import partial
 from textwrap import wrap
 from typing import Any
 
-from docs.figures.documents import DOCS, compared, draw, fact, panels, replace
+from docs.figures.documents import DOCS, compared, draw, panels, replace
 from docs.figures.model_figures import pictures, sheet
+from fotismos.comparisons.audit import diagnosis
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import LEADING
@@ -41,7 +42,7 @@ def write() -> None:
     """Compare the shaders, and write their tables and pictures."""
     _write_comparisons()
     replace("shaders.md", "lamp", _lamp())
-    replace("shaders.md", "mistakes", [f"{'; '.join(fact('mistakes'))}."])
+    replace("shaders.md", "mistakes", [f"- {words}" for words in diagnosis.recognised()])
     _write_spheres()
 
 

@@ -287,9 +287,36 @@ def examine(heuristic: Heuristic) -> tuple[str, ...]:
     value = shaded(heuristic.name, heuristic.shade, point)
     colours = np.array(value, float).reshape(dr.size_v(mi.Spectrum), -1)
     colours = np.broadcast_to(colours, (len(colours), POINTS))
-    _require(heuristic, np.isfinite(colours), colours, "finite")
+    is_finite = np.isfinite(colours)
+    if not is_finite.all():
+        _require_finite_powers(heuristic, point)
+    _require(heuristic, is_finite, colours, "finite")
     _require(heuristic, colours >= -ROUNDING, colours, "0 or more")
     return tuple(sorted(point.read))
+
+
+def _require_finite_powers(heuristic: Heuristic, point: Point) -> None:
+    """Say why a heuristic is not finite, if the lights' distance is why, or a large power."""
+
+    def is_finite(kind: type) -> bool:
+        """Whether it is finite under the lights of a kind, if the exponent is 1."""
+        lights = [light for light in point.arguments.lights if isinstance(light, kind)]
+        material = replace(point.arguments.material, n=mi.Float(1.0))
+        arguments = point.arguments._replace(lights=lights, material=material)
+        value = shaded(heuristic.name, heuristic.shade, replace(point, arguments=arguments))
+        return bool(np.isfinite(np.array(value, float)).all())
+
+    if not is_finite(PointLight):
+        return
+    reason = (
+        "under a power: a cosine is above 1. Normalise every vector of it."
+        if is_finite(DirectionalLight)
+        else "under a parallel light, whose distance is infinite. Do not multiply by the distance:"
+        " `toward` is a unit vector, and `intensity` has fallen off already."
+    )
+    raise InputError(
+        f"{place_of(heuristic.shade)}: heuristic {heuristic.name} is not finite {reason}"
+    )
 
 
 @dataclass(frozen=True)  # hashable, like what it imitates

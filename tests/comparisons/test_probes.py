@@ -129,7 +129,7 @@ FURTHER = {
         "value += I * c\n    value = 1 - dr.exp(-value)", "1.9. times the value, not 2"
     ),
     "a length": ("value += I * dr.maximum(dr.dot(n, toward * dr.minimum(light.distance, 9)), 0)",
-                 "0.5 times as large, not 0.25; is the light vector not normalised"),
+                 "0.5 times as large, not 0.25: .* is the light vector not normalised"),
     "the first light": ("value += I * c * m.base_color\n        break", "only the first light"),
     "the brighter light": ("value = dr.maximum(value, I * c)", "they are not added"),
     "grey light": ("value += dr.mean(I) * c * m.base_color", "channels are mixed: 67%"),

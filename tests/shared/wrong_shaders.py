@@ -72,7 +72,7 @@ WRONG = (
           "the light vector is not normalised: it has a length of 1.5"),
     Wrong("reflect() of the wrong vector", GLSL,
           "2.0 * cosine * point.normal - light.toward", "reflect(light.toward, point.normal)",
-          "or the mirrored one is reversed"),
+          r"mirrored vector is reversed, .* GLSL's reflect"),
     Wrong("half vector for the reflection", GLSL, "dot(mirrored, point.view)",
           "dot(point.normal, normalize(light.toward + point.view))", "about the half vector"),
     Wrong("view vector of another space", GLSL, "dot(mirrored, point.view)",

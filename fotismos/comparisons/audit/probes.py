@@ -55,6 +55,9 @@ BRIGHTEST = 1.5
 MANY = 0.1
 """Share of the points above which a difference is more than the edge of a step."""
 
+PEAK = 2.5
+"""A lobe's largest value over the mean around the normal, at least."""
+
 
 class Cases(NamedTuple):
     """Points with lights of their own: vectors (3, N) or (3, 1), and numbers (N,) or alone.
@@ -292,7 +295,10 @@ def both_lights(seen: Values) -> str:
 
 FALL_OFFS = (
     (1.0, ": the fall-off with the square of the distance is missing"),
+    (0.5, ": it falls off with the distance alone; is the light vector not normalised?"),
+    (0.125, ": it falls off with the distance once more; is the light vector not normalised?"),
     (0.0625, ": it falls off with the square of the distance a second time"),
+    (1 / 64, ": the squared distance is squared again, and a fall-off is there already"),
 )
 
 
@@ -304,7 +310,8 @@ def distance(seen: Values) -> str:
         return ""
     named = [words for wanted, words in FALL_OFFS if abs(ratio - wanted) <= ALIKE * wanted]
     end = named[0] if named else "; is the light vector not normalised?"
-    return f"At twice the distance its value is {ratio:.3g} times as large, not 0.25{end}."
+    end = end if end.endswith("?") else f"{end}."
+    return f"At twice the distance its value is {ratio:.3g} times as large, not 0.25{end}"
 
 
 @probe({"here": ANYWHERE, "turned": TURNED}, vague=True)
@@ -327,8 +334,11 @@ def cosine(seen: Values) -> str:
         ratio = value / COSINES**power
         if np.ptp(ratio) <= 5 * ALIKE * ratio.max():
             return name and f"On white matte its value goes with (N.L)^{power}: {name}."
-        edges = np.abs(np.diff(ratio)) >= FLAT * ratio.max()
-        if power == 1 and edges.mean() < MANY:
+        jumps = np.abs(np.diff(ratio))
+        edges = jumps >= FLAT * ratio.max()
+        # On a ramp all change is at its steps.
+        is_ramp = edges.any() and jumps[~edges].sum() <= ALIKE * jumps[edges].sum()
+        if power == 1 and is_ramp and edges.mean() < MANY:
             steps = f"N.L times a ramp of {edges.sum() + 1} steps"
             return f"On white matte its value goes with {steps}: squared cosine."
     return ""
@@ -368,6 +378,9 @@ def highlights(seen: Values) -> str:
 def mirror(seen: Values) -> str:
     """A highlight is where the viewer looks into the mirrored light."""
     around = seen["around"].sum(axis=0).reshape(len(ELEVATIONS), -1)
+    # Sheen and rims are brightest elsewhere, too, but are no lobe about a direction.
+    if around.max() < PEAK * around.mean():
+        return ""
     # Halfway around, viewers look towards the mirrored light.
     ratio = around[:, len(AZIMUTHS) // 2].sum() / around.mean(axis=1).sum()
     if ratio >= 0.5:
