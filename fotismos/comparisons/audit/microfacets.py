@@ -514,7 +514,9 @@ def sample() -> Facets:
         toward = unit(np.array(LAMP) - random.uniform(-1, 1, 3))
         if min(normal @ toward, normal @ view) > LEAST_COSINE:
             points.append((normal, toward, view))
-    normals, towards, views = (np.array(vectors) for vectors in zip(*points, strict=True))
+    normals = np.array([normal for normal, _, _ in points])
+    towards = np.array([toward for _, toward, _ in points])
+    views = np.array([view for _, _, view in points])
     ior = random.uniform(1.2, 2.2, (POINTS, 1)).astype(np.float32).astype(float)
     return Facets(
         normal=normals,
