@@ -6,7 +6,7 @@ The seed of pass ``i`` is hashed from the run's seed and ``i``.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from importlib import import_module
 from importlib.util import find_spec
@@ -57,6 +57,7 @@ def compare(
     progress: Progress | None = None,
     command: str = "",
     then: Sequence[Step] = (),
+    shown: Callable[[Comparison], object] | None = None,
 ) -> Comparison:
     """Compare the textbook half of a scene with the physical one, in the current variant.
 
@@ -64,7 +65,8 @@ def compare(
     after each pass; with a noise target, ``total`` is the limit. The steps ``then`` add to the
     comparison, one after the other (:mod:`fotismos.comparisons.steps`). Raises `InputError` if the
     scene cannot be read or paired, no pixel sees a surface, or both halves are black;
-    `NonFiniteError` for a NaN or an infinity in a rendering.
+    `NonFiniteError` for a NaN or an infinity in a rendering. ``shown`` is called once there are
+    pictures, with what a page shows first.
     """
     from fotismos.comparisons.prepared import guarded  # loaded late: two pictures need no Mitsuba
     from fotismos.reference.scene.source import collect_messages, count_messages  # the same
@@ -75,6 +77,8 @@ def compare(
         halves = guarded(source, options)
         comparison = look(halves, command, progress)
     comparison = comparison.warned(count_messages([*source.messages, *printed]))
+    if shown:
+        shown(comparison)
     return finish(comparison, halves, then, progress)
 
 

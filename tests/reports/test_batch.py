@@ -6,12 +6,18 @@ import re
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
 from random import Random
 
 import jsonschema
 import pytest
 
 from fotismos.comparisons.names import file_of
+from fotismos.comparisons.processes.pool import Task
+from fotismos.reports.files import results as result_files
+from fotismos.reports.page import page
+from fotismos.reports.run import batch
+from tests.shared import records
 from tests.shared.outputs import results
 from tests.shared.programs import ROOT
 from tests.shared.schemas import schema
@@ -205,3 +211,37 @@ def test_printed_commands_begin_as_the_program_was_started(run, folder, tmp_path
     record = json.loads((tmp_path / "out/a/comparison.json").read_text(encoding="utf-8"))
     assert record["command"].startswith("'./my run' compare ")
     assert "'./my run' scenes" in run("compare", "nowhere.xml")[2]
+
+
+@pytest.mark.parametrize("count", [1, 4, 40, 160])
+def test_the_work_of_the_pages_of_a_run_is_linear_in_its_scenes(tmp_path, monkeypatch, count):
+    """The first is there with the first picture; each scene is drawn once more when it is done."""
+    drawn, shown = [], []
+    draw, render = page.drawn_scene, page.render
+
+    def drawing(view, *others):
+        drawn.append(view.record.scene)
+        return draw(view, *others)
+
+    def rendering(views, **others):
+        shown.append(len(views))
+        return render(views, **others)
+
+    monkeypatch.setattr(page, "drawn_scene", drawing)
+    monkeypatch.setattr(page, "render", rendering)
+    views = [records.view(records.data() | {"scene": f"s-{n}"}) for n in range(count)]
+    with result_files.hold(tmp_path, "test") as folder:
+        names = [view.record.scene for view in views]
+        run = batch.Batch(folder, dict.fromkeys(names, ""), None, command="", within=2.0)
+        for view in views:
+            name = view.record.scene
+            run.show(Task(name, print, ()), view)
+            assert (folder / "index.html").exists()
+            outcome = Future()
+            outcome.set_result((view, {}))
+            run.take(name, outcome)
+        assert "the page reloads by itself" in (folder / "index.html").read_text() or count == 1
+        run.write_page()
+        assert "In progress" not in (folder / "index.html").read_text()
+    assert len(drawn) == 2 * count
+    assert sum(shown) <= 8 * count

@@ -9,6 +9,7 @@ import os
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
@@ -26,6 +27,7 @@ from fotismos.reports.files import results
 from fotismos.reports.files.results import FIGURES, START, TABLES, Failure, RunRecord
 from fotismos.reports.jobs import Job, Terminal, command_line
 from fotismos.reports.page import page
+from fotismos.reports.page.page import PageScene
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files
 from fotismos.reports.terminal import progress
@@ -35,8 +37,8 @@ from fotismos.reports.terminal.words import as_typed, remark, tell, tell_where
 if TYPE_CHECKING:  # a comparison has no hard cases
     from fotismos.comparisons.hard_cases import HardCases
 
-SHARE = 0.1
-"""Greatest share of the time that writing unfinished pages may take."""
+GROWTH = 1.25
+"""Factor by which a page grows before it is written again, so that the work is linear in scenes."""
 
 
 @dataclass
@@ -53,14 +55,15 @@ class Batch:
     within: float
     libraries: Sequence[str] = LIBRARIES
     stages: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
-    views: dict[str, SceneView] = field(default_factory=dict)
-    first_views: dict[str, SceneView] = field(default_factory=dict)
+    views: dict[str, PageScene] = field(default_factory=dict)
+    first_views: dict[str, PageScene] = field(default_factory=dict)
     errors: dict[str, FotismosError] = field(default_factory=dict)
     hard_cases: "HardCases | None" = None
+    growth: int = 0
     next_page: float = 0.0
 
     @property
-    def ordered(self) -> list[SceneView]:
+    def ordered(self) -> list[PageScene]:
         """The views in the order of the scenes; the first ones of scenes that are not done."""
         views = self.first_views | self.views
         return [views[target] for target in self.places if target in views]
@@ -97,40 +100,44 @@ class Batch:
         path = self.folder / results.PAGE
         state = ""
         done = f"{self.done} of {len(self.places)} scenes are done"
+        is_growing = self.done < len(self.places) and not is_interrupted
         if is_interrupted:
             state = f"Interrupted: {done}; the same command resumes the run."
-        elif self.done < len(self.places) and self.first_views:
-            state = "In progress: other metrics and mistakes follow; the page reloads by itself."
-        elif self.done < len(self.places):
-            state = f"In progress: {done}; reload to see more."
-        # Details first: the page links them.
-        records = [view.record for view in self.ordered]
-        details = page.details(self.hard_cases, run, records)
-        results.write(self.folder / results.DETAILS, details)
+        elif is_growing:
+            state = f"In progress: {done}; the page reloads by itself."
+        # Details first: the page links them. While it grows, the first ones are enough.
+        if not is_growing or not (self.folder / results.DETAILS).exists():
+            records = [view.record for view in self.ordered]
+            details = page.details(self.hard_cases, run, records)
+            results.write(self.folder / results.DETAILS, details)
         html = page.render(
             self.ordered,
             failures=self.failures(),
             state=state,
             threshold=self.within,
-            reloads=self.done < len(self.places) and bool(self.first_views),
+            reloads=is_growing,
         )
         results.write(path, html)
-        end = perf_counter()
-        self.stages["page"] += end - begin
-        self.next_page = end + (end - begin) / SHARE
+        self.stages["page"] += perf_counter() - begin
         if self.on_page:
             self.on_page(path)
             self.on_page = None
 
     def show(self, task: Task, view: SceneView) -> None:
         """Put the first view of a scene on the page, which is measured in part."""
-        self.first_views[task.name] = view
+        self.first_views[task.name] = self._drawn(task.name, view)
         self.grow_page()
 
+    def _drawn(self, target: str, view: SceneView) -> PageScene:
+        """Draw a scene for all pages of the run, in place of its first view."""
+        self.first_views.pop(target, None)
+        taken = {scene.id for scene in self.ordered}
+        return page.drawn_scene(view, taken, self.within)
+
     def withdraw(self) -> None:
-        """Delete a page that has first views alone: none of their scenes was finished."""
-        if self.first_views and not self.views:
-            self.first_views.clear()
+        """Delete a page that grew, if no scene was finished, and none failed among several."""
+        has_failures = self.errors and len(self.places) > 1
+        if self.growth and not self.views and not has_failures:
             results.clear(self.folder, (results.PAGE, results.DETAILS))
 
     def take(self, target: str, outcome: Future[Any]) -> None:
@@ -140,21 +147,23 @@ class Batch:
         except InstallationError:
             raise
         except FotismosError as error:
+            self.first_views.pop(target, None)
             self.errors[target] = error
         else:
-            self.views[target] = scene_files.with_fit(view, self.folder / "fit" / target)
+            view = scene_files.with_fit(view, self.folder / "fit" / target)
+            self.views[target] = self._drawn(target, view)
             for stage, seconds in spent.items():
                 self.stages[stage] += seconds
             remark(tables.details(view.record))
         self.grow_page()
 
     def grow_page(self) -> None:
-        """Write the page of an unfinished run, unless that took long just now."""
-        if self.done < len(self.places) and perf_counter() >= self.next_page:
-            try:
+        """Write the page of an unfinished run, unless it grew little since it was written."""
+        self.growth += 1
+        if self.done < len(self.places) and self.growth >= self.next_page:
+            with suppress(OutputError):  # the next scene tries again
                 self.write_page()
-            except OutputError:
-                self.next_page = perf_counter()  # the next scene tries again
+                self.next_page = GROWTH * self.growth
 
 
 Comparing = Callable[..., tuple[SceneView, dict[str, float]]]
@@ -239,6 +248,7 @@ def compare_all(
         except KeyboardInterrupt:
             # No process may write while the results are put together.
             pool.end()
+            batch.first_views.clear()
             if batch.done:
                 _write(batch, is_interrupted=True)
             raise

@@ -44,5 +44,5 @@ def compared(
     comparison = finish(first, halves, steps(why=False))
     seconds["pictures"] += perf_counter() - begin
     begin = perf_counter()
-    view = scene_files.write(folder, target, comparison, view=view, with_figures=job.figures)
+    view = scene_files.write(folder, target, comparison, first=view, with_figures=job.figures)
     return view, seconds | {"files": perf_counter() - begin}

@@ -12,6 +12,7 @@ from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.metrics import METRICS
 from fotismos.comparisons.names import file_of, name_of, picture_parts
 from fotismos.comparisons.records.comparison import CAUSES, ComparisonRecord
+from fotismos.comparisons.records.images import Comparison
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic import program
 from fotismos.heuristic.heuristics import named
@@ -54,12 +55,20 @@ def compared(
     begin = perf_counter()
     source = case.source
     options = case.options
+    first: list[SceneView] = []
+
+    def show(comparison: Comparison) -> None:
+        """Send what a page shows first."""
+        first.append(scene_files.view_of(comparison))
+        progress(first[0])
+
     comparison = compare(
         source,
         options,
         progress,
         command=case.command(),
         then=steps(why=job.with_causes),
+        shown=show,
     )
     spent = _stages(comparison.record, perf_counter() - begin)
     # The costs of methods, for a few scenes.
@@ -80,7 +89,13 @@ def compared(
         spent["methods"] = perf_counter() - begin
     begin = perf_counter()
     view = scene_files.write(
-        folder, target, comparison, costs=costs, key=key, with_figures=job.figures
+        folder,
+        target,
+        comparison,
+        costs=costs,
+        key=key,
+        first=first[0],
+        with_figures=job.figures,
     )
     return view, spent | {"files": perf_counter() - begin}
 

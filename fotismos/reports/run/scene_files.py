@@ -64,14 +64,14 @@ def write(
     comparison: Comparison,
     costs: "Study[Cost] | None" = None,
     key: str | None = None,
-    view: SceneView | None = None,
+    first: SceneView | None = None,
     with_figures: bool = False,
 ) -> SceneView:
     """Write the files of one comparison to ``folder/name``, and return its part of the page.
 
     The record is removed first and written last. Files of an earlier result that this one does not
-    have are deleted. With a key, :func:`load` finds the result. ``view`` is that of the same images
-    with an earlier record. Figures for print go to a folder of their own.
+    have are deleted. With a key, :func:`load` finds the result. ``first`` is the view of the same
+    images that a page showed before. Figures for print go to a folder of their own.
     """
     target = folder / name
     record = comparison.record
@@ -83,7 +83,7 @@ def write(
     # The view names the earlier files, and is about to go.
     earlier = _files(target)
     results.clear(target, (RECORD, VIEW))
-    view = structs.replace(view, record=record) if view else view_of(comparison)
+    view = view_of(comparison, first)
     made = {
         f"{picture}.png": png
         for picture, png in images.pictures(comparison.images, record.viewing.exposure).items()
@@ -117,14 +117,18 @@ def remove(folder: Path) -> None:
     results.clear(folder, (RECORD, VIEW, *_files(folder)))
 
 
-def view_of(comparison: Comparison) -> SceneView:
-    """Return a comparison's part of the page without links."""
+def view_of(comparison: Comparison, first: SceneView | None = None) -> SceneView:
+    """Return a comparison's part of the page without links; the ``first`` one has its images."""
     record = comparison.record
     shown = comparison.images
+    if first is not None:
+        embedded = first.embedded
+    else:
+        embedded = embedding.embed(images.channels(_layers(shown)), shown.counted)
     view = SceneView(
         record=record,
         thumbnails=images.thumbnails(shown, record.viewing.exposure),
-        embedded=embedding.embed(images.channels(_layers(shown)), shown.counted),
+        embedded=embedded,
         worst=worst_pixel(shown.maps[LEADING.name], shown.counted),
     )
     terms = comparison.terms
