@@ -635,10 +635,15 @@ def _in_pixels(shift: float, ahead: str, back: str) -> str:
 
 def _shifted(picture: Floats, right: float, down: float) -> Floats:
     """Return a picture whose content is moved; its edges repeat beyond them."""
-    from scipy import ndimage  # loaded late: few pictures are shifted
-
-    moved: Floats = ndimage.shift(picture, (down, right, 0), order=1, mode="nearest")
-    return moved
+    for axis, by in ((0, down), (1, right)):
+        last = picture.shape[axis] - 1
+        place = np.clip(np.arange(last + 1) - by, 0, last)
+        below = place.astype(int)
+        share = (place - below)[:, None] if axis else (place - below)[:, None, None]
+        before = np.take(picture, below, axis)
+        after = np.take(picture, np.minimum(below + 1, last), axis)
+        picture = before + share * (after - before)
+    return picture
 
 
 def _zoom(picture: Floats, other: Floats) -> float | None:

@@ -2,6 +2,7 @@
 
 import json
 import re
+from operator import attrgetter
 
 import colour
 import mitsuba as mi
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
+from scipy import ndimage
 
 from fotismos.comparisons import alignment, picture_files, picture_mistakes
 from fotismos.comparisons.case import open_case
@@ -17,8 +19,11 @@ from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
 from fotismos.comparisons.departure.mapped_sums import Light
 from fotismos.comparisons.departure.metrics import METRICS
+from fotismos.comparisons.departure.tone_maps import TONE_MAPS
+from fotismos.comparisons.halves import PassSums
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_mistakes import Names, NoisyImage
+from fotismos.comparisons.pictures import MappedPassSums, StillSums
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.steps import steps
 from fotismos.heuristic.errors import InputError
@@ -316,3 +321,50 @@ def test_a_changed_picture_is_compared_again(run, tmp_path, monkeypatch):
         path = tmp_path / "out/fig-8-9/comparison.json"
         records.append((path.stat().st_mtime_ns, path.read_text()))
     assert records[0] == records[1] != records[2]
+
+
+# --- Large pictures ------------------------------------------------------------------------------
+
+
+def test_changes_are_tried_at_a_sample_of_the_same_blocks(monkeypatch):
+    """All of them in a small picture, with partial blocks at its edges; else as many as allowed."""
+    rng = np.random.default_rng(4)
+    picture, other = rng.random((2, 67, 90, 3))
+    counted = rng.random((67, 90)) < 0.8
+    whole = picture_mistakes.Blocks.of(picture, other, counted)
+    tried = picture_mistakes.Tiles.of(picture, other, counted).blocks(lambda image: image)
+    np.testing.assert_allclose(tried.picture, whole.picture, rtol=1e-12)
+    np.testing.assert_allclose(tried.other, whole.other, rtol=1e-12)
+    monkeypatch.setattr(picture_mistakes, "MOST_BLOCKS", 20)
+    some = picture_mistakes.Tiles.of(picture, other, counted).blocks(lambda image: image)
+    assert len(some.picture) == 20
+    near = np.abs(some.picture[:, None] - whole.picture).max(axis=-1).min(axis=1)
+    np.testing.assert_allclose(near, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(("right", "down"), [(0.5, 0.0), (-3.0, 1.5), (0.0, -2.5)])
+def test_a_shift_is_that_of_scipy(right, down):
+    image = np.random.default_rng(5).random((9, 14, 3))
+    expected = ndimage.shift(image, (down, right, 0), order=1, mode="nearest")
+    found = picture_mistakes._shifted(image, right=right, down=down)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [None, "aces"])
+def test_single_pictures_are_what_the_sums_of_their_passes_are(name):
+    rng = np.random.default_rng(6)
+    picture, light = rng.random((2, 20, 24, 3)).astype(np.float32)
+    counted = rng.random((20, 24)) < 0.7
+    tone_map = name and TONE_MAPS[name]
+    plain = PassSums(counted) if name is None else MappedPassSums(counted, tone_map)
+    still = StillSums(counted, tone_map)
+    for sums in (plain, still):
+        for _ in range(2):
+            sums.add(picture, light)
+    expected = plain.images()
+    found = still.images()
+    for part in ("heuristic", "reference", "reference_stderr", "difference.mean",
+                 "difference.standard_error", "difference.noise", "difference.third",
+                 "difference.grouped.means", "difference.grouped.places"):  # fmt: skip
+        values = (attrgetter(part)(images) for images in (found, expected))
+        np.testing.assert_allclose(*values, atol=2e-7, err_msg=part)

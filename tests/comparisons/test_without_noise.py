@@ -146,7 +146,7 @@ def test_the_interval_of_a_mean_is_that_of_students_table():
     error = np.std([1, 2, 3, 4], ddof=1) / 2
     found, half = sums.student(2.5, error, 4), 3.182446 * error  # t(0.975, 3) = 3.182446
     assert (found.value, found.low) == (2.5, pytest.approx(2.5 - half, rel=1e-6))
-    assert found.high - 2.5 == 2.5 - found.low
+    assert found.high - 2.5 == pytest.approx(2.5 - found.low, rel=1e-12)
     assert sums.student(0.25, 0.0, 16) == Interval(value=0.25, low=0.25, high=0.25)
 
 

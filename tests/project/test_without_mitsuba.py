@@ -48,6 +48,23 @@ main()
 """
 )
 
+COMMANDED = (
+    WITHOUT
+    + """
+import numpy as np
+rng = np.random.default_rng(0)
+truth = np.full((24, 32, 3), 0.4)
+np.save("truth.npy", truth * (1 + 0.05 * rng.standard_normal(truth.shape)))
+np.save("mine.npy", 1.3 * truth * (1 + 0.05 * rng.standard_normal(truth.shape)))
+from fotismos.reports.cli import main
+sys.argv[1:] = ["compare", "--reference", "truth.npy", "--image", "mine.npy"]
+try:
+    main()
+finally:
+    print("loaded:", {"scipy", "colour", "altair", "pandas", "pyarrow"} & {*sys.modules})
+"""
+)
+
 COMPARED = (
     WITHOUT
     + """
@@ -91,6 +108,13 @@ print(json.dumps(plain(found)))
 def test_modules_for_two_pictures_are_imported_without_mitsuba():
     done = python("-c", IMPORTED, *ROOTS)
     assert done.stdout == "0\n", done.stderr
+
+
+def test_two_pictures_are_compared_without_large_libraries(tmp_path):
+    """Each of them takes as long to import as the comparison."""
+    done = python("-c", COMMANDED, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "loaded: set()" in done.stdout
 
 
 def test_settings_are_judged_without_mitsuba(tmp_path):

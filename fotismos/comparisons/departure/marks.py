@@ -52,6 +52,7 @@ from fotismos.comparisons.departure.blocks import (
 )
 from fotismos.comparisons.departure.colour import Array
 from fotismos.comparisons.departure.estimate import NoiseShown
+from fotismos.reference import student
 from fotismos.reference.rendering.passes import require_finite
 from fotismos.reference.rendering.sums import BLOCK, DifferenceEstimate
 
@@ -161,8 +162,6 @@ def _is_even(difference: Array, counted: Array) -> bool:
     their share of all squares. The variance of the tile's mean is that many times as large at least
     twice over: from cells to quarters, and from quarters to the tile.
     """
-    from scipy.special import stdtrit  # scipy.stats takes a second to import
-
     height = counted.shape[0] // (CELL * CELLS)
     width = counted.shape[1] // (CELL * CELLS)
     if not height or not width:
@@ -184,7 +183,7 @@ def _is_even(difference: Array, counted: Array) -> bool:
     inflation = max(1.0, float(np.median(alike)) / TYPICAL) ** 2 if alike.size else 1.0
     mean = np.abs(tiles.mean(axis=1))
     error = np.sqrt(inflation * variance) / CELLS
-    limit = float(stdtrit(CELLS * CELLS - 1, 1 - BLOCK_LEVEL / (2 * mean.size)))
+    limit = student.quantile(CELLS * CELLS - 1, 1 - BLOCK_LEVEL / (2 * mean.size))
     return bool((mean > np.maximum(limit * error, ABSOLUTE_ROUNDING)).any())
 
 

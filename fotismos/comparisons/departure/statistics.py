@@ -230,8 +230,9 @@ def least_squares_factor(test: Array, reference: Array) -> float:
     """Return ``Σ test·reference / Σ test²``, or 1 if that is not positive."""
     energy = overlap = 0.0
     for rows in _rows(test):
-        shown = np.asarray(test[rows], np.float64)
-        truth = np.asarray(reference[rows], np.float64)
-        energy += float(np.vdot(shown, shown))
-        overlap += float(np.vdot(shown, truth))
+        shown = np.asarray(test[rows], np.float64).reshape(-1, 3)
+        truth = np.asarray(reference[rows], np.float64).reshape(-1, 3)
+        # Not a product of BLAS, whose threads wait at full load.
+        energy += float(np.einsum("nc,nc->", shown, shown))
+        overlap += float(np.einsum("nc,nc->", shown, truth))
     return overlap / energy if energy > 0.0 and overlap > 0.0 else 1.0

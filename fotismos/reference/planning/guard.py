@@ -25,6 +25,7 @@ import numpy as np
 from fotismos.reference.planning.plan import physical_integrator
 from fotismos.reference.planning.plan_record import Guard, Plan
 from fotismos.reference.rendering.passes import Stream, pass_seed
+from fotismos.reference.student import quantile
 
 SHARE = 0.02
 """Share of the reference's samples that bounds the rays, within the next two limits."""
@@ -93,9 +94,7 @@ class Tally:
 
 
 def _quantile(level: float) -> float:
-    from scipy.special import stdtrit  # it takes 0.1 s to load
-
-    return float(-stdtrit(BATCHES - 1, level / 2))
+    return quantile(BATCHES - 1, 1 - level / 2)
 
 
 def examine_plan(

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fotismos.heuristic.convention import Array
 from fotismos.reference.records import Interval
+from fotismos.reference.student import quantile
 
 GROUPS = 8
 """Groups of passes, at most: seven degrees of freedom for an interval."""
@@ -353,9 +354,7 @@ def student(value: float, error: float, count: int, bias: float = 0.0) -> Interv
 
     ``bias`` is an error that all repeats share, which widens it: ``half = hypot(t error, bias)``.
     """
-    from scipy.special import stdtrit  # scipy.stats takes a second to import
-
-    half = hypot(float(stdtrit(count - 1, 0.5 + LEVEL / 2)) * error, bias)
+    half = hypot(quantile(count - 1, 0.5 + LEVEL / 2) * error, bias)
     return Interval(value=value, low=value - half, high=value + half)
 
 
