@@ -208,6 +208,10 @@ def _opaque(path: Path, image: Floats, layer: Layer, behind: Array | None) -> Fl
 
 # --- OpenEXR -----------------------------------------------------------------------------------
 
+LOSSY = ("DWAA", "DWAB")
+LOSSY_FOR_HALF = ("B44", "B44A")
+"""Compressions of EXR that change values, and make them finite."""
+
 
 def _exr(path: Path, name: str) -> Layer:
     header = _exr_header(path)
@@ -236,6 +240,12 @@ def _exr(path: Path, name: str) -> Layer:
     colours = np.broadcast_to(colours, (*colours.shape[:2], 3))
     alpha = channels.get(f"{prefix}A")
     notes = []
+    compression = str(header["compression"]).rpartition(".")[2].removesuffix("_COMPRESSION")
+    if compression in LOSSY or (is_half and compression in LOSSY_FOR_HALF):
+        notes.append(
+            f"its compression {compression} has losses: what was NaN or infinite may be an ordinary"
+            " number"
+        )
     data = np.array(header["dataWindow"]).tolist()
     display = np.array(header["displayWindow"]).tolist()
     if data != display:
@@ -318,8 +328,9 @@ def _without_colours(path: Path, layer: str, channels: Mapping[str, Any]) -> Inp
     if layer and {*"RGB"} <= set(channels):
         return InputError(f"{path}: it has R, G and B but no layer {layer!r}: give {path}.")
     if not layers:
+        grey = " Z is depth, or grey as pyexr writes it: name it Y." if {*channels} == {"Z"} else ""
         return InputError(
-            f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B, or Y."
+            f"{path}: its channels are {', '.join(sorted(channels))}. Give R, G and B, or Y.{grey}"
         )
     where = f"no layer {layer!r}{suggestion(layer, layers)}" if layer else "no channel R"
     return InputError(

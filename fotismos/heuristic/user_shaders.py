@@ -161,7 +161,8 @@ def of_function(
     )
     read = examine(everything)
     needs = {part.partition(".")[0] for part in read} & set(INPUTS)
-    return replace(everything, needs=frozenset(needs), reads=read)
+    remarks = powers_of_zero(everything) if "material.n" in read else ()
+    return replace(everything, needs=frozenset(needs), reads=read, remarks=remarks)
 
 
 def _parameters(function: Callable[..., Any]) -> tuple[Parameter, ...]:
@@ -280,19 +281,44 @@ def examine(heuristic: Heuristic) -> tuple[str, ...]:
     """
     if mi.variant() is None:
         mi.set_variant(DEFAULT_VARIANT)
-    point = trial_points(heuristic)
-    if heuristic.prepare is not None:
-        numbers = {one.name: one.default for one in heuristic.parameters if one.prepared}
-        point = replace(point, prepared=heuristic.prepared(trial_scene(0.5), numbers))
-    value = shaded(heuristic.name, heuristic.shade, point)
-    colours = np.array(value, float).reshape(dr.size_v(mi.Spectrum), -1)
-    colours = np.broadcast_to(colours, (len(colours), POINTS))
+    point = _prepared(heuristic, trial_points(heuristic))
+    colours = _colours(heuristic, point)
     is_finite = np.isfinite(colours)
     if not is_finite.all():
         _require_finite_powers(heuristic, point)
     _require(heuristic, is_finite, colours, "finite")
     _require(heuristic, colours >= -ROUNDING, colours, "0 or more")
     return tuple(sorted(point.read))
+
+
+def powers_of_zero(heuristic: Heuristic) -> tuple[str, ...]:
+    """Return a warning if a material with ``n = 0`` is NaN, as 0 to the power of 0 is in Dr.Jit."""
+    point = _prepared(heuristic, trial_points(heuristic))
+    flat = replace(point.arguments.material, n=mi.Float(np.zeros(POINTS)))
+    point = replace(point, arguments=point.arguments._replace(material=flat))
+    count = int(np.isnan(_colours(heuristic, point)).any(axis=0).sum())
+    if not count:
+        return ()
+    return (
+        f"{heuristic.label}: it is NaN at {count} of {POINTS} points of materials with n = 0, since"
+        " Dr.Jit has NaN for 0 to the power of 0. Keep the bases of powers above 0, as by"
+        " drjit.maximum(x, 1e-6).",
+    )
+
+
+def _prepared(heuristic: Heuristic, point: "TrialPoint") -> "TrialPoint":
+    """Return points with what a heuristic prepares for the scene of a trial."""
+    if heuristic.prepare is None:
+        return point
+    numbers = {one.name: one.default for one in heuristic.parameters if one.prepared}
+    return replace(point, prepared=heuristic.prepared(trial_scene(0.5), numbers))
+
+
+def _colours(heuristic: Heuristic, point: Point) -> np.ndarray:
+    """Return the colours (components, points) of a heuristic."""
+    value = shaded(heuristic.name, heuristic.shade, point)
+    colours = np.array(value, float).reshape(dr.size_v(mi.Spectrum), -1)
+    return np.broadcast_to(colours, (len(colours), POINTS))
 
 
 def _require_finite_powers(heuristic: Heuristic, point: Point) -> None:
@@ -437,7 +463,10 @@ def _require(
     maximum = "max" if heuristic.name.endswith(".glsl") else "drjit.maximum"
     cure = f"Clamp what can be negative, such as a cosine: {maximum}(cosine, 0)."
     if expected == "finite":
-        cure = f"Keep divisors, roots and logarithms above 0, as by {maximum}(x, 1e-6)."
+        cure = (
+            "Keep divisors, roots, logarithms and the bases of powers above 0, as by"
+            f" {maximum}(x, 1e-6)."
+        )
     raise InputError(
         f"{place_of(heuristic.shade)}: heuristic {heuristic.name} returned ({shown}) on trial, and"
         f" wrong values at {wrong.size} of {POINTS} points; components must be {expected}. {cure}"

@@ -1,6 +1,7 @@
 """Heuristics in files of a user's: the same anywhere, and every mistake in words."""
 
 import json
+import re
 from pathlib import Path
 
 import mitsuba as mi
@@ -89,6 +90,34 @@ FORMULAS = {
     "oren_nayar": (oren_nayar, {"sigma": 0.9}),
     "cook_torrance": (ggx, {}),
 }
+
+
+POWER = """
+import drjit as dr
+
+
+def shade(point):
+    light = point.lights[0]
+    mirrored = 2 * dr.dot(point.normal, light.toward) * point.normal - light.toward
+    cosine = dr.maximum(dr.dot(mirrored, point.view), {floor})
+    return point.material.k_s * light.intensity * dr.power(cosine, point.material.n)
+"""
+
+
+@pytest.mark.parametrize("floor", [0, 1e-6])
+def test_a_power_that_is_nan_for_an_exponent_of_0_is_a_remark(rgb, tmp_path, floor):
+    path = tmp_path / "mine.py"
+    path.write_text(POWER.format(floor=floor))
+    remarks = named(str(path)).remarks
+    assert len(remarks) == (floor == 0)
+    assert all(re.search(r"mine: it is NaN at \d+ of 256 points .* n = 0", one) for one in remarks)
+
+
+def test_a_power_of_what_is_negative_is_refused(rgb, tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(POWER.format(floor=-1))
+    with pytest.raises(InputError, match="the bases of powers above 0"):
+        named(str(path))
 
 
 def test_a_shader_of_the_documentation_is_its_formula(rgb):

@@ -207,6 +207,30 @@ def test_samples_of_direct_and_weights_that_change_the_light_are_named(rgb):
     assert found["sampling_weight of lamp"] == ("0", "1")
 
 
+@pytest.mark.parametrize(
+    ("sampler", "asked", "rendered"),
+    [
+        ("independent", 100, 100),
+        ("ldsampler", 100, 256),
+        ("orthogonal", 10, 25),
+        ("stratified", 5, 9),
+        ("multijitter", 5, 6),
+    ],
+)
+def test_the_record_has_the_samples_asked_for_those_of_mitsuba_and_of_the_plan(
+    rgb, sampler, asked, rendered
+):
+    given = scene(ball={"type": "sphere"}, lamp=lamp((0, -3, 0)))
+    given["sensor"]["sampler"] = {"type": sampler, "sample_count": asked}
+    count, used = overridden(given)["sampler"]
+    assert count.startswith(f"{sampler}, {asked} samples per pixel")
+    stock = mi.load_dict(given["sensor"]["sampler"]).sample_count()
+    assert stock == rendered
+    assert ("of which Mitsuba makes" in count) == (asked != rendered)
+    assert asked == rendered or count.endswith(f" {rendered}")
+    assert used.startswith("rotated_multijitter, ")
+
+
 def test_the_depth_of_russian_roulette_is_the_one_used(rgb):
     """`direct_all` ends paths by its own depth, whatever the scene names."""
     lamps = {"lamp": lamp((0, -3, 0)), "second": lamp((0, -3, 2))}

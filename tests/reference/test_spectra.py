@@ -134,6 +134,49 @@ def test_colours_are_no_matter_of_spectra_in_rgb(rgb):
         assert not halves.pair(Source("a test", made())).warnings
 
 
+@pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"], indirect=True)
+def test_a_light_whose_spectrum_is_one_number_is_named_with_its_colour(variant):
+    def lit(intensity):
+        return scene(
+            (0, 0, 5),
+            size=4,
+            wall={"type": "rectangle", "to_world": mi.ScalarTransform4f().scale(9)},
+            lamp={"type": "directional", "direction": [0, 0, -1], "irradiance": intensity},
+        )
+
+    flat = lit({"type": "spectrum", "value": 1.0})
+    (warning,) = halves.pair(Source("a test", flat)).warnings
+    pink = [float(part) for part in re.search(r"pink: \((.*)\) times", warning)[1].split(",")]
+    for white in (coloured(1, 1, 1), 1.0):
+        assert not halves.pair(Source("a test", lit(white))).warnings
+        shown, plain = (
+            np.mean(mi.render(mi.load_dict(each), spp=2048, seed=1), axis=(0, 1))
+            for each in (flat, lit(white))
+        )
+        np.testing.assert_allclose(shown / plain, pink, rtol=0.02)
+
+
+@pytest.mark.parametrize("kind", ["uchar", "float"])
+def test_the_whole_numbers_of_a_ply_are_named_and_are_reflectances(rgb, tmp_path, kind):
+    rows = "\n".join(f"{x} {y} 0 128 64 32" for x, y in ((-9, -9), (9, -9), (0, 9)))
+    places = "".join(f"property float {axis}\n" for axis in "xyz")
+    colours = "".join(f"property {kind} {channel}\n" for channel in "rgb")
+    (tmp_path / "mesh.ply").write_text(
+        f"ply\nformat ascii 1.0\nelement vertex 3\n{places}{colours}element face 1\n"
+        f"property list uchar int vertex_indices\nend_header\n{rows}\n3 0 1 2\n"
+    )
+    painted = {"type": "mesh_attribute", "name": "vertex_color"}
+    mesh = {"type": "ply", "filename": str(tmp_path / "mesh.ply")}
+    mesh["bsdf"] = {"type": "diffuse", "reflectance": painted}
+    sun = {"type": "directional", "direction": [0, 0, -1], "irradiance": np.pi}
+    given = scene((0, 0, 5), size=4, mesh=mesh, sun=sun)
+    warnings = halves.pair(Source("a test", given)).warnings
+    named = [each for each in warnings if "128 is a reflectance of 128" in each]
+    assert len(named) == (kind == "uchar")
+    image = np.array(mi.render(mi.load_dict(given), spp=4))
+    np.testing.assert_allclose(image, np.broadcast_to([128, 64, 32], image.shape), rtol=1e-3)
+
+
 def test_a_metal_that_is_not_finite_is_named_with_its_table(spectral):
     """Light falls straight on it, so Fresnel's term is 0 / 0 beyond the table."""
     flat = {"type": "rectangle", "bsdf": {"type": "conductor", "material": "AlSb"}}

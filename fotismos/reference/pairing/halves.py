@@ -20,7 +20,7 @@ from fotismos.reference.pairing.factors import Convention, Replacements, specula
 from fotismos.reference.pairing.pairing_record import Override, Pairing, Unrepresentable
 from fotismos.reference.pairing.settings import Settings, complete
 from fotismos.reference.rendering.gbuffer import GBuffer, gbuffer
-from fotismos.reference.scene import values
+from fotismos.reference.scene import spectra, values
 from fotismos.reference.scene.graph import Graph, properties
 from fotismos.reference.scene.messages import plain_message
 from fotismos.reference.scene.source import Source
@@ -199,7 +199,7 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
         ),
         unrepresentable=tuple(dict.fromkeys(replaced.lost)),
         warnings=(
-            *_doubts_on_spectra(graph),
+            *spectra.doubts(graph),
             *_energy_warnings(half),
             *_mirrored_spheres(graph),
             *model.remarks,
@@ -210,13 +210,6 @@ def _paired(graph: Graph, settings: Settings, options: PairOptions) -> Pair:
         overridden=tuple(settings.overridden),
         shading=model.name,
     )
-
-
-def _doubts_on_spectra(graph: Graph) -> Iterator[str]:
-    if mi.is_spectral:
-        from fotismos.reference.scene import spectra  # loaded late: most scenes are in RGB
-
-        yield from spectra.doubts(graph)
 
 
 def _mirrored_spheres(graph: Graph) -> Iterator[str]:

@@ -12,6 +12,7 @@ from fotismos.reference.pairing.pairing_record import Override
 from fotismos.reference.records import PATHS
 from fotismos.reference.scene import checks, values
 from fotismos.reference.scene.graph import Graph, Reference, properties
+from fotismos.reference.scene.source import collect_messages
 
 FILM = mi.ObjectType.Film
 INTEGRATOR = mi.ObjectType.Integrator
@@ -74,6 +75,11 @@ def complete(graph: Graph, resolution: tuple[int, int] | None, sensor: int = 0) 
     for _, index in graph.children(camera, SAMPLER):
         count = graph.props(index).get("sample_count", 4)
         before = f"{graph.plugin(index)}, {count} samples per pixel"
+        # Some samplers round the count up, to a power of 4 or a square.
+        with collect_messages([]):
+            rendered = graph.instantiate(index).sample_count()
+        if rendered != count:
+            before += f", of which Mitsuba makes {rendered}"
         settings.override("sampler", before, "sampler and samples of the plan")
     _give_weights(graph, settings)
     _take_integrator(graph, settings)

@@ -1,10 +1,12 @@
-"""What Mitsuba's spectral variants read otherwise than a scene's author is likely to mean.
+"""Colours that Mitsuba reads otherwise than a scene's author is likely to mean.
 
-There a colour becomes a spectrum: a smooth function of wavelength between 0 and 1, whose three
-coefficients are fitted to the colour (Jakob and Hanika 2019). Lights given as ``rgb`` are scaled,
-and multiplied by the spectrum of daylight; pictures are not. A table is 0 beyond its ends.
+In spectral variants a colour becomes a spectrum: a smooth function of wavelength between 0 and 1,
+whose three coefficients are fitted to the colour (Jakob and Hanika 2019). Lights given as ``rgb``
+are scaled, and multiplied by the spectrum of daylight; pictures are not. A table is 0 beyond its
+ends.
 """
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -24,8 +26,61 @@ EMISSION = "k_i"
 IN_RGB = "Give the variant llvm_ad_rgb"
 
 
+WHOLE_NUMBERS = re.compile(rb"^property u?(?:char|short|int)\w* (?:r|red)\s", re.MULTILINE)
+"""The line of a PLY file's header by which its colours are whole numbers."""
+
+HEADER = 65536
+"""Bytes of a PLY file in which its header ends."""
+
+EQUAL_ENERGY = "(1.20, 0.95, 0.91)"
+"""The RGB of light with the power 1 at all wavelengths, of which daylight has (1, 1, 1)."""
+
+
 def doubts(graph: Graph) -> Iterator[str]:
-    """Yield what a spectral variant reads otherwise than meant, each by the element's name."""
+    """Yield what Mitsuba reads otherwise than meant, each by the element's name."""
+    yield from _flat_lights(graph)
+    yield from _whole_colours(graph)
+    if mi.is_spectral:
+        yield from _of_wavelengths(graph)
+
+
+def _flat_lights(graph: Graph) -> Iterator[str]:
+    """Yield the lights whose spectrum is one number, which is no white."""
+    if mi.is_monochromatic:
+        return
+    for index in graph.nodes_in_use():
+        if graph.kind(index) != mi.ObjectType.Emitter:
+            continue
+        props = graph.props(index)
+        for key in props.keys():  # noqa: SIM118  Mitsuba's properties are no mapping
+            value = props[key]
+            if hasattr(value, "wavelengths") and not len(value.wavelengths):
+                yield (
+                    f"{graph.label(index)}: {key} is a spectrum of one value, the same at all"
+                    f" wavelengths, which is pink: {EQUAL_ENERGY} times it. For white light give"
+                    " rgb or a number."
+                )
+
+
+def _whole_colours(graph: Graph) -> Iterator[str]:
+    """Yield the PLY files whose colours are whole numbers, if any surface reads its mesh's."""
+    if not graph.nodes(mi.ObjectType.Texture, "mesh_attribute"):
+        return
+    for index in graph.nodes(mi.ObjectType.Shape, "ply"):
+        path = graph.file(index)
+        if path is None:
+            continue
+        with path.open("rb") as file:
+            header, _, _ = file.read(HEADER).partition(b"end_header")
+        if WHOLE_NUMBERS.search(header):
+            yield (
+                f"{graph.label(index)}: the colours in {path.name} are whole numbers, which Mitsuba"
+                " takes as they are: 128 is a reflectance of 128. Save them as floats from 0 to 1."
+            )
+
+
+def _of_wavelengths(graph: Graph) -> Iterator[str]:
+    """Yield what spectral variants read otherwise."""
     of_lights = set()
     for index in graph.nodes_in_use():
         for key, child in graph.children(index, mi.ObjectType.Texture):
