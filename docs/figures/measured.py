@@ -50,7 +50,7 @@ def write() -> None:
 
 def baselines() -> None:
     """Measure all baselines of the tests again, not only those that moved."""
-    for file in (ROOT / "tests" / "baselines").glob("*.json"):
+    for file in (ROOT / "tests" / "baselines").glob("*.exr"):
         file.unlink()
     words = ("-q", "-m", "", "tests/test_baselines.py", "--fotismos-update")
     subprocess.run([sys.executable, "-P", "-m", "pytest", *words], cwd=ROOT, check=True)

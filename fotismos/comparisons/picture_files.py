@@ -92,6 +92,17 @@ class PictureFile:
     is_encoded: bool = False
     notes: tuple[str, ...] = ()
 
+    @classmethod
+    def of(cls, values: NDArray[Any]) -> "PictureFile":
+        """Return a linear image (H, W, 3) that is in no file; its digest is of its values."""
+        image = np.ascontiguousarray(values)
+        return cls(
+            image=image,
+            opaque=np.ones(image.shape[:2], bool),
+            digest=hashlib.sha256(image.tobytes()).hexdigest(),
+            rounding=np.zeros(3),
+        )
+
 
 def read_file(
     word: str, transfer: str | None = None, over: str | None = None, is_mask: bool = False
@@ -214,7 +225,7 @@ LOSSY_FOR_HALF = ("B44", "B44A")
 
 
 def _exr(path: Path, name: str) -> Layer:
-    header = _exr_header(path)
+    header = exr_header(path)
     sampling = {c.name: (c.xSampling, c.ySampling) for c in header["channels"]}
     prefix = f"{name}." if name else ""
     names = [f"{prefix}{c}" for c in "RGB"]
@@ -234,7 +245,7 @@ def _exr(path: Path, name: str) -> Layer:
                 f"{path}: its channel {channel} has one value for {x_step}x{y_step} pixels. Save it"
                 " with a sampling of 1."
             )
-    channels = _exr_channels(path)
+    channels = exr_channels(path)
     is_half = any(channels[channel].dtype == np.float16 for channel in names)
     colours: Floats = np.stack([channels[channel].astype(np.float32) for channel in names], axis=-1)
     colours = np.broadcast_to(colours, (*colours.shape[:2], 3))
@@ -263,7 +274,7 @@ def _exr(path: Path, name: str) -> Layer:
     )
 
 
-def _exr_header(path: Path) -> dict[str, Any]:
+def exr_header(path: Path) -> dict[str, Any]:
     """Return the header of an EXR file of one part."""
     import OpenEXR  # loaded late: other pictures do not need it
 
@@ -283,7 +294,7 @@ def _exr_header(path: Path) -> dict[str, Any]:
     return header
 
 
-def _exr_channels(path: Path) -> dict[str, NDArray[Any]]:
+def exr_channels(path: Path) -> dict[str, NDArray[Any]]:
     """Return the channels (H, W) of an EXR file of one part."""
     import OpenEXR
 

@@ -70,11 +70,10 @@ class Pictures:
     preparation: float = 0.0
 
     @classmethod
-    def of(cls, name: str, image: Floats) -> Self:
-        """Return the half that an image (H, W, 3) is, opaque and without rounding."""
-        opaque = np.ones(image.shape[:2], bool)
-        file = PictureFile(image=image, opaque=opaque, digest="", rounding=np.zeros(3))
-        return cls(names=(name,), files=(file,))
+    def of(cls, name: str, images: Iterable[NDArray[Any]]) -> Self:
+        """Return linear images (H, W, 3) that are in no file of their own, such as passes."""
+        files = tuple(map(PictureFile.of, images))
+        return cls(names=tuple(f"{name} {number}" for number in range(len(files))), files=files)
 
     @property
     def size(self) -> Size:
@@ -258,6 +257,22 @@ class GivenPictures:
             )
         return counted
 
+    def as_halves(self, name: str, options: Options, seconds: float = 0.0) -> Halves:
+        """Return ``image`` and ``reference`` as halves; they were read within some seconds."""
+        assert self.image is not None, "the test image is missing"
+        assert self.reference is not None, "the reference is missing"
+        return Halves(
+            name=name,
+            options=options,
+            first=self.image,
+            second=self.reference,
+            passes=self.passes or FEWEST,
+            has=frozenset({"pictures"}),
+            noise_shown=self.noise_shown,
+            seconds={"reading": seconds},
+            **self.parts(),
+        )
+
     def sized(self, film: Size, options: Options) -> Options:
         """Return options with the resolution of the pictures, which must be the film's in shape.
 
@@ -342,17 +357,7 @@ def two_pictures(options: Options, name: str) -> Halves:
     if given.image is None or given.reference is None:
         raise InputError("two pictures are needed: give `image` and `reference`.")
     require_no_scene(options)
-    return Halves(
-        name=name,
-        options=options,
-        first=given.image,
-        second=given.reference,
-        passes=given.passes or FEWEST,
-        has=frozenset({"pictures"}),
-        noise_shown=given.noise_shown,
-        seconds={"reading": perf_counter() - begin},
-        **given.parts(),
-    )
+    return given.as_halves(name, options, perf_counter() - begin)
 
 
 def require_no_scene(options: Options, others: Iterable[str] = ()) -> None:

@@ -263,8 +263,10 @@ def check(asked: Baseline) -> CheckRecord:
     ``significance`` is the chance of a false alarm, above 0 and below 1. Raises `InputError` if the
     baseline or its scene cannot be read.
     """
-    file = baselines.read(asked.baseline)
-    result, _ = checks.examine(file, file.open(), asked.significance)
+    (path,) = baselines.find(asked.baseline)
+    file = baselines.read(path)
+    now = file.rendered(file.open())
+    result, _ = checks.examine(file, now, str(file.baseline.scene), asked.significance)
     return result
 
 

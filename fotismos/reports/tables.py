@@ -25,7 +25,7 @@ from fotismos.reports.terminal.table import Column, Table, comma_separated, prin
 from fotismos.reports.terminal.words import difference, number, percent, seconds
 
 if TYPE_CHECKING:  # only checks load it
-    from fotismos.comparisons.records.check import Move
+    from fotismos.comparisons.records.check import CheckRecord, Move
 
 SHOWN = 12
 """Quantities of a check that are listed; all are in the record."""
@@ -248,17 +248,17 @@ def _shares(records: Iterable[ComparisonRecord]) -> Table:
 # --- What moved since a baseline ---------------------------------------------------------------
 
 
-def moved(moves: Sequence[Move]) -> Table:
-    """Return the table of what moved most: from, to, by how many standard errors, and p-value."""
+def moved(made: CheckRecord) -> Table:
+    """Return the table of what moved most: by how much, from, to, and how certain that is."""
     columns = (
         Column("what moved", "name"),
+        Column("change", "change", is_right=True),
         Column("baseline", lambda move: f"{move.before:.6g}"),
         Column("now", "after", "{:.6g}".format, is_right=True),
-        Column("change", "change", is_right=True),
         Column("standard errors", certainty, "{:+.1f}".format, is_right=True),
         Column("p", "p_corrected", "{:.1g}".format, is_right=True),
     )
-    return Table(columns, moves[:SHOWN])
+    return Table(columns, (made.moved or ())[:SHOWN])
 
 
 def certainty(move: Move) -> float | str:

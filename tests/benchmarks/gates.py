@@ -15,9 +15,8 @@ from fotismos.comparisons.case import open_case
 
 from fotismos.comparisons.options import Options  # isort: skip  it finds LLVM first
 
-from fotismos.comparisons.check.moved import sidak
-from fotismos.comparisons.check.pictures import Repeats, means
 from fotismos.comparisons.departure.colour import from_srgb, to_srgb
+from fotismos.comparisons.departure.drift import Run, blocks, drift, level_of_each, sidak, whole
 from fotismos.comparisons.departure.flip import ldr_flip
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.records.departure import DEFAULT_VIEWING
@@ -98,8 +97,18 @@ def drawn(name):
     return draw
 
 
+def drifts(before, after):
+    """Return what a check tests: means of the picture, and of its blocks."""
+    return [drift(before, after, parts((HEIGHT, WIDTH))) for parts in (whole, blocks)]
+
+
+def level_of_kind():
+    return level_of_each(LEVEL, 2)
+
+
 def ours(before, after):
-    return np.any([each.moved(LEVEL).any(axis=AXES) for each in means(before, after)], axis=0)
+    found = drifts(before, after)
+    return np.any([each.moved(level_of_kind()).any(axis=(0, 1)) for each in found], axis=0)
 
 
 def rmse(before, after):
@@ -126,16 +135,17 @@ def measured(draw, count, runs, *gates):
     rng, alarms, power, sizes = np.random.default_rng(1), [], [], []
     for _ in range(-(-runs // BATCH)):
         repeats = draw(rng, 2 * count)
-        before, after = Repeats.of(repeats[:count]), Repeats.of(repeats[count:])
-        scaled = replace(after, mean=after.mean * FACTOR, variance=after.variance * FACTOR**2)
+        before, after = Run.of(repeats[:count]), Run.of(repeats[count:])
+        scaled = after.changed(lambda image: image * FACTOR)
+        scaled = replace(scaled, variance=after.variance * FACTOR**2)
         alarms.append([[gate(before, one).mean() for gate in gates] for one in (after, scaled)])
-        for each in means(before, after):
-            limit = each.limit(LEVEL)
-            sizes.append(np.median(limit.sum(AXES) / each.before.sum(AXES)))
+        for each in drifts(before, after):
+            limit = each.limit(level_of_kind())
+            sizes.append(np.median(limit.sum((0, 1)) / each.before.sum((0, 1))))
             shifted = (
                 replace(each, after=each.after + one) for one in (limit, np.roll(limit, 1, -1))
             )
-            power.append([one.moved(LEVEL)[each.error > 0].mean() for one in shifted])
+            power.append([one.moved(level_of_kind())[each.error > 0].mean() for one in shifted])
     power = np.nanmean(np.reshape(power, (-1, 2, 2)), axis=0)
     return np.mean(alarms, axis=0), power, np.median(sizes[::2])
 

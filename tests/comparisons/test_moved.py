@@ -1,154 +1,164 @@
-"""What a check calls moved: false alarms at the stated rate, and values of the statistic.
+"""What a check calls moved, and how: false alarms at the stated rate, and what is said of a change.
 
 Passes are drawn here, by NumPy, so that hundreds of checks take a second. Alarms are counted
 against bounds that a right statistic leaves once in a thousand runs.
 """
 
+import re
+
 import numpy as np
 import pytest
-from msgspec import structs
 from scipy import stats
 
-from fotismos.comparisons.check import measurement as measuring
-from fotismos.comparisons.check import moved as moving
-from fotismos.comparisons.check.measurement import measurement
-from fotismos.comparisons.departure.metrics import METRICS, RATIO
-from fotismos.comparisons.records.check import Block, Half, Measurement, MetricAmount
-from fotismos.comparisons.records.departure import DEFAULT_VIEWING
+from fotismos.comparisons.check.measured import Measured, picture
+from fotismos.comparisons.check.moved import check
+from fotismos.comparisons.departure.drift import Run, blocks, drift, whole
+from fotismos.comparisons.pictures import Pictures
+from fotismos.comparisons.records.check import HALVES
+from fotismos.reference.rendering.gbuffer import ObjectIds
 
-PASSES = 16
-
-
-def half(mean, error):
-    """Colours (51,) of a half: the whole image's, then those of 4 by 4 blocks."""
-    rows = np.stack([mean, error])[:, 3:].reshape(2, 4, 4, 3)
-    blocks = [[Block(mean=tuple(m), error=tuple(e)) for m, e in zip(*row, strict=True)]
-              for row in zip(*rows.tolist(), strict=True)]  # fmt: skip
-    return Half(mean=tuple(mean[:3]), error=tuple(error[:3]), blocks=tuple(map(tuple, blocks)))
+SHAPE = (32, 48, 3)
+PARTS = (whole(SHAPE), blocks(SHAPE))
 
 
-def measured(passes):
-    """A measurement of drawn passes (n, 102), as if they were colours; metrics are 0."""
-    mean, error = passes.mean(axis=0), passes.std(axis=0, ddof=1) / np.sqrt(len(passes))
-    halves = [half(*one) for one in zip(mean.reshape(2, 51), error.reshape(2, 51), strict=True)]
-    nothing = MetricAmount(value=0.0, error=0.0, noise_floor=0.0)
-    metrics = dict.fromkeys((*METRICS, RATIO.name), nothing)
-    colours = dict(zip(measuring.HALVES, halves, strict=True))
-    return Measurement(passes=len(passes), metrics=metrics, **colours)
+def normal(rng, image):
+    return image * (1 + 0.05 * rng.normal(size=(8, *SHAPE)))
 
 
-def normal(rng):
-    return 1 + 0.01 * rng.normal(size=(PASSES, 102))
+def fireflies(rng, image):
+    """One sample in a thousand is a hundred times as bright as the others."""
+    return normal(rng, image) + 100 * (rng.random((8, *SHAPE)) < 1e-3)
 
 
-def fireflies(rng):
-    """One sample in fifty is a hundred times as bright as the others."""
-    return 1 + 0.01 * rng.normal(size=(PASSES, 102)) + (rng.random((PASSES, 102)) < 0.02)
-
-
-def skewed(rng):
-    return rng.lognormal(sigma=1.0, size=(PASSES, 102))
-
-
-def alarms(draw, checks, level):
-    """Count the checks that alarm though both sides are drawn alike."""
-    rng = np.random.default_rng(11)
-    return sum(
-        bool(moving.moved(moving.differences(measured(draw(rng)), measured(draw(rng))), level))
-        for _ in range(checks)
-    )
-
-
-def bounds(checks, level):
-    return stats.binom.interval(0.999, checks, level)
+def skewed(rng, image):
+    return image * rng.lognormal(mean=-0.5, sigma=1.0, size=(8, *SHAPE))
 
 
 # --- False alarms ----------------------------------------------------------------------------
 
 
-def test_normal_noise_alarms_at_the_stated_rate():
-    level = 0.2
-    least, most = bounds(400, level * 102 / (103 + len(METRICS)))
-    assert least <= alarms(normal, 400, level) <= most
-
-
 @pytest.mark.guarantee("checks", "Heavy-tailed noise raises alarms no more often than stated.")
-@pytest.mark.parametrize("draw", [fireflies, skewed])
-def test_noise_of_heavy_tails_alarms_no_more_than_stated(draw):
-    assert alarms(draw, 500, 0.05) <= bounds(500, 0.05)[1]
+@pytest.mark.parametrize("noise", [normal, fireflies, skewed])
+@pytest.mark.parametrize("are_paired", [False, True])
+def test_unchanged_passes_alarm_no_more_often_than_stated(noise, are_paired):
+    """Pairs share nine tenths of their noise, as other versions of a sampler may."""
+    rng = np.random.default_rng(11)
+    level = 0.1
+    alarms = 0
+    for _ in range(120):
+        first, second = noise(rng, 0.5), noise(rng, 0.5)
+        if are_paired:
+            second = 0.9 * first + 0.1 * second
+        runs = Run.of(first), Run.of(second)
+        alarms += any(drift(*runs, parts).moved(level / 2).any() for parts in PARTS)
+    assert alarms <= stats.binom.ppf(0.999, 120, level)
 
 
-def test_shared_significance_is_that_of_all_checks():
-    level = moving.level_of_each(0.01, 27)
-    assert 1 - (1 - level) ** 27 == pytest.approx(0.01)
+# --- The statistic ---------------------------------------------------------------------------
 
 
-# --- Values ----------------------------------------------------------------------------------
-
-
-def test_the_p_value_is_scipys_of_welchs_test():
-    rng = np.random.default_rng(3)
-    sides = normal(rng), 1.002 + 0.03 * rng.normal(size=(PASSES, 102))
-    moves = moving.differences(*map(measured, sides))[len(METRICS) + 1 :]
-    expected = stats.ttest_ind(sides[1], sides[0], equal_var=False)
-    names = [move.quantity for move in moves]
-    assert names[:4] == ["heuristic R", "heuristic G", "heuristic B", "reference R"]
-    order = np.r_[0:3, 51:54, 3:51, 54:102]
-    np.testing.assert_allclose([m.p for m in moves], expected.pvalue[order], rtol=1e-9)
-    t = [m.standard_errors for m in moves]
-    np.testing.assert_allclose(t, expected.statistic[order], rtol=1e-9)
-    corrected = [m.p_corrected for m in moves]
-    np.testing.assert_allclose(
-        corrected, 1 - (1 - expected.pvalue[order]) ** (103 + len(METRICS)), rtol=1e-6
-    )
-
-
-def exact(value):
-    return measured(np.full((PASSES, 102), value))
-
-
-@pytest.mark.parametrize(("after", "moves"), [(1.0, 0), (1 + 9e-6, 0), (1 + 2e-5, 102)])
+@pytest.mark.parametrize(("after", "moves"), [(1.0, 0), (1 + 9e-6, 0), (1 + 2e-5, 7)])
 def test_without_noise_what_exceeds_rounding_moved(after, moves):
-    found = moving.moved(moving.differences(exact(1.0), exact(after)))
-    assert len(found) == moves
+    sides = [picture(Pictures.of("p", [np.full(SHAPE, value)] * 8)) for value in (1.0, after)]
+    found = check(sides[0].halves, sides[1]).moves
+    assert len(found) == 3 * moves
     assert all(move.p == 0 and move.standard_errors is None for move in found)
 
 
-def test_the_surest_of_the_widest_comes_first():
-    before = exact(1.0)
-    mean = np.ones(51)
-    mean[[1, 3 + 3 * (1 * 4 + 2)]] = 1.1, 1.5  # green, and red of block 2,3
-    rmse = MetricAmount(value=0.1, error=0.0, noise_floor=0.0)
-    after = structs.replace(before, reference=half(mean, np.zeros(51)),
-                            metrics=before.metrics | {"rmse": rmse})  # fmt: skip
-    names = [move.quantity for move in moving.moved(moving.differences(before, after))]
-    assert names == ["rmse", "reference G", "reference R, block 2,3"]
+def test_errors_by_images_and_pairs_are_those_of_scipy():
+    rng = np.random.default_rng(5)
+    first, second = rng.normal(1, 0.1, (2, 8, *SHAPE))
+    found = drift(Run.of(first), Run.of(second), blocks(SHAPE))
+    part = blocks(SHAPE) == 4
+    ours, theirs = (side[:, part].mean(axis=1)[:, 1] for side in (first, second))
+    welch = stats.ttest_ind(theirs, ours, equal_var=False)
+    paired = stats.ttest_rel(theirs, ours)
+    for way, known in ((1, welch), (2, paired)):
+        t = (found.after - found.before)[4, 1] / found.errors[way, 4, 1]
+        assert t == pytest.approx(known.statistic, rel=1e-6)
+        assert found.freedom[way, 4, 1] == pytest.approx(known.df, rel=1e-6)
 
 
-# --- Measurement -----------------------------------------------------------------------------
-
-
-@pytest.mark.thorough
-def test_jackknife_errors_are_those_of_metrics_drawn_again():
-    """The spread of a metric over independent measurements is the error that each reports."""
+def test_common_random_numbers_show_a_change_far_below_the_noise():
     rng = np.random.default_rng(6)
-    truth = rng.uniform(0.2, 0.6, (2, 8, 8, 3))
-    counted = np.ones((8, 8), bool)
-    drawn = [
-        measurement(truth + 0.05 * rng.normal(size=(8, *truth.shape)), counted, DEFAULT_VIEWING)
-        for _ in range(30)
+    passes = normal(rng, 0.5)
+    changed = passes.copy()
+    changed[:, :8, :8] *= 1.001
+    found = drift(Run.of(passes), Run.of(changed), blocks(SHAPE))
+    assert found.moved(0.01).any(axis=1).tolist() == [True, *[False] * 5]
+    assert (found.limit(0.01)[0] > 10 * np.abs(found.after - found.before)[0]).all()
+
+
+# --- In words --------------------------------------------------------------------------------
+
+
+def changed(heuristic=lambda image: image, reference=lambda image: image):
+    """Return a check of halves that were changed by functions of passes (8, H, W, 3)."""
+    rng = np.random.default_rng(0)
+    places = np.repeat([[0] * 24 + [2] * 24], SHAPE[0], axis=0)
+    before = [normal(rng, rng.uniform(0.3, 0.7, SHAPE)) for _ in HALVES]
+    after = [
+        change(passes.copy()) for change, passes in zip((heuristic, reference), before, strict=True)
     ]
-    for name in (*METRICS, RATIO.name):
-        values = [one.metrics[name].value for one in drawn]
-        errors = [one.metrics[name].error for one in drawn]
-        # 30 draws know their own spread to 13 %.
-        assert np.std(values, ddof=1) == pytest.approx(np.sqrt(np.mean(np.square(errors))), rel=0.4)
+    sides = [
+        Measured(
+            halves={name: Pictures.of(name, half) for name, half in zip(HALVES, side, strict=True)},
+            counted=np.ones(SHAPE[:2], bool),
+            shapes=ObjectIds(places, ("matte", "hidden", "wall")),
+        )
+        for side in (before, after)
+    ]
+    return check(sides[0].halves, sides[1])
 
 
-def test_metrics_are_those_of_the_mean_image_over_counted_pixels():
-    rng = np.random.default_rng(7)
-    images = rng.uniform(0.1, 0.9, (4, 2, 10, 12, 3))
-    counted = rng.random((10, 12)) < 0.5
-    found = measurement(images, counted, DEFAULT_VIEWING)
-    test, reference = images.mean(axis=0)[:, counted]
-    assert found.metrics["rmse"].value == pytest.approx(np.sqrt(np.mean((test - reference) ** 2)))
+def less_red(passes):
+    passes[:, :, :24, 0] *= 0.943
+    return passes
+
+
+def brighter_block(passes):
+    passes[:, 16:32, 16:32] *= 1.5
+    return passes
+
+
+@pytest.mark.parametrize(
+    ("changes", "headline", "causes"),
+    [
+        ({}, "", ""),
+        (
+            {"heuristic": less_red, "reference": less_red},
+            "`matte`: red -5.7 % in both halves",
+            "Both halves moved: look at what",
+        ),
+        (
+            {"reference": less_red},
+            "`matte`: red -5.7 % in the physical half",
+            "Only the physical half moved: .* in 4 of 6 blocks, most in row ., column 1,",
+        ),
+        (
+            {"heuristic": lambda passes: 1.3 * passes},
+            "whole picture: light +30 % in the textbook half",
+            "The textbook half moved by a constant factor of 1.3.* Nothing else moved",
+        ),
+        (
+            {"heuristic": less_red, "reference": lambda passes: passes + 0.1},
+            "`matte`: red -5.7 % in the textbook half, light +20 % in the physical half",
+            "The physical half moved by .*constant offset of 0.1",
+        ),
+    ],
+)
+def test_a_change_is_told_by_shape_colour_size_and_half(changes, headline, causes):
+    found = changed(**changes)
+    assert found.headline() == headline
+    assert re.search(causes, " ".join(found.causes()))
+
+
+def test_moves_are_listed_by_shape_then_block_and_the_largest_first():
+    found = changed(reference=brighter_block)
+    kinds = ["shape" if m.shape else "block" if m.block else "whole" for m in found.moves]
+    assert kinds == sorted(kinds, key=["shape", "block", "whole"].index)
+    assert {"shape", "block", "whole"} == set(kinds)
+    sizes = [abs(m.after - m.before) for m in found.moves if m.block]
+    assert sizes == sorted(sizes, reverse=True)
+    assert next(m for m in found.moves if m.block).block == (2, 2)
+    assert found.tested == 2 * 3 * (1 + 6 + 2)

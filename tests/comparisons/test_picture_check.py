@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -11,12 +10,23 @@ import pytest
 from PIL import Image
 from scipy import ndimage, stats
 
-from fotismos.comparisons.check.pictures import Repeats, check_pictures, picture_gate
+from fotismos.comparisons.check.measured import Measured
+from fotismos.comparisons.check.moved import check as checked_with
+from fotismos.comparisons.departure.drift import Run
+from fotismos.comparisons.pictures import Pictures
+from fotismos.comparisons.records.check import PICTURE
+from fotismos.reference import records
+from fotismos.reports.ci import baselines, summary
 from tests.benchmarks import gates
 from tests.shared.outputs import write
 from tests.shared.schemas import schema
 
 TRUTH = gates.TRUTH[..., 0]
+
+
+def header(path):
+    """Return the record in a baseline's header."""
+    return records.plain(baselines.read(Path(path)).baseline)
 
 
 @pytest.fixture
@@ -40,7 +50,7 @@ def check(run, tmp_path, monkeypatch):
 
 @pytest.mark.guarantee("checks", "A constant change of a picture is named, with its factor.")
 def test_repeats_pass_and_a_factor_fails_by_name(check):
-    jsonschema.validate(json.loads(Path("b/hall.json").read_text()), schema("pictures"))
+    jsonschema.validate(header("b/hall.exr"), schema("baseline"))
     assert [check(count, 1)[0] for count in (1, 2, 4)] == [0, 0, 0]
     code, printed, _ = check(2, 1.01322, "--json", "--junit", "j.xml")
     jsonschema.validate(json.loads(printed), schema("check"))
@@ -56,7 +66,9 @@ def test_repeats_pass_and_a_factor_fails_by_name(check):
         assert cause in Path(path).read_text()
     local = np.ones((*TRUTH.shape[:2], 1))
     local[16:32, 32:48] = 1.1
-    assert "in 1 of 12 blocks, most in row 2, column 3" in check(3, local)[1]
+    printed = check(3, local)[1]
+    assert "hall: failed. row 2, column 3: light +10 %" in printed
+    assert "in 1 of 12 blocks, most in row 2, column 3" in printed
 
 
 def test_what_cannot_be_checked_ends_with_2(run, check, tmp_path):
@@ -72,7 +84,7 @@ def test_what_cannot_be_checked_ends_with_2(run, check, tmp_path):
         "--picture hall=twin?.exr": "give each its own seed",
         "--picture hall=text.exr": "not a readable EXR",
         "--picture hall=gone*.exr": "no file matches",
-        "--picture hall=?.exr --picture roof=?.exr": "roof.json: No such file",
+        "--picture hall=?.exr --picture roof=?.exr": "roof.exr: this is no baseline: No such file",
         "--picture hall=0.exr --update": "two repeats or more",
         "--picture hall=?.exr --update --spp 4": "--spp: pictures are not rendered",
         "": "Give --picture hall",
@@ -84,11 +96,14 @@ def test_what_cannot_be_checked_ends_with_2(run, check, tmp_path):
     for name in ("equal0.exr", "equal1.exr"):
         write(tmp_path / name, TRUTH)
     assert "its own seed" in run("check", "c", "--update", "--picture", "e=equal?.exr")[1]
-    Path("b/mine.json").write_text("{}")
-    assert run("check", "b/mine.json", "--update", "--picture", "mine=?.exr")[0] == 2
-    assert Path("b/mine.json").read_text() == "{}"
-    (tmp_path / "b/hall.exr").write_bytes((tmp_path / "0.exr").read_bytes())
-    assert check(4, 1)[0] == 2
+    for name in ("mine.json", "0.exr"):
+        Path("b/mine.json").write_text("{}")
+        mine = (tmp_path / name).read_bytes() if (tmp_path / name).exists() else b"{}"
+        place = Path("b") / name
+        place.write_bytes(mine)
+        code, printed, _ = run("check", place, "--update", "--picture", "mine=?.exr")
+        assert (code, "this is no baseline" in printed) == (2, False)
+        assert place.read_bytes() == mine
 
 
 def test_an_update_keeps_how_pictures_are_read(run, tmp_path, monkeypatch):
@@ -101,9 +116,9 @@ def test_an_update_keeps_how_pictures_are_read(run, tmp_path, monkeypatch):
     assert "have an alpha below 1" in messages
     for words in (("--over", "white", "--transfer", "srgb"), ()):
         assert run("check", "b", "--update", "--picture", "wall=?.png", *words)[0] == 0
-        made = json.loads(Path("b/wall.json").read_text())
-        assert (made["over"], made["transfer"]) == ("white", "srgb")
-        assert min(made["mean"]) > 0.5  # of white, since the front is transparent and dark
+        assert header("b/wall.exr")["options"] == {"over": "white", "transfer": "srgb"}
+        (half,) = baselines.read(Path("b/wall.exr")).halves.values()
+        assert half.mean.min() > 0.5  # of white, since the front is transparent and dark
     assert run("check", "b", "--picture", "wall=?.png")[0] == 0
 
 
@@ -149,9 +164,9 @@ def test_noise_that_pixels_share_is_no_drift(kind):
         rng = np.random.default_rng(run)
         counts = [(4, 4), (8, 8), (2, 4), (4, 2)][run % 4]
         sides = [
-            Repeats.of(0.4 + 0.05 * correlated(kind, rng) for _ in range(count)) for count in counts
+            Run.of(0.4 + 0.05 * correlated(kind, rng) for _ in range(count)) for count in counts
         ]
-        alarms += bool(check_pictures(*sides, 0.01).moved)
+        alarms += gates.ours(*sides)
     assert alarms < 4
 
 
@@ -194,10 +209,18 @@ def test_a_tolerance_judges_what_is_visible_in_place_of_drift(run, tmp_path, mon
         if error != 2:
             assert made["gate"]["visible"]["value"] == pytest.approx(share, abs=0.002)
             assert made["gate"]["visible"]["low"] == made["gate"]["visible"]["high"]
-    assert "of the pixels differ by more than ΔE2000 2, at most 5.00% may: it fails." in printed
+    assert "of the pixels differ by more than ΔE2000 2, at most 5.00 % may: it fails." in printed
     page = Path("out/check/index.html").read_text()
-    assert "ΔE2000 between them" in page
+    assert "picture, change: ΔE2000" in page
     assert "it fails" in page
+
+
+def gate(before, after):
+    """Return whether at most 5 % of the pixels of repeats differ by more than ΔE2000 2."""
+    old, new = ({PICTURE: Pictures.of("p", images)} for images in (before, after))
+    (half,) = checked_with(old, Measured(halves=new)).halves
+    (found,) = summary.gates([half.comparison.record], 0.05, 2.0)
+    return found
 
 
 def test_many_repeats_decide_though_their_noise_is_visible():
@@ -205,10 +228,10 @@ def test_many_repeats_decide_though_their_noise_is_visible():
     grey = np.full((48, 64, 3), 0.2)
 
     def repeats(level):
-        return Repeats.of(level * grey + 0.005 * rng.normal(size=grey.shape) for _ in range(64))
+        return [level * grey + 0.005 * rng.normal(size=grey.shape) for _ in range(64)]
 
     for level, state in ((1.0, "pass"), (1.5, "fail")):
-        found = picture_gate(repeats(1.0), repeats(level), 2.0, 0.05)
+        found = gate(repeats(1.0), repeats(level))
         assert found.state == state
         assert found.visible.low <= found.visible.value <= found.visible.high
 
@@ -221,23 +244,13 @@ def test_a_tolerance_is_not_fooled_by_noise(noise):
     """A tenth of the pixels is made a third brighter, which is ΔE2000 7 in the median."""
     draw = gates.drawn(noise)
     rng = np.random.default_rng(2)
-    wrong = np.ones((48, 64, 1, 1))
+    wrong = np.ones((48, 64, 1))
     wrong[:, :7] = 1.35
-
-    def single(repeats, place):
-        shown = (getattr(repeats, name)[..., place] for name in ("mean", "variance", "correlation"))
-        return Repeats(repeats.count, *shown)
-
     for count, new in ((2, 1), (2, 2), (4, 4), (8, 1)):
-        repeats = draw(rng, count + new)
-        before = Repeats.of(repeats[:count])
-        after = Repeats.of(repeats[count:])
-        changed = replace(after, mean=after.mean * wrong)
-        for place in range(0, gates.BATCH, 5):
-            same = picture_gate(single(before, place), single(after, place), 2.0, 0.05)
-            assert same.state != "fail", (count, new, same)
-            other = picture_gate(single(before, place), single(changed, place), 2.0, 0.05)
-            assert other.state != "pass", (count, new, other)
+        repeats = [image[..., 0] for image in draw(rng, count + new)]
+        for factor, excluded in ((1.0, "fail"), (wrong, "pass")):
+            found = gate(repeats[:count], [factor * image for image in repeats[count:]])
+            assert found.state != excluded, (count, new, found)
 
 
 def test_a_tolerance_that_judges_nothing_is_refused(run, tmp_path, monkeypatch):
@@ -275,3 +288,34 @@ def test_an_update_writes_only_pictures_that_moved_and_says_what_did(run, tmp_pa
     assert "1 of 1 baselines written" in said
     assert "what moved" in said
     assert Path("b/hall.exr").read_bytes() != kept
+
+
+@pytest.mark.guarantee("checks", "Of the same repeats, check and compare say the same.")
+def test_ten_sets_of_repeats_have_the_share_and_the_decision_of_compare(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    decided = set()
+    # Of two values, repeats may be equal by chance, which a check refuses.
+    noises = [name for name in gates.NOISES if "two values" not in name]
+    for number, noise in enumerate([*noises, noises[0]]):
+        rng = np.random.default_rng(number)
+        repeats = [image[..., 0] for image in gates.drawn(noise)(rng, 8)]
+        wrong = np.ones((48, 64, 1))
+        wrong[: 6 * (number % 4)] = 1.35
+        for count, image in enumerate(repeats):
+            name = f"old{count}.exr" if count < 4 else f"new{count}.exr"
+            shown = image.clip(0) * (wrong if count >= 4 else 1)
+            write(Path(name), shown.astype(np.float32))
+        baseline = f"{number}/hall.exr"
+        assert run("check", baseline, "--update", "--picture", "hall=old?.exr")[0] == 0
+        words = ("--max-visible", "5%", "--json")
+        code, printed, _ = run("check", baseline, "--picture", "hall=new?.exr", *words)
+        (checked,) = json.loads(printed)["checks"]
+        pictures = ("--image", "new?.exr", "--reference", "old?.exr", "-o", "c")
+        expected, _, _ = run("compare", *pictures, "--max-visible", "5%")
+        (file,) = Path("c").glob("*/comparison.json")
+        compared = json.loads(file.read_text())
+        (share,) = [v for v in compared["metrics"]["dE2000"]["visible"] if v["threshold"] == 2]
+        assert checked["gate"]["visible"] == share
+        assert (code, checked["gate"]["state"] == "pass") == (expected, expected == 0)
+        decided.add(checked["gate"]["state"])
+    assert decided >= {"pass", "fail"}

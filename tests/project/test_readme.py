@@ -38,7 +38,7 @@ def clone(tmp_path_factory):
         (folder / name).symlink_to(ROOT / name)
     # One of many: tests/test_baselines.py checks all.
     (folder / "tests/baselines").mkdir(parents=True)
-    shutil.copy(ROOT / "tests/baselines/fig-8-9-llvm_ad_rgb.json", folder / "tests/baselines")
+    shutil.copy(ROOT / "tests/baselines/fig-8-9-llvm_ad_rgb.exr", folder / "tests/baselines")
     shutil.copy(ROOT / "run", folder)
     sensor = re.search(r"<sensor.*?</sensor>", SCENE, re.DOTALL)[0]
     rough = SCENE.replace('name="alpha" value="0.2"', 'name="alpha" value="$roughness"')

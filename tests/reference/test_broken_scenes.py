@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.check.measurement import measure_scene
+from fotismos.comparisons.check.measured import measure_scene
+from fotismos.comparisons.check.moved import check
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.departure import criterion
@@ -178,7 +179,9 @@ def test_every_command_refuses_an_empty_picture_unless_it_is_allowed(rgb, tmp_pa
             work(case.source, case.options)
     case = case_of(tmp_path, AWAY, allow_empty=True)
     assert compare(case.source, case.options).record.pixels.counted == 0
-    assert measure_scene(case.source, case.options).measurement.metrics["dE2000"].value == 0
+    measured = measure_scene(case.source, case.options)
+    assert measured.metrics(measured.halves)["dE2000"] == 0
+    assert check(measured.halves, measured).moves == ()
     assert "--allow-empty" in case.command()
 
 

@@ -13,22 +13,23 @@ import OpenEXR
 import pytest
 from msgspec import structs
 
-from fotismos.comparisons.check.measurement import MeasuredScene, measurement
-from fotismos.comparisons.check.moved import Check, differences, moved
 from fotismos.comparisons.departure.metrics import METRICS
-from fotismos.comparisons.records.check import HALVES, Move
-from fotismos.comparisons.records.departure import DEFAULT_VIEWING, VisibleShare
+from fotismos.comparisons.records.check import HALVES
+from fotismos.comparisons.records.departure import VisibleShare
 from fotismos.heuristic.errors import InputError
-from fotismos.reports.ci import checks, summary
+from fotismos.reports.ci import baselines, checks, summary
 from fotismos.reports.commands.compare import Compare
+from fotismos.reports.files import images
 from fotismos.reports.jobs import Terminal
 from tests.shared import records
+from tests.shared.outputs import write
 from tests.shared.programs import command_line
 from tests.shared.schemas import schema
 from tests.shared.small_baselines import FAST, change
 from tests.shared.small_scene import SCENE
 
 SMALL = ("--spp", 4, "--resolution", "12x8")
+HEADLINE = "`sphere`: red -"
 
 # --- Gates -----------------------------------------------------------------------------------
 
@@ -50,7 +51,7 @@ def test_a_run_beyond_its_bounds_ends_with_1_and_says_so_everywhere(two_scenes):
     assert "gates: 1 failed, 1 passed" in two_scenes.printed
     suite = ElementTree.parse(two_scenes.folder / "j.xml").getroot().find("testsuite")
     assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
-    assert "at most 10.0 % may: fail" in suite.find("testcase/failure").get("message")
+    assert "at most 10.0 % may: it fails." in suite.find("testcase/failure").get("message")
     text = (two_scenes.folder / "s.md").read_text()
     assert "| fail |" in text
     assert f"`{two_scenes.out / 'index.html'}`" in text
@@ -104,14 +105,14 @@ def failure(made_baselines, tmp_path_factory):
     """A check of two baselines, one of which moved, and then one of which none did."""
     folder = tmp_path_factory.mktemp("failed")
     baselines = shutil.copytree(made_baselines, folder / "baselines")
-    change(baselines / "fig-8-6b.json")
-    (baselines / "broken.json").write_text("{")
+    change(baselines / "fig-8-6b.exr")
+    (baselines / "broken.exr").write_text("{")
     words = ("check", baselines, "-o", folder / "out")
     files = ("--junit", folder / "j.xml", "--summary", folder / "s.md")
     code, printed, messages = command_line(*words, *files)
     shutil.copytree(folder / "out", folder / "kept")
-    (baselines / "broken.json").unlink()
-    change(baselines / "fig-8-6b.json", factor=1 / 1.5)
+    (baselines / "broken.exr").unlink()
+    shutil.copy(made_baselines / "fig-8-6b.exr", baselines)
     again = command_line(*words, "--seed", 7)
     return SimpleNamespace(
         folder=folder, baselines=baselines, code=code, printed=printed, messages=messages,
@@ -122,31 +123,33 @@ def failure(made_baselines, tmp_path_factory):
 def test_what_moved_fails_with_a_table_and_the_others_are_checked(failure):
     assert failure.code == 2, "one baseline could not be read"
     assert "1 of 3 moved" in failure.printed
-    assert "fig-8-6b: failed. physical R, block 2,3 moved from " in failure.printed
+    assert f"fig-8-6b: failed. {HEADLINE}" in failure.printed
     assert "1 could not be checked" in failure.printed
-    assert re.search(r"physical R, block 2,3 +\S+ +\S+ +-33 % +-\S+ +\S+", failure.printed)
-    accepting = f"fotismos check {failure.baselines / 'fig-8-6b.json'} --update"
+    assert re.search(r"sphere: physical red +-\d\S+ % +\S+ +\S+ +-\S+ +\S+", failure.printed)
+    accepting = f"fotismos check {failure.baselines / 'fig-8-6b.exr'} --update"
     assert accepting in failure.printed
-    assert re.search(r"error: .*broken\.json: this is not JSON", failure.messages)
+    assert re.search(r"error: .*broken\.exr: not a readable EXR file: ", failure.messages)
 
 
 @pytest.mark.guarantee("checks", "A failure writes one page: before, now, where, and why.")
-def test_the_page_of_a_failure_is_that_of_a_comparison_with_before(failure):
+def test_the_page_of_a_failure_shows_before_and_now_under_what_moved(failure):
     html = (failure.out / "index.html").read_text()
-    headline = re.search(r'<h1 id="headline">(.*?)</h1>', html)[1]
-    assert "fig-8-6b: physical R, block 2,3 moved from " in headline
-    assert "-33 %" in headline
-    assert "differ visibly</h1>" not in html
-    for part in ("1 of 3 moved", "row 2, column 3", "physical, before", "--update"):
+    shown = "<code>sphere</code>: red −"
+    assert shown in re.search(r"<h1>(.*?)</h1>", html)[1]
+    assert "<title>`sphere`: red -" in html
+    for part in ("1 of 3 moved", "textbook, before", "physical, now", "change: ΔE2000", "--update"):
         assert part in html, part
     names = {path.name for path in (failure.out / "fig-8-6b").iterdir()}
-    assert {"check.json", "comparison.json", "comparison.exr", "reference.png"} <= names
+    panels = {f"{half}-{name}.png" for half in HALVES for name in ("before", "now", "dE2000")}
+    assert names >= {"check.json", *panels}
     record = json.loads((failure.out / "fig-8-6b/check.json").read_text())
+    assert record["headline"].startswith(HEADLINE)
     assert record["causes"][0].startswith("Only the physical half moved")
-    (move,) = record["moved"]
-    assert (move["half"], move["block"]) == ("reference", [2, 3])
-    assert move["before"] == pytest.approx(1.5 * move["after"], rel=1e-6)
-    assert record["tested"] == len(METRICS) + 1 + 2 * 3 * (1 + 4 * 4)  # halves, channels, blocks
+    assert {move["half"] for move in record["moved"]} == {"reference"}
+    assert {move["channel"] for move in record["moved"]} == {"R"}
+    # Of each half and channel: the picture, one block of 16 by 16 pixels, and a sphere.
+    assert record["tested"] == 2 * 3 * 3
+    assert record["metrics"].keys() == {*METRICS, "log2_luminance"}
 
 
 def test_once_it_passes_nothing_speaks_of_the_failure(failure):
@@ -160,24 +163,20 @@ def test_ci_reads_what_moved_and_what_was_not_checked(failure):
     suite = ElementTree.parse(failure.folder / "j.xml").getroot().find("testsuite")
     assert [suite.get(key) for key in ("tests", "failures", "errors")] == ["3", "1", "1"]
     (message,) = suite.findall("testcase/failure")
-    assert message.get("message").startswith("physical R, block 2,3 moved from ")
+    assert message.get("message").startswith(HEADLINE)
     assert "standard errors" in message.text
     text = (failure.folder / "s.md").read_text()
-    assert "| fig-8-6b | failed | physical R, block 2,3, -33 % (1 in all) |" in text
+    assert "| fig-8-6b | failed | \\`sphere\\`: red -" in text
     assert f"`{failure.folder / 'out/check/index.html'}`" in text
 
 
-def test_json_follows_its_schema_and_a_lost_metric_is_not_tested(run, baselines_folder, tmp_path):
-    path = baselines_folder / "fig-8-6a.json"
-    data = json.loads(path.read_text())
-    jsonschema.validate(data, schema("baseline"))
-    for name in ("ldr_flip", "hdr_flip"):
-        del data["metrics"][name]
-    path.write_text(json.dumps(data))
+def test_json_and_a_baselines_header_follow_their_schemas(run, baselines_folder, tmp_path):
+    path = baselines_folder / "fig-8-6a.exr"
+    with OpenEXR.File(str(path), header_only=True) as file:
+        jsonschema.validate(json.loads(file.header()["fotismos"]), schema("baseline"))
     code, printed, _ = run("check", path, "--json", "-o", tmp_path / "out")
-    found = json.loads(printed)
-    jsonschema.validate(found, schema("check"))
-    assert (code, set(found["checks"][0]["metrics"])) == (0, set(data["metrics"]))
+    jsonschema.validate(json.loads(printed), schema("check"))
+    assert code == 0
 
 
 def test_names_that_xml_and_utf_8_forbid_are_shown():
@@ -194,7 +193,7 @@ def test_bad_words_are_refused(run, tmp_path, monkeypatch):
     for name in ("a/x.xml", "b/x.xml"):
         (tmp_path / name).write_text(SCENE)
     for words, expected in {
-        ("check", "nix.json"): "no such baseline",
+        ("check", "nix.exr"): "no such baseline",
         ("check", "empty"): "no baseline",
         ("check", "nix.json", "--update"): "--scene",
         ("check", "nix.json", "--update", "--scene", "fig-0"): "'fig-0' is neither",
@@ -220,18 +219,18 @@ def test_an_update_rewrites_what_moved_and_nothing_else(run, baselines_folder):
         return {path.name: path.read_bytes() for path in baselines_folder.iterdir()}
 
     whole = content()
-    change(baselines_folder / "fig-8-6b.json")
+    change(baselines_folder / "fig-8-6b.exr")
     code, printed, _ = run("check", baselines_folder, "--update")
     assert code == 0
-    for words in ("fig-8-6b: updated", "physical R, block 2,3", "1 of 2 baselines written"):
+    for words in (f"fig-8-6b: updated. {HEADLINE}", "1 of 2 baselines written"):
         assert words in printed
     assert content() == whole
 
 
 def test_other_options_write_a_baseline_anew(run, baselines_folder):
-    path = baselines_folder / "fig-8-6b.json"
+    path = baselines_folder / "fig-8-6b.exr"
     assert run("check", path, "--update", "--pairing", "literal", "--seed", 4)[0] == 0
-    options = json.loads(path.read_text())["options"]
+    options = baselines.read(path).baseline.options
     assert (options["pairing"], options["seed"]) == ("literal", 4)
     assert (options["spp"], options["resolution"]) == (32, [16, 12])
 
@@ -246,64 +245,55 @@ def test_an_update_replaces_no_other_baseline_and_no_other_file(run, tmp_path, m
         return run("check", baseline, "--update", "--scene", scene, *FAST)
 
     assert update("base", "a/x.xml")[0] == 0
-    before = (tmp_path / "base/x.json").read_bytes()
-    assert json.loads(before)["scene"] == "../a/x.xml", "found from anywhere"
+    path = tmp_path / "base/x.exr"
+    before = path.read_bytes()
+    assert baselines.read(path).baseline.scene == "../a/x.xml", "found from anywhere"
     code, _, messages = update("base", "b/x.xml")
-    assert (code, (tmp_path / "base/x.json").read_bytes()) == (2, before)
+    assert (code, path.read_bytes()) == (2, before)
     assert "the baseline of ../a/x.xml, not of b/x.xml" in messages
     other = tmp_path / "package.json"
-    for text in ('{"name": "mine"}', "[]", "mine", before[:99].decode()):
+    for text in ('{"name": "mine"}', "[]", "mine", OLD[:40]):
         other.write_text(text)
         code, _, messages = update(other, "a/x.xml")
         assert (code, "Delete it, and write it again" in messages) == (2, True)
         assert other.read_text() == text
 
 
-# --- Causes ----------------------------------------------------------------------------------
+OLD = """{"record_version": 4, "scene": "fig-8-6a", "options": {"resolution": [16, 12], "spp": 32},
+"passes": 16, "versions": {}, "metrics": {}, "heuristic": {}, "reference": {}}"""
 
 
-def check_of(heuristic=lambda image: image, reference=lambda image: image):
-    """Return a check of halves that were changed by functions of images (16, 16, 3)."""
-    rng = np.random.default_rng(0)
-    before = rng.uniform(0.3, 0.7, (2, 16, 16, 3)) + 1e-4 * rng.normal(size=(4, 2, 16, 16, 3))
-    after = np.stack(
-        [[heuristic(one[0].copy()), reference(one[1].copy())] for one in before]
-    ) + 1e-4 * rng.normal(size=before.shape)
-    sides = [
-        measurement(each, np.ones((16, 16), bool), DEFAULT_VIEWING) for each in (before, after)
-    ]
-    moves = differences(*sides)
-    pictures = dict(zip(HALVES, after.mean(axis=0), strict=True))
-    now = MeasuredScene(sides[1], pictures, 4)
-    return Check(sides[0], now, moves, tuple(moved(moves)), 0.01)
-
-
-def redder(image):
-    image[4:8, 8:12, 0] *= 1.5
-    return image
-
-
-def test_what_moved_most_is_the_largest_not_the_most_certain():
-    change = {"half": None, "block": None, "error": 0.0, "standard_errors": 1.0, "p_corrected": 0.0}
-    moves = [
-        Move(quantity="certain", before=100.0, after=101.0, p=1e-30, **change),
-        Move(quantity="large", before=0.1, after=0.2, p=1e-4, **change),
-        Move(quantity="larger", before=0.0, after=0.01, p=1e-5, **change),
-        Move(quantity="odd", before=0.1, after=float("nan"), p=1e-5, **change),
-    ]
-    found = moved(moves)
-    assert [move.quantity for move in found] == ["odd", "larger", "large", "certain"]
-    assert [move.change for move in found[1:]] == ["+0.01", "+1e+02 %", "+1 %"]
-
-
-def test_causes_name_the_half_the_place_and_the_colour():
-    found = check_of(reference=redder)
-    causes = " ".join(found.causes())
-    assert "Only the physical half moved" in causes
-    assert "in 1 of 16 blocks, most in row 2, column 3, from luminance 0.5" in causes
-    level = " ".join(check_of(heuristic=lambda image: 1.3 * image).causes())
-    assert "1.3 times the light everywhere" in level
-    assert check_of(redder, redder).causes()[0].startswith("Both halves moved: look at what")
+@pytest.mark.guarantee("checks", "A baseline of 0.4 never passes, and an update makes it again.")
+def test_a_baseline_of_0_4_is_refused_until_it_is_made_again(run, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    old = Path("b/fig.json")
+    old.parent.mkdir()
+    old.write_text(OLD)
+    kept = {"baseline.reference": np.zeros((2, 2, 3))}  # the pictures beside it
+    images.write_exr(Path("b/fig.exr"), kept, {"scene": "fig-8-6a"})
+    for words in (("b",), ("b/fig.json",), ("b/fig.exr",)):
+        code, printed, messages = run("check", *words)
+        assert (code, "of fotismos 0.4, which kept numbers" in messages) == (2, True)
+        assert "check b/fig.json --update` makes fig.exr" in messages
+        assert old.exists()
+    code, printed, _ = run("check", "b", "--update")
+    assert (code, old.exists()) == (0, False)
+    assert "fig.json of fotismos 0.4 could not be compared: fig.exr, in its place" in printed
+    made = baselines.read(Path("b/fig.exr")).baseline
+    assert (made.scene, made.options["resolution"], made.options["spp"]) == (
+        "fig-8-6a", [16, 12], 32,
+    )  # fmt: skip
+    assert run("check", "b/fig.json")[0] == 0, "by its old name, too"
+    shots = ("--picture", "hall=?.exr")
+    Path("c").mkdir()
+    Path("c/hall.json").write_text('{"record_version": 4, "repeats": 2, "transfer": "linear"}')
+    write(Path("0.exr"), np.full((8, 8, 3), 0.5))
+    write(Path("1.exr"), np.full((8, 8, 3), 0.51))
+    code, _, messages = run("check", "c", *shots)
+    assert (code, "--update --picture hall=PATTERN` makes hall.exr" in messages) == (2, True)
+    assert run("check", "c", "--update", *shots)[0] == 0
+    assert baselines.read(Path("c/hall.exr")).baseline.options == {"transfer": "linear"}
+    assert run("check", "c", *shots)[0] == 0
 
 
 # --- Files of others -------------------------------------------------------------------------
@@ -329,7 +319,7 @@ def test_a_file_of_others_is_not_replaced_by_compare(run, tmp_path, monkeypatch)
 def test_a_picture_of_others_is_not_replaced_by_a_baselines(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "b.exr").write_bytes(b"mine")
-    words = ("check", "b.json", "--update", "--scene", "fig-8-6b", "--images", *SMALL)
+    words = ("check", "b.exr", "--update", "--scene", "fig-8-6b", *SMALL)
     code, _, messages = run(*words)
     assert code == 2
     assert "b.exr" in messages
@@ -338,7 +328,7 @@ def test_a_picture_of_others_is_not_replaced_by_a_baselines(run, tmp_path, monke
     for seed in range(2):  # its own are
         assert run(*words, "--seed", seed)[0] == 0
         with OpenEXR.File("b.exr", separate_channels=True) as file:
-            assert "baseline.reference.R" in file.channels()
+            assert "pass.reference.0.R" in file.channels()
 
 
 def test_a_report_replaces_an_earlier_one_and_a_summary_is_appended(run, tmp_path, monkeypatch):

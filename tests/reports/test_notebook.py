@@ -117,7 +117,7 @@ def test_comparisons_in_threads_are_those_of_one_thread(rgb):
 
 @pytest.mark.parametrize("significance", [0, 1, float("nan"), "x"])
 def test_an_impossible_significance_is_refused(rgb, baselines_folder, significance):
-    (path, *_) = baselines_folder.glob("*.json")
+    (path, *_) = baselines_folder.glob("*.exr")
     with pytest.raises(InputError, match=r"significance = .* above 0 and below 1"):
         fotismos.check(path, significance)
 

@@ -109,7 +109,6 @@ def test_the_page_loads_nothing_and_escapes_everything(record, pictures):
     record["pairing"]["misses"][0]["what"] = HOSTILE
     html = page.render(
         [records.view(record, embedded=pictures, files={HOSTILE: "javascript:" + HOSTILE})],
-        title=HOSTILE,
         failures=[Failure(scene=HOSTILE, error=HOSTILE)],
     )
     shown = Page(html)

@@ -4,7 +4,7 @@ import pytest
 
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.cli import cli
-from fotismos.reports.commands.check import Check
+from fotismos.reports.commands.check import Check, Tolerance
 from fotismos.reports.commands.compare import Compare
 from tests.shared.programs import command_line
 
@@ -44,16 +44,16 @@ def test_the_table_sets_what_the_command_line_leaves_open(asked):
     made, terminal = asked(TABLE, *PICTURES)
     assert made.baseline.as_posix() == "../../kept"
     assert terminal.output.as_posix() == "../../made"
-    assert (made.significance, made.tolerance()) == (0.001, (3, 0.07))
+    assert (made.significance, made.tolerance) == (0.001, Tolerance(within=3, bound=0.07))
     words = ("other", "-o", "out", "--significance", 0.1, "--within", 4, "--max-visible", "1%")
     made, terminal = asked(TABLE, *words, *PICTURES)
     assert (made.baseline.name, terminal.output.name) == ("other", "out")
-    assert (made.significance, made.tolerance()) == (0.1, (4, 0.01))
+    assert (made.significance, made.tolerance) == (0.1, Tolerance(within=4, bound=0.01))
 
 
 def test_a_tolerance_of_the_table_is_for_pictures_alone(asked):
     made, _ = asked(TABLE)
-    assert made.tolerance() is None
+    assert made.tolerance is None
 
 
 @pytest.mark.parametrize("nearer", ["[tool.other]\nbaselines = 'no'", "tool = 3"])

@@ -8,7 +8,7 @@ import pytest
 from msgspec import structs
 
 from fotismos.comparisons.departure.metrics import THRESHOLDS
-from fotismos.comparisons.records.departure import VisibleShare
+from fotismos.comparisons.records.departure import Gate, VisibleShare
 from fotismos.reference.records import Interval
 from fotismos.reports import cost_tables, sentences, tables
 from fotismos.reports.ci import summary
@@ -75,10 +75,10 @@ def test_headings_of_costs_have_the_glossarys_sentences(table):
 
 def test_a_gate_is_a_row_and_a_sentence_with_the_same_numbers():
     found = VisibleShare(threshold=2.0, value=0.4, low=0.3, high=0.5)
-    gate = summary.Gate(scene="hall", bound=0.05, found=found, state="fail")
+    gate = Gate(scene="hall", bound=0.05, visible=found, state="fail")
     (row,) = Table(summary.GATES, [gate]).texts()
     assert row == ["hall", "5.00 %", "40.0 %", "30.0 %", "50.0 %", "fail"]
-    assert all(text in str(gate) for text in row[1:])
+    assert all(text in summary.sentence(gate) for text in row[1:])
 
 
 def test_terminal_and_page_have_the_same_sentences():

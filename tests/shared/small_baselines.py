@@ -1,8 +1,14 @@
-"""Two small baselines for tests, and what makes one of them seem to have moved."""
+"""Two small baselines for tests, and what makes them seem to have moved."""
 
-import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+from msgspec import structs
+
+from fotismos.comparisons.pictures import Pictures
+from fotismos.reports.ci import baselines
 from tests.shared.programs import command_line
 
 FAST = ("--spp", 32, "--resolution", "16x12")
@@ -10,12 +16,29 @@ SCENES = ("--scene", "fig-8-6a", "--scene", "fig-8-6b")
 
 
 def make(folder: Path) -> None:
-    """Write both, with pictures, by the command and in this process."""
-    command_line("check", folder, "--update", *SCENES, "--images", *FAST)
+    """Write both, by the command and in this process."""
+    command_line("check", folder, "--update", *SCENES, *FAST)
 
 
-def change(path: Path, half: str = "reference", factor: float = 1.5) -> None:
-    """Change a baseline so that its scene seems to have moved in one block."""
-    data = json.loads(path.read_text(encoding="utf-8"))
-    data[half]["blocks"][1][2]["mean"][0] *= factor
-    path.write_text(json.dumps(data), encoding="utf-8")
+def redder(image: np.ndarray) -> np.ndarray:
+    """Return an image with more red in a part of it."""
+    changed = image.copy()
+    changed[4:8, 5:11, 0] *= 1.5
+    return changed
+
+
+def change(
+    path: Path, half: str = "reference", by: Callable[[np.ndarray], np.ndarray] = redder
+) -> None:
+    """Change the passes of a half in a baseline, so that its scene seems to have moved."""
+    file = baselines.read(path)
+    images = [by(picture.image) for picture in file.halves[half].files]
+    halves = dict(file.halves) | {half: Pictures.of(half, images)}
+    baselines.write(baselines.BaselineFile(path, file.baseline, halves))
+
+
+def changed_header(path: Path, new: Path, **changes: Any) -> None:
+    """Write a baseline with other fields in its header to another file."""
+    file = baselines.read(path)
+    baseline = structs.replace(file.baseline, **changes)
+    baselines.write(baselines.BaselineFile(new, baseline, file.halves))

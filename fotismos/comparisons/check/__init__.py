@@ -1,1 +1,1 @@
-"""Regression checks: measure a scene again, and compare it with a baseline."""
+"""Regression checks: what a baseline kept is compared with what there is now, half by half."""

@@ -1,39 +1,63 @@
-"""Check a scene against its baseline: the numbers that moved by more than both sides' uncertainty.
+"""What moved since a baseline: each half now is compared with the half as it was.
 
-Welch's t-test, many at once. Before and after are independent measurements. If they share a seed,
-unchanged numbers differ by even less than the test allows for.
+Both are sources of passes, so this is a comparison of two pictures. Whether a mean moved is judged
+by :mod:`fotismos.comparisons.departure.drift`: that of the whole picture, of each block, and of
+each shape of a scene. These kinds of parts, and the halves, share the chance of a false alarm.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from math import floor, log10
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from fotismos.comparisons.check.measurement import LINEAR_ROUNDING, MeasuredScene, measure_scene
+from fotismos.comparisons.check.measured import Halves, Measured
+from fotismos.comparisons.compare import look
 from fotismos.comparisons.departure.colour import Array, luminance
-from fotismos.comparisons.departure.metrics import METRICS, RATIO
+from fotismos.comparisons.departure.drift import (
+    POWER,
+    Drift,
+    Run,
+    blocks,
+    drift,
+    level_of_each,
+    sidak,
+    whole,
+)
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.records.check import HALVES, READERS, Measurement, Move
-from fotismos.heuristic.errors import InputError
-from fotismos.reference.rendering.passes import Progress
-from fotismos.reference.scene.source import Source
+from fotismos.comparisons.pictures import GivenPictures, require_one_size
+from fotismos.comparisons.records.check import (
+    CHANNELS,
+    HALVES,
+    PICTURE,
+    READERS,
+    Move,
+    SmallestChanges,
+    part_of,
+)
+from fotismos.comparisons.records.departure import Colour
+from fotismos.comparisons.records.images import Comparison
+from fotismos.reference.rendering.gbuffer import ObjectIds
 
 LEVEL = 0.01
-"""Chance of a false alarm, over all quantities that one check tests."""
+"""Chance of a false alarm, over all that one check tests."""
 
-RELATIVE_ROUNDING = 1e-5
-"""Share of a value that rounding can change: other machines order float32 sums otherwise."""
-
-ALIKE = 0.02
-"""Relative spread of the blocks' factors below which they count as one factor."""
+ALIKE = 0.1
+"""Relative difference up to which changes are told as one."""
 
 DARK = 1e-3
-"""Luminance below which a block has no meaningful factor."""
+"""Display-linear: a change of what is darker is no percentage that means anything."""
+
+SHAPES = "shapes"
+BLOCKS = "blocks"
+WHOLE = "whole"
+KINDS = (SHAPES, BLOCKS, WHOLE)
+"""Kinds of parts, those that say most about a local change first."""
 
 CAUSES = {
-    (): "The colours of neither half moved, only the error between them: look at the noise, the"
-    " samples, or how metrics are computed.",
     ("heuristic",): "Only the textbook half moved: look at its shading, or at how materials and"
     " lights are paired.",
     ("reference",): "Only the physical half moved: look at its materials and lights, the"
@@ -44,160 +68,294 @@ CAUSES = {
 """Where to look, by the halves that moved."""
 
 
-def differences(before: Measurement, after: Measurement) -> tuple[Move, ...]:
-    """Compare all quantities of two measurements of the same kind.
+@dataclass(frozen=True)
+class Parts:
+    """Parts of a picture: their numbers by pixel (H, W), and the fields of each in a record."""
 
-    ::
+    numbers: NDArray[np.int_]
+    fields: Sequence[Mapping[str, Any]]
 
-        t = (x₂ − x₁) / √(e₁² + e₂²)
-        ν = (n − 1) (e₁² + e₂²)² / (e₁⁴ + e₂⁴)
+    @cached_property
+    def pixels(self) -> NDArray[np.int_]:
+        """The number of pixels of each."""
+        return np.bincount(self.numbers[self.numbers >= 0], minlength=len(self.fields))
 
-    with standard errors e over n passes on each side (Welch 1947; Satterthwaite 1946). A difference
-    within rounding has p = 1. A larger one has p = 0 if neither side has any spread. Šidák's
-    correction treats the quantities as independent; they nearly are, and alarms get rarer.
 
-    ``ValueError`` for different quantities, or different numbers of passes: Welch's test is then
-    wrong in the far tails, which a correction for many tests needs.
+def parts_of(shape: Sequence[int], shapes: ObjectIds | None) -> dict[str, Parts]:
+    """Return the kinds of parts of a picture (H, W, 3), and of what its pixels see."""
+    numbers = blocks(shape)
+    across = int(numbers[0, -1]) + 1
+    places = [divmod(number, across) for number in range(int(numbers.max()) + 1)]
+    found = {
+        WHOLE: Parts(whole(shape), [{}]),
+        BLOCKS: Parts(numbers, [{"block": (row + 1, column + 1)} for row, column in places]),
+    }
+    if shapes is not None and (shapes.places >= 0).any():
+        present, order = np.unique(shapes.places, return_inverse=True)
+        seen = present[present >= 0]
+        numbers = order.reshape(shapes.places.shape) - (len(present) - len(seen))
+        found[SHAPES] = Parts(numbers, [{"shape": shapes.names[index]} for index in seen])
+    return found
+
+
+@dataclass(frozen=True)
+class HalfCheck:
+    """A half now, and as it was: the comparison of both, and the drift of its parts by kind.
+
+    ``level`` is the chance of a false alarm in this half.
     """
-    from scipy.stats import ttest_ind_from_stats  # half a second, for those who check
 
-    pairs = list(zip(before.quantities(), after.quantities(), strict=True))
-    if before.passes != after.passes or any(old.name != new.name for old, new in pairs):
-        raise ValueError("measurements with different passes or quantities cannot be compared")
-    count = before.passes
-    x = np.array([[old.value, new.value] for old, new in pairs])
-    errors = np.array([[old.error, new.error] for old, new in pairs])
-    difference = x[:, 1] - x[:, 0]
-    total = (errors**2).sum(axis=1)
-    known = {name: metric.rounding for name, metric in METRICS.items()}
-    known[RATIO.name] = RATIO.rounding
-    rounding = np.array([known.get(old.name, LINEAR_ROUNDING) for old, _ in pairs])
-    rounding = np.maximum(rounding, RELATIVE_ROUNDING * np.abs(x).max(axis=1))
-    spread = total > (1e-6 * rounding) ** 2  # sums of equal numbers differ in their last bits
-    # Deviations of single passes, as SciPy takes them; where there are none, t is not used.
-    deviations = np.where(spread[:, None], errors, 1.0) * np.sqrt(count)
-    t, p = ttest_ind_from_stats(
-        x[:, 1], deviations[:, 1], count, x[:, 0], deviations[:, 0], count, equal_var=False
-    )
-    p = np.where(np.abs(difference) <= rounding, 1.0, np.where(spread, p, 0.0))
-    corrected = sidak(p, len(pairs))
-    return tuple(
-        Move(
-            quantity=old.name,
-            half=old.half,
-            block=old.block,
-            before=old.value,
-            after=new.value,
-            error=float(np.sqrt(total[i])),
-            standard_errors=float(t[i]) if spread[i] else None,
-            p=float(p[i]),
-            p_corrected=float(corrected[i]),
+    name: str
+    comparison: Comparison
+    before: Run
+    after: Run
+    parts: Mapping[str, Parts]
+    level: float
+
+    @cached_property
+    def drifts(self) -> dict[str, Drift]:
+        """The means of parts before and now, by kind."""
+        return {
+            kind: drift(self.before, self.after, parts.numbers)
+            for kind, parts in self.parts.items()
+        }
+
+    @property
+    def level_of_kind(self) -> float:
+        """The chance of a false alarm among the parts of a kind."""
+        return level_of_each(self.level, len(self.parts))
+
+    @cached_property
+    def moved(self) -> dict[str, NDArray[np.bool_]]:
+        """Which means (N, 3) moved, by kind."""
+        return {kind: found.moved(self.level_of_kind) for kind, found in self.drifts.items()}
+
+    def moves(self) -> Iterator[Move]:
+        """Yield what moved."""
+        for kind, found in self.drifts.items():
+            p = found.p()
+            corrected = sidak(p, found.tests)
+            errors = found.error
+            for part, channel in np.argwhere(self.moved[kind]).tolist():
+                index = part, channel
+                before = float(found.before[index])
+                after = float(found.after[index])
+                error = float(errors[index])
+                yield Move(
+                    half=self.name,
+                    channel="RGB"[channel],
+                    **self.parts[kind].fields[part],
+                    before=before,
+                    after=after,
+                    error=error,
+                    standard_errors=(after - before) / error if error > 0 else None,
+                    p=float(p[index]),
+                    p_corrected=float(corrected[index]),
+                )
+
+    def smallest_changes(self) -> SmallestChanges:
+        """Return the smallest changes that the check catches."""
+        each = self.drifts[BLOCKS].limit(self.level_of_kind)
+        return SmallestChanges(
+            power=POWER,
+            mean=colour(self.drifts[WHOLE].limit(self.level_of_kind)[0]),
+            block=colour(np.median(each, axis=0)),
+            noisiest=colour(each.max(axis=0)),
         )
-        for i, (old, new) in enumerate(pairs)
-    )
 
+    @cached_property
+    def constants(self) -> list[str]:
+        """The constant changes that each explain all that moved, in words.
 
-def sidak(p: ArrayLike, tests: int) -> NDArray[np.float64]:
-    """Return the chance of a p-value as small as `p` among this many independent tests."""
-    # `1 − (1 − p)^n`, in a form that keeps its digits for small p.
-    with np.errstate(divide="ignore"):  # p = 1
-        chances: NDArray[np.float64] = -np.expm1(tests * np.log1p(-np.asarray(p, float)))
-        return chances
+        Over the blocks' means x before and y now, with weights w of 1 / error², the offset of a
+        channel is ``Σ w (y − x) / Σ w``, and its factor ``1 + Σ w z (y − x) / Σ w z x``, where z is
+        the mean of all passes. If the baseline, changed alike, agrees everywhere, it explains all.
+        """
+        m = self.before.count
+        n = self.after.count
+        found = self.drifts[BLOCKS]
+        old = found.before
+        new = found.after
+        weight = 1.0 / np.maximum(found.error, found.rounding) ** 2
+        level = weight * (m * old + n * new) / (m + n)
+        words = []
+        for name, start, weights, base, image in (
+            ("factor", 1.0, level, old, self.before.mean),
+            ("offset", 0.0, weight, np.ones_like(old), np.ones(3)),
+        ):
+            size = np.maximum((weights * base).sum(axis=0), 1e-30)
+            value = (weights * (new - old)).sum(axis=0) / size
+            change = partial(np.add, value * image)
+            shifted = replace(self, before=self.before.changed(change))
+            if not any(moved.any() for moved in shifted.moved.values()):
+                shown = map(_interval, start + value, 2.0 / np.sqrt(size))
+                words.append(f"a constant {name} of {', '.join(shown)} in R, G, B")
+        return words
 
-
-def level_of_each(level: float, checks: int) -> float:
-    """Return the level of each of several checks, so that together they have `level`."""
-    return float(-np.expm1(np.log1p(-level) / checks))
-
-
-def moved(moves: Sequence[Move], level: float = LEVEL) -> list[Move]:
-    """Return those that moved: metrics, then whole images, then blocks, the largest move first."""
-
-    def order(move: Move) -> tuple[int, float]:
-        part = (move.half is not None) + (move.block is not None)
-        return part, -np.nan_to_num(move.size, nan=np.inf)
-
-    # A NaN does not pass.
-    return sorted((move for move in moves if not move.p_corrected >= level), key=order)
-
-
-def where_moved(before: Array, after: Array, count: int) -> str:
-    """Return how many blocks (rows, columns, 3) moved, ``count``, where most and by how much."""
-    if not count:
-        return "moved in the mean of the image, but in no single block"
-    change = np.abs(after - before).sum(axis=-1)
-    row, column = np.unravel_index(change.argmax(), change.shape)
-    old = float(luminance(before[row, column]))
-    new = float(luminance(after[row, column]))
-    most = f"most in row {row + 1}, column {column + 1}, from luminance {old:.3g} to {new:.3g}"
-    return f"moved in {count} of {change.size} blocks, {most}"
+    def cause(self) -> str:
+        """Return the sentence on factors or offsets that leave nothing moved, or else on where."""
+        subject = "The whole picture" if self.name == PICTURE else f"The {READERS[self.name]} half"
+        if self.constants:
+            return f"{subject} moved by {' or by '.join(self.constants)}. Nothing else moved."
+        found = self.drifts[BLOCKS]
+        count = int(self.moved[BLOCKS].any(axis=-1).sum())
+        where = "moved in no single block, but in larger parts"
+        if count:
+            change = np.abs(found.after - found.before).sum(axis=-1)
+            most = int(change.argmax())
+            row, column = self.parts[BLOCKS].fields[most]["block"]
+            old = float(luminance(found.before[most]))
+            new = float(luminance(found.after[most]))
+            where = (
+                f"moved in {count} of {change.size} blocks, most in row {row}, column {column},"
+                f" from luminance {old:.3g} to {new:.3g}"
+            )
+        return f"No factor or offset explains it: {subject[0].lower()}{subject[1:]} {where}."
 
 
 @dataclass(frozen=True)
 class Check:
-    """A scene compared with its baseline: every quantity tested, and those that moved.
+    """A scene or a picture now, compared with its baseline half by half."""
 
-    ``level`` is the chance of a false alarm.
-    """
-
-    before: Measurement
-    now: MeasuredScene
-    moves: tuple[Move, ...]
-    moved: tuple[Move, ...]
+    before: Halves
+    now: Measured
+    halves: Sequence[HalfCheck]
     level: float
 
-    @property
-    def passed(self) -> bool:
-        """Whether nothing moved."""
-        return not self.moved
+    @cached_property
+    def moves(self) -> tuple[Move, ...]:
+        """What moved: shapes, then blocks, then whole pictures; of each the largest first."""
 
-    def blocks(self, half: str) -> tuple[Array, Array]:
-        """Return the colours of a half's blocks before and now, (rows, columns, 3)."""
-        before = getattr(self.before, half)
-        after = getattr(self.now.measurement, half)
-        return before.means(), after.means()
+        def order(move: Move) -> tuple[bool, bool, float]:
+            return move.shape is None, move.block is None, -abs(move.after - move.before)
+
+        return tuple(sorted((m for half in self.halves for m in half.moves()), key=order))
+
+    @property
+    def tested(self) -> int:
+        """How many means were tested."""
+        return sum(found.before.size for half in self.halves for found in half.drifts.values())
+
+    @property
+    def are_moved(self) -> list[HalfCheck]:
+        """The halves that moved."""
+        return [half for half in self.halves if any(m.any() for m in half.moved.values())]
 
     def causes(self) -> list[str]:
         """Return sentences on which half moved, where and how."""
-        halves = tuple(half for half in HALVES if any(move.half == half for move in self.moved))
-        sentences = [CAUSES[halves]]
-        for half in halves:
-            moves = [move for move in self.moved if move.half == half]
-            sentences.append(f"The {READERS[half]} half {self._where(half, moves)}.")
-        return sentences
+        names = tuple(half.name for half in self.are_moved)
+        first = [CAUSES[names]] if names in CAUSES else []
+        return first + [half.cause() for half in self.are_moved]
 
-    def _where(self, half: str, moves: Sequence[Move]) -> str:
-        old, new = self.blocks(half)
-        before = luminance(old)
-        after = luminance(new)
-        ratios = after[before > DARK] / before[before > DARK]
-        is_one = ratios.size and np.ptp(ratios) <= ALIKE * abs(ratios.mean())
-        if is_one and abs(ratios.mean() - 1) > ALIKE:
-            return f"has {ratios.mean():.3g} times the light everywhere: its level moved"
-        return where_moved(old, new, len({move.block for move in moves if move.block}))
+    def headline(self) -> str:
+        """Return what moved most: the part, by how much, and in which half; empty for nothing."""
+        halves = self.are_moved
+        if not halves:
+            return ""
+        kind = WHOLE
+        if not all(half.constants and half.moved[WHOLE].any() for half in halves):
+            kind = next(k for k in KINDS if any(h.moved[k].any() for h in halves if k in h.moved))
+        most = int(np.argmax(sum(_light(half, kind) for half in halves)))
+        amounts = {
+            half.name: _amounts(half.drifts[kind], half.moved[kind], most)
+            for half in halves
+            if half.moved[kind][most].any()
+        }
+        part = part_of(**halves[0].parts[kind].fields[most])
+        return f"{f'`{part}`' if kind == SHAPES else part}: {_told(amounts)}"
 
 
 def check(
-    source: Source,
-    options: Options,
-    before: Measurement,
-    level: float = LEVEL,
-    progress: Progress | None = None,
+    before: Halves, now: Measured, level: float = LEVEL, options: Options | None = None
 ) -> Check:
-    """Measure a scene as before, and return what moved.
+    """Compare what there is now with what a baseline kept.
 
-    ``options`` are the baseline's. With its seed, an unchanged scene gives the same images on the
-    same machine; the test also holds for other seeds. Metrics that the baseline lacks are not
-    tested. ``level`` is the chance of a false alarm, over all quantities of this scene.
+    With the baseline's seed, an unchanged scene gives the same images on the same machine; the
+    test also holds for other seeds. ``level`` is the chance of a false alarm.
     """
-    now = measure_scene(source, options, count=before.passes, progress=progress)
-    after = now.measurement.of(before.metrics)
-    old = before.reference.means().shape
-    new = after.reference.means().shape
-    if old != new:
-        raise InputError(
-            f"{source.name}: the baseline has {old[0]} by {old[1]} blocks, but the scene {new[0]}"
-            f" by {new[1]}. Write it again with `update`."
+    sides = [half.files[0].image for halves in (before, now.halves) for half in halves.values()]
+    require_one_size(sides)
+    options = (options or Options()).changed(allow_empty=True)
+    checked = []
+    for name, half in now.halves.items():
+        counted = now.counted if now.counted is not None and now.counted.any() else None
+        given = GivenPictures(image=half, reference=before[name], mask=counted)
+        comparison = look(given.as_halves(READERS[name], options))
+        after = Run.of(file.image for file in half.files)
+        checked.append(
+            HalfCheck(
+                name=name,
+                comparison=comparison,
+                before=Run.of(file.image for file in before[name].files),
+                after=after,
+                parts=parts_of(after.mean.shape, now.shapes),
+                level=level_of_each(level, len(now.halves)),
+            )
         )
-    moves = differences(before, after)
-    return Check(before=before, now=now, moves=moves, moved=tuple(moved(moves, level)), level=level)
+    return Check(before=before, now=now, halves=tuple(checked), level=level)
+
+
+def colour(values: Array) -> Colour:
+    """Return an array (3,) as a colour."""
+    red, green, blue = values
+    return float(f"{red:.8g}"), float(f"{green:.8g}"), float(f"{blue:.8g}")
+
+
+# --- In words ------------------------------------------------------------------------------------
+
+
+def _light(half: HalfCheck, kind: str) -> Array:
+    """Return how much light moved in each part (N,) of a kind; 0 if it may be noise."""
+    found = half.drifts[kind]
+    change = np.abs(luminance(found.after - found.before)) * half.parts[kind].pixels
+    return np.where(half.moved[kind].any(axis=-1), change, 0.0)
+
+
+def _amounts(found: Drift, moved: NDArray[np.bool_], part: int) -> dict[str, tuple[float, str]]:
+    """Return by how much a part moved, by the names of channels: numbers and their unit.
+
+    Channels that moved less than half as much as another are left out, and three that moved alike
+    are ``light``.
+    """
+    change = (found.after - found.before)[part]
+    unit = ""
+    if found.before[part][moved[part]].min() >= DARK:
+        change = 100.0 * change / np.maximum(found.before[part], DARK)
+        unit = " %"
+    size = np.abs(change)
+    if moved[part].all() and np.ptp(change) <= ALIKE * size.max():
+        return {"light": (float(change.mean()), unit)}
+    return {
+        name: (float(change[place]), unit)
+        for place, name in enumerate(CHANNELS.values())
+        if moved[part, place] and size[place] >= size[moved[part]].max() / 2
+    }
+
+
+def _told(amounts: Mapping[str, Mapping[str, tuple[float, str]]]) -> str:
+    """Return amounts by half as words; halves that moved alike are told as one."""
+    if len(amounts) == len(HALVES):
+        first, second = amounts.values()
+        if first.keys() == second.keys():
+            pairs = {name: (first[name], second[name]) for name in first}
+            alike = all(
+                one[1] == other[1] and abs(one[0] - other[0]) <= ALIKE * abs(one[0])
+                for one, other in pairs.values()
+            )
+            if alike:
+                mean = {
+                    name: ((one[0] + other[0]) / 2, one[1]) for name, (one, other) in pairs.items()
+                }
+                return f"{_listed(mean)} in both halves"
+    return ", ".join(
+        _listed(half) + ("" if name == PICTURE else f" in the {READERS[name]} half")
+        for name, half in amounts.items()
+    )
+
+
+def _listed(amounts: Mapping[str, tuple[float, str]]) -> str:
+    return ", ".join(f"{name} {value:+.2g}{unit}" for name, (value, unit) in amounts.items())
+
+
+def _interval(value: float, half: float) -> str:
+    return f"{value:.{min(7, max(2, 1 - floor(log10(half))))}f} ± {half:.1g}"

@@ -1,20 +1,25 @@
-"""What moved between two runs of a picture: means of its parts, and single pixels.
+"""What moved between two runs of one picture by more than their noise.
 
-A run is a number of pictures of one thing (passes or repeats), each with its own random numbers.
-Compared are m before with n after. With the differences d of the pixels' means, tested is their
-mean over each part of N pixels (the picture, a block, a shape), in each channel::
+A run is several images of one picture, each with its own random numbers: passes of a renderer, or
+repeats from any program. Tested are the means of both runs over *parts*: the whole picture, blocks,
+or what shapes cover. In each channel of a part of N pixels, ``t = Σ d / N e`` is Student's, with
+the differences d of the pixels' means of m images before and n after. Where both have as many, and
+at least `FEWEST`, the standard error e is known in three ways, else in the first alone. Each is a
+test of its own, and the smallest chance counts, times their number (Bonferroni).
 
-    t = Σ d / √(r max(P, Q))
-    P = (1/m + 1/n) Σ s²      s² the pooled variance of a pixel over both runs
+**By pixels.** All pixels of a part are pooled, so that two images are enough::
+
+    (N e)² = r max(P, Q)
+    P = (1/m + 1/n) Σ s²      s² the pooled variance of a pixel over the images
     Q = Σ (d − Σ d / N)²
     r = the mean over tiles of (variance of the tile's sum / sum of its pixels' variances), ≥ 1
 
-P pools all pixels of a part, so that two repeats are enough. P can be too small by chance: where
-noise has few values (edges in a PNG, fireflies cut off at 1), or is skewed and m ≠ n. Then Q, the
-spread of the differences themselves, is larger. If nothing changed and m = n, each d is symmetric
-about 0, and the tails of ``Σ d / √Σ d²`` are no heavier than a normal variable's, however the noise
-is distributed (Efron, J. Am. Stat. Assoc. 64, 1969): a firefly raises both sums. It also means
-that a change of fewer than about 30 pixels in a part counts as fireflies.
+P can be too small by chance: where noise has few values (edges in a PNG, fireflies cut off at 1),
+or is skewed and m ≠ n. Then Q, the spread of the differences themselves, is larger. If nothing
+changed and m = n, each d is symmetric about 0, and the tails of ``Σ d / √Σ d²`` are no heavier than
+a normal variable's, however the noise is distributed (Efron, J. Am. Stat. Assoc. 64, 1969): a
+firefly raises both sums. It also means that a change of fewer than about 30 pixels in a part counts
+as fireflies.
 
 r is 1 for independent pixels; a reconstruction filter, which correlates neighbours, raises it.
 Noise that is correlated over a part of a tile is correlated with a part of the next one: r falls
@@ -24,100 +29,110 @@ is taken to reach along the whole picture, as in stripes. A pattern that tiles r
 sums over the same pixel of all tiles, and multiplies r. Longer patterns are not noticed. With f
 degrees of freedom of r, t has ``1 / (1/f + r/N)``.
 
-If no pixel varies at all, any change beyond rounding is a drift. Several partitions share one level
-by Šidák's correction, :func:`level_of_each`.
+**By images.** e is that of the part's own means over the images, e₁ before and e₂ now, whatever
+happens within it: ``e² = e₁² + e₂²``, with Satterthwaite's degrees of freedom (Welch 1947).
+
+**By pairs.** e is that of the differences of the i-th images, with n − 1 degrees of freedom. If
+both runs drew the same random numbers, these cancel, and the smallest changes show.
+
+If nothing varies at all, any change beyond rounding is a drift.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons.departure.blocks import block_sums, ratio
 from fotismos.comparisons.departure.colour import Array
-from fotismos.heuristic.errors import InputError
+
+LINEAR_ROUNDING = 1e-6
+"""The difference that rounding can make in a colour."""
+
+RELATIVE_ROUNDING = 1e-5
+"""Share of a value that rounding can change: other machines order float32 sums otherwise."""
 
 SIDE = 16
 TILES = 8
-"""Side in pixels of blocks; tiles of whole blocks along the longer side of the picture, at most."""
+"""Side in pixels of a block; tiles of whole blocks along the longer side of the picture, at
+most."""
 
 LIKELY = 0.97
 SURE = 0.995
 """Chances with which independent tiles have a smaller variance of their sums: beyond the first,
 noise is taken to reach a little further than a tile, beyond the second much further."""
 
+FEWEST = 8
+"""Images on each side that show the spread of a part's means: fewer may be equal by chance."""
+
 POWER = 0.95
 QUANTILE = 1.645
 """The chance with which the smallest visible change is caught, and its quantile."""
 
-LINEAR_ROUNDING = 1e-6
-RELATIVE_ROUNDING = 1e-5
-"""The difference that rounding can make in a colour, and as a share of it."""
-
 
 @dataclass(frozen=True)
 class Run:
-    """Pictures of one thing: how many, mean and variance of each pixel, correlation r of its noise.
+    """Images of a picture: how many, mean and variance of each pixel, correlation r of its noise.
 
-    Images are linear, (H, W, 3); r is (3,).
+    Images are linear, (H, W, 3, ...): further axes hold further pictures, r is (...).
     """
 
-    count: int
+    images: Sequence[Array]
     mean: Array
     variance: Array
     correlation: Array
 
+    @property
+    def count(self) -> int:
+        """The number of images."""
+        return len(self.images)
+
     @classmethod
-    def of(cls, images: Iterable[ArrayLike]) -> Run:
-        """Return the statistics of images (H, W, 3) of one size, in one pass over them."""
-        mean: Array = np.zeros((0, 0, 3))
-        squares: Array = np.zeros(())
-        known = set()
+    def of(cls, images: Iterable[ArrayLike]) -> "Run":
+        """Return the statistics of images (H, W, 3, ...) of one size."""
+        known = [np.asarray(image) for image in images]
+        mean = np.zeros(())
+        squares = np.zeros(())
         sums: dict[str, list[Array]] = {name: [] for name in SUMS}
-        count = 0
-        for count, image in enumerate(images, start=1):
-            values = np.asarray(image, np.float64)
-            if count > 1 and values.shape != mean.shape:
-                raise InputError(
-                    f"pictures of {values.shape[1]} x {values.shape[0]} and {mean.shape[1]} x"
-                    f" {mean.shape[0]} pixels cannot be compared: give all in one size."
-                )
+        for count, image in enumerate(known, start=1):
+            values = image.astype(np.float64)
             # Welford's update takes the step from the old mean and from the new one.
-            step = values - (mean if count > 1 else 0.0)
-            mean = values - step * (1.0 - 1.0 / count)
+            step = values - mean
+            mean = mean + step / count
             squares = squares + step * (values - mean)
-            for name, of_pictures in sums.items():
-                of_pictures.append(SUMS[name](values))
-            known.add(hash(values.tobytes()))
-        # Two of one seed would hide noise; all may be equal, where a picture has none.
-        if 1 < len(known) < count:
-            raise InputError("some repeats are equal: give each its own seed.")
-        variance = squares / max(count - 1, 1)
-        return cls(
-            count=count,
-            mean=mean,
-            variance=variance,
-            correlation=_correlation(sums, variance, count),
+            for name, of_images in sums.items():
+                of_images.append(SUMS[name](values))
+        variance = squares / max(len(known) - 1, 1)
+        correlation = _correlation(sums, variance, len(known))
+        return cls(images=known, mean=mean, variance=variance, correlation=correlation)
+
+    def changed(self, change: Callable[[Array], Array]) -> "Run":
+        """Return the run with a change of the light in each image that leaves its noise."""
+        return replace(
+            self, images=[change(image) for image in self.images], mean=change(self.mean)
         )
 
 
 @dataclass(frozen=True)
 class Drift:
-    """Means over N parts (N, 3) before and now, and the difference's uncertainty.
+    """Means over parts (N, 3, ...) before and now, and the uncertainty of their difference.
 
-    ``error`` is its standard error, with so many degrees of ``freedom``.
+    ``errors`` (T, N, 3, ...) are its standard error as known in T ways, with so many degrees of
+    ``freedom``.
     """
 
     before: Array
     after: Array
-    error: Array
+    errors: Array
     freedom: Array
+
+    @property
+    def tests(self) -> int:
+        """The number of means that are tested."""
+        return int(np.prod(self.before.shape[:2]))
 
     @property
     def rounding(self) -> Array:
@@ -127,109 +142,132 @@ class Drift:
 
     def p(self) -> Array:
         """Return the chance of a difference at least as large if nothing changed."""
+        p: Array = np.minimum(len(self.errors) * self._chances().min(axis=0), 1.0)
+        return p
+
+    @property
+    def error(self) -> Array:
+        """The standard error that tells most."""
+        best = self._chances().argmin(axis=0)
+        error: Array = np.take_along_axis(self.errors, best[None], axis=0)[0]
+        return error
+
+    def _chances(self) -> Array:
+        """Return the chance by each standard error, (T, N, 3, ...)."""
         from scipy.special import stdtr  # loaded late: half a second
 
         size = np.abs(self.after - self.before)
         with np.errstate(divide="ignore", invalid="ignore"):  # no noise
-            p = 2.0 * stdtr(self.freedom, -size / self.error)
+            p = 2.0 * stdtr(self.freedom, -size / self.errors)
         return np.where(size <= self.rounding, 1.0, p)
 
-    def corrected(self) -> Array:
-        """Return the chance of one as small among as many independent tests (Šidák)."""
-        return sidak(self.p(), self.before.size)
-
     def moved(self, level: float) -> NDArray[np.bool_]:
-        """Return which means moved, at a level over all of them."""
-        return ~(self.corrected() >= level)  # a NaN does not pass
+        """Return which means moved, with the chance ``level`` that any does if nothing changed."""
+        return ~(sidak(self.p(), self.tests) >= level)  # a NaN does not pass
 
     def limit(self, level: float) -> Array:
         """Return the smallest change of each mean that is caught with the chance `POWER`.
 
         With the critical value c and ν degrees of freedom, the change is this many errors (Johnson
-        and Welch 1940): ``c (1 − 1/4ν) + z √(1 + c²/2ν)``.
+        and Welch 1940): ``c (1 − 1/4ν) + z √(1 + c²/2ν)``. Pairs do not count: their spread is
+        known only once something changed.
         """
         from scipy.special import stdtrit
 
-        c = -stdtrit(self.freedom, level_of_each(level, self.before.size) / 2.0)
-        errors = c * (1.0 - 0.25 / self.freedom)
-        errors += QUANTILE * np.sqrt(1.0 + c**2 / (2.0 * self.freedom))
-        return np.asarray(np.maximum(errors * self.error, self.rounding))
+        freedom = self.freedom[:2]
+        c = -stdtrit(freedom, level_of_each(level, self.tests) / (2.0 * len(self.errors)))
+        factors = c * (1.0 - 0.25 / freedom)
+        factors += QUANTILE * np.sqrt(1.0 + c**2 / (2.0 * freedom))
+        limit: Array = np.maximum((factors * self.errors[:2]).min(axis=0), self.rounding)
+        return limit
 
 
-def drift(before: Run, after: Run, parts: NDArray[Any]) -> Drift:
-    """Return the means over parts; ``parts`` (H, W) numbers them from 0, -1 is in none.
+def drift(before: Run, after: Run, parts: NDArray[np.integer]) -> Drift:
+    """Compare the means of two runs over parts.
 
-    ``before`` has at least two pictures; ``after`` may be one, whose noise is taken for equal.
+    ``parts`` (H, W) are their numbers from 0 to N - 1, each of some pixel; -1 is in none. The first
+    run has at least two images; the second may have one, whose noise is taken for equal.
     """
+    order = np.argsort(parts, axis=None, kind="stable")
+    numbers = parts.ravel()[order]
+    order = order[numbers >= 0]
+    numbers = numbers[numbers >= 0]
+    starts = np.searchsorted(numbers, np.arange(numbers[-1] + 1))
+
+    def summed(image: Array) -> Array:
+        """Return the sums (N, ...) of an image (H, W, ...) over the parts."""
+        flat = image.reshape(-1, *image.shape[2:])[order]
+        sums: Array = np.add.reduceat(flat, starts, axis=0, dtype=np.float64)
+        return sums
+
+    ways = [_by_pixels(before, after, summed)]
+    if before.count == after.count >= FEWEST:
+        first = np.array([summed(image) for image in before.images])
+        second = np.array([summed(image) for image in after.images])
+        ways += [_by_images(first, second), _by_pairs(second - first)]
+    errors, freedoms = zip(*ways, strict=True)
+    pixels = summed(np.ones_like(before.mean[:, :, :1]))
+    return Drift(
+        before=summed(before.mean) / pixels,
+        after=summed(after.mean) / pixels,
+        errors=np.array(errors) / pixels,
+        freedom=np.array(np.broadcast_arrays(*freedoms)),
+    )
+
+
+def _by_pixels(before: Run, after: Run, summed: Callable[[Array], Array]) -> tuple[Array, Array]:
+    """Return the standard errors of sums of differences by their pixels, and their freedom."""
+    m = before.count
+    n = after.count
     first, second = _weights(before, after)
     d = after.mean - before.mean
     noise = noise_of_difference(before, after)
     r = np.maximum(first * before.correlation + second * after.correlation, 1.0)
-    free = before.count + after.count - 2
     # The channels' noise may be one.
-    f = np.maximum(_total(_tiles(noise) > 0) * free / 3.0, 1.0)
-    inside = parts >= 0
-    numbers = parts[inside].astype(np.int64)
-    count = int(numbers.max(initial=-1)) + 1
-
-    def over(image: Array) -> Array:
-        channels = [np.bincount(numbers, image[inside][:, c], count) for c in range(3)]
-        return np.stack(channels, axis=-1)
-
-    pixels = np.maximum(over(np.ones_like(d)), 1.0)
+    f = np.maximum(_total(_tiles(noise) > 0) * (m + n - 2) / 3.0, 1.0)
+    pixels = summed(np.ones_like(d[:, :, :1]))
     # Q; it counts only if some pixel varies, else a change would hide in its own spread.
-    spread = np.maximum(over(d * d) - over(d) ** 2 / pixels, 0.0)
-    square = r * np.maximum(over(noise), spread * noise.any(axis=(0, 1, 2)))
-    return Drift(
-        before=over(before.mean) / pixels,
-        after=over(after.mean) / pixels,
-        error=np.sqrt(square) / pixels,
-        freedom=1.0 / (1.0 / f + r / pixels),
-    )
+    spread = np.maximum(summed(d * d) - summed(d) ** 2 / pixels, 0.0) * noise.any(axis=(0, 1, 2))
+    error = np.sqrt(r * np.maximum(summed(noise), spread))
+    return error, np.broadcast_to(1.0 / (1.0 / f + r / pixels), error.shape)
 
 
-def in_blocks(shape: tuple[int, ...], side: int = SIDE) -> NDArray[np.int64]:
-    """Return the number of the block of each pixel of an image (H, W), in reading order."""
-    rows, columns = np.indices(shape[:2]) // side
-    return np.asarray(rows * (int(columns.max()) + 1) + columns)
+def _by_images(before: Array, after: Array) -> tuple[Array, Array]:
+    """Return standard errors by the sums (n, N, 3, ...) of as many images, and their freedom."""
+    count = len(before)
+    first = before.var(axis=0, ddof=1) / count
+    second = after.var(axis=0, ddof=1) / count
+    square = first + second
+    freedom = (count - 1) * ratio(square**2, first**2 + second**2)
+    return np.sqrt(square), np.maximum(freedom, 1.0)
 
 
-def pixels_moved(before: Run, after: Run, level: float) -> NDArray[np.bool_]:
-    """Return which pixels (H, W) moved in any channel; ``level`` is the share of false ones.
-
-    Welch's t would need many pictures; the variance of a pixel is pooled over its block, and never
-    less than its own (Benjamini and Hochberg 1995 choose the pixels).
-    """
-    from scipy.special import stdtr
-
-    noise = noise_of_difference(before, after)
-    blocks = in_blocks(noise.shape)
-    pooled = np.stack(
-        [
-            (np.bincount(blocks.ravel(), noise[..., c].ravel()) / np.bincount(blocks.ravel()))[
-                blocks
-            ]
-            for c in range(3)
-        ],
-        axis=-1,
-    )
-    error = np.sqrt(np.maximum(pooled, noise))
-    size = np.abs(after.mean - before.mean)
-    free = before.count + after.count - 2
-    with np.errstate(divide="ignore", invalid="ignore"):  # no noise
-        chances = 6.0 * stdtr(free, -size / error).min(axis=-1)
-    largest = np.maximum(np.abs(before.mean), np.abs(after.mean))
-    is_rounding = size <= np.maximum(LINEAR_ROUNDING, RELATIVE_ROUNDING * largest)
-    chances = np.where(is_rounding.all(axis=-1), 1.0, np.nan_to_num(chances))
-    return np.asarray(chances <= discoveries(chances.ravel(), level))
+def _by_pairs(difference: Array) -> tuple[Array, Array]:
+    """Return the standard errors by the sums (n, N, 3, ...) of differences, and their freedom."""
+    count = len(difference)
+    error = difference.std(axis=0, ddof=1) / np.sqrt(count)
+    return error, np.full(error.shape, count - 1.0)
 
 
-def discoveries(chances: Array, rate: float) -> float:
-    """Return the largest chance that counts as a discovery (Benjamini and Hochberg); −1 if none."""
-    # The largest `p(i) <= rate i / n`; all smaller chances are discoveries with it.
-    ordered = np.sort(chances)
-    passed = ordered <= rate * np.arange(1, len(ordered) + 1) / max(len(ordered), 1)
-    return float(ordered[passed][-1]) if passed.any() else -1.0
+def whole(shape: Sequence[int]) -> NDArray[np.int_]:
+    """Return the whole picture (H, W) as one part."""
+    return np.zeros(shape[:2], int)
+
+
+def blocks(shape: Sequence[int], side: int = SIDE) -> NDArray[np.int_]:
+    """Return square blocks of a picture (H, W) as parts, row by row; those at the edge are cut."""
+    height, width = shape[:2]
+    rows = np.arange(height) // side
+    columns = np.arange(width) // side
+    numbers: NDArray[np.int_] = rows[:, None] * (columns[-1] + 1) + columns
+    return numbers
+
+
+def noise_of_difference(before: Run, after: Run) -> Array:
+    """Return the variance of the difference of both means, at each pixel."""
+    first, second = _weights(before, after)
+    pooled: Array = first * before.variance + second * after.variance
+    return (1.0 / before.count + 1.0 / after.count) * pooled
 
 
 def sidak(p: ArrayLike, tests: int) -> NDArray[np.float64]:
@@ -240,26 +278,19 @@ def sidak(p: ArrayLike, tests: int) -> NDArray[np.float64]:
         return chances
 
 
-def level_of_each(level: float, checks: int) -> float:
-    """Return the level of each of several checks, so that together they have `level`."""
-    return float(-np.expm1(np.log1p(-level) / checks))
-
-
-def noise_of_difference(before: Run, after: Run) -> Array:
-    """Return the variance of the difference of both means, at each pixel."""
-    first, second = _weights(before, after)
-    pooled: Array = first * before.variance + second * after.variance
-    return (1.0 / before.count + 1.0 / after.count) * pooled
+def level_of_each(level: float, tests: int) -> float:
+    """Return the level of each of several tests, so that together they have `level`."""
+    return float(-np.expm1(np.log1p(-level) / tests))
 
 
 def _weights(before: Run, after: Run) -> tuple[float, float]:
-    """Return the weights of both variances, by degrees of freedom: a single picture has none."""
+    """Return the weights of both variances, by degrees of freedom: a single image has none."""
     free = before.count + after.count - 2
     return (before.count - 1) / free, (after.count - 1) / free
 
 
 def _correlation(sums: Mapping[str, Sequence[Array]], variance: Array, count: int) -> Array:
-    """Return r (3,) from each picture's sums over tiles, and the pixels' variance (H, W, 3).
+    """Return r (...) from each image's sums over tiles, and the pixels' variance (H, W, 3, ...).
 
     ``sums`` are over tiles, over tiles of twice the side, and over the same pixel of all tiles.
     """
@@ -267,9 +298,9 @@ def _correlation(sums: Mapping[str, Sequence[Array]], variance: Array, count: in
 
     found = {}
     chance = {}
-    for name, of_repeats in sums.items():
+    for name, of_images in sums.items():
         alone = SUMS[name](variance)
-        r = ratio(np.var(of_repeats, axis=0) * count / max(count - 1, 1), alone)
+        r = ratio(np.var(of_images, axis=0) * count / max(count - 1, 1), alone)
         # The channels' noise may be one.
         tested = _total(alone > 0)
         freedom = np.maximum(tested / 3.0 * (count - 1), 1.0)

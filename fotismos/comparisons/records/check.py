@@ -1,196 +1,88 @@
-"""Baselines, what is measured for them, and the results of checks."""
+"""Baselines, what moved from them, and the results of checks."""
 
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
-import numpy as np
-from msgspec import Meta, field, structs
+from msgspec import Meta, field
 
 from fotismos.comparisons.records.comparison import PictureFiles
-from fotismos.comparisons.records.departure import Colour, Verdict, VisibleShare
+from fotismos.comparisons.records.departure import Colour, Gate
 from fotismos.heuristic import program
-from fotismos.heuristic.convention import Doubles
-from fotismos.reference import records
-from fotismos.reference.records import (
-    VERSION,
-    Amount,
-    Count,
-    Record,
-    Resolution,
-    Share,
-    Versions,
-    laid_out,
-)
+from fotismos.reference.records import VERSION, Amount, Count, Record, Share, Versions
 
-MOST_PASSES = 1024
-"""Passes of a measurement, at most: the images of all of them are in memory at once."""
+MOST_PASSES = 64
+"""Images that a baseline keeps of each half, at most."""
 
 HALVES = ("heuristic", "reference")
+PICTURE = "picture"
+"""The names of what a baseline keeps: the halves of a scene, or a picture."""
+
+READERS = {"heuristic": "textbook", "reference": "physical", PICTURE: PICTURE}
+"""What readers call them."""
+
+CHANNELS = {"R": "red", "G": "green", "B": "blue"}
 
 Value = TypeVar("Value")
 
-Errors = Annotated[tuple[Amount, Amount, Amount], Meta(description="Standard errors.")]
-
-
-class MetricAmount(Record, omit_defaults=True):
-    """A departure metric, its standard error, and its value from noise alone.
-
-    ``noise_floor`` is None for the signed ratio of luminances, which noise does not raise.
-    """
-
-    value: float
-    error: Amount
-    noise_floor: Amount | None = None
-
-
-class Block(Record):
-    """Mean linear RGB of a block of pixels."""
-
-    mean: Colour
-    error: Errors
-
-
-class Half(Record):
-    """Mean linear RGB of a half, over the image and over its blocks, row by row."""
-
-    mean: Colour
-    error: Errors
-    blocks: tuple[tuple[Block, ...], ...]
-
-    def means(self) -> Doubles:
-        """Return the blocks' colours, (rows, columns, 3)."""
-        return np.array([[block.mean for block in row] for row in self.blocks])
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A number that a check tests: of a metric, of the colour of a half, or of a block of it.
-
-    ``block`` is its row and column, from 1.
-    """
-
-    name: str
-    value: float
-    error: float
-    half: str | None = None
-    block: tuple[int, int] | None = None
-
-
-class Measurement(Record):
-    """All measurements of a scene, from ``passes`` independent passes of both halves."""
-
-    passes: Annotated[int, Meta(ge=2, le=MOST_PASSES)]
-    metrics: dict[str, MetricAmount]
-    heuristic: Half
-    reference: Half
-
-    def of(self, metrics: Iterable[str]) -> "Measurement":
-        """Return the measurement with only these metrics."""
-        return structs.replace(self, metrics={name: self.metrics[name] for name in metrics})
-
-    def quantities(self) -> Iterator[Quantity]:
-        """Yield all numbers: metrics, then whole images, then blocks."""
-        for name, metric in self.metrics.items():
-            yield Quantity(name=name, value=metric.value, error=metric.error)
-        halves = {name: getattr(self, name) for name in HALVES}
-        for name, half in halves.items():
-            for letter, value, error in zip("RGB", half.mean, half.error, strict=True):
-                yield Quantity(name=f"{name} {letter}", half=name, value=value, error=error)
-        for name, half in halves.items():
-            for i, row in enumerate(half.blocks, start=1):
-                for j, block in enumerate(row, start=1):
-                    for letter, value, error in zip("RGB", block.mean, block.error, strict=True):
-                        yield Quantity(
-                            name=f"{name} {letter}, block {i},{j}",
-                            half=name,
-                            block=(i, j),
-                            value=value,
-                            error=error,
-                        )
-
 
 class Baseline(Record, omit_defaults=True):
-    """Measurements of one scene, from independent passes of both halves."""
+    """What a baseline is of: the attribute `fotismos` in the header of its EXR file.
 
-    record_version: int
+    The file keeps passes of both halves of a scene, or repeats of a picture, each as a layer, such
+    as `pass.heuristic.0`.
+    """
+
+    # Made by a function, which `omit_defaults` does not omit.
+    record_version: int = field(default_factory=lambda: VERSION)
     scene: Annotated[
-        str, Meta(description="A built-in name, or a file's path from the baseline's folder.")
+        str | None,
+        Meta(
+            description="A built-in name, or a file's path from the baseline's folder; null for"
+            " pictures."
+        ),
     ]
     options: Annotated[
         dict[str, Any], Meta(description="As on the command line; defaults are left out.")
     ]
     passes: Annotated[int, Meta(ge=2, le=MOST_PASSES)]
     versions: Annotated[Versions, Meta(description="Of the software that measured it.")]
-    images: Annotated[
-        str | None,
-        Meta(description="An EXR with both pictures, beside the baseline, for people to look at."),
-    ] = None
-    metrics: dict[str, MetricAmount]
-    heuristic: Half
-    reference: Half
 
-    def measured(self) -> Measurement:
-        """Return the measurement."""
-        return Measurement(
-            passes=self.passes,
-            metrics=self.metrics,
-            heuristic=self.heuristic,
-            reference=self.reference,
-        )
-
-    def text(self) -> str:
-        """Return the file's content."""
-        return laid_out(records.plain(self)) + "\n"
+    @property
+    def halves(self) -> tuple[str, ...]:
+        """What its file keeps."""
+        return (PICTURE,) if self.scene is None else HALVES
 
 
-class PictureBaseline(Record):
-    """Repeats of a picture; the mean and the variance of each pixel are in an EXR beside it.
-
-    Attributes
-    ----------
-    transfer, over
-        How its files are read; null for what they say themselves.
-    mean, error
-        Mean linear RGB of the picture, and its standard errors.
-    correlation
-        Variance of sums over tiles, over that of independent pixels.
-    """
-
-    record_version: int = VERSION
-    repeats: Annotated[int, Meta(ge=2)]
-    resolution: Resolution
-    transfer: Literal["linear", "srgb"] | None
-    over: str | None = None
-    mean: Colour
-    error: Errors
-    correlation: Amount
-    images: str
-
-
-READERS = {"heuristic": "textbook", "reference": "physical"}
-"""What readers call the halves."""
+def part_of(shape: str | None = None, block: tuple[int, int] | None = None) -> str:
+    """Return what readers call a part of a picture: the whole, a shape or a block."""
+    if shape is not None:
+        return shape
+    return "row {}, column {}".format(*block) if block else "whole picture"
 
 
 class Move(Record):
-    """One quantity, before and after.
+    """A channel of what is compared, over the whole picture, a shape or a block of it.
 
     Attributes
     ----------
+    half
+        `heuristic` and `reference` of a scene, or `picture`.
     error
         Standard error of the difference.
     standard_errors
-        The signed difference over that error; None if neither side has any spread.
+        The signed difference over that error; None if there is no noise.
     p
         Chance of a difference at least this large if nothing changed.
     p_corrected
-        Chance of one such among all quantities tested (Šidák).
+        Chance of one such among all that are tested alike (Šidák).
     """
 
-    quantity: str
-    half: str | None
-    block: Annotated[tuple[int, int], Meta(description="Row and column, from 1.")] | None
+    half: str
+    channel: Annotated[str, Meta(description="R, G or B.")]
+    shape: str | None = None
+    block: Annotated[
+        tuple[int, int] | None, Meta(description="Row and column of 16 by 16 pixels, from 1.")
+    ] = None
     before: float
     after: float
     error: Amount
@@ -200,19 +92,9 @@ class Move(Record):
 
     @property
     def name(self) -> str:
-        """What readers call the quantity: halves are textbook and physical."""
-        name = self.quantity
-        for half, shown in READERS.items():
-            name = name.replace(half, shown)
-        return name
-
-    @property
-    def size(self) -> float:
-        """How much it moved: metrics, which differ in unit, by their share, colours in light."""
-        change = abs(self.after - self.before)
-        if self.half or self.block:
-            return change
-        return change / max(abs(self.before), abs(self.after), 1e-9)
+        """What readers call it."""
+        half = "" if self.half == PICTURE else f"{READERS[self.half]} "
+        return f"{part_of(self.shape, self.block)}: {half}{CHANNELS[self.channel]}"
 
     @property
     def change(self) -> str:
@@ -238,39 +120,6 @@ class SmallestChanges(Record):
     noisiest: Colour
 
 
-class PictureGate(Record):
-    """Whether too many pixels of a picture differ visibly from its baseline.
-
-    Attributes
-    ----------
-    visible
-        The share of pixels above a ΔE2000, with an interval that holds the repeats' noise.
-    bound
-        The largest share that is allowed.
-    """
-
-    visible: VisibleShare
-    bound: Share
-    state: Verdict
-
-    @property
-    def sentence(self) -> str:
-        """What differs, what is allowed, and the result."""
-        share = self.visible
-        shown = f"{share.value:.2%}"
-        if share.low != share.high:
-            shown = f"{shown} ({share.low:.2%} to {share.high:.2%})"
-        results: dict[Verdict, str] = {
-            "pass": "it passes",
-            "fail": "it fails",
-            "undecided": "noise leaves it undecided, and more repeats decide",
-        }
-        return (
-            f"{shown} of the pixels differ by more than ΔE2000 {share.threshold:g}, at"
-            f" most {self.bound:.2%} may: {results[self.state]}."
-        )
-
-
 class Change(Record, Generic[Value]):
     """A number, or the version of a library, in the baseline and now."""
 
@@ -284,11 +133,14 @@ class CheckRecord(Record, omit_defaults=True):
     # Made by functions, which `omit_defaults` does not omit.
     record_version: int = field(default_factory=lambda: VERSION)
     baseline: Annotated[str, Meta(description="Path of its file.")]
-    scene: str
+    scene: Annotated[str, Meta(description="Of pictures the pattern of their files.")]
     status: Literal["passed", "failed", "error", "created", "updated", "unchanged"]
     passed: bool = field(default_factory=lambda: True)
     seconds: Amount
     message: str = ""
+    headline: Annotated[
+        str, Meta(description="What moved most, where and by how much; empty for nothing.")
+    ] = ""
     tested: Count | None = None
     significance: Share | None = None
     moved: tuple[Move, ...] | None = None
@@ -298,39 +150,20 @@ class CheckRecord(Record, omit_defaults=True):
         tuple[str, ...], Meta(description="Why, as far as the numbers tell, in sentences.")
     ] = ()
     pictures: Annotated[str, Meta(description="Folder of the pictures of a failure.")] | None = None
-    smallest_changes: SmallestChanges | None = None
+    smallest_changes: Annotated[
+        dict[str, SmallestChanges] | None, Meta(description="By half, or of the picture.")
+    ] = None
     picture: Annotated[PictureFiles | None, Meta(description="The pictures that were checked.")] = (
         None
     )
     gate: Annotated[
-        PictureGate | None, Meta(description="The tolerance that decided, in place of drift.")
+        Gate | None, Meta(description="The tolerance that decided, in place of drift.")
     ] = None
 
     @property
     def name(self) -> str:
         """The baseline's name."""
         return Path(self.baseline).stem
-
-    @property
-    def largest(self) -> Move | None:
-        """What moved most: of a block, which says where, if any did."""
-        moved = self.moved or ()
-        return next((move for move in moved if move.block), moved[0] if moved else None)
-
-    @property
-    def headline(self) -> str:
-        """What moved most, where, from what to what, and how much else; empty for nothing.
-
-        If a tolerance decided, what differs visibly.
-        """
-        if self.gate is not None:
-            return self.gate.sentence
-        if (most := self.largest) is None:
-            return ""
-        others = len(self.moved or ()) - 1
-        more = f", and {others} more" if others else ""
-        values = f"from {most.before:.4g} to {most.after:.4g} ({most.change})"
-        return f"{most.name} moved {values}{more}."
 
     @property
     def exit_code(self) -> int:
@@ -340,7 +173,7 @@ class CheckRecord(Record, omit_defaults=True):
     @property
     def update_command(self) -> str:
         """The command that writes what moved to the baseline."""
-        picture = ("--picture", f"{self.name}={self.scene}") if self.smallest_changes else ()
+        picture = ("--picture", f"{self.name}={self.scene}") if self.picture else ()
         return program.command("check", self.baseline, "--update", *picture)
 
     @property

@@ -64,6 +64,23 @@ class VisibleShare(Interval):
     high: Share
 
 
+class Gate(Record):
+    """Whether too many pixels differ visibly.
+
+    Attributes
+    ----------
+    visible
+        The share of pixels above a ΔE2000, with an interval that holds the noise.
+    bound
+        The largest share that is allowed.
+    """
+
+    scene: str
+    visible: VisibleShare
+    bound: Share
+    state: Verdict
+
+
 class Exposed(Record):
     """A metric after the factor `exposure` on the test image that makes its mean smallest."""
 

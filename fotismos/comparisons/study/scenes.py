@@ -330,7 +330,7 @@ def lobe(point: Point, options: Options) -> tuple[dict[str, float], Halves]:
     ):
         seen, everywhere, _, _ = np.split(total, splits)
         _, specular, in_plane, mirrored = np.split(lobe_alone, splits)
-        sources.append(Pictures.of(half, np.repeat(seen[None, :, None], 3, axis=2)))
+        sources.append(Pictures.of(half, [np.repeat(seen[None, :, None], 3, axis=2)]))
         result[f"albedo_{half}"] = albedo(everywhere, angle)
         result[f"specular_albedo_{half}"] = albedo(specular, angle)
         result[f"specular_{half}"] = float(mirrored[0])

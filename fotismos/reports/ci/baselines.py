@@ -1,83 +1,44 @@
-"""Baselines as files, of scenes and of pictures: finding, reading and writing them."""
+"""Baselines as files: finding, reading and writing them.
+
+A baseline is one OpenEXR file, ``NAME.exr``. Its layers are the passes of both halves of a scene,
+or the repeats of a picture, in single precision; its header says in JSON what they are of.
+"""
 
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from msgspec import structs
-from numpy.typing import NDArray
 
-from fotismos.comparisons import atomic
-from fotismos.comparisons.atomic import content, require_regular
+from fotismos.comparisons.atomic import LARGEST, content, require_regular
 from fotismos.comparisons.case import Case, open_case
-from fotismos.comparisons.check.measurement import read_baseline
-from fotismos.comparisons.check.pictures import Repeats, colour, means
-from fotismos.comparisons.departure.blocks import averaged, shrunk
-from fotismos.comparisons.names import SUFFIXES, file_of, is_script, matching
+from fotismos.comparisons.check.measured import Halves, Measured, measure_scene
+from fotismos.comparisons.names import SUFFIXES, file_of, is_script
 from fotismos.comparisons.options import Options
-from fotismos.comparisons.picture_files import read_file
-from fotismos.comparisons.records.check import HALVES, Baseline, PictureBaseline
-from fotismos.comparisons.records.comparison import PictureFiles
+from fotismos.comparisons.picture_files import exr_channels, exr_header
+from fotismos.comparisons.pictures import Pictures
+from fotismos.comparisons.records.check import MOST_PASSES, Baseline
 from fotismos.heuristic import program
 from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.heuristics import in_file
+from fotismos.heuristic.program import versions
 from fotismos.reference import records
-from fotismos.reference.records import laid_out
+from fotismos.reference.rendering.passes import Progress
+from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.files import images
 
-Kept = Mapping[str, NDArray[np.floating]]
-"""The halves' small pictures, ``{half: (H, W, 3) linear RGB}``."""
+HEADER = "fotismos"
+"""The attribute of the file's header that holds the record."""
 
+LARGEST_VALUE = 1e30
+"""Largest value: squares of images in single precision must not overflow."""
 
-@dataclass(frozen=True)
-class BaselineFile:
-    """A baseline and the file that it is in."""
-
-    path: Path
-    baseline: Baseline
-
-    def open(self, seed: int | None = None) -> Case:
-        """Open the scene; ``seed`` replaces the baseline's."""
-        options = options_from(self.baseline.options, self.path)
-        options |= {} if seed is None else {"seed": seed}
-        return open_case(scene_from(self.baseline.scene, self.path), Options.of(options))
-
-    def pictures(self) -> Kept | None:
-        """Return the small pictures, or None if the baseline has none."""
-        if not (name := self.baseline.images):
-            return None
-        how = program.command("check", "BASELINE", "--update", "--images")
-        return read_layers(
-            self.path.parent / Path(name).name, HALVES, longest=LONGEST_KEPT, how=how
-        )
-
-
-def find(path: Path) -> list[Path]:
-    """Return the baselines at ``path``: the file itself, or a folder's, sorted."""
-    if path.is_dir():
-        found = sorted(path.glob("*.json"))
-        if not found:
-            raise InputError(f"{path}: this folder has no baseline (*.json). {_HOW}")
-        return found
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such baseline. {_HOW}")
-    return [path]
-
-
-LARGEST = 2**24
-"""Bytes of a baseline, and of its pictures: a thousand times their usual size."""
-
-LONGEST_KEPT = 128
-"""Pixels of the longer side of the pictures that a baseline keeps."""
-
-LONGEST_PICTURE = 2**15
-"""Pixels of the longer side of a baseline of pictures that is read, at most."""
-
-PICTURE_LAYERS = ("mean", "variance")
+NEW = ".exr"
+OLD = ".json"
+"""Suffixes of baselines, and of those of fotismos 0.4, which held numbers."""
 
 _HOW = (
     f"Make one with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`, or"
@@ -85,83 +46,266 @@ _HOW = (
 )
 
 
-def read(path: Path) -> BaselineFile:
-    """Read a baseline."""
-    return BaselineFile(path, read_baseline(read_text(path), str(path)))
+@dataclass(frozen=True)
+class BaselineFile:
+    """A baseline, the file that it is in, and the passes of its halves."""
+
+    path: Path
+    baseline: Baseline
+    halves: Halves
+
+    @classmethod
+    def of(
+        cls, path: Path, scene: str | None, options: Mapping[str, Any], measured: Measured
+    ) -> "BaselineFile":
+        """Return the baseline of what was measured, with the current versions.
+
+        ``scene`` is None of pictures.
+        """
+        counts = [len(half.files) for half in measured.halves.values()]
+        if counts[0] < 2:
+            raise InputError(
+                f"{path}: one picture does not show its noise. Give two repeats or more."
+            )
+        if counts[0] > MOST_PASSES:
+            raise InputError(
+                f"{path}: {counts[0]} repeats are more than the {MOST_PASSES} that a baseline"
+                " keeps. Give fewer."
+            )
+        baseline = Baseline(
+            scene=scene,
+            options=dict(sorted(options.items())),
+            passes=counts[0],
+            versions=versions(),
+        )
+        return cls(path=path, baseline=baseline, halves=measured.halves)
+
+    def open(self, seed: int | None = None) -> Case:
+        """Open the scene; ``seed`` replaces the baseline's."""
+        require_kind(self.path, self.baseline.scene, None)
+        options = options_from(self.baseline.options, self.path)
+        options |= {} if seed is None else {"seed": seed}
+        return open_case(scene_from(str(self.baseline.scene), self.path), Options.of(options))
+
+    def rendered(self, case: Case, progress: Progress | None = None) -> Measured:
+        """Render a scene in as many passes as the baseline's was."""
+        set_variant(case.variant)
+        return measure_scene(case.source, case.options, self.baseline.passes, progress)
+
+
+@dataclass(frozen=True)
+class Known:
+    """The scene and options of a baseline, and its file, None of one of fotismos 0.4."""
+
+    scene: str | None
+    options: Mapping[str, Any]
+    file: BaselineFile | None
+
+
+# --- Finding -----------------------------------------------------------------------------------
+
+
+def find(path: Path) -> list[Path]:
+    """Return the baselines at ``path``: the file itself, or a folder's, sorted.
+
+    Those of fotismos 0.4 are among them, without the pictures beside them, and so are files that
+    are damaged; pictures of others are not.
+    """
+    if path.is_dir():
+        old = set(path.glob(f"*{OLD}"))
+        new = {
+            file
+            for file in path.glob(f"*{NEW}")
+            if file.with_suffix(OLD) not in old and not _is_of_others(file)
+        }
+        if not (old or new):
+            raise InputError(f"{path}: this folder has no baseline (*.exr). {_HOW}")
+        return sorted(old | new)
+    found = placed(path)
+    if not found.is_file():
+        raise InputError(f"{path}: there is no such baseline. {_HOW}")
+    return [found]
+
+
+def _is_of_others(path: Path) -> bool:
+    """Return whether a file is a picture that was never a baseline."""
+    try:
+        require_regular(path, LARGEST)
+        header = exr_header(path)
+    except (InputError, OSError):
+        return False
+    names = [channel.name for channel in header["channels"]]
+    return HEADER not in header and not any(name.startswith(images.PASS) for name in names)
+
+
+def placed(path: Path) -> Path:
+    """Return the file of a baseline: that of 0.4 while there is one, however it is named."""
+    if path.suffix not in (OLD, NEW):
+        return path
+    old = path.with_suffix(OLD)
+    return old if os.path.lexists(old) else path.with_suffix(NEW)
 
 
 def may_run_script(path: Path) -> bool:
     """Return whether a check of a baseline runs a script: its scene is one, or not yet known."""
     try:
-        return is_script(json.loads(content(path, LARGEST)).get("scene", ""))
-    except (OSError, ValueError, AttributeError, TypeError, RecursionError):
+        scene = old_record(path).scene if path.suffix == OLD else json.loads(_header(path))["scene"]
+        return is_script(scene or "")
+    except Exception:  # the library has many for a file that is not EXR
         return True
 
 
-def read_text(path: Path, of_pictures: bool = False) -> str:
-    """Read the text of a baseline: of a scene, or of pictures."""
-    try:
-        text = content(path, LARGEST).decode()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}. {_HOW}") from error
-    # Both kinds are JSON in one folder; only that of pictures counts repeats.
-    if ('"repeats":' in text) != of_pictures:
-        hint = "not of pictures. Omit" if of_pictures else "of pictures. Give"
-        raise InputError(f"{path}: this baseline is {hint} --picture {path.stem}=PATTERN.")
-    return text
-
-
-def require_own_pictures(path: Path) -> None:
-    """Ensure that the pictures next to a baseline, if any, are those of a baseline."""
-    images = path.with_suffix(".exr")
-    if not images.exists():
+def require_kind(path: Path, scene: str | None, pattern: str | None) -> None:
+    """Ensure that a baseline of a scene is compared with it, and one of pictures with pictures."""
+    if (scene is None) == (pattern is not None):
         return
-    import OpenEXR
+    hint = "of pictures. Give" if scene is None else "not of pictures. Omit"
+    raise InputError(f"{path}: this baseline is {hint} --picture {path.stem}=PATTERN.")
 
-    foreign = InputError(
-        f"{images}: fotismos did not make this file, which the baseline's would replace. Move it"
-        " away, or give another baseline."
-    )
+
+# --- Reading -----------------------------------------------------------------------------------
+
+
+def known(path: Path) -> Known:
+    """Return what a baseline is of, also if it is one of fotismos 0.4."""
+    if path.suffix == OLD:
+        return old_record(path)
+    file = read(path)
+    return Known(scene=file.baseline.scene, options=file.baseline.options, file=file)
+
+
+def old_record(path: Path) -> Known:
+    """Return what a baseline of fotismos 0.4 was of."""
     try:
-        require_regular(images)
-        with OpenEXR.File(str(images), separate_channels=True, header_only=True) as file:
-            names = [*file.channels()]
+        kept = json.loads(content(path, 2**24))
+        is_old = kept["record_version"] in (*records.OLDER, records.VERSION)
+        if not is_old or not kept.keys() & {"repeats", "passes"}:
+            raise ValueError("it has other keys.")
+        reading = {key: kept[key] for key in ("transfer", "over") if kept.get(key)}
+        options = {**kept.get("options", {}), **reading}
+        Options.of(options)
+        return Known(scene=kept.get("scene"), options=options, file=None)
+    # Numbers too long for Python and lists nested too deeply raise other errors.
+    except (InputError, OSError, ValueError, LookupError, TypeError, AttributeError,
+            OverflowError, RecursionError) as error:  # fmt: skip
+        raise _no_baseline(path, error) from error
+
+
+def read(path: Path) -> BaselineFile:
+    """Read a baseline; ``InputError`` has the name of the file and the fault in it."""
+    if path.suffix == OLD:
+        shots = () if old_record(path).scene else ("--picture", f"{path.stem}=PATTERN")
+        raise InputError(
+            f"{path}: this baseline is of fotismos 0.4, which kept numbers where passes are kept"
+            " now, so it cannot be compared."
+            f" `{program.command('check', path, '--update', *shots)}` makes {path.stem}{NEW} of"
+            " what there is today, in its place."
+        )
+    try:
+        baseline = records.read(Baseline, _header(path), str(path))
+        if baseline.scene is not None and not (baseline.scene and baseline.scene.isprintable()):
+            raise ValueError(
+                f"the scene is {baseline.scene!r}: a built-in name or the path of a file is"
+                " allowed."
+            )
+        Options.of(baseline.options)
+        return BaselineFile(path=path, baseline=baseline, halves=_halves(path, baseline))
     except Exception as error:  # the library has many for a file that is not EXR
-        raise foreign from error
-    if not all(name.startswith("baseline.") for name in names):
-        raise foreign
+        raise _no_baseline(path, error) from error
 
 
-def write(path: Path, baseline: Baseline, pictures: Kept | None = None) -> None:
-    """Write a baseline atomically, with its small pictures if given."""
-    layers = {}
-    if pictures is not None:
-        # "baseline." keeps the layers at half precision, which is enough for pictures.
-        layers = {f"baseline.{half}": small(pictures[half]) for half in HALVES}
-        baseline = structs.replace(baseline, images=path.with_suffix(".exr").name)
-    put(path, baseline.text(), layers, baseline.scene)
+def _no_baseline(path: Path, error: Exception) -> InputError:
+    reason = getattr(error, "strerror", None) or str(error)
+    where = "" if reason.startswith(str(path)) else f"{path}: this is no baseline: "
+    update = program.command("check", "BASELINE", "--update", "--scene", "SCENE")
+    return InputError(
+        f"{where}{reason.rstrip('.')}. Delete it, and write it again: `{update}`, or with"
+        " `--picture NAME=PATTERN` in place of the scene."
+    )
 
 
-def put(path: Path, text: str, layers: Kept, subject: str) -> None:
-    """Write the text of a baseline, and the layers of its EXR if there are any."""
+def _header(path: Path) -> str:
+    """Return the record in a file's header, as JSON."""
+    require_regular(path, LARGEST)  # before one is opened
+    header = exr_header(path)
+    if HEADER not in header:
+        raise ValueError("fotismos did not make this file.")
+    return str(header[HEADER])
+
+
+def _halves(path: Path, baseline: Baseline) -> Halves:
+    channels = exr_channels(path)
+    halves = {}
+    for half in baseline.halves:
+        shown = []
+        for number in range(baseline.passes):
+            names = [f"{_layer(half, number)}.{channel}" for channel in "RGB"]
+            if not channels.keys() >= set(names):
+                raise ValueError(f"the layer {_layer(half, number)} is missing.")
+            image = np.stack([channels[name] for name in names], axis=-1)
+            # Written so that a NaN fails it, too.
+            if not (np.abs(image) <= LARGEST_VALUE).all():
+                raise ValueError(f"a value is not finite, or larger than {LARGEST_VALUE:.2g}.")
+            shown.append(image)
+        halves[half] = Pictures.of(f"{path.name} {half}", shown)
+    return halves
+
+
+def _layer(half: str, number: int) -> str:
+    return f"{images.PASS}{half}.{number}"
+
+
+# --- Writing -----------------------------------------------------------------------------------
+
+
+def write(file: BaselineFile) -> None:
+    """Write a baseline, in place of an older one."""
+    path = file.path
+    layers = {
+        _layer(half, number): picture.image
+        for half, pictures in file.halves.items()
+        for number, picture in enumerate(pictures.files)
+    }
+    size = sum(layer.nbytes for layer in layers.values())
+    if size > LARGEST:
+        raise InputError(
+            f"{path}: {len(layers)} repeats of this size are {size / 1e9:.2g} GB. Give fewer, or"
+            " smaller ones."
+        )
+    record = json.dumps(records.plain(file.baseline), ensure_ascii=False, allow_nan=False)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        if path.exists():
-            require_regular(path)
-        # The text comes last: it names the pictures.
-        if layers:
-            require_own_pictures(path)
-            images.write_exr(path.with_suffix(".exr"), layers, {"scene": subject})
-        atomic.write(path, text)
+        require_own(path)
+        old = path.with_suffix(OLD)
+        if os.path.lexists(old):
+            old_record(old)  # refuses what is none
+        images.write_exr(path, layers, {HEADER: record})
+        old.unlink(missing_ok=True)
     except OSError as error:
         raise InputError(
             f"baseline {path}: {error.strerror or error}. Name another place for it."
         ) from error
 
 
-def small(image: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Average an image (H, W, 3) down to sides of at most `LONGEST_KEPT`."""
-    return averaged(image, shrunk(image.shape[:2], LONGEST_KEPT))
+def require_own(path: Path) -> None:
+    """Ensure that a file, if there is one, is a baseline, or the pictures of one of 0.4."""
+    if not os.path.lexists(path):
+        return
+    foreign = InputError(
+        f"{path}: fotismos did not make this file, which the baseline would replace. Move it away,"
+        " or give another baseline."
+    )
+    try:
+        require_regular(path, LARGEST)
+        header = exr_header(path)
+    except (InputError, OSError) as error:
+        raise foreign from error
+    is_old = all(channel.name.startswith("baseline.") for channel in header["channels"])
+    if not (HEADER in header or is_old):
+        raise foreign
+
+
+# --- Scenes and files that a baseline names ----------------------------------------------------
 
 
 def scene_from(scene: str, path: Path) -> str:
@@ -198,118 +342,3 @@ def _with_heuristic(options: Mapping[str, Any], placed: Callable[[str], str]) ->
 def name_of(scene: str | Path) -> str:
     """Return the name of a scene's baseline: the scene's, or its file's."""
     return Path(scene).stem if Path(scene).suffix in SUFFIXES else str(scene)
-
-
-def read_layers(
-    path: Path, names: Sequence[str], longest: int, how: str
-) -> dict[str, NDArray[np.float64]]:
-    """Read layers ``baseline.NAME`` of a baseline's EXR, of at most so many pixels per side.
-
-    ``how`` is the command that makes the file.
-    """
-    import OpenEXR
-
-    try:
-        require_regular(path, atomic.LARGEST)  # before one is opened
-        with OpenEXR.File(str(path), separate_channels=True) as file:
-            channels = file.channels()
-            pictures = {
-                name: np.stack(
-                    [channels[f"baseline.{name}.{c}"].pixels.astype(float) for c in "RGB"], axis=-1
-                )
-                for name in names
-            }
-            if max(max(picture.shape) for picture in pictures.values()) > longest:
-                raise ValueError("they are too large")
-            if not all(np.isfinite(picture).all() for picture in pictures.values()):
-                raise ValueError("they are not finite")
-            return pictures
-    except Exception as error:  # the library has many for a file that is not EXR
-        raise InputError(
-            f"{path}: the baseline's pictures cannot be read: {error}. Write them again with"
-            f" `{how}`."
-        ) from error
-
-
-# --- Pictures ----------------------------------------------------------------------------------
-
-
-def read_repeats(
-    pattern: str, transfer: str | None, over: str | None = None
-) -> tuple[Repeats, PictureFiles]:
-    """Read the repeats that match a pattern, ``render_*.exr`` or ``render_*.exr:LAYER``.
-
-    Also return the record of their files.
-    """
-    names = matching([pattern])
-    digests = []
-    notes: dict[str, None] = {}
-
-    def shots() -> Iterator[np.ndarray]:
-        # One at a time: only their sums are kept.
-        for name in names:
-            file = read_file(name, transfer, over)
-            digests.append(file.digest)
-            notes.update(dict.fromkeys(file.notes))
-            yield file.image
-
-    repeats = Repeats.of(shots())
-    files = PictureFiles(
-        files=names,
-        digests=tuple(digests),
-        transfer=transfer,
-        notes=tuple(notes),
-        repeats=len(names),
-    )
-    return repeats, files
-
-
-def write_pictures(
-    path: Path,
-    repeats: Repeats,
-    transfer: Literal["linear", "srgb"] | None,
-    over: str | None = None,
-) -> None:
-    """Write a baseline, and its EXR with the mean and variance of each pixel."""
-    if repeats.count < 2:
-        raise InputError(f"{path}: one picture does not show its noise. Give two repeats or more.")
-    # Compared with itself: the difference of two such means has an error √2 times that of one.
-    whole, _ = means(repeats, repeats)
-    height, width = repeats.mean.shape[:2]
-    baseline = PictureBaseline(
-        repeats=repeats.count,
-        resolution=(width, height),
-        transfer=transfer,
-        over=over,
-        mean=colour(whole.before[0, 0]),
-        error=colour(whole.error[0, 0] / np.sqrt(2.0)),
-        correlation=float(repeats.correlation),
-        images=path.with_suffix(".exr").name,
-    )
-    layers = {f"baseline.{name}": getattr(repeats, name) for name in PICTURE_LAYERS}
-    put(path, laid_out(records.plain(baseline)) + "\n", layers, path.stem)
-
-
-def picture_record(path: Path) -> PictureBaseline:
-    """Read the record of a baseline."""
-    return records.read(PictureBaseline, read_text(path, of_pictures=True), str(path))
-
-
-def read_pictures(path: Path) -> tuple[PictureBaseline, Repeats]:
-    """Read a baseline, and the statistics of its repeats from the EXR beside it."""
-    baseline = picture_record(path)
-    return baseline, kept_repeats(path, baseline)
-
-
-def kept_repeats(path: Path, baseline: PictureBaseline) -> Repeats:
-    """Read the statistics of a baseline's repeats from the EXR beside it."""
-    # Only the name counts: a baseline must not lead to files elsewhere.
-    kept = path.parent / Path(baseline.images).name
-    how = program.command("check", path, "--update", "--picture", f"{path.stem}=PATTERN")
-    found = read_layers(kept, PICTURE_LAYERS, longest=LONGEST_PICTURE, how=how)
-    repeats = Repeats(baseline.repeats, **found, correlation=np.array(baseline.correlation))
-    # The two files may come from different runs, or one was edited.
-    is_same = np.allclose(repeats.mean.mean(axis=(0, 1)), baseline.mean, rtol=1e-5, atol=1e-9)
-    if not (is_same and (repeats.variance >= 0).all() and baseline.correlation < np.inf):
-        raise InputError(f"{kept}: this is not of {path.name}. Write both again: `{how}`.")
-    return repeats

@@ -1,70 +1,53 @@
-"""Checking scenes against baselines, and writing baselines: one, or all of a command."""
+"""Checking against baselines, and writing them: one, or all of a command."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from msgspec import structs
 
 from fotismos.comparisons.case import Case, open_case
-from fotismos.comparisons.check.measurement import (
-    LINEAR_ROUNDING,
-    baseline_of,
+from fotismos.comparisons.check.measured import (
+    Measured,
     made_small,
     measure_scene,
+    read_repeats,
 )
-from fotismos.comparisons.check.moved import LEVEL, Check, check, level_of_each
-from fotismos.comparisons.check.pictures import (
-    SIDE,
-    PictureCheck,
-    Repeats,
-    check_pictures,
-    picture_gate,
-)
-from fotismos.comparisons.compare import compare
-from fotismos.comparisons.departure.blocks import averaged
+from fotismos.comparisons.check.moved import LEVEL, Check, HalfCheck, check
+from fotismos.comparisons.departure.blocks import averaged, shrunk
+from fotismos.comparisons.departure.drift import LINEAR_ROUNDING, SIDE, level_of_each
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
-from fotismos.comparisons.records.check import (
-    READERS,
-    Change,
-    CheckRecord,
-    PictureBaseline,
-    SmallestChanges,
-)
-from fotismos.comparisons.records.comparison import PictureFiles
-from fotismos.comparisons.steps import steps
+from fotismos.comparisons.records.check import PICTURE, READERS, Change, CheckRecord
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.heuristic.program import versions
 from fotismos.reference.records import to_json
 from fotismos.reference.rendering.passes import Progress
-from fotismos.reference.scene.graph import set_variant
-from fotismos.reports.ci import baselines
+from fotismos.reports.ci import baselines, summary
 from fotismos.reports.ci.baselines import BaselineFile
 from fotismos.reports.files import images, results
-from fotismos.reports.page import page
-from fotismos.reports.page.scene_view import Before, SceneView
-from fotismos.reports.run import scene_files
+from fotismos.reports.page.scene_view import Before
+from fotismos.reports.page.templating import head, rendered
 from fotismos.reports.terminal import progress
 
-RECORD = "check.json"
+if TYPE_CHECKING:
+    from fotismos.reports.commands.check import Check as Asked
+    from fotismos.reports.commands.check import Tolerance
 
-Judging = Callable[..., tuple["CheckRecord", SceneView | Before | None]]
-"""A function that checks or writes the baseline at a path."""
+RECORD = "check.json"
 
 LARGEST_ERROR = 2.0
 """ΔE2000 at which the map's colours end: changes are often hardly noticeable."""
 
+LONGEST = 256
+"""Pixels of the longer side of the pictures on the page."""
 
-@dataclass(frozen=True)
-class Tolerance:
-    """At most the share ``bound`` of the pixels may differ by more than the ΔE2000 ``within``."""
-
-    within: float
-    bound: float
+Outcome = tuple[CheckRecord, Before | None]
+"""The result for a baseline, and its section of the page if it failed."""
 
 
 # --- One baseline ----------------------------------------------------------------------------
@@ -72,247 +55,161 @@ class Tolerance:
 
 def examine(
     file: BaselineFile,
-    case: Case,
+    now: Measured,
+    scene: str,
     level: float = LEVEL,
     folder: Path | None = None,
-    progress: Progress | None = None,
-) -> tuple[CheckRecord, SceneView | None]:
-    """Check a scene against its baseline.
+    tolerance: Tolerance | None = None,
+) -> Outcome:
+    """Compare what there is now with a baseline, for drift or by a tolerance.
 
-    ``level`` is the chance of an alarm though nothing changed. If something moved, the scene is
-    compared as ``fotismos compare`` does, its files and ``check.json`` are written to ``folder``,
-    and its part of the page is returned; else those of an earlier failure are deleted.
+    ``scene`` is the scene's name, or the pattern of pictures. ``level`` is the chance of an alarm
+    though nothing changed. After a failure, pictures and ``check.json`` are written to ``folder``;
+    else those of an earlier one are deleted.
     """
     begin = perf_counter()
-    kept = file.pictures()
-    found = _checked(file, case, level, progress)
+    found = check(file.halves, now, level)
+    gate = None
+    has_failed = bool(found.moves)
+    if tolerance is not None:
+        record = found.halves[0].comparison.record
+        (gate,) = summary.gates([record], tolerance.bound, tolerance.within)
+        has_failed = gate.state != "pass"
+    made = _record(file, found, scene=scene, status="failed" if has_failed else "passed")
+    if gate is not None:
+        sentence = summary.sentence(gate)
+        made = structs.replace(made, gate=gate, headline=sentence, message=sentence)
+    if has_failed:
+        made = structs.replace(made, passed=False, causes=tuple(found.causes()))
+    made = structs.replace(made, seconds=round(now.seconds + perf_counter() - begin, 3))
     if folder is not None:
-        scene_files.remove(folder)
-        results.clear(folder, (RECORD,))
-    made = _record(file, "passed" if found.passed else "failed", found, begin)
-    if found.passed:
+        results.clear(folder, (RECORD, *_names(found)))
+    if not has_failed:
         return made, None
-    made = structs.replace(
-        made, causes=tuple(found.causes()), pictures=folder.as_posix() if folder else None
-    )
-    if folder is None:
-        return made, None
-    # Checks usually pass, so a failure alone is compared in full.
-    added = steps(why=False)
-    comparison = compare(case.source, case.options, progress, case.command(), then=added)
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    view = scene_files.write(folder.parent, folder.name, comparison)
-    results.write(folder / RECORD, to_json(made))
-    return made, structs.replace(view, before=_before(made, kept or {}, found.now.pictures))
+    return shown(made, found, folder)
+
+
+def shown(made: CheckRecord, found: Check, folder: Path | None) -> tuple[CheckRecord, Before]:
+    """Return a failure's record and its section of the page; write both to a folder, if any."""
+    panels = {name: panel for half in found.halves for name, panel in _panels(half)}
+    if folder is not None:
+        made = structs.replace(made, pictures=folder.as_posix())
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        results.own(folder)
+        for name, (_, panel) in panels.items():
+            results.write(folder / name, images.png(panel))
+        results.write(folder / RECORD, to_json(made))
+    # Those of the half that moved most come first.
+    pictures = {caption: images.webp(panel, lossless=True) for caption, panel in panels.values()}
+    return made, Before(check=made, pictures=pictures)
 
 
 def update(
-    file: BaselineFile,
-    case: Case,
+    path: Path,
+    scene: str | None,
+    options: Mapping[str, Any],
+    now: Measured,
+    word: str,
     level: float = LEVEL,
-    with_pictures: bool = False,
-    progress: Progress | None = None,
+    file: BaselineFile | None = None,
 ) -> CheckRecord:
-    """Measure again, and write the baseline if anything moved, or pictures are to be added."""
+    """Write a baseline of what there is now, unless nothing moved from that in its ``file``.
+
+    ``scene`` is None of pictures, and ``word`` the pattern of their files. Without a file, or if it
+    kept something else, what it held does not count.
+    """
     begin = perf_counter()
-    old = file.baseline
-    found = _checked(file, case, level, progress)
-    made = _record(file, "unchanged" if found.passed else "updated", found, begin)
-    is_added = found.passed and with_pictures and not old.images
-    if is_added:
-        added = f"the pictures were added. {found.now.caution}".removesuffix(". ")
-        made = structs.replace(made, message=added)
-    if is_added or not found.passed:
-        kept = found.now.pictures if with_pictures or old.images else None
-        # If nothing moved, the old numbers stay, and only the pictures are new.
-        new = old if found.passed else baseline_of(old.scene, old.options, found.now.measurement)
-        baselines.write(file.path, new, kept)
-    return made
+    old = path.with_suffix(baselines.OLD)
+    is_old = old.exists()
+    target = path.with_suffix(baselines.NEW)
+    status = "updated" if is_old or target.exists() else "created"
+    found = None
+    if file is not None and _are_comparable(file, now):
+        found = check(file.halves, now, level)
+    if found is not None and not found.moves:
+        status = "unchanged"
+    else:
+        new = BaselineFile.of(target, scene, options, now)
+        baselines.write(new)
+    if found is None or file is None:
+        file = new
+        found = check(now.halves, now, level)
+    made = _record(file, found, scene=word, status=status)
+    if is_old:
+        replaced = (
+            f"{old.name} of fotismos 0.4 could not be compared: {target.name}, in its place, begins"
+            " with what there is today."
+        )
+        made = structs.replace(made, message=" ".join(filter(None, (replaced, made.message))))
+    return structs.replace(made, seconds=round(now.seconds + perf_counter() - begin, 3))
 
 
-def create(
+def update_scene(
     path: Path,
     scene: str,
     case: Case,
-    with_pictures: bool = False,
+    level: float = LEVEL,
+    file: BaselineFile | None = None,
     progress: Progress | None = None,
 ) -> CheckRecord:
-    """Measure a scene at a small size, and write or replace its baseline, which names it."""
-    begin = perf_counter()
+    """Write the baseline of a scene, as :func:`update` does.
+
+    Unless its ``file`` has the same options, it is rendered at a small size, which is kept.
+    """
+    if file is not None:
+        now = file.rendered(case, progress)
+        return update(path, scene, file.baseline.options, now, scene, level, file)
     case = made_small(case)
-    measured = measure_scene(case.source, case.options, progress=progress)
+    now = measure_scene(case.source, case.options, progress=progress)
     # The number of samples becomes an option: every later check takes as many.
-    options = baselines.options_for(case.changed(spp=measured.spp).options.stated(), path)
-    status: Literal["updated", "created"] = "updated" if path.exists() else "created"
-    new = baseline_of(scene, options, measured.measurement)
-    baselines.write(path, new, measured.pictures if with_pictures else None)
-    return CheckRecord(
-        baseline=path.as_posix(),
-        scene=scene,
-        status=status,
-        seconds=round(perf_counter() - begin, 3),
-        message=measured.caution,
+    options = baselines.options_for(case.changed(spp=now.spp).options.stated(), path)
+    return update(path, scene, options, now, scene, level)
+
+
+def _are_comparable(known: BaselineFile, now: Measured) -> bool:
+    """Return whether a baseline's passes are as many and as large as those of now."""
+    return all(
+        len(known.halves[name].files) == len(half.files) and known.halves[name].size == half.size
+        for name, half in now.halves.items()
     )
 
 
-def _checked(file: BaselineFile, case: Case, level: float, progress: Progress | None) -> Check:
-    set_variant(case.variant)
-    return check(case.source, case.options, file.baseline.measured(), level, progress)
-
-
-def _record(file: BaselineFile, status: Any, found: Check, begin: float) -> CheckRecord:
+def _record(file: BaselineFile, found: Check, scene: str, status: Any) -> CheckRecord:
     now = versions()
     changed = {
         name: Change(before=old, after=now.get(name, "none"))
         for name, old in file.baseline.versions.items()
         if now.get(name) != old
     }
-    metrics = found.before.metrics.items()
-    after = found.now.measurement.metrics
+    before = found.now.metrics(found.before)
+    after = found.now.metrics(found.now.halves)
+    metrics = None
+    if before is not None and after is not None:
+        metrics = {name: Change(before=before[name], after=after[name]) for name in after}
+    half = found.halves[0]
+    is_picture = half.name == PICTURE
+    picture = found.now.halves[PICTURE].record() if is_picture else None
     return CheckRecord(
         baseline=file.path.as_posix(),
-        scene=file.baseline.scene,
+        scene=scene,
         status=status,
-        passed=status != "failed",
-        seconds=round(perf_counter() - begin, 3),
-        message=found.now.caution,
-        tested=len(found.moves),
+        seconds=0.0,
+        message=_caught(half) if is_picture else found.now.caution,
+        headline=found.headline(),
+        tested=found.tested,
         significance=found.level,
-        moved=found.moved,
-        metrics={name: Change(before=old.value, after=after[name].value) for name, old in metrics},
+        moved=found.moves,
+        metrics=metrics,
         versions=changed or None,
+        smallest_changes={half.name: half.smallest_changes() for half in found.halves},
+        picture=picture,
     )
 
 
-def _before(made: CheckRecord, before: baselines.Kept, after: baselines.Kept) -> Before:
-    """Return the section of the page on what moved, with images before and now by their names."""
-    shown = {}
-    later = {name: averaged(after[name], old.shape) for name, old in before.items()}
-    errors = {name: LEADING(later[name], old) for name, old in before.items()}
-    # What moved most comes first.
-    for name in sorted(errors, key=lambda name: -errors[name].mean()):
-        caption = READERS.get(name, name)
-        shown[f"{caption}, before"] = images.tonemap(before[name])
-        shown[f"{caption}, now"] = images.tonemap(later[name])
-        error = f"{caption}, {LEADING.label} between them, 0 to {LARGEST_ERROR:g}"
-        shown[error] = images.error_map(errors[name], LARGEST_ERROR)
-    return Before(
-        check=made,
-        pictures={name: images.webp(picture, lossless=True) for name, picture in shown.items()},
-    )
-
-
-def write_page(
-    folder: Path, title: str, views: Sequence[SceneView] = (), moved: Sequence[Before] = ()
-) -> Path:
-    """Write the page of what moved, and its details, into a folder; return the page's path."""
-    details = page.details(records=[view.record for view in views])
-    results.write(folder / results.DETAILS, details)
-    results.write(folder / results.PAGE, page.render(views, title, moved=moved))
-    return folder / results.PAGE
-
-
-# --- Pictures --------------------------------------------------------------------------------
-
-
-def examine_pictures(
-    path: Path, pattern: str, level: float, tolerance: Tolerance | None = None
-) -> tuple[CheckRecord, Before | None]:
-    """Check pictures that match a pattern against their baseline, for drift or by a tolerance."""
-    begin = perf_counter()
-    baseline, before = baselines.read_pictures(path)
-    after, files = baselines.read_repeats(pattern, baseline.transfer, baseline.over)
-    found = check_pictures(before, after, level)
-    gate = None
-    has_failed = bool(found.moved)
-    if tolerance is not None:
-        gate = picture_gate(before, after, tolerance.within, tolerance.bound)
-        has_failed = gate.state != "pass"
-    status = "failed" if has_failed else "passed"
-    made = of_pictures(path, pattern, status=status, found=found, begin=begin, files=files)
-    if gate is not None:
-        made = structs.replace(made, gate=gate, message=gate.sentence)
-    if not has_failed:
-        return made, None
-    return picture_section(made, before, found)
-
-
-def picture_section(
-    made: CheckRecord, before: Repeats, found: PictureCheck
-) -> tuple[CheckRecord, Before]:
-    """Return the record of pictures that failed, with the cause, and their section of the page."""
-    causes = (found.cause(),) if found.moved else ()
-    made = structs.replace(made, passed=False, causes=causes)
-    old = {"picture": baselines.small(before.mean), "blocks": found.blocks.before}
-    return made, _before(made, old, {"picture": found.after.mean, "blocks": found.blocks.after})
-
-
-def update_pictures(
-    path: Path,
-    pattern: str,
-    transfer: Any,
-    over: str | None,
-    level: float,
-    progress: Progress | None = None,
-) -> tuple[CheckRecord, None]:
-    """Write the baseline of the pictures that match a pattern, unless nothing moved from it."""
-    begin = perf_counter()
-    known = baselines.picture_record(path) if path.exists() else None
-    if known is not None:
-        transfer = transfer or known.transfer
-        over = over or known.over
-    repeats, files = baselines.read_repeats(pattern, transfer, over)
-    before = None
-    if known is not None and (transfer, over) == (known.transfer, known.over):
-        before = _comparable(path, known, repeats)
-    found = None if before is None else check_pictures(before, repeats, level)
-    status = "created" if known is None else "updated"
-    if found is not None and not found.moved:
-        status = "unchanged"
-    else:
-        baselines.write_pictures(path, repeats, transfer, over)
-    found = found or check_pictures(repeats, repeats, level)
-    made = of_pictures(path, pattern, status=status, found=found, begin=begin, files=files)
-    return made, None
-
-
-def _comparable(path: Path, known: PictureBaseline, repeats: Repeats) -> Repeats | None:
-    """Return a baseline's repeats if others are as many and as large; None if it is damaged."""
-    try:
-        before = baselines.kept_repeats(path, known)
-    except InputError:
-        return None
-    is_alike = before.count == repeats.count and before.mean.shape == repeats.mean.shape
-    return before if is_alike else None
-
-
-def of_pictures(
-    path: Path,
-    pattern: str,
-    status: Any,
-    found: PictureCheck,
-    begin: float,
-    files: PictureFiles | None = None,
-) -> CheckRecord:
-    """Return the record of a check of pictures that match a pattern, in ``files`` if in any."""
-    changes = found.smallest_changes()
-    return CheckRecord(
-        baseline=path.as_posix(),
-        scene=pattern,
-        status=status,
-        seconds=round(perf_counter() - begin, 3),
-        message=_caught(changes, found.before),
-        tested=found.picture.before.size + found.blocks.before.size,
-        significance=found.level,
-        moved=found.moved,
-        smallest_changes=changes,
-        picture=files,
-    )
-
-
-def _caught(changes: SmallestChanges, before: Repeats) -> str:
+def _caught(half: HalfCheck) -> str:
     """Return the sentence on what could not be seen, relative to the mean of the picture."""
-    whole = max(before.mean.mean(), LINEAR_ROUNDING)
+    changes = half.smallest_changes()
+    whole = max(half.before.mean.mean(), LINEAR_ROUNDING)
     picture = f"{100 * max(changes.mean) / whole:.2g} %"
     block = f"{100 * max(changes.block) / whole:.2g} %"
     noisiest = f"{100 * max(changes.noisiest) / whole:.2g} %"
@@ -320,68 +217,75 @@ def _caught(changes: SmallestChanges, before: Repeats) -> str:
     return (
         f"caught in {100 * changes.power:g} % of cases: a change of the mean by {picture}, of a"
         f" block of {SIDE} x {SIDE} pixels by {block} of it, of the noisiest block by {noisiest};"
-        f" smaller ones may be missed.{'' if before.variance.any() else equal}"
+        f" smaller ones may be missed.{'' if half.before.variance.any() else equal}"
     )
+
+
+def _names(found: Check) -> list[str]:
+    return [name for half in found.halves for name, _ in _panels(half)]
+
+
+def _panels(half: HalfCheck) -> Iterator[tuple[str, tuple[str, Any]]]:
+    """Yield the pictures of a half: the names of their files, captions and panels."""
+    shape = shrunk(half.before.mean.shape[:2], LONGEST)
+    caption = READERS[half.name]
+    for name, mean in (("before", half.before.mean), ("now", half.after.mean)):
+        panel = images.tonemap(averaged(mean, shape))
+        yield f"{half.name}-{name}.png", (f"{caption}, {name}", panel)
+    error = half.comparison.images.maps[LEADING.name]
+    panel = images.error_map(error, LARGEST_ERROR)
+    told = f"{caption}, change: {LEADING.label}, 0 to {LARGEST_ERROR:g}"
+    yield f"{half.name}-{LEADING.name}.png", (told, panel)
+
+
+# --- The page --------------------------------------------------------------------------------
+
+
+def write_page(folder: Path, sections: Sequence[Before], outcome: str = "") -> Path:
+    """Write the page of what moved into a folder; return its path.
+
+    ``outcome`` says how many baselines were checked.
+    """
+    first = sections[0]
+    others = len(sections) - 1
+    title = first.check.headline
+    title = f"{first.check.name}: {title}; and {others} more" if others else title
+    html = rendered(
+        "check_page.html.j2",
+        title=title,
+        outcome=outcome,
+        head=head("check", None),
+        sections=sections,
+    )
+    results.write(folder / results.PAGE, html)
+    return folder / results.PAGE
 
 
 # --- All baselines of a command --------------------------------------------------------------
 
 
-def examine_all(
-    pool: Pool,
-    path: Path,
-    significance: float,
-    seed: int | None,
-    folder: Path,
-    patterns: Mapping[Path, str],
-    tolerance: Tolerance | None = None,
-) -> tuple[list[CheckRecord], list[SceneView], list[Before]]:
-    """Check one baseline or a folder of them in a pool; the significance is shared.
+def examine_all(pool: Pool, asked: Asked, folder: Path) -> list[Outcome]:
+    """Check the baselines of a command in a pool; they share its significance.
 
-    ``seed`` replaces the baselines' unless it is None; failures go to ``folder``; ``patterns``
-    name the new pictures of baselines, which a ``tolerance`` judges in place of drift.
+    Failures go to ``folder``.
     """
-    paths = sorted({*baselines.find(path), *patterns})
-    level = level_of_each(significance, len(paths))
-    calls = [
-        (baseline, level, seed, folder / baseline.stem, patterns.get(baseline), tolerance)
-        for baseline in paths
-    ]
-    found = _each(pool, examine_one, calls)
-    scenes = [view for _, view in found if isinstance(view, SceneView)]
-    return [made for made, _ in found], scenes, [v for _, v in found if isinstance(v, Before)]
+    paths = sorted({*baselines.find(asked.baseline), *asked.patterns})
+    level = level_of_each(asked.significance, len(paths))
+    calls = [(path, asked, level, folder / path.stem) for path in paths]
+    return _each(pool, examine_one, calls)
 
 
-def update_all(
-    pool: Pool,
-    path: Path,
-    scenes: Sequence[str],
-    with_pictures: bool,
-    significance: float,
-    options: Mapping[str, Any],
-    patterns: Mapping[Path, str],
-) -> list[CheckRecord]:
-    """Write one baseline or several, except those with the same options of which nothing moved.
-
-    Without ``scenes``, the files name them; ``options`` replace theirs. With ``patterns``, only
-    baselines of pictures are written.
-    """
-    if patterns:
-        how = options.get("transfer"), options.get("over")
-        shots = [(baseline, word, *how, significance) for baseline, word in patterns.items()]
-        return [made for made, _ in _each(pool, update_pictures, shots)]
-    calls = [
-        (baseline, scene, with_pictures, significance, options)
-        for baseline, scene in _targets(path, scenes)
-    ]
-    return [made for made, _ in _each(pool, update_one, calls)]
+def update_all(pool: Pool, asked: Asked) -> list[Outcome]:
+    """Write the baselines of a command, except those of which nothing moved."""
+    paths = asked.patterns or asked.scene_words or baselines.find(asked.baseline)
+    return _each(pool, update_one, [(path, asked) for path in paths])
 
 
 def _each(
-    pool: Pool, function: Judging, calls: Sequence[tuple[Any, ...]]
-) -> list[tuple[CheckRecord, SceneView | Before | None]]:
+    pool: Pool, function: Callable[..., Outcome], calls: Sequence[tuple[Any, ...]]
+) -> list[Outcome]:
     """Return the result of each baseline, in order; its path is the first argument."""
-    results = {}
+    found = {}
     tasks = [
         Task(
             name=call[0].name,
@@ -396,8 +300,8 @@ def _each(
         for task, outcome in shown.each(tasks):
             path = task.arguments[0]
             error = outcome.exception()
-            results[path] = (failed(path, error), None) if error else outcome.result()
-    return [results[call[0]] for call in calls]
+            found[path] = (failed(path, error), None) if error else outcome.result()
+    return [found[call[0]] for call in calls]
 
 
 def failed(path: Path, error: BaseException) -> CheckRecord:
@@ -415,71 +319,41 @@ def failed(path: Path, error: BaseException) -> CheckRecord:
 
 
 def examine_one(
-    path: Path,
-    level: float,
-    seed: int | None,
-    folder: Path,
-    pattern: str | None,
-    tolerance: Tolerance | None = None,
-    progress: Progress | None = None,
-) -> tuple[CheckRecord, SceneView | Before | None]:
+    path: Path, asked: Asked, level: float, folder: Path, progress: Progress | None = None
+) -> Outcome:
     """Check one baseline, of a scene or of the pictures that match a pattern."""
-    if pattern is not None:
-        return examine_pictures(path, pattern, level, tolerance)
     file = baselines.read(path)
-    return examine(file, file.open(seed), level, folder, progress)
+    pattern = asked.patterns.get(path)
+    baselines.require_kind(path, file.baseline.scene, pattern)
+    if pattern is not None:
+        now = read_repeats(pattern, Options.of(file.baseline.options))
+        return examine(file, now, pattern, level, folder, tolerance=asked.tolerance)
+    now = file.rendered(file.open(asked.changes.get("seed")), progress)
+    return examine(file, now, str(file.baseline.scene), level, folder)
 
 
-def update_one(
-    path: Path,
-    scene: str | None,
-    with_pictures: bool,
-    significance: float,
-    options: Mapping[str, Any],
-    progress: Progress | None = None,
-) -> tuple[CheckRecord, None]:
-    """Write one baseline; ``scene`` is None if the file names it."""
-    if with_pictures:
-        baselines.require_own_pictures(path)
-    options = baselines.options_for(options, path)
-    if path.exists():
-        file = baselines.read(path)
-        old = file.baseline
-        if scene is not None and baselines.scene_for(scene, path) != old.scene:
+def update_one(path: Path, asked: Asked, progress: Progress | None = None) -> Outcome:
+    """Write one baseline, of a scene or of the pictures that match a pattern."""
+    pattern = asked.patterns.get(path)
+    word = asked.scene_words.get(path)
+    options = baselines.options_for(asked.changes, path)
+    level = asked.significance
+    known = baselines.known(path) if path.exists() else None
+    if known is not None:
+        baselines.require_kind(path, known.scene, pattern)
+        options = dict(known.options) | options
+    file = known.file if known and Options.of(options) == Options.of(known.options) else None
+    if pattern is not None:
+        now = read_repeats(pattern, Options.of(options))
+        return update(path, None, options, now, pattern, level, file), None
+    if known is not None:
+        if word is not None and baselines.scene_for(word, path) != known.scene:
             raise InputError(
-                f"{path}: this is the baseline of {old.scene}, not of {scene}. Give another file"
-                f" for {scene}, or delete this one."
+                f"{path}: this is the baseline of {known.scene}, not of {word}. Give another file"
+                f" for {word}, or delete this one."
             )
-        scene = baselines.scene_from(old.scene, path)
-        options = dict(old.options) | options
-        # With equal options only what moved is written; with others the old numbers mean nothing.
-        if Options.of(options) == Options.of(old.options):
-            return update(file, file.open(), significance, with_pictures, progress), None
-        with_pictures = with_pictures or bool(old.images)
-    assert scene is not None, "a missing baseline comes with its scene"
-    case = open_case(scene, Options.of(baselines.options_from(options, path)))
-    return create(
-        path,
-        baselines.scene_for(scene, path),
-        case=case,
-        with_pictures=with_pictures,
-        progress=progress,
-    ), None
-
-
-def _targets(path: Path, scenes: Sequence[str]) -> list[tuple[Path, str | None]]:
-    """Return ``(file, scene)`` of each baseline to write; without a scene, its file names it."""
-    if path.suffix == ".json":
-        if len(scenes) > 1:
-            raise InputError(f"{path}: a baseline is of one --scene; give a folder for several.")
-        if not scenes and not path.exists():
-            raise InputError(f"{path}: there is no such baseline. Give its --scene.")
-        return [(path, scenes[0] if scenes else None)]
-    if scenes:
-        named = {path / f"{baselines.name_of(scene)}.json": scene for scene in scenes}
-        if len(named) < len(scenes):
-            raise InputError(
-                f"{', '.join(scenes)}: two scenes have one name. Give a file for each."
-            )
-        return list(named.items())
-    return [(baseline, None) for baseline in baselines.find(path)]
+        word = baselines.scene_from(str(known.scene), path)
+    assert word is not None, "a missing baseline comes with its scene"
+    case = open_case(word, Options.of(baselines.options_from(options, path)))
+    scene = baselines.scene_for(word, path)
+    return update_scene(path, scene, case, level, file, progress), None

@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import click
@@ -16,15 +15,15 @@ from fotismos.comparisons import atomic
 from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.records.comparison import ComparisonRecord
-from fotismos.comparisons.records.departure import Verdict, VisibleShare
+from fotismos.comparisons.records.departure import Gate, Verdict
 from fotismos.heuristic.errors import FotismosError, InputError, OutputError
 from fotismos.reports import verdict
-from fotismos.reports.tables import SHOWN, certainty, moved
+from fotismos.reports.tables import SHOWN, moved
 from fotismos.reports.terminal.table import Column, Table, escaped, markdown, printed
 from fotismos.reports.terminal.words import echo, is_quiet, number, percent, tell, visible
 
 if TYPE_CHECKING:
-    from fotismos.comparisons.records.check import CheckRecord, Move
+    from fotismos.comparisons.records.check import CheckRecord
     from fotismos.reports.jobs import Terminal
     from fotismos.reports.page.scene_view import SceneView
 
@@ -41,29 +40,12 @@ NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 # --- Gates -----------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Gate:
-    """The largest share of a scene's pixels that may differ visibly, and the share that does."""
-
-    scene: str
-    bound: float
-    found: VisibleShare
-    state: Verdict
-
-    def __str__(self) -> str:
-        return (
-            f"{percent(self.found.value)} of the pixels ({percent(self.found.low)} to"
-            f" {percent(self.found.high)}) differ by more than {LEADING.label}"
-            f" {self.found.threshold:g}, at most {percent(self.bound)} may: {self.state}"
-        )
-
-
 GATES = (
     Column("scene", "scene"),
     Column("at most", "bound", percent, is_right=True),
-    Column("pixels that differ", "found.value", percent, is_right=True),
-    Column("from", "found.low", percent, is_right=True),
-    Column("to", "found.high", percent, is_right=True),
+    Column("pixels that differ", "visible.value", percent, is_right=True),
+    Column("from", "visible.low", percent, is_right=True),
+    Column("to", "visible.high", percent, is_right=True),
     Column("result", "state", is_right=True),
 )
 """The table of gates."""
@@ -79,11 +61,28 @@ def gates(
         Gate(
             scene=record.scene,
             bound=bound,
-            found=verdict.share(record, threshold),
+            visible=verdict.share(record, threshold),
             state=verdict.decision(record, threshold, bound),
         )
         for record in records
     ]
+
+
+def sentence(gate: Gate) -> str:
+    """Return what differs, what is allowed, and the result."""
+    share = gate.visible
+    shown = percent(share.value)
+    if share.low != share.high:
+        shown += f" ({percent(share.low)} to {percent(share.high)})"
+    results: dict[Verdict, str] = {
+        "pass": "it passes",
+        "fail": "it fails",
+        "undecided": "it is undecided, and more samples or repeats decide",
+    }
+    return (
+        f"{shown} of the pixels differ by more than {LEADING.label} {share.threshold:g}, at most"
+        f" {percent(gate.bound)} may: {results[gate.state]}."
+    )
 
 
 def gate_lines(gates: Sequence[Gate]) -> Iterator[str]:
@@ -241,7 +240,7 @@ def junit_of_gates(gates: Sequence[Gate], errors: Mapping[str, FotismosError]) -
     for gate in gates:
         case = _element("testcase", {"name": gate.scene, "classname": "fotismos.compare"})
         if gate.state != "pass":
-            case.append(_element("failure", {"message": str(gate), "type": gate.state}))
+            case.append(_element("failure", {"message": sentence(gate), "type": gate.state}))
         cases.append(case)
     return _document("compare", cases)
 
@@ -304,7 +303,7 @@ def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
     parts = [
         "### fotismos check",
         outcome(checks, level),
-        _marked_down(Table(_most_moved(), checks)),
+        _marked_down(Table(MOST_MOVED, checks)),
     ]
     parts += [escaped(f"{made.name}: {' '.join(made.causes)}") for made in checks if made.causes]
     return "\n\n".join([*parts, *([_where(page)] if page else ())]) + "\n\n"
@@ -354,20 +353,21 @@ def outcome(checks: Sequence[CheckRecord], level: float) -> str:
 
 
 def moved_lines(made: CheckRecord) -> Iterator[str]:
-    """Yield the table of what moved: from, to, by how many standard errors, p-value; and causes."""
-    moves = made.moved or ()
-    yield from printed(moved(moves))
-    if len(moves) > SHOWN:
-        yield f"and {len(moves) - SHOWN} more; {made.tested} quantities were tested"
+    """Yield the table of what moved, by how much and how certain that is; and causes."""
+    yield from printed(moved(made))
+    others = len(made.moved or ()) - SHOWN
+    if others > 0:
+        yield f"and {others} more; {made.tested} means were tested"
     yield from made.causes
 
 
 def _details(made: CheckRecord) -> Iterator[str]:
+    if made.moved:
+        yield f"{made.name}: {made.status}. {made.headline}"
     if made.message and made.status != "error":  # an error has its own line
         yield f"{made.name}: {made.message}"
     if not made.moved:
         return
-    yield f"{made.name}: {made.status}. {made.headline}"
     yield from ("  " + line for line in moved_lines(made))
     if made.versions_line:
         yield "  " + made.versions_line
@@ -398,23 +398,16 @@ def _checked() -> tuple[Column, ...]:
     )
 
 
-def _most_moved() -> tuple[Column, ...]:
-    """Return the columns of checks in a summary, with what moved most."""
-
-    def what(made: CheckRecord) -> str:
-        if not made.moved or (most := made.largest) is None:
-            return made.message
-        return f"{most.name}, {most.change} ({len(made.moved)} in all)"
-
-    def of(value: Callable[[Move], Any]) -> Callable[[CheckRecord], Any]:
-        return lambda made: "" if made.largest is None else value(made.largest)
-
-    return (
-        Column("Baseline", "name"),
-        Column("Result", "status"),
-        Column("What moved most", what),
-        Column("Baseline", of(lambda move: move.before), "{:.6g}".format, is_right=True),
-        Column("Now", of(lambda move: move.after), "{:.6g}".format, is_right=True),
-        Column("Standard errors", of(certainty), "{:+.1f}".format, is_right=True),
-        Column("p", of(lambda move: move.p_corrected), "{:.1g}".format, is_right=True),
-    )
+MOST_MOVED = (
+    Column("Baseline", "name"),
+    Column("Result", "status"),
+    Column("What moved most", lambda made: made.headline or made.message),
+    Column("Moved", lambda made: "" if made.tested is None else len(made.moved or ())),
+    Column("Of", lambda made: "" if made.tested is None else made.tested),
+    Column(
+        "p",
+        lambda made: min((m.p_corrected for m in made.moved or ()), default=""),
+        "{:.1g}".format,
+    ),
+)
+"""The columns of checks in a summary."""

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 import mitsuba as mi
@@ -13,29 +12,33 @@ import numpy as np
 from msgspec import structs
 
 from fotismos.comparisons import atomic
+from fotismos.comparisons import pictures as repeats
 from fotismos.comparisons.case import Case, Scene, open_case
-from fotismos.comparisons.check.measurement import PASSES, made_small, measure_scene
-from fotismos.comparisons.check.moved import LEVEL
-from fotismos.comparisons.check.pictures import (
-    PictureCheck,
-    Repeats,
-    check_pictures,
-    picture_gate,
+from fotismos.comparisons.check.measured import (
+    Measured,
+    made_small,
+    measure_scene,
+    picture,
+    read_repeats,
 )
+from fotismos.comparisons.check.moved import LEVEL
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, checked_threshold
-from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.metrics import RATIO
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import require_linear
+from fotismos.comparisons.pictures import require_one_size
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import in_file, known_as
 from fotismos.reference import records
 from fotismos.reference.rendering.passes import require_finite
-from fotismos.reference.rendering.sums import student
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines, checks, summary
-from fotismos.reports.files import images, results
-from fotismos.reports.page.scene_view import Before, SceneView
+from fotismos.reports.commands.check import Tolerance
+from fotismos.reports.files import results
+from fotismos.reports.page.scene_view import Before
 from fotismos.reports.terminal.parsing import share_of
+
+UPDATE = "pytest --fotismos-update"
 
 Pictures = np.ndarray | Sequence[np.ndarray] | str | Path
 """A linear picture (H, W, 3), several that differ by noise, a file, or a pattern of files."""
@@ -44,15 +47,14 @@ Pictures = np.ndarray | Sequence[np.ndarray] | str | Path
 class Departure(float):
     """A departure metric of a scene: a number that explains itself where an assertion fails.
 
-    ``error`` is its standard error over ``passes`` independent passes, ``noise_floor`` the value
-    that noise alone would give.
+    ``interval`` is the 95 % interval of its value without noise, and ``noise_floor`` the value that
+    noise alone would give; the signed ratio of luminances has neither.
     """
 
     scene: str
     metric: str
-    error: float
+    interval: tuple[float, float] | None
     noise_floor: float | None
-    passes: int
 
     def __new__(cls, value: float, **about: Any) -> "Departure":
         """Return the number with its attributes."""
@@ -63,20 +65,15 @@ class Departure(float):
     def __repr__(self) -> str:
         return f"{self.metric} {float(self):.4g}"
 
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Return the 95 % interval of Student's t."""
-        amount = student(float(self), self.error, self.passes)
-        return amount.low, amount.high
-
     def fotismos_explanation(self) -> list[str]:
         """Return the lines for the message of a failed assertion."""
-        low, high = self.interval
-        floor = "" if self.noise_floor is None else f"; noise alone: {self.noise_floor:.4g}"
-        return [
-            f"{self.scene}: mean {self.metric} {float(self):.6g}, standard error {self.error:.2g}",
-            f"95 % interval: {low:.6g} to {high:.6g}{floor}",
-        ]
+        lines = [f"{self.scene}: mean {self.metric} {float(self):.6g}"]
+        if self.interval is not None and self.noise_floor is not None:
+            low, high = self.interval
+            lines.append(
+                f"95 % interval: {low:.6g} to {high:.6g}; noise alone: {self.noise_floor:.4g}"
+            )
+        return lines
 
 
 @contextmanager
@@ -118,20 +115,18 @@ class Fotismos:
             _open(self._scene(scene), self._options({}) | self._with_file(options), "scene")
         )
         measured = measure_scene(case.source, case.options)
-        found = measured.measurement
         if measured.caution:
             warnings.warn(f"{case.name}: {measured.caution}", stacklevel=2)
-        if metric not in found.metrics:
-            raise unknown("metric", metric, found.metrics)
-        amount = found.metrics[metric]
-        return Departure(
-            amount.value,
-            scene=case.name,
-            metric=metric,
-            error=amount.error,
-            noise_floor=amount.noise_floor,
-            passes=PASSES,
-        )
+        record = measured.compared(case.name, case.options)
+        about: dict[str, Any] = {"scene": case.name, "metric": metric}
+        if metric == RATIO.name:
+            value = record.log2_luminance.mean
+            return Departure(value, **about, interval=None, noise_floor=None)
+        if metric not in record.metrics:
+            raise unknown("metric", metric, (*record.metrics, RATIO.name))
+        found = record.metrics[metric]
+        interval = (found.low, found.high)
+        return Departure(found.mean, **about, interval=interval, noise_floor=found.noise_floor)
 
     def unchanged(
         self,
@@ -154,41 +149,41 @@ class Fotismos:
         path = self._path(scene, name)
         if not path.exists():
             if not self.update:
-                raise AssertionError(
-                    f"{path}: there is no such baseline. `pytest --fotismos-update` writes it."
-                )
+                raise _missing(path)
             case = _open(scene, given, name)
             named = case.word if _in_python(scene) else baselines.scene_for(str(scene), path)
-            checks.create(path, named, case)
+            checks.update_scene(path, named, case)
             return True
-        file = baselines.read(path)
+        kept = self._kept(path)
         # The baseline's own scene and options; those of the test replace some.
         if not _in_python(scene):
-            scene = baselines.scene_from(file.baseline.scene, path)
-        case = _open(scene, baselines.options_from(file.baseline.options, path) | given, name)
+            scene = baselines.scene_from(str(kept.scene), path)
+        case = _open(scene, baselines.options_from(kept.options, path) | given, name)
         # Other options give other numbers: the baseline is written again, or the test fails.
-        others = _other_options(file.baseline.options, baselines.options_for(given, path))
+        others = _other_options(kept.options, baselines.options_for(given, path))
+        if self.update:
+            file = None if others else kept.file
+            checks.update_scene(path, str(kept.scene), case, level, file)
+            return True
         if others:
-            if not self.update:
-                raise AssertionError(
-                    f"{path}: the options of the baseline and the test differ: {others}."
-                    " `pytest --fotismos-update` writes it again."
-                )
-            checks.create(path, file.baseline.scene, case)
-        elif self.update:
-            checks.update(file, case, level)
-        else:
-            folder = self.pictures() / path.stem / path.stem
-            result, view = checks.examine(file, case, level, folder)
-            if result.status != "passed":
-                text = [f"{path}: {len(result.moved or ())} of {result.tested} moved"]
-                text += [*summary.moved_lines(result), result.versions_line]
-                title = f"{path.stem} moved"
-                views = [view] if view else []
-                text += [f"page: {_page(folder.parent, title, views)}"]
-                raise AssertionError("\n".join(filter(None, text)))
-            if result.message:
-                warnings.warn(f"{path}: {result.message}", stacklevel=2)
+            raise AssertionError(
+                f"{path}: the options of the baseline and the test differ: {others}."
+                f" `{UPDATE}` writes it again."
+            )
+        assert kept.file is not None, "one of 0.4 is refused"
+        now = kept.file.rendered(case)
+        folder = self.pictures() / path.stem / path.stem
+        result, section = checks.examine(kept.file, now, str(kept.scene), level, folder)
+        if section is not None:
+            text = [
+                f"{path}: {len(result.moved or ())} of {result.tested} moved. {result.headline}"
+            ]
+            text += [*summary.moved_lines(result), result.versions_line]
+            section = structs.replace(section, approval=UPDATE)
+            text += [f"page: {_page(folder.parent, section)}"]
+            raise AssertionError("\n".join(filter(None, text)))
+        if result.message:
+            warnings.warn(f"{path}: {result.message}", stacklevel=2)
         return True
 
     def picture(
@@ -208,34 +203,29 @@ class Fotismos:
         with the chance ``significance`` of an alarm though nothing changed.
         """
         __tracebackhide__ = True  # pytest shows the test, not this
-        path = self.folder / f"{atomic.file_name(name, 'a baseline')}.json"
+        path = baselines.placed(self.folder / f"{atomic.file_name(name, 'a baseline')}.exr")
         after = self._repeats(image)
+        level = self.significance if significance is None else significance
+        tolerance = None if within is None else _tolerance(within, max_visible)
         if not path.exists():
             if not self.update:
-                raise AssertionError(
-                    f"{path}: there is no such baseline. `pytest --fotismos-update` writes it."
-                )
-            baselines.write_pictures(path, _noiseless(after), None)
+                raise _missing(path)
+            checks.update(path, None, {}, _noiseless(after), name)
             return True
-        _, before = baselines.read_pictures(path)
-        begin = perf_counter()
-        level = self.significance if significance is None else significance
-        found = None
-        if within is None:
-            found = check_pictures(before, after, level)
-            fault = _drift(found)
-        else:
-            fault = _visible(before, after, within, _share(max_visible))
-        if fault and self.update:
-            baselines.write_pictures(path, _noiseless(after), None)
-        elif fault:
-            folder = self._shown(name, before, after)
-            found = found or check_pictures(before, after, level)
-            made = checks.of_pictures(path, name, status="failed", found=found, begin=begin)
-            _, section = checks.picture_section(made, before, found)
-            section = structs.replace(section, fault=fault, approval="pytest --fotismos-update")
-            page = _page(folder, f"{name} differs", moved=[section])
-            raise AssertionError(f"{path}: {fault}\npage: {page}")
+        file = self._kept(path, name).file
+        section = None
+        folder = self._report(name)
+        if file is not None:
+            _, section = checks.examine(file, after, name, level, folder, tolerance)
+        if self.update and (file is None or section is not None):
+            checks.update(path, None, {}, _noiseless(after), name)
+        elif section is not None:
+            made = section.check
+            text = [f"{path}: {made.headline}"]
+            if tolerance is None:
+                text += [f"{len(made.moved)} means moved.", *made.causes]
+            page = _page(folder, structs.replace(section, approval=UPDATE))
+            raise AssertionError(f"{' '.join(text)}\npage: {page}")
         return True
 
     def same(
@@ -248,17 +238,20 @@ class Fotismos:
         """Return True; fail the test if two pictures differ visibly; see :meth:`picture`."""
         __tracebackhide__ = True  # pytest shows the test, not this
         before = _noiseless(self._repeats(reference))
+        file = baselines.BaselineFile.of(Path("same"), None, {}, before)
         after = self._repeats(image)
-        if fault := _visible(before, after, within, _share(max_visible)):
-            raise AssertionError(f"{fault}\npictures: {self._shown('same', before, after)}")
+        tolerance = _tolerance(within, max_visible)
+        result, section = checks.examine(
+            file, after, "same", folder=self._report("same"), tolerance=tolerance
+        )
+        if section is not None:
+            raise AssertionError(f"{result.headline}\npictures: {result.pictures}")
         return True
 
-    def _repeats(self, image: Pictures) -> Repeats:
+    def _repeats(self, image: Pictures) -> Measured:
         """Return pictures as repeats."""
         if isinstance(image, (str, Path)):
-            beside = self.beside / image
-            repeats, _ = baselines.read_repeats(str(beside), None)
-            return repeats
+            return read_repeats(str(self.beside / image), Options())
         arrays = [image] if isinstance(image, np.ndarray) else list(image)
         for array in arrays:
             require_linear(np.asarray(array), "a picture")
@@ -268,21 +261,22 @@ class Fotismos:
                     " (height, width, 3)."
                 )
             require_finite(np.asarray(array), "the picture")
-        return Repeats.of(arrays)
+        require_one_size(arrays)
+        return picture(repeats.Pictures.of("the picture", arrays))
 
-    def _shown(self, name: str, before: Repeats, after: Repeats) -> Path:
-        """Write both pictures and the map of their difference; return their folder."""
-        folder = self.pictures() / atomic.file_name(name, "a picture")
-        folder.mkdir(parents=True, exist_ok=True)
-        error = images.error_map(LEADING(after.mean, before.mean), LEADING.map_range[1])
-        panels = {
-            "before": images.tonemap(before.mean),
-            "now": images.tonemap(after.mean),
-            LEADING.name: error,
-        }
-        for panel, shown in panels.items():
-            (folder / f"{panel}.png").write_bytes(images.png(shown))
-        return folder
+    def _kept(self, path: Path, name: str | None = None) -> baselines.Known:
+        """Return what a baseline of a scene, or of the picture of a name, is of."""
+        kept = baselines.known(path)
+        baselines.require_kind(path, kept.scene, name)
+        if kept.file is None and not self.update:
+            raise AssertionError(
+                f"{path}: this baseline is of fotismos 0.4, and cannot be compared. `{UPDATE}`"
+                " makes it again of what there is today."
+            )
+        return kept
+
+    def _report(self, name: str) -> Path:
+        return self.pictures() / atomic.file_name(name, "a picture")
 
     def _scene(self, scene: Scene) -> Scene:
         """Return a scene; a path relative to the test's folder, if there is such a file."""
@@ -292,11 +286,11 @@ class Fotismos:
         return beside if beside.is_file() else scene
 
     def _path(self, scene: Scene, name: str | None) -> Path:
-        if isinstance(scene, (str, Path)) and Path(scene).suffix == ".json":
-            return Path(scene)
+        if isinstance(scene, (str, Path)) and Path(scene).suffix in (baselines.NEW, baselines.OLD):
+            return baselines.placed(Path(scene))
         suffix = f"-{self.variant}" if self.variant else ""
         stem = atomic.file_name(name or _name(scene), "a baseline")
-        return self.folder / f"{stem}{suffix}.json"
+        return baselines.placed(self.folder / f"{stem}{suffix}{baselines.NEW}")
 
     def _options(self, options: dict[str, Any]) -> dict[str, Any]:
         return self._with_file(options) | ({"variant": self.variant} if self.variant else {})
@@ -311,39 +305,33 @@ class Fotismos:
         return options | {"heuristic": str(self.beside / name) if is_beside else name}
 
 
-def _page(
-    folder: Path, title: str, views: Sequence[SceneView] = (), moved: Sequence[Before] = ()
-) -> Path:
+def _page(folder: Path, section: Before) -> Path:
     """Write the page of a failure into its folder, in place of that of an earlier one."""
-    results.own(folder, results.PAGE, results.DETAILS)
-    return checks.write_page(folder, title, views, moved)
+    results.own(folder, results.PAGE)
+    return checks.write_page(folder, [section])
 
 
-def _noiseless(repeats: Repeats) -> Repeats:
+def _missing(path: Path) -> AssertionError:
+    return AssertionError(f"{path}: there is no such baseline. `{UPDATE}` writes it.")
+
+
+def _noiseless(measured: Measured) -> Measured:
     """Return a single picture as two that are equal, for one that has no noise to show."""
-    return replace(repeats, count=2) if repeats.count == 1 else repeats
+    (half,) = measured.halves.values()
+    if len(half.files) > 1:
+        return measured
+    return picture(replace(half, names=2 * half.names, files=2 * half.files))
 
 
-def _share(max_visible: float | str) -> float:
-    """Return a share from 0 to 1, or that of a text such as "5%"; ``InputError`` for others."""
-    share = share_of(max_visible) if isinstance(max_visible, str) else max_visible
-    if not 0.0 <= share <= 1.0:
+def _tolerance(within: float, max_visible: float | str) -> Tolerance:
+    """Return a tolerance; its share is from 0 to 1, or a text such as "5%"."""
+    bound = share_of(max_visible) if isinstance(max_visible, str) else max_visible
+    if not 0.0 <= bound <= 1.0:
         raise InputError(
             f"max_visible = {max_visible!r} is not a share of the pixels: give a number from 0 to"
             " 1, such as 0.05, or a text such as '5%'."
         )
-    return share
-
-
-def _visible(before: Repeats, after: Repeats, within: float, max_visible: float) -> str:
-    """Return what differs visibly, as a sentence; empty if a tolerance allows it."""
-    gate = picture_gate(before, after, checked_threshold(within), max_visible)
-    return "" if gate.state == "pass" else gate.sentence
-
-
-def _drift(found: PictureCheck) -> str:
-    """Return what moved by more than noise, as a sentence; empty for nothing."""
-    return f"{len(found.moved)} means moved. {found.cause()}" if found.moved else ""
+    return Tolerance(within=checked_threshold(within), bound=bound)
 
 
 def _open(scene: Scene, options: Mapping[str, Any], name: str | None = None) -> Case:

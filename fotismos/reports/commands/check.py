@@ -13,6 +13,7 @@ An option on the command line comes before the table. Folders are relative to th
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -26,9 +27,19 @@ from fotismos.heuristic.errors import InputError
 from fotismos.reports.command import PROCESSES, SCENES, Command
 from fotismos.reports.jobs import Terminal, command_line
 from fotismos.reports.terminal.parsing import definition, percentage
+from fotismos.reports.terminal.words import echo
 
 if TYPE_CHECKING:  # help needs no Mitsuba
     from fotismos.comparisons.records.check import CheckRecord
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """At most the share ``bound`` of the pixels may differ by more than the ΔE2000 ``within``."""
+
+    within: float
+    bound: float
+
 
 READING = ("--transfer", "--over")
 """Options that say how pictures are read; they are kept in their baseline."""
@@ -67,7 +78,7 @@ class Check(Baseline, frozen=True):
     --------
       fotismos check baselines --update --scene cornell-box --scene my_scene.xml
       fotismos check baselines
-      fotismos check baselines/cornell-box.json --update
+      fotismos check baselines/cornell-box.exr --update
       fotismos check baselines --update --picture hall='render_*.exr'
       fotismos check baselines --picture hall='new_*.exr'
       fotismos check baselines --picture hall='new_*.png' --within 2 --max-visible 5%
@@ -111,9 +122,9 @@ class Check(Baseline, frozen=True):
             type=definition,
         ),
     ] = ()
-    images: Annotated[
-        bool, option("With --update: keep small pictures next to BASELINE, for people to compare.")
-    ] = False
+    images: Annotated[bool, option("Does nothing any more: baselines always keep pictures.")] = (
+        False
+    )
     within: Annotated[
         float | None,
         option(
@@ -135,7 +146,6 @@ class Check(Baseline, frozen=True):
     def run(self, terminal: Terminal) -> int:
         """Check or update baselines, print what moved, and return the exit code."""
         self._require_what_fits(terminal.stated)
-        patterns = self._patterns()
         inputs = list(self.baseline.glob("*")) if self.baseline.is_dir() else [self.baseline]
         with terminal.processes(max(len(self.scenes), len(inputs))) as pool:
             from fotismos.reports.ci import checks, summary  # loaded late
@@ -144,15 +154,7 @@ class Check(Baseline, frozen=True):
             summary.require_free(terminal.junit, terminal.summary, [*self.scenes, *inputs])
             page = ""
             if self.update:
-                outcomes = checks.update_all(
-                    pool,
-                    self.baseline,
-                    scenes=self.scenes,
-                    with_pictures=self.images,
-                    significance=self.significance,
-                    options=self.changes,
-                    patterns=patterns,
-                )
+                outcomes = [made for made, _ in checks.update_all(pool, self)]
             else:
                 outcomes, page = self._examined(pool, terminal.output)
             code = summary.conclude_checks(outcomes, terminal, self.significance, page)
@@ -168,22 +170,15 @@ class Check(Baseline, frozen=True):
         from fotismos.reports.ci import checks, summary  # loaded late
         from fotismos.reports.files import results  # as late
 
-        bounds = self.tolerance()
         with results.hold(output / "check", command_line(), ()) as folder:
-            outcomes, views, moved = checks.examine_all(
-                pool,
-                self.baseline,
-                significance=self.significance,
-                seed=self.changes.get("seed"),
-                folder=folder,
-                patterns=self._patterns(),
-                tolerance=bounds and checks.Tolerance(within=bounds[0], bound=bounds[1]),
-            )
-            if not (views or moved):
+            found = checks.examine_all(pool, self, folder)
+            outcomes = [made for made, _ in found]
+            sections = [section for _, section in found if section is not None]
+            if not sections:
                 results.clear(folder, (results.PAGE, results.DETAILS))
                 return outcomes, ""
-            title = f"fotismos check: {summary.outcome(outcomes, self.significance)}"
-            return outcomes, str(checks.write_page(folder, title, views, moved))
+            outcome = summary.outcome(outcomes, self.significance)
+            return outcomes, str(checks.write_page(folder, sections, outcome))
 
     def _require_what_fits(self, stated: frozenset[str]) -> None:
         """Refuse options that what is asked has no use for."""
@@ -191,7 +186,7 @@ class Check(Baseline, frozen=True):
         if self.scenes:
             wanting.append("--scene")
         if self.images:
-            wanting.append("--images")
+            echo("--images does nothing any more: baselines always keep pictures.", err=True)
         if wanting and not self.update:
             raise InputError(
                 f"{', '.join(wanting)}: a check renders its baseline's scene and options. Add"
@@ -208,8 +203,9 @@ class Check(Baseline, frozen=True):
                 " --update."
             )
 
-    def tolerance(self) -> tuple[float, float] | None:
-        """Return a ΔE2000 and the largest share of pixels above it; None if drift decides.
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """How many pixels may differ visibly, and from which ΔE2000 on; None if drift decides.
 
         A project's own tolerance is for its pictures alone.
         """
@@ -219,18 +215,41 @@ class Check(Baseline, frozen=True):
         # Loaded late: help needs no NumPy.
         from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, checked_threshold
 
-        return (
-            checked_threshold(TOLERANCE if self.within is None else self.within),
-            LIMIT if self.max_visible is None else self.max_visible,
+        return Tolerance(
+            within=checked_threshold(TOLERANCE if self.within is None else self.within),
+            bound=LIMIT if self.max_visible is None else self.max_visible,
         )
 
-    def _patterns(self) -> dict[Path, str]:
-        """Return the patterns of pictures by the files of their baselines."""
-        is_file = self.baseline.suffix == ".json"
-        by_file = {}
-        for name, pattern in self.pictures:
-            file = f"{file_name(name, '--picture')}.json"
-            by_file[self.baseline if is_file else self.baseline / file] = pattern
-        if len(by_file) < len(self.pictures):
+    @property
+    def patterns(self) -> dict[Path, str]:
+        """The patterns of pictures, by the files of their baselines."""
+        names = {file_name(name, "--picture"): pattern for name, pattern in self.pictures}
+        if len(names) < len(self.pictures) or (len(names) > 1 and self._is_file):
             raise InputError("--picture: give each name once, and a folder for several pictures.")
-        return by_file
+        return {self._file(name): pattern for name, pattern in names.items()}
+
+    @property
+    def scene_words(self) -> dict[Path, str]:
+        """The scenes of baselines to be written, by their files; others are in the files."""
+        from fotismos.reports.ci import baselines  # loaded late
+
+        if self._is_file and len(self.scenes) > 1:
+            raise InputError(
+                f"{self.baseline}: a baseline is of one --scene; give a folder for several."
+            )
+        named = {self._file(baselines.name_of(scene)): scene for scene in self.scenes}
+        if len(named) < len(self.scenes):
+            raise InputError(
+                f"{', '.join(self.scenes)}: two scenes have one name. Give a file for each."
+            )
+        return named
+
+    @property
+    def _is_file(self) -> bool:
+        return self.baseline.suffix in (".exr", ".json")
+
+    def _file(self, name: str) -> Path:
+        """Return the file of the baseline of this name."""
+        from fotismos.reports.ci import baselines  # loaded late
+
+        return baselines.placed(self.baseline if self._is_file else self.baseline / f"{name}.exr")

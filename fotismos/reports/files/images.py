@@ -176,8 +176,11 @@ def webp_uri(file: bytes) -> str:
 #: Layers that keep float32, as terms do; the others are maps, for which half's 11 bits are enough.
 FULL_PRECISION = frozenset({"heuristic", "reference", "reference_stderr", "P", "N"})
 
-#: How further layers begin that keep float32: terms, and statistics of pictures in a baseline.
-FULL_PREFIXES = ("term.", "baseline.mean", "baseline.variance")
+#: How the layers of a baseline begin.
+PASS = "pass."
+
+#: How further layers begin that keep float32.
+FULL_PREFIXES = ("term.", PASS)
 
 #: Layers with X, Y, Z instead of R, G, B.
 VECTORS = frozenset({"P", "N"})

@@ -40,7 +40,6 @@ from fotismos.reports.page.scene_view import (
     EFFECT_COLOURS,
     EFFECTS_TITLE,
     NO_EFFECT,
-    Before,
     SceneView,
     WhyView,
     parts,
@@ -68,9 +67,6 @@ APART = 12
 """Two scenes look nearly alike if their pictures, in grey at so many pixels, are less apart: the
 mean difference of their levels, of 255."""
 
-FIRST_MOVED = 3
-"""Moved scenes that the headline of a check names."""
-
 CHARTED = 6
 """Most charts of error against time on the overview."""
 
@@ -96,21 +92,18 @@ class PageScene(SceneView):
 
 def render(
     views: Sequence[SceneView],
-    title: str = "",
     failures: Sequence[Failure] = (),
     state: str = "",
     threshold: float = TOLERANCE,
-    moved: Sequence[Before] = (),
     reloads: bool = False,
 ) -> str:
     """One HTML page of all scenes, worst first, that begins at a threshold.
 
     Views that :func:`drawn_scene` drew before are taken as they are: only new ones are work.
     `failures` are the scenes that could not be compared; `state` is a sentence on an unfinished
-    run; `moved` are pictures without a scene that moved. The page ``reloads`` itself until one
-    that does not takes its place, or until none was written for a while.
+    run. The page ``reloads`` itself until one that does not takes its place, or until none was
+    written for a while.
     """
-    page_title = title or title_of([view.record for view in views])
     taken = {view.id for view in views if isinstance(view, PageScene)}
     usual = THRESHOLDS.index(threshold)
     records = [view.record for view in views]
@@ -120,11 +113,6 @@ def render(
     ]
     scenes.sort(key=lambda scene: tables.extent(scene.record, threshold), reverse=True)
     failed = {identifier(failure.scene, taken): failure for failure in failures}
-    # On the page of a check, what moved takes the place of the verdict.
-    since = [*(view.before for view in views if view.before), *moved]
-    headline = " ".join(
-        [title, *(f"{one.check.name}: {one.headline}" for one in since[:FIRST_MOVED])]
-    )
     data = {
         "scenes": [
             *(scene.script for scene in scenes),
@@ -133,9 +121,9 @@ def render(
         "written": round(1000 * time()) if reloads else None,
         "thresholds": THRESHOLDS,
         "usual": threshold,
-        "headlines": _runs(lambda t: headline if since else verdict.headline(records, t)),
-        "missing": _runs(lambda t: "" if since else verdict.most_missing(records, t)),
-        "costs": _runs(lambda t: "" if since else verdict.costs(records, t)),
+        "headlines": _runs(lambda t: verdict.headline(records, t)),
+        "missing": _runs(lambda t: verdict.most_missing(records, t)),
+        "costs": _runs(lambda t: verdict.costs(records, t)),
         "terms": glossary.meanings(),
         "axis": _axis(scenes),
         **_drawing(),
@@ -143,8 +131,7 @@ def render(
     return rendered(
         "page.html.j2",
         SCRIPTS,
-        title=page_title,
-        note=title,
+        title=title_of(records),
         data=data,
         scenes=scenes,
         columns=tables.scenes(records, threshold).columns,
@@ -154,13 +141,12 @@ def render(
         settings=_size(records) if records else "",
         failures=failed,
         usual=usual,
-        priced=[] if since or len(scenes) < 2 else scenes,
+        priced=scenes if len(scenes) > 1 else [],
         charted=[scene for scene in scenes if scene.chart][:CHARTED],
         limit=LIMIT,
         leading=LEADING,
         details=DETAILS,
         state=state,
-        moved=moved,
     )
 
 

@@ -96,22 +96,16 @@ class CostView(Record):
 
 
 class Before(Record):
-    """What moved in a scene or picture since its baseline.
+    """What moved in a scene or picture since its baseline, as the page of a check shows it.
 
-    ``check`` is a :class:`fotismos.reports.ci.checks.CheckRecord`, which only checks need to load.
-    ``pictures`` are WebP files by their captions: how it was, and maps of the change. A test has a
-    ``fault`` in place of the check's headline, and an ``approval`` in place of its command.
+    ``check`` is a :class:`fotismos.comparisons.records.check.CheckRecord`, which only checks load.
+    ``pictures`` are WebP files by their captions: before, now, and the map of the change. A test
+    has an ``approval`` in place of the check's command.
     """
 
     check: Any
     pictures: dict[str, bytes]
-    fault: str = ""
     approval: str = ""
-
-    @property
-    def headline(self) -> str:
-        """What moved most."""
-        return self.fault or str(self.check.headline)
 
     @property
     def command(self) -> str:
@@ -124,9 +118,9 @@ class SceneView(Record):
 
     ``thumbnails`` are small named WebP files of both halves, the leading metric's map and terms;
     without ``embedded`` images, the scene has only these. ``worst`` is column and row of the pixel
-    with the largest error. ``files`` are labels, and paths relative to the page. ``before`` is what
-    moved since a baseline, on the page of a check. ``terms`` are those of 8.10 at pixels, ``live``
-    the points that the page can shade again (:mod:`fotismos.reports.page.why_view`).
+    with the largest error. ``files`` are labels, and paths relative to the page. ``terms`` are
+    those of 8.10 at pixels, ``live`` the points that the page can shade again
+    (:mod:`fotismos.reports.page.why_view`).
     """
 
     record: ComparisonRecord
@@ -138,7 +132,6 @@ class SceneView(Record):
     cost: CostView | None = None
     terms: PointsView | None = None
     live: PointsView | None = None
-    before: Before | None = None
     why: WhyView | None = None
 
     @property

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from fotismos.comparisons.audit.checks import Audit
-from fotismos.comparisons.records.check import Baseline, Checks, PictureBaseline
+from fotismos.comparisons.records.check import Baseline, Checks
 from fotismos.comparisons.records.comparison import ComparisonRecord
 from fotismos.comparisons.records.cost import Cost
 from fotismos.comparisons.records.engine import EngineCost
@@ -27,7 +27,6 @@ PUBLISHED: dict[str, Any] = {
     "cost": Cost,
     "engine": EngineCost,
     "fit": FitRecord,
-    "pictures": PictureBaseline,
     "run": RunRecord,
 }
 """The type of each record that is written to a file, by the name of its schema."""
