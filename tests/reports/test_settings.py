@@ -2,9 +2,10 @@
 
 import pytest
 
+from fotismos.comparisons.records.check import Tolerance
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.cli import cli
-from fotismos.reports.commands.check import Check, Tolerance
+from fotismos.reports.commands.check import Check
 from fotismos.reports.commands.compare import Compare
 from tests.shared.programs import command_line
 

@@ -1,5 +1,6 @@
 """Baselines, what moved from them, and the results of checks."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
@@ -118,6 +119,14 @@ class SmallestChanges(Record):
     mean: Colour
     block: Colour
     noisiest: Colour
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """At most the share ``bound`` of the pixels may differ by more than the ΔE2000 ``within``."""
+
+    within: float
+    bound: float
 
 
 class Change(Record, Generic[Value]):

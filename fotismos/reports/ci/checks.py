@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from msgspec import structs
 
@@ -22,7 +22,13 @@ from fotismos.comparisons.departure.drift import LINEAR_ROUNDING, SIDE, level_of
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
-from fotismos.comparisons.records.check import PICTURE, READERS, Change, CheckRecord
+from fotismos.comparisons.records.check import (
+    PICTURE,
+    READERS,
+    Change,
+    CheckRecord,
+    Tolerance,
+)
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.heuristic.program import versions
 from fotismos.reference.records import to_json
@@ -34,10 +40,6 @@ from fotismos.reports.page.scene_view import Before
 from fotismos.reports.page.templating import head, rendered
 from fotismos.reports.terminal import progress
 
-if TYPE_CHECKING:
-    from fotismos.reports.commands.check import Check as Asked
-    from fotismos.reports.commands.check import Tolerance
-
 RECORD = "check.json"
 
 LARGEST_ERROR = 2.0
@@ -45,6 +47,9 @@ LARGEST_ERROR = 2.0
 
 LONGEST = 256
 """Pixels of the longer side of the pictures on the page."""
+
+Asked = Any
+"""What the command was asked, :class:`fotismos.reports.commands.check.Check`, which imports this."""
 
 Outcome = tuple[CheckRecord, Before | None]
 """The result for a baseline, and its section of the page if it failed."""

@@ -27,13 +27,13 @@ from fotismos.comparisons.departure.metrics import RATIO
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import require_linear
 from fotismos.comparisons.pictures import require_one_size
+from fotismos.comparisons.records.check import Tolerance
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import in_file, known_as
 from fotismos.reference import records
 from fotismos.reference.rendering.passes import require_finite
 from fotismos.reference.scene.graph import set_variant
 from fotismos.reports.ci import baselines, checks, summary
-from fotismos.reports.commands.check import Tolerance
 from fotismos.reports.files import results
 from fotismos.reports.page.scene_view import Before
 from fotismos.reports.terminal.parsing import share_of

@@ -13,7 +13,6 @@ An option on the command line comes before the table. Folders are relative to th
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -22,7 +21,7 @@ from msgspec import Meta
 from fotismos.comparisons.atomic import file_name
 from fotismos.comparisons.options import option
 from fotismos.comparisons.processes.pool import Pool
-from fotismos.comparisons.records.check import Checks
+from fotismos.comparisons.records.check import Checks, Tolerance
 from fotismos.heuristic.errors import InputError
 from fotismos.reports.command import PROCESSES, SCENES, Command
 from fotismos.reports.jobs import Terminal, command_line
@@ -31,14 +30,6 @@ from fotismos.reports.terminal.words import echo
 
 if TYPE_CHECKING:  # help needs no Mitsuba
     from fotismos.comparisons.records.check import CheckRecord
-
-
-@dataclass(frozen=True)
-class Tolerance:
-    """At most the share ``bound`` of the pixels may differ by more than the ΔE2000 ``within``."""
-
-    within: float
-    bound: float
 
 
 READING = ("--transfer", "--over")
