@@ -49,7 +49,7 @@ LONGEST = 256
 """Pixels of the longer side of the pictures on the page."""
 
 Asked = Any
-"""What the command was asked, :class:`fotismos.reports.commands.check.Check`, which imports this."""
+"""What is asked, a :class:`fotismos.reports.commands.check.Check`, which imports this module."""
 
 Outcome = tuple[CheckRecord, Before | None]
 """The result for a baseline, and its section of the page if it failed."""
