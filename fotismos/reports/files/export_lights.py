@@ -7,11 +7,15 @@ cos o))^2``, the form that the extension recommends.
 
 from typing import Any
 
+import drjit as dr
 import numpy as np
 
 from fotismos.comparisons.plain_scene import PlainScene
 from fotismos.heuristic.convention import IRRADIANCE_PER_INTENSITY
+from fotismos.heuristic.lights import INTENSITIES, PLUGINS, light_fields
 from fotismos.reference.pairing.lamps import power_falloff, power_flux
+
+WHITE = (1.0, 1.0, 1.0)
 
 EVEN = 1 - 1e-4
 """Inner over outer angle of an even cone: glTF wants the inner one to be smaller."""
@@ -104,24 +108,27 @@ def _ratio(given: dict[str, Any], cone: dict[str, float], scene: PlainScene) -> 
     distance = np.maximum(np.linalg.norm(offset, axis=1), np.finfo(float).tiny)
     toward = offset / distance[:, None]
     lambert = np.maximum(np.sum(toward * scene.layers["N"][seen], axis=1), 0)
-    k0, k1, k2 = given["attenuation"]
-    textbook = 1 / (k0 + k1 * distance + k2 * distance**2)
-    if given.get("clamped"):
-        textbook = np.minimum(textbook, 1)
     physical = 1 / distance**2
-    if "cutoff" in given:
+    if cone:
         axis = np.array(given["direction"]) / np.linalg.norm(given["direction"])
-        cosine = -toward @ axis
-        angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
-        textbook = textbook * power_falloff(angle, given.get("exponent", 0.0))
-        textbook = textbook * (angle <= given["cutoff"])
-        if cone:
-            inner = np.cos(cone["innerConeAngle"])
-            outer = np.cos(cone["outerConeAngle"])
-            physical = physical * np.clip((cosine - outer) / (inner - outer), 0, 1) ** 2
+        inner = np.cos(cone["innerConeAngle"])
+        outer = np.cos(cone["outerConeAngle"])
+        physical = physical * np.clip((-toward @ axis - outer) / (inner - outer), 0, 1) ** 2
+    textbook = _arriving(given, scene.layers["P"][seen])
     here = float(np.sum(lambert * textbook))
     there = float(np.sum(lambert * physical))
     return here / there if there > 0 else 1.0
+
+
+def _arriving(given: dict[str, Any], positions: np.ndarray) -> np.ndarray:
+    """Return the light (N,) of a lamp of intensity 1 at positions (N, 3), by the kernel."""
+    kind = PLUGINS[f"heuristic_{given['type']}"]
+    fields = {name: given[name] for name in light_fields(kind) if name in given}
+    lamp = kind(**fields | dict.fromkeys(fields.keys() & INTENSITIES, WHITE))
+    arrival = lamp.illuminate(dr.llvm.Array3f64(positions.T.astype(float)))
+    colours = np.broadcast_to(np.array(arrival.diffuse, float), (3, len(positions)))
+    arriving: np.ndarray = colours[0]
+    return arriving
 
 
 def node(given: dict[str, Any], number: int) -> dict[str, Any]:
