@@ -48,6 +48,16 @@ def test_links_lead_somewhere(page):
             assert anchor in headings(place), target
 
 
+@pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md"])
+def test_guides_to_the_code_name_what_it_has(page):
+    code = (path.read_text() for path in (ROOT / "fotismos").rglob("*.py"))
+    known = set(re.findall(r"\w+", "\n".join(code)))
+    prose = re.sub(r"```.*?```", "", (ROOT / page).read_text(), flags=re.DOTALL)
+    named = re.findall(r"`([A-Za-z_][\w.]*)(?:\([^`]*\))?`", prose)
+    assert named
+    assert [name for name in named if not set(name.split(".")) <= known] == []
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_commands_in_examples_exist_with_their_options(page):
     blocks = MarkdownIt().parse(page.read_text())
