@@ -11,10 +11,8 @@ from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.comparison import (
-    Agreement,
     ComparisonRecord,
     NoiseTarget,
-    PictureFiles,
 )
 from fotismos.reference.pairing.pairing_record import Pairing
 from fotismos.reference.planning.plan_record import Plan
@@ -78,9 +76,11 @@ def _flat(record: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, An
 
 def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> Iterator[str]:
     """Yield a line for each scene, worst first, and what is special about single ones."""
+    said = []
     for record in records:
-        if record.agreement:
-            yield from _pictures(record, record.agreement)
+        of_scene = f"{record.scene}: " if len(records) > 1 else ""
+        said += [f"{of_scene}{sentence}" for sentence in verdict.given_pictures(record)]
+    yield from said and (*said, "")
     yield from printed(scenes(records, threshold), room())
     decisions = {verdict.decision(record, threshold) for record in records}
     doubt = "; ?: undecided" if "undecided" in decisions else ""
@@ -150,34 +150,6 @@ def _differs(threshold: float, record: ComparisonRecord) -> tuple[Any, ...]:
     """Return the share of the pixels that differ visibly, with a mark if it is undecided."""
     is_undecided = verdict.decision(record, threshold) == "undecided"
     return "? " if is_undecided else "", verdict.share(record, threshold).value
-
-
-def _pictures(record: ComparisonRecord, found: Agreement) -> Iterator[str]:
-    """Yield a picture's shift, and what is odd about it: all numbers depend on that.
-
-    Its mistakes are part of the verdict.
-    """
-    ratio = ", ".join(f"{value:.3g}" for value in found.ratio)
-    shift = found.shift
-    shifted = "not known"
-    if shift is not None:
-        is_still = round(shift[0], 1) == round(shift[1], 1) == 0
-        shifted = "none" if is_still else f"{shift[0]:+z.1f}, {shift[1]:+z.1f} pixels"
-    if record.picture:
-        yield from _files(record.scene, "picture", record.picture)
-    if record.reference_picture:
-        yield from _files(record.scene, "reference", record.reference_picture)
-    other = "the reference's" if record.picture else f"those of {record.heuristic}"
-    yield f"shift {shifted}; red, green, blue {ratio} times {other}"
-    yield from found.odd
-    yield ""
-
-
-def _files(scene: str, half: str, picture: PictureFiles) -> Iterator[str]:
-    yield f"{scene}: {half} {', '.join(picture.files)}"
-    if picture.tone_map:
-        yield f"the reference is shown by the tone map {picture.tone_map}, as the picture was"
-    yield from picture.notes
 
 
 def details(record: ComparisonRecord) -> Iterator[str]:

@@ -84,6 +84,36 @@ def truth(record: ComparisonRecord) -> HalfNames:
     return HalfNames(subject="Physical picture", title="Physical", name="physical")
 
 
+def given_pictures(record: ComparisonRecord) -> Iterator[str]:
+    """Yield what given pictures are: their files, where their content is, and how strong.
+
+    Their mistakes are part of the verdict.
+    """
+    found = record.agreement
+    if found is None:
+        return
+    sides = [(record.picture, judged(record)), (record.reference_picture, truth(record))]
+    for half, names in sides:
+        if half is not None:
+            yield f"The {names.name} is {'; '.join((', '.join(half.files), *half.notes))}."
+            if half.tone_map:
+                yield (
+                    f"The reference is shown by the tone map {half.tone_map}, as the picture was."
+                )
+    # What was placed is the picture, or else the reference.
+    (_, placed), (_, other) = sorted(sides, key=lambda side: side[0] is None)[:2]
+    if found.shift is None:
+        position = f"Edges do not tell whether the {placed.name} is aligned; its"
+    elif round(found.shift[0], 1) == round(found.shift[1], 1) == 0:
+        position = f"The content of the {placed.name} is not moved; its"
+    else:
+        moved = "{:z.1f}, {:z.1f}".format(*found.shift)
+        position = f"The content of the {placed.name} is moved by {moved} pixels, and its"
+    ratio = ", ".join(f"{value:.3g}" for value in found.ratio)
+    yield f"{position} red, green and blue are {ratio} times those of the {other.name}."
+    yield from found.odd
+
+
 def is_searched(record: ComparisonRecord) -> bool:
     """Return whether a method may be looked for: of a scene whose shader has no mistakes."""
     return bool(record.command and record.plan and not record.mistakes)

@@ -67,7 +67,7 @@ def test_a_picture_of_another_run_has_its_departure(run, tmp_path, monkeypatch):
     file = f"own/{scene}/comparison.exr:heuristic"
     code, said, _ = run(*words, "--image", file, "-o", "theirs")
     assert code == 0
-    assert said.splitlines()[1].startswith("shift ")
+    assert said.splitlines()[1].startswith("The content of the picture ")
     assert "The picture equals the textbook half to ΔE2000 0.01, away from edges." in said
     first, second = (
         json.loads((tmp_path / out / scene / "comparison.json").read_text())

@@ -75,7 +75,16 @@ MISTAKES = (
     (part("alfa = 1"), "'alfa' is not known.*alpha"),
     (part("alpha = 0"), "alpha = 0: give a number from 0.02 to 1[.]"),
     (part("alpha = []"), "at least one value"),
-    (part("alpha = {from = 0.1, to = 1}"), "from, steps, to"),
+    (part("alpha = [true]"), "alpha: Expected `float`, got `bool`"),
+    (part("alpha = nan"), "alpha = nan: give a number from 0.02 to 1[.]"),
+    (part("light_angle = 95"), "light_angle = 95: give a number from 0 to 89 deg[.]"),
+    (part("'a.b' = inf", "s.xml"), "a.b = inf: give a finite number"),
+    (part("alpha = {from = 0.1, to = 1, stepps = 3}"), "alpha: .*unknown field `stepps`"),
+    (
+        part("alpha = {from = 0.1, to = 1, steps = 4}", "lobe", "design = 'sobol'\npoints = 4"),
+        "from and to, without steps",
+    ),
+    (part("alpha = {from = 0.1, to = 1}"), "from, to and steps"),
     (part("alpha = {from = 0.5, to = 0.1, steps = 3}"), "from 0.5 to 0.1"),
     (part("light_angle = {from = 0, to = 9, steps = 3, scale = 'log'}"), "above 0"),
     (part("alpha = 0.1\nn = 3"), "two materials"),
@@ -117,7 +126,9 @@ def test_a_mistake_is_refused_with_what_is_allowed(tmp_path):
 
 
 def rows(*words):
-    found = [running.row(point) for point in running.all_points(design.parse(part(*words)))]
+    found = [
+        running.evaluated(point)[0] for point in running.all_points(design.parse(part(*words)))
+    ]
     assert all(row["error"] is None for row in found), found[0]["error"]
     return found
 
@@ -429,7 +440,7 @@ def test_the_shipped_dataset_is_that_of_its_study(shipped, rgb):
     for name, step in every.items():
         known = {row["point"]: row for row in dataset.rows(table, name)}
         for each in [each for each in points if each.part.name == name][::step]:
-            row = running.row(each)
+            row, _ = running.evaluated(each)
             for column in row.keys() - younger_metrics - {"exposure"}:
                 value, expected = row[column], known[row["point"]][column]
                 if isinstance(value, float):

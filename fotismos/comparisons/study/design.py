@@ -35,8 +35,6 @@ part whose scene is rendered may also set ``resolution``, ``spp`` (over all pass
 import tomllib
 from dataclasses import dataclass
 from itertools import product
-from math import isfinite
-from numbers import Real
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -147,6 +145,15 @@ class StudyFile:
     parts: tuple[StudyPart, ...]
     text: str
     figures: tuple[StudyFigure, ...] = ()
+
+
+class Range(Record):
+    """The values of a parameter from one to another, evenly spread on a scale."""
+
+    low: float = msgspec.field(name="from")
+    high: float = msgspec.field(name="to")
+    steps: Steps | None = None
+    scale: Literal["linear", "log"] = "linear"
 
 
 class PartTable(Record):
@@ -278,37 +285,24 @@ def _all_levels(table: PartTable, where: str) -> dict[str, Levels]:
 def _levels(raw: object, parameter: StudyParameter, is_grid: bool, where: str) -> Levels:
     """Read the values of a parameter; those of a range are rounded to six digits: 0.1 is 0.1."""
     if not isinstance(raw, dict):
-        listed = raw if isinstance(raw, list) else [raw]
+        listed = _converted(raw if isinstance(raw, list) else [raw], tuple[float, ...], where)
         if not listed:
             raise InputError(f"{where} = []: give at least one value.")
-        return Levels(tuple(_checked(value, parameter, where) for value in listed))
-    needed = {"from", "to", "steps"} if is_grid else {"from", "to"}
-    if not needed <= set(raw) <= {*needed, "scale"}:
-        raise InputError(
-            f"{where} has {', '.join(raw)}: give a range {', '.join(sorted(needed))} and, if you"
-            " like, scale (linear or log)."
-        )
-    low = _checked(raw["from"], parameter, f"{where}, from")
-    high = _checked(raw["to"], parameter, f"{where}, to")
-    scale = _converted(raw.get("scale", "linear"), Literal["linear", "log"], f"{where}, scale")
-    steps = _converted(raw.get("steps", 2), Steps, f"{where}, steps")
-    is_log = scale == "log"
+        return Levels(tuple(parameter.checked(value, where) for value in listed))
+    span = _converted(raw, Range, where)
+    if is_grid == (span.steps is None):
+        needed = "from, to and steps" if is_grid else "from and to, without steps"
+        raise InputError(f"{where} has {', '.join(raw)}: give a range {needed}.")
+    low = parameter.checked(span.low, f"{where}, from")
+    high = parameter.checked(span.high, f"{where}, to")
+    is_log = span.scale == "log"
     if not low < high or (is_log and low <= 0):
         least = "above 0 and " if is_log else ""
         raise InputError(f"{where} runs from {low:g} to {high:g}: begin {least}below the end.")
-    if not is_grid:
+    if span.steps is None:
         return Levels((low, high), True, is_log)
-    spaced = (np.geomspace if is_log else np.linspace)(low, high, steps)
+    spaced = (np.geomspace if is_log else np.linspace)(low, high, span.steps)
     return Levels(tuple(float(f"{value:.6g}") for value in spaced), True, is_log)
-
-
-def _checked(value: Any, parameter: StudyParameter, where: str) -> float:
-    is_number = isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
-    if not is_number or not parameter.low <= value <= parameter.high:
-        span = f"number from {parameter.low:g} to {parameter.high:g} {parameter.unit}"
-        allowed = span if isfinite(parameter.low) else "finite number"
-        raise InputError(f"{where} = {value!r}: give a {allowed.removesuffix(' 1').strip()}.")
-    return float(value)
 
 
 def _check_size(part: StudyPart, where: str) -> None:

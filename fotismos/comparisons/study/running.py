@@ -189,16 +189,12 @@ def kept_pictures(points: list[StudyPoint], folder: Path) -> dict[int, sheet.Pic
     return {number: pictures for number, pictures in found if pictures is not None}
 
 
-def row(point: StudyPoint) -> Row:
-    """Evaluate a point, the same in any process.
-
-    The row of a point that fails has its parameters and, in the column ``error``, the reason.
-    """
-    return evaluated(point)[0]
-
-
 def evaluated(point: StudyPoint) -> tuple[Row, sheet.Pictures | None]:
-    """Return the row of a point, and small pictures of it if it is rendered and did not fail."""
+    """Return the row of a point, and small pictures of it if it is rendered and did not fail.
+
+    They are the same in any process. The row of a point that fails has its parameters and, in the
+    column ``error``, the reason.
+    """
     _set_up()
     part = point.part
     columns: Row = {"error": None}

@@ -12,7 +12,7 @@ surface. The others are rendered.
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from math import cos, inf, radians, sin, tan
+from math import cos, inf, isfinite, radians, sin, tan
 from typing import Any, TypeAlias
 
 import mitsuba as mi
@@ -25,6 +25,7 @@ from fotismos.comparisons.halves import Halves
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.pictures import FEWEST, Pictures
 from fotismos.heuristic import heuristics
+from fotismos.heuristic.errors import InputError
 from fotismos.heuristic.lights import DirectionalLight
 from fotismos.reference.pairing.albedo import RoughPlastic, to_phong, to_roughplastic
 from fotismos.reference.pairing.factors import Convention, Phong
@@ -56,6 +57,14 @@ class StudyParameter:
     high: float
     default: float
     meaning: str
+
+    def checked(self, value: float, where: str) -> float:
+        """Return a value of the parameter; `InputError` begins with ``where`` it was given."""
+        if not (isfinite(value) and self.low <= value <= self.high):
+            span = f"number from {self.low:g} to {self.high:g} {self.unit}".removesuffix(" 1")
+            allowed = span if isfinite(self.low) else "finite number"
+            raise InputError(f"{where} = {value:g}: give a {allowed}.")
+        return value
 
 
 ROUGHPLASTIC = {

@@ -98,6 +98,7 @@ def environment() -> Environment:
         title_of=title_of,
         search=verdict.search,
         judged=verdict.judged,
+        given_pictures=verdict.given_pictures,
         moved=moved,
         truth=verdict.truth,
         saving=verdict.saving,
