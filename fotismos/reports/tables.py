@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.comparison import (
     ComparisonRecord,
     NoiseTarget,
@@ -91,8 +90,8 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
     for record in records:
         if record.caution and len(records) > 1:
             yield f"{record.scene}: {record.caution}"
-        if record.heuristic != Options().heuristic and not record.picture:
-            line = f"{record.scene}: shading {record.heuristic}"
+        if record.shader:
+            line = f"{record.scene}: shading {record.shader}"
             if record.textbook is not None:
                 own = number(record.metrics[LEADING.name].mean)
                 line += f" {own}, Phong {number(record.textbook)} (mean {LEADING.label})"

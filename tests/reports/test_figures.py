@@ -19,7 +19,7 @@ def test_a_scene_is_written_as_svg_and_pdf_with_its_number(tmp_path):
         content = path.read_bytes()
         assert content.startswith(b"%PDF") if path.suffix == ".pdf" else b"<svg" in content
     titles = [axes.get_title() for axes in figures.strip(records.comparison()).axes]
-    assert titles[:3] == ["heuristic", "reference", "ΔE2000: mean 4.33 (noise 0.0532)"]
+    assert titles[:3] == ["textbook", "physical", "ΔE2000: mean 4.33 (noise 0.0532)"]
 
 
 def test_a_strip_keeps_every_pixel():

@@ -396,6 +396,17 @@ class ComparisonRecord(Record):
         return tuple(half for half in (self.picture, self.reference_picture) if half is not None)
 
     @property
+    def shader(self) -> str:
+        """The name of the shading in the textbook's place; empty if that or a picture is judged."""
+        return "" if self.picture or self.heuristic == "phong" else self.heuristic
+
+    @property
+    def other_warnings(self) -> tuple[str, ...]:
+        """The warnings, without what is said of pictures."""
+        said = (*self.agreement.mistakes, *self.agreement.odd) if self.agreement else ()
+        return tuple(warning for warning in self.warnings if warning not in said)
+
+    @property
     def is_noise_known(self) -> bool:
         """Whether passes or repeats show the noise: two single pictures do not."""
         return len(self.given) < 2 or any(half.repeats > 1 for half in self.given)

@@ -18,6 +18,7 @@ from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.records.images import Comparison
 from fotismos.reports.files import images, results
 from fotismos.reports.terminal.words import number
+from fotismos.reports.verdict import judged, truth
 
 FORMATS = ("svg", "pdf")
 
@@ -51,10 +52,9 @@ def strip(comparison: Comparison) -> Figure:
     heading = f"{metric.label}: mean {number(summary.mean)}"
     if summary.noise_floor:
         heading += f" (noise {number(summary.noise_floor)})"
-    first = "picture" if comparison.record.picture else "heuristic"
     panels = {
-        first: images.tonemap(shown.heuristic, exposure),
-        "reference": images.tonemap(shown.reference, exposure),
+        judged(comparison.record).name: images.tonemap(shown.heuristic, exposure),
+        truth(comparison.record).name: images.tonemap(shown.reference, exposure),
         heading: images.error_map(shown.maps[metric.name], high),
     }
     height, width = shown.counted.shape
