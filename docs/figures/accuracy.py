@@ -12,10 +12,10 @@ from docs.figures import charts
 from docs.figures.documents import DOCS, fact, replace, write_table
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.cost.cost import cost
-from fotismos.comparisons.cost.front import at_size, fronted, sufficient
-from fotismos.comparisons.cost.methods import FULL_PLAN, STAND_INS
 from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.ladder.cost import cost
+from fotismos.comparisons.ladder.front import cheapest
+from fotismos.comparisons.ladder.methods import FULL_PLAN, STAND_INS
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.cost import Cost, Point
 from fotismos.reports.charts import vega
@@ -62,14 +62,9 @@ def measured() -> list[Cost]:
     found = []
     for name in (*SCENES, *map(str, LARGER)):
         case = open_case(name, Options(resolution=(SIZE[0] // 4, SIZE[1] // 4)))
-        found.append(cost(case.source, case.options).record)
+        found.append(cost(case.source, case.options, at=SIZE).record)
         print(name, flush=True)
     return found
-
-
-def at_full_size(record: Cost) -> tuple[Point, ...]:
-    """Return the points of a study with their times and front at :data:`SIZE`."""
-    return fronted(at_size(record.points, record.methods, SIZE))
 
 
 def setting(records: Sequence[Cost]) -> Iterator[str]:
@@ -88,7 +83,7 @@ def fronts(records: Sequence[Cost]) -> Iterator[tuple[str, ...]]:
     yield "scene", "method", "samples", "seconds", "mean ΔE2000"
     for record in (each for each in records if each.scene in AT_FULL_SIZE):
         error = float("inf")
-        for point in sorted(at_full_size(record), key=lambda point: point.seconds.value):
+        for point in sorted(record.points, key=lambda point: point.seconds.value):
             if point.front and point.error.value <= 0.9 * error:
                 error = point.error.value
                 numbers = f"{point.seconds.value:.3g}", number(error)
@@ -112,8 +107,8 @@ def methods(records: Sequence[Cost]) -> Iterator[tuple[str, ...]]:
     yield "scenes", "threshold", "method", "samples", "time over the kernel's"
     alike: dict[tuple[str, ...], list[tuple[Cost, list[Point | None]]]] = {}
     for record in records:
-        points = at_full_size(record)
-        chosen = [sufficient(points, limit) for limit in TOLERANCES]
+        points = record.points
+        chosen = [cheapest(points, limit) for limit in TOLERANCES]
         names = tuple(_named(one, record.methods[0].name) for one in chosen)
         alike.setdefault(names, []).append((record, chosen))
     for names, group in alike.items():
@@ -168,7 +163,7 @@ def _kernels(records: Sequence[Any]) -> str:
     for limit in TOLERANCES:
         saved = []
         for record in records:
-            chosen = sufficient(at_full_size(record), limit)
+            chosen = cheapest(record.points, limit)
             if chosen and record.method(chosen.method).is_kernel:
                 full = record.method(FULL_PLAN.name).per_sample_s.value
                 saved.append(full / record.method(chosen.method).per_sample_s.value)
@@ -201,7 +196,7 @@ def _stand_ins(records: Sequence[Any]) -> str:
     on_front = Counter(
         name
         for record in records
-        for name in {one.method for one in at_full_size(record) if one.front}.intersection(names)
+        for name in {one.method for one in record.points if one.front}.intersection(names)
     )
     never = [name for name in names if not on_front[name]]
     said = "; ".join(f"{name} ({count})" for name, count in on_front.most_common()) or "none"
@@ -217,14 +212,14 @@ def _named(point: Point | None, kernel: str) -> str:
 
 def _longest(record: Cost) -> Point:
     """Return the full plan with the most samples."""
-    own = (point for point in at_full_size(record) if point.method == FULL_PLAN.name)
+    own = (point for point in record.points if point.method == FULL_PLAN.name)
     return max(own, key=lambda point: point.spp)
 
 
 def _ratio(record: Cost, point: Point | None) -> float:
     """Return a point's time over that of the textbook kernel with the fewest samples."""
     kernel = record.methods[0].name
-    fewest = min(one.seconds.value for one in at_full_size(record) if one.method == kernel)
+    fewest = min(one.seconds.value for one in record.points if one.method == kernel)
     return point.seconds.value / fewest if point else 0.0
 
 

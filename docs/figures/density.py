@@ -13,14 +13,17 @@ from matplotlib.figure import Figure
 
 from docs.figures import documents
 from docs.figures.model_figures import COLOURS, GROUND, STYLE, quiet
-from fotismos.comparisons.cost import measure
+from fotismos.comparisons import turns
+from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery import scenes
+from fotismos.comparisons.ladder import climb
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
-from fotismos.comparisons.timing import ratio
+from fotismos.comparisons.turns import Time
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering.renderer import Renderer
+from fotismos.reference.rendering.sums import Accumulator
 from fotismos.reference.scene.source import Source
 from fotismos.reports.terminal.words import number
 
@@ -67,8 +70,9 @@ def measured() -> list[Density]:
     source, options = Source(EXACT, near_sphere), Options(resolution=(SIDE, SIDE))
     ready = prepare(source, options)
     kernel = replace(ready, reference=ready.heuristic, scene=ready.heuristic.scene)
-    reference = measure.converged(kernel, options.seed, None)
-    judge = measure.judge_by(reference, ready.counted, options.viewing)
+    total = Accumulator()
+    climb.converge(kernel, total, climb.REFERENCE_PASSES)
+    distances = LEADING.against(total.mean(), ready.counted, options.viewing)
     firsts = {EXACT: ready.heuristic.sampled(SPP)}
     meshes: dict[str, tuple[Interpolation, int]] = {}
     for n in FINENESS:
@@ -78,12 +82,13 @@ def measured() -> list[Density]:
             name = f"{shading.value} {n}"
             firsts[name] = renderer.sampled(SPP)
             meshes[name] = shading, renderer.scene.shapes()[0].face_count()
-    renderers = measure.tried(firsts, dict.fromkeys(firsts, (SPP,)), SIDE**2)
-    judged = {(name, SPP) for name in meshes}
-    errors, _ = measure.rendered(renderers, judge, judged, ROUNDS, options.seed, None, "")
-    lines = measure.timed(renderers, ROUNDS, SIDE**2)
+    errors: dict[str, list[float]] = {name: [] for name in meshes}
+    for images in turns.in_turn(firsts, options.seed, ROUNDS):
+        for name, found in errors.items():
+            found.append(LEADING.mean(distances(np.array(images[name]))))
+    times = {name: Time.of(half, (SIDE, SIDE), ROUNDS) for name, half in firsts.items()}
     return [
-        Density(*mesh, errors[name, SPP][0].value, ratio(lines[name], lines[EXACT]))
+        Density(*mesh, float(np.mean(errors[name])), turns.ratio(times[name], times[EXACT]))
         for name, mesh in meshes.items()
     ]
 

@@ -19,20 +19,20 @@ from pyarrow import csv, parquet
 
 from docs.figures.documents import DOCS, draw, replace
 from docs.figures.model_figures import GROUND, STYLE
-from fotismos.comparisons import timing
+from fotismos.comparisons import turns
 from fotismos.comparisons.case import Case, open_case
-from fotismos.comparisons.cost import measure
-from fotismos.comparisons.cost.methods import DIRECT, FULL_PLAN, Ladder
 from fotismos.comparisons.departure.colour import luminance
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.scenes import plastic_spheres
+from fotismos.comparisons.ladder import climb
+from fotismos.comparisons.ladder.methods import DIRECT, FULL_PLAN, Ladder
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.records.cost import Method
+from fotismos.comparisons.turns import Time
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Machine
-from fotismos.reference.rendering.gbuffer import image_size
 from fotismos.reference.rendering.passes import passes
 from fotismos.reference.rendering.sums import Accumulator
 from fotismos.reports.files import images
@@ -128,9 +128,11 @@ def on_scene(name: str) -> Iterator[Measured]:
     """Yield what is measured on a scene."""
     scene, light = SCENES[name]
     case = open_case(scene, Options(), name=name)
-    case = case.changed(resolution=measure.reduced(case.source, case.options, WIDTH))
+    case = case.changed(resolution=climb.reduced(case.source, case.options, WIDTH))
     ready = guarded(case.source, case.options)
-    reference = measure.converged(ready, case.options.seed, progress=None).mean
+    total = Accumulator()
+    climb.converge(ready, total, climb.REFERENCE_PASSES)
+    reference = total.mean()
     served = [method for method, lights in APPROXIMATIONS.items() if light in lights]
     rendered = {method.name: _rendered(case, method) for method in served}
     direct = rendered[NO_INTERREFLECTION.name].picture
@@ -166,19 +168,19 @@ def _rendered(case: Case, method: Method) -> Rendered:
     options = case.options.changed(heuristic=method.heuristic or "phong")
     ready = guarded(case.source, options)
     ladder = Ladder(ready)
-    firsts = {one.name: ladder.renderer(one, 4) for one in (KERNEL, method)}
-    width, height = image_size(ready.scene)
-    renderers = measure.tried(firsts, dict.fromkeys(firsts, (4,)), width * height)
-    measure.rendered(renderers, lambda _: (0.0, 0.0), (), ROUNDS, options.seed, None, "timing")
-    lines = measure.timed(renderers, ROUNDS, width * height)
+    size, spp = turns.timed_size(ready.reference)
+    firsts = {one.name: ladder.renderer(one, spp) for one in (KERNEL, method)}
+    for _ in turns.in_turn(firsts, options.seed, ROUNDS, size=size):
+        pass
+    times = {name: Time.of(renderer, size, ROUNDS) for name, renderer in firsts.items()}
     total = Accumulator()
-    renderer = firsts[method.name].sampled(measure.REFERENCE_SPP)
-    for one in passes([renderer], options.seed, measure.REFERENCE_PASSES):
+    renderer = firsts[method.name].sampled(climb.REFERENCE_SPP)
+    for one in passes([renderer], options.seed, climb.REFERENCE_PASSES):
         total.add(one[0])
     return Rendered(
         picture=total.mean(),
-        time=timing.ratio(lines[method.name], lines[KERNEL.name]).value,
-        prepare_s=getattr(firsts[method.name].integrator, "preparation", 0.0),
+        time=turns.ratio(times[method.name], times[KERNEL.name]).value,
+        prepare_s=firsts[method.name].preparation,
     )
 
 

@@ -16,8 +16,8 @@ from docs.figures import density, light_counts, phong_roughplastic
 from docs.figures.documents import DOCS, ROOT, fact, replace, run, write_table
 from fotismos.comparisons import atomic
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.ladder.cost import cost
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.fit import FitRecord
 from fotismos.comparisons.study import dataset, design

@@ -101,7 +101,7 @@ def with_causes(comparison: Comparison, ready: Prepared, progress: Progress | No
 
 def with_price(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
     """Return a comparison whose price has times, the samples that pass, and the effects needed."""
-    from fotismos.comparisons.ladder import price  # see above
+    from fotismos.comparisons import price  # see above
 
     return price.with_price(comparison, ready, progress)
 

@@ -112,7 +112,8 @@ class Times(Record):
     Attributes
     ----------
     median_s
-        Median time per pass, once compiled.
+        Median time of a pass's kernels, once compiled. Not of whole passes: the half that comes
+        first after a pause pays for it.
     first_s
         The first pass, with compilation.
     compile_s
@@ -126,10 +127,16 @@ class Times(Record):
     compile_s: Amount | None
 
     @classmethod
-    def of(cls, passes: Sequence[float], compilation: float) -> "Times":
-        """Return the times of some passes; the median is of those after the first, if any."""
+    def of(
+        cls, passes: Sequence[float], compilation: float, kernels: Sequence[float] = ()
+    ) -> "Times":
+        """Return the times of some passes, and of their kernels if they have any.
+
+        The median is of those after the first, if there are more.
+        """
+        timed = kernels or passes
         return cls(
-            median_s=median(passes[1:] or passes),
+            median_s=median(timed[1:] or timed),
             passes=len(passes),
             first_s=passes[0],
             total_s=sum(passes),

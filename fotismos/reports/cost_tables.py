@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from fotismos.comparisons.cost.front import sufficient
 from fotismos.comparisons.departure.criterion import TOLERANCE, share_above
 from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.ladder.front import cheapest
 from fotismos.reports.sentences import (
     OWN_FRONT,
     answer,
@@ -19,12 +19,12 @@ from fotismos.reports.sentences import (
     left_out,
     oddities,
     reference_of,
-    sized,
     stated,
     together,
 )
 from fotismos.reports.terminal.table import Column, Piece, Table, printed
 from fotismos.reports.terminal.words import given_time, number, parameter, percent, seconds
+from fotismos.reports.verdict import sized
 
 if TYPE_CHECKING:
     from fotismos.comparisons.records.cost import Cost, EffectCost, Point, TimedMethod
@@ -32,18 +32,11 @@ if TYPE_CHECKING:
     from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting, FrontPoint
     from fotismos.reference.records import Interval
 
-BENT = 0.1
-"""Share by which a time is off its method's straight line: more is mentioned."""
-
 
 def lines(record: Cost) -> Iterator[str]:
-    """Yield the lines of a study: methods, points, attribution, and what is predicted."""
+    """Yield the lines of a study: methods, points, attribution, the answer."""
     reference = record.reference
     size = sized(record.resolution)
-    yield answer(record)
-    if record.engine:
-        yield from judgements(record.engine)
-    yield ""
     yield (
         f"{record.scene}, {size}, {record.rounds} rounds with {record.threads} threads on"
         f" {record.machine.processor}"
@@ -58,12 +51,6 @@ def lines(record: Cost) -> Iterator[str]:
         yield "a probe disagreed with the plan, so everything is simulated: please report it"
     # Methods with their times, and what is odd or absent among them.
     yield from _section("Time of each method: overhead + samples x time per sample", times(record))
-    bent = [method.name for method in record.methods if abs(method.bend) > BENT]
-    if bent:
-        yield (
-            f"Time per sample is unsteady in {', '.join(bent)}, as on a busy machine: predicted"
-            " times are rough."
-        )
     # The names of the others say what they are.
     yield from explained(method.name for method in record.methods if method.family == "physical")
     yield from left_out(record)
@@ -78,19 +65,20 @@ def lines(record: Cost) -> Iterator[str]:
         yield "alone, last: added first, added last"
         yield together(record)
         yield closure(record)
-    # Another size, if one was requested.
-    if record.at:
-        title = f"Predicted times at {sized(record.at)}; errors are not predicted"
-        yield from _section(title, predicted(record))
+    # The answer stands last, where it is seen.
+    yield ""
+    if record.engine:
+        yield from judgements(record.engine)
+    yield answer(record)
 
 
 def lines_of_pictures(record: EngineCost, within: float) -> Iterator[str]:
     """Yield the lines of settings without a scene; pixels differ visibly above a ΔE2000."""
-    yield answer_of_pictures(record, within)
-    yield from judgements(record.engine)
-    yield ""
     yield f"{record.scene}, {sized(record.resolution)}: {reference_of(record)}"
     yield from _pictures(record.engine, within=within)
+    yield ""
+    yield from judgements(record.engine)
+    yield answer_of_pictures(record, within)
 
 
 def times(record: Cost) -> Table:
@@ -117,30 +105,24 @@ def _first(method: TimedMethod) -> tuple[Any, ...]:
 
 def points(record: Cost) -> Table:
     """Return error and time of one image by each method, with each number of samples."""
-    cheapest = sufficient(record.points, TOLERANCE)
+    best = cheapest(record.points, TOLERANCE)
 
     def notes(point: Point) -> str:
-        is_cheapest = cheapest and (point.method, point.spp) == (cheapest.method, cheapest.spp)
+        is_cheapest = best and (point.method, point.spp) == (best.method, best.spp)
         more = ", cheapest that looks right" if is_cheapest else ""
         return f"{_front(point) if point.front else ''}{more}".removeprefix(", ")
 
+    where = f"at {sized(record.at)}" if record.at else ""
     columns = (
-        *_timed(),
+        Column("method", "method"),
+        Column("samples", "spp", str),
+        Column("time", "seconds.value", short_time, detail=where),
+        Column("interval", "seconds", short_time),
         Column(f"mean {LEADING.label}", lambda point: _spread(point.error), "{:.3f}".format),
         Column("passes at", lambda point: _spread(point.tolerance), "{:.2f}".format),
         Column("front", notes),
     )
     return Table(columns, record.points)
-
-
-def _timed() -> tuple[Column, ...]:
-    """Return the columns of a method with a number of samples, and its time."""
-    return (
-        Column("method", "method"),
-        Column("samples", "spp", str),
-        Column("time", "seconds.value", short_time),
-        Column("interval", "seconds", short_time),
-    )
 
 
 def _spread(error: Interval) -> tuple[float, str, float]:
@@ -180,11 +162,6 @@ def settings(engine: Engine, within: float = TOLERANCE) -> Table:
     if engine.kernel_s:
         columns.insert(3, Column("x kernel there", "ratio", number))
     return Table(columns, engine.settings)
-
-
-def predicted(record: Cost) -> Table:
-    """Return the times that are predicted for another size."""
-    return Table(_timed(), record.predicted)
 
 
 def attribution(record: Cost, named: Callable[[str], str] = str) -> Table:

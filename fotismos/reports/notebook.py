@@ -27,10 +27,10 @@ from fotismos.comparisons.audit.checks import Kind
 from fotismos.comparisons.audit.checks import audit as examined
 from fotismos.comparisons.case import RGB, open_case
 from fotismos.comparisons.compare import compare_pictures
-from fotismos.comparisons.cost.methods import declare as declare_method
-from fotismos.comparisons.cost.timed_pictures import TimedPicture
 from fotismos.comparisons.departure.metrics import Metric
 from fotismos.comparisons.departure.metrics import declare as declare_metric
+from fotismos.comparisons.ladder.methods import declare as declare_method
+from fotismos.comparisons.ladder.timed_pictures import TimedPicture
 from fotismos.comparisons.names import as_files, with_files
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.records.check import CheckRecord

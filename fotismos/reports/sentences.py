@@ -9,10 +9,9 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fotismos.comparisons.cost.front import beats, is_below, reach, sufficient
 from fotismos.comparisons.departure.criterion import TOLERANCE, decide
 from fotismos.comparisons.departure.metrics import LEADING
-from fotismos.comparisons.records.engine import Reach
+from fotismos.comparisons.ladder.front import beats, is_below
 from fotismos.reports import verdict
 from fotismos.reports.glossary import meanings
 from fotismos.reports.terminal.words import (
@@ -21,13 +20,12 @@ from fotismos.reports.terminal.words import (
     number,
     parameter,
     percent,
-    seconds,
 )
 
 if TYPE_CHECKING:  # few commands need all
     from fotismos.comparisons.audit.checks import Audit
     from fotismos.comparisons.records.comparison import ComparisonRecord
-    from fotismos.comparisons.records.cost import Choice, Cost, Point
+    from fotismos.comparisons.records.cost import Choice, Cost
     from fotismos.comparisons.records.engine import Engine, EngineCost, EngineSetting
     from fotismos.comparisons.records.fit import FitRecord
 
@@ -35,42 +33,12 @@ if TYPE_CHECKING:  # few commands need all
 
 
 def answer(record: Cost) -> str:
-    """Return the cheapest method that looks right, at the size that was asked for.
-
-    If none does, whether more samples would.
-    """
-    points = record.predicted or record.points
-    size = sized(record.resolution)
-    # Times can be predicted for another size, and errors cannot.
-    at = f" at {sized(record.at)}" if record.at and record.predicted else ""
-    best = sufficient(points, TOLERANCE)
-    if best is None:
-        advice = beyond(reach(points, TOLERANCE))
-        return f"No measured method looks right at {size}. {advice}"
-    time = seconds(best.seconds.value)
-    method = f"{best.method} with {best.spp} samples"
-    sentence = f"Cheapest that looks right at {size}: {method}, {time}{at}"
-    # The ladder begins with the textbook kernel.
-    kernel = next(point for point in points if point.method == record.methods[0].name)
-    if kernel.method == best.method:
-        return f"{sentence}."
-    outcome = "looks right, too" if kernel.tolerance.high <= TOLERANCE else "fails"
-    return f"{sentence}; the textbook kernel takes {seconds(kernel.seconds.value)} and {outcome}."
-
-
-def beyond(need: Reach | None) -> str:
-    """Return what more samples than measured would do at a tolerance that no method passes at."""
-    if need is None:
-        return "More samples (--spp) decide."
-    if need.spp is None:
-        return (
-            f"More samples cannot help: even without noise, 5 % of the pixels of {need.method}, the"
-            f" nearest, exceed {LEADING.label} {number(need.left)}. That may be the noise of the"
-            " picture it is compared with; a larger --spp shows it."
-        )
-    return (
-        f"About {need.spp:,} samples per pixel with {need.method} would pass; a larger --spp"
-        " measures that."
+    """Return the cheapest method that looks right, at the size that was asked for."""
+    return verdict.answer(
+        record.points,
+        textbook=record.methods[0].name,
+        size=record.at or record.resolution,
+        stopped=record.stopped,
     )
 
 
@@ -191,47 +159,27 @@ def closure(record: Cost) -> str:
 
 
 def choice_lines(choice: Choice) -> Iterator[str]:
-    """Yield the method to take, its error and time, and the method that it replaces.
-
-    Then what each method in the sentence is.
-    """
-    size = sized(choice.resolution)
-    within = f"{LEADING.label} {parameter(choice.within)}"
-    chosen = choice.chosen
-    full = choice.full
-    is_smaller = choice.measured != choice.resolution
-    measured = f"measured at {sized(choice.measured)}, " if is_smaller else ""
-    if chosen is None:
-        yield (
-            f"At {size} no method passes at {within} with the samples measured here. The nearest is"
-            f" {_offer(choice.best, measured)}. {beyond(choice.reach)}"
-        )
-    elif chosen.method == full.method:
-        yield f"At {size}: {_offer(chosen, measured)}. Nothing faster passes at {within}."
-    else:
-        yield f"At {size}: {_offer(chosen, measured)}, in place of {_offer(full, measured)}."
-    if chosen and chosen.ties:
-        yield f"Too close to call: {', '.join(chosen.ties)}."
-    yield from explained(dict.fromkeys(((chosen or choice.best).method, full.method)))
-
-
-def _offer(point: Point, measured: str) -> str:
-    """Return a method, its time, and the error that 5 % exceed, at the size ``measured``."""
-    return (
-        f"{point.method} with {point.spp} samples per pixel in {seconds(point.seconds.value)}:"
-        f" {measured}5 % of the pixels exceed {LEADING.label} {number(point.tolerance.value)}"
+    """Yield the cheapest method that passes, what is too close to call, and what it is."""
+    yield verdict.answer(
+        choice.points,
+        textbook=choice.textbook,
+        size=choice.resolution,
+        tolerance=choice.within,
+        stopped=choice.stopped,
     )
+    if choice.measured != choice.resolution:
+        yield f"Errors are measured at {verdict.sized(choice.measured)}."
+    if choice.chosen is None:
+        return
+    if choice.chosen.ties:
+        yield f"Too close to call: {', '.join(choice.chosen.ties)}."
+    yield from explained([choice.chosen.method])
 
 
 def explained(methods: Iterable[str]) -> Iterator[str]:
     """Yield what each method is, if the glossary says it."""
     known = meanings()
     return (f"{method}: {known[method]}" for method in methods if method in known)
-
-
-def sized(resolution: tuple[int, int]) -> str:
-    """Return a size as options have it."""
-    return "x".join(map(str, resolution))
 
 
 # --- Fits, audits and plans -------------------------------------------------------------------
@@ -286,7 +234,7 @@ def price_lines(record: ComparisonRecord, within: float) -> Iterator[str]:
     outcome = {"pass": "passes", "fail": "fails"}.get(verdict.decision(record, within))
     judged = verdict.judged(record).subject
     what = f"{judged} {outcome or 'is undecided'} at {LEADING.label} {parameter(within)}"
-    size = sized(record.resolution)
+    size = verdict.sized(record.resolution)
     yield f"At {size}: {what}. {verdict.sentence(record, threshold=within)}"
     yield from record.mistakes
     if saving := verdict.saving(record):

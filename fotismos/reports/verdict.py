@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 from fotismos.comparisons.departure.criterion import LIMIT, TOLERANCE, decide, share_above
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.ladder.front import cheapest
 from fotismos.comparisons.records.comparison import (
     MOST_SPP,
     ComparisonRecord,
@@ -30,7 +31,8 @@ from fotismos.reference.planning.effects import EFFECTS, MICROFACETS
 from fotismos.reports.terminal.words import number, parameter, percent, seconds
 
 if TYPE_CHECKING:
-    from fotismos.comparisons.records.cost import Cost
+    from fotismos.comparisons.records.cost import Cost, Point
+    from fotismos.reference.rendering.passes import Size
 
 NAMED = 3
 """Number of effects that the sentence on a run names."""
@@ -411,40 +413,70 @@ def costs(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> 
 
 
 def _remedy(record: ComparisonRecord, cost: Cost, threshold: float) -> str:
-    """Return the cheapest method of a study that passes, or else the nearest that is better.
+    """Return the cheapest method of a study that passes, at the scene's own size if it can."""
+    found = answer(
+        cost.points,
+        textbook=cost.methods[0].name,
+        size=cost.at or cost.resolution,
+        tolerance=threshold,
+        stopped=cost.stopped,
+    )
+    if cheapest(cost.points, threshold):
+        return found
+    nearest = min(cost.points, key=lambda point: point.tolerance.value)
+    return f"{found} To try more samples: `{search(record, threshold, 4 * nearest.spp)}`."
 
-    At the scene's own size, if the study predicts for it.
+
+def answer(
+    points: Sequence[Point],
+    textbook: str,
+    size: Size,
+    tolerance: float = TOLERANCE,
+    stopped: str = "",
+) -> str:
+    """Return the cheapest method that looks right, and the best in the time of the textbook kernel.
+
+    ``points`` have their times at a size, and ``textbook`` is the kernel's name. If no method looks
+    right, the nearest is named, and why no more samples were taken, if that is why it ``stopped``.
     """
-    from fotismos.comparisons.cost.front import sufficient  # loaded late: few scenes have a study
-
-    points = cost.predicted or cost.points
-    size = "x".join(map(str, cost.at if cost.predicted and cost.at else cost.resolution))
-    kernels = [point for point in points if _is_judged(cost, point.method)]
-    if best := sufficient(points, threshold):
-        time = seconds(best.seconds.value)
-        if kernels:
-            time += f", kernel {seconds(min(point.seconds.value for point in kernels))}"
-        return f"{best.method[:1].upper()}{best.method[1:]} passes: {time} at {size}."
-    nearest = min(points, key=lambda point: point.tolerance.value)
-    more = f"To try more samples: `{search(record, threshold, 4 * nearest.spp)}`."
-    if nearest in kernels:
-        return f"None of the {len(cost.methods)} methods measured is closer. {more}"
+    looks = "looks right"
+    if tolerance != TOLERANCE:
+        looks = f"passes at {LEADING.label} {parameter(tolerance)}"
+    best = cheapest(points, tolerance)
+    if best is None:
+        nearest = min(points, key=lambda point: point.tolerance.value)
+        more = f" More samples may help, but {stopped}." if stopped else ""
+        return f"No method {looks} at {sized(size)}. The nearest is {offered(nearest)}.{more}"
+    found = f"{capitalised(best.method)} with {best.spp:,} samples is the cheapest that {looks}"
+    found = f"{found}: {seconds(best.seconds.value)} at {sized(size)}"
+    if best.method == textbook:
+        return f"{found}."
+    # The kernel has no noise but that of edges: its picture with the most samples counts.
+    kernel = [point for point in points if point.method == textbook][-1]
+    as_fast = [point for point in points if point.seconds.value <= kernel.seconds.value]
+    near = min(as_fast, key=lambda point: point.tolerance.value)
     return (
-        f"None of the {len(cost.methods)} methods measured passes. Nearest:"
-        f" {nearest.method} with {nearest.spp} samples, which passes at"
-        f" {LEADING.label} {number(nearest.tolerance.high)}. {more}"
+        f"{found}. In the textbook's time, {seconds(kernel.seconds.value)}, {near.method} reaches"
+        f" {LEADING.label} {number(near.tolerance.value)}."
     )
 
 
-def _is_judged(cost: Cost, name: str) -> bool:
-    """Return whether a method of a study is the kernel that is judged."""
-    return any(
-        name in (method.name, *method.names)
-        and method.is_kernel
-        and not (method.shadows or method.heuristic)
-        and method.interpolation == cost.interpolation
-        for method in cost.methods
+def offered(point: Point) -> str:
+    """Return a method with its samples and time, and the error that 5 % of its pixels exceed."""
+    return (
+        f"{point.method} with {point.spp:,} samples in {seconds(point.seconds.value)}, of which 5 %"
+        f" of the pixels exceed {LEADING.label} {number(point.tolerance.value)}"
     )
+
+
+def capitalised(text: str) -> str:
+    """Return a text that begins with a capital letter."""
+    return f"{text[:1].upper()}{text[1:]}"
+
+
+def sized(resolution: Size) -> str:
+    """Return a size as options have it."""
+    return "x".join(map(str, resolution))
 
 
 def search(record: ComparisonRecord, threshold: float, spp: int | None = None) -> str:

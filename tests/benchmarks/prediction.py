@@ -15,8 +15,7 @@ from fotismos.comparisons.case import open_case
 
 from fotismos.comparisons.options import Options  # isort: skip  it finds LLVM first
 
-from fotismos.comparisons.cost.front import at_size
-from fotismos.comparisons.cost.measure import Effort, measure_ladder
+from fotismos.comparisons.ladder.climb import Effort, climbed
 
 SCENES = ("fig-8-9", "fig-6-10", "plastic-spheres", "cornell-box")
 TARGET = 1280, 720
@@ -59,13 +58,13 @@ def summary(found):
 def _deviations(name, rounds, target=TARGET):
     """Compare the study's prediction with a study at the target, both with the fewest samples."""
     case = open_case(name, Options())
-    effort = Effort(rounds=rounds, largest=4, is_short=True)
+    effort = Effort(rounds=rounds, largest=4, is_short=True, goes_on=False)
     at_target = case.options.changed(resolution=target)
-    small = measure_ladder(case.source, case.options, effort, silent, at=target)
-    whole = measure_ladder(case.source, at_target, effort, silent)
-    predicted = {point.method: point for point in at_size(small.points, small.methods, target)}
+    small = climbed(case.source, case.options, effort, silent, at=target)
+    whole = climbed(case.source, at_target, effort, silent)
+    predicted = {point.method: point for point in small.points(target)}
     found = []
-    for point in whole.points:
+    for point in whole.points():
         said = predicted[point.method]
         found.append(
             {

@@ -11,9 +11,9 @@ from axe_playwright_python.sync_playwright import Axe
 from msgspec import structs
 from playwright.sync_api import sync_playwright
 
-from fotismos.comparisons.cost.engine import Study
 from fotismos.comparisons.departure import regions
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS, drawn, log2_luminance_ratio
+from fotismos.comparisons.ladder.engine import Study
 from fotismos.comparisons.records.departure import Region
 from fotismos.comparisons.records.images import Comparison
 from fotismos.reference.records import Machine, Missing, Pixels, plain

@@ -4,22 +4,27 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import jsonschema
 import msgspec
+import numpy as np
 import pytest
 from msgspec import structs
 
+from fotismos.comparisons import turns
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.cost import cost as studies
-from fotismos.comparisons.cost import measure, methods
-from fotismos.comparisons.cost.cost import cost
-from fotismos.comparisons.cost.measure import WIDTH, Effort, measure_ladder, reduced
-from fotismos.comparisons.cost.methods import BUILT_IN, Ladder, declare
 from fotismos.comparisons.gallery.builtin import SCENES
+from fotismos.comparisons.ladder import climb, methods
+from fotismos.comparisons.ladder import cost as studies
+from fotismos.comparisons.ladder.climb import LARGEST, WIDTH, Climb, Effort, climbed, reduced
+from fotismos.comparisons.ladder.cost import cost
+from fotismos.comparisons.ladder.front import cheapest
+from fotismos.comparisons.ladder.methods import BUILT_IN, Ladder, declare
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.records.cost import Cost, Method
+from fotismos.comparisons.turns import Time
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Interval
 from fotismos.reference.scene.graph import set_variant
@@ -27,13 +32,14 @@ from fotismos.reference.scene.source import Source
 from fotismos.reports import cost_tables
 from fotismos.reports.run import cost_files
 from fotismos.reports.terminal.words import as_typed
+from fotismos.reports.verdict import answer
 from tests.shared.misplanned import scene as described
 from tests.shared.noisy import require_equal, whole
 from tests.shared.schemas import schema
 from tests.shared.small_scene import PLAIN, SCENE
 
 SCHEMA = schema("cost")
-TINY = Effort(rounds=2, largest=4)
+TINY = Effort(rounds=2, largest=4, goes_on=False)
 CORPUS = Path(__file__).parents[1] / "corpus"
 
 
@@ -41,8 +47,8 @@ CORPUS = Path(__file__).parents[1] / "corpus"
 def short():
     """Times of these scenes need not repeat."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(measure, "LEAST_S", 0.0)
-        patched.setattr(measure, "REFERENCE_SPP", 4)
+        patched.setattr(turns, "SAMPLES", 0)
+        patched.setattr(climb, "REFERENCE_SPP", 4)
         yield
 
 
@@ -221,7 +227,7 @@ def test_the_command_predicts_at_another_shape_than_the_films(rgb, run, tmp_path
     words = ("--spp", 4, "--rounds", 2, "--at", "160x100", "-o", tmp_path)
     code, said, _ = run("cost", "lambert-sphere", *words)
     assert code == 0
-    assert "Predicted times at 160x100" in said
+    assert "time at 160x100" in said
     place = tmp_path / "cost/lambert-sphere"
     text = (place / "cost.json").read_text()
     jsonschema.Draft202012Validator(SCHEMA).validate(json.loads(text))
@@ -230,9 +236,9 @@ def test_the_command_predicts_at_another_shape_than_the_films(rgb, run, tmp_path
     files = {path.name for path in place.iterdir()}
     assert {"cost.svg", "cost-reference.png", "cost-method-phong-kernel.png"} <= files
     assert (record.resolution, record.at) == ((128, 80), (160, 100))
-    assert {point.method for point in record.predicted} == {row.name for row in record.methods}
+    assert {point.method for point in record.points} == {row.name for row in record.methods}
     kernel = record.method("Phong kernel")
-    (predicted,) = (p for p in record.predicted if (p.method, p.spp) == (kernel.name, 4))
+    (predicted,) = (p for p in record.points if (p.method, p.spp) == (kernel.name, 4))
     assert predicted.seconds.low <= predicted.seconds.value <= predicted.seconds.high
     assert predicted.seconds.value == pytest.approx(kernel.seconds(4 * 160 * 100).value)
 
@@ -247,13 +253,91 @@ def test_sizes_that_cannot_be_predicted_are_refused(run):
         assert reason in error
 
 
+# -- More samples ----------------------------------------------------------------------------------
+
+
+class Judged(Climb):
+    """A ladder of two methods whose tolerances follow a law, and whose kernels take a time."""
+
+    def __init__(self, laws, seconds, size=(16, 16)):
+        methods = [Method(name=name, family="physical", monte_carlo=True) for name in laws]
+        self.ladder = SimpleNamespace(methods=methods)
+        self.steps = (SimpleNamespace(before=methods[0]),)
+        self.effort = Effort(rounds=6)
+        self.ready = SimpleNamespace(size=size)
+        self.stopped = ""
+        self.total = SimpleNamespace(count=10**9)
+        self.asked = []
+        self._laws = laws
+        self._errors = {name: {} for name in laws}
+        turn = np.ones(6)
+        self._times = {
+            name: Time(per_sample=time * turn, overhead=1e-6 * turn, processors=1.0)
+            for name, time in seconds.items()
+        }
+        first = SimpleNamespace(times=[1.0], preparation=0.0)
+        self._renderers = dict.fromkeys(laws, first)
+        self._progress = None
+        for spp in (4, 16, 64):
+            self._judge(list(laws), spp, 6)
+        self.asked.clear()
+
+    def _judge(self, names, spp, rounds):
+        self.asked.append((tuple(names), spp))
+        for name in names:
+            left, noise = self._laws[name]
+            tolerance = np.hypot(left, noise / np.sqrt(spp))
+            near = Interval(value=tolerance, low=0.99 * tolerance, high=1.01 * tolerance)
+            self._errors[name][spp] = near, near
+
+
+def test_samples_grow_until_the_cheapest_that_passes_is_known():
+    laws = {"biased": (9.0, 3.0), "slow": (0.0, 20.0), "fast": (0.0, 60.0)}
+    climb = Judged(laws, {"biased": 1e-9, "slow": 50e-9, "fast": 1e-9})
+    climb._go_on(2.0)
+    # Slow passes with 256 samples, and fast with 1,024, which takes less time.
+    assert climb.asked == [(("slow", "fast"), 256), (("fast",), 1024)]
+    best = cheapest(climb.points(), 2.0)
+    assert (best.method, best.spp, climb.stopped) == ("fast", 1024, "")
+
+
+@pytest.mark.parametrize(
+    ("laws", "seconds", "stopped"),
+    [
+        ({"biased": (9.0, 3.0)}, 1e-9, ""),
+        ({"noisy": (0.0, 2000.0)}, 1e-9, "262,144 samples would take more than 60 s"),
+        ({"noisy": (0.0, 2000.0)}, 1e-3, "256 samples would take more than 60 s"),
+    ],
+)
+def test_what_cannot_pass_or_takes_too_long_takes_no_more_samples(laws, seconds, stopped):
+    climb = Judged(laws, dict.fromkeys(laws, seconds))
+    climb._go_on(2.0)
+    assert climb.stopped == stopped
+    assert cheapest(climb.points(), 2.0) is None
+    said = answer(climb.points(), textbook="none", size=(16, 16), stopped=climb.stopped)
+    assert said.startswith("No method looks right at 16x16. The nearest is ")
+    assert ("More samples may help" in said) is bool(stopped)
+
+
 @pytest.mark.thorough
-def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does(
+@pytest.mark.guarantee("attribution", "`cost` goes on in samples until a method looks right.")
+def test_a_study_goes_on_until_a_method_looks_right(rgb):
+    case = open_case("cornell-box", Options(resolution=(24, 24)))
+    climb = climbed(case.source, case.options, Effort(rounds=2), lambda *_: None)
+    points = climb.points()
+    assert max(point.spp for point in points) > LARGEST
+    best = cheapest(points, 2.0)
+    assert best.tolerance.high <= 2.0
+    assert best.method == "full plan"
+
+
+@pytest.mark.thorough
+def test_plan_within_names_the_cheapest_that_passes_and_exits_with_1_if_none_does(
     rgb, run, monkeypatch
 ):
     source, few = SCENES["lambert-sphere"].source(), Options(resolution=(12, 12))
-    found = measure_ladder(source, few, TINY, lambda *_: None)
-    monkeypatch.setattr(studies, "measure_ladder", lambda *_, **__: found)
+    found = climbed(source, few, TINY, lambda *_: None)
+    monkeypatch.setattr(studies, "climbed", lambda *_, **__: found)
     words = "plan", "lambert-sphere", "--resolution", "12x12"
     code, said, _ = run(*words, "--within", 10, "--json")
     assert code == 0
@@ -264,18 +348,16 @@ def test_plan_within_names_the_fastest_that_passes_and_exits_with_1_if_none_does
     assert omitted.startswith("Left out, since it changes nothing: ")
     assert made["price"]["left_out"]
     assert {sample["threshold"] for sample in made["price"]["samples"]} >= {10.0}
-    assert sentence.startswith("At 64x64: ")
-    assert ": measured at 12x12, 5 % of the pixels exceed ΔE2000" in sentence
-    best, full, chosen = (made[name]["tolerance"]["value"] for name in ("best", "full", "chosen"))
-    assert 0 < best <= full < 10 > chosen
-    assert made["chosen"]["seconds"]["low"] <= made["full"]["seconds"]["high"]
+    assert "is the cheapest that passes at ΔE2000 10: " in sentence
+    assert "Errors are measured at 12x12." in said
+    assert made["chosen"]["tolerance"]["high"] <= 10
+    assert made["chosen"]["method"] in {point["method"] for point in made["points"]}
     assert {"shadow map", "hemisphere ambient"} <= made["left_out"].keys()
     none = Interval(value=20.0, low=19.0, high=21.0)
-    points = tuple(structs.replace(point, tolerance=none) for point in found.points)
-    monkeypatch.setattr(studies, "measure_ladder", lambda *_, **__: replace(found, points=points))
+    points = tuple(structs.replace(point, tolerance=none) for point in found.points())
+    found.points = lambda at=None: points
     code, said, _ = run(*words, "--within", 10)
     assert code == 1
-    assert "\nAt 12x12 no method passes at ΔE2000 10 with the samples measured here" in said
-    assert "More samples (--spp) decide" in said
+    assert "\nNo method passes at ΔE2000 10 at 12x12. The nearest is " in said
     code, _, said = run(*words, "--within", 1.1)
     assert (code, "in steps of 0.25" in said) == (2, True)

@@ -10,10 +10,10 @@ import pytest
 from fotismos.comparisons import attribution
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.cost.methods import Ladder
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.hybrids import IN_EMISSION, HybridImages, HybridScenes
+from fotismos.comparisons.ladder.methods import Ladder
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded, prepare
 from fotismos.comparisons.records.cost import Method

@@ -4,12 +4,12 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from fotismos.comparisons import price
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS
 from fotismos.comparisons.gallery.builtin import SCENES
-from fotismos.comparisons.ladder import price
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
 from fotismos.comparisons.records.comparison import MOST_SPP

@@ -5,13 +5,14 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 
+from fotismos.comparisons import turns
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.ladder import turns
-from fotismos.comparisons.ladder.turns import TURNS, Time
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.steps import PRICE
+from fotismos.comparisons.turns import TURNS, Time
+from fotismos.reference.records import Times
 from fotismos.reports import tables
 from fotismos.reports.terminal.words import number
 
@@ -111,3 +112,14 @@ def test_the_lines_and_the_record_have_the_same_ratio(rgb):
     assert ratio.low <= ratio.value <= ratio.high
     printed = "\n".join(tables.details(record))
     assert f"sample: {number(ratio.value)} times the textbook's" in printed
+
+
+def test_a_median_of_passes_is_that_of_their_kernels():
+    """Of whole passes, the half that comes first after a pause would be the slower one."""
+    assert Times.of([9.0, 5.0, 1.0], 0.0, [0.3, 0.2, 0.1]).median_s == pytest.approx(0.15)
+    assert Times.of([9.0, 5.0, 1.0], 0.0).median_s == 3.0
+    half = prepare(open_case("lambert-sphere", Options(resolution=(24, 16))).source).reference
+    for _ in half.passes(3):
+        pass
+    assert half.pass_times().median_s == pytest.approx(np.median(half.kernel_times[1:]))
+    assert 0 < half.pass_times().median_s < max(half.times[1:])

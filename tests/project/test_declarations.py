@@ -18,9 +18,9 @@ import pytest
 from scipy.ndimage import uniform_filter
 
 from fotismos.comparisons.check.measured import Measured
-from fotismos.comparisons.cost import methods
 from fotismos.comparisons.departure.metrics import METRICS, Metric, declare
 from fotismos.comparisons.fit.fit import RenderedHalves
+from fotismos.comparisons.ladder import methods
 from fotismos.comparisons.pictures import Pictures
 from fotismos.comparisons.records.check import HALVES
 from fotismos.comparisons.records.cost import Method

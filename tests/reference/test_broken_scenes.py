@@ -14,12 +14,12 @@ from fotismos.comparisons.case import open_case
 from fotismos.comparisons.check.measured import measure_scene
 from fotismos.comparisons.check.moved import check
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.cost.cost import cost
 from fotismos.comparisons.departure import criterion
 from fotismos.comparisons.departure.criterion import TOLERANCE, caution
 from fotismos.comparisons.departure.metrics import leading_distance
 from fotismos.comparisons.fit.fit import fit
 from fotismos.comparisons.halves import Halves
+from fotismos.comparisons.ladder.cost import cost
 from fotismos.comparisons.options import LARGEST_SPP, Options
 from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.comparisons.study import design

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.cost.methods import Ladder
+from fotismos.comparisons.ladder.methods import Ladder
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.reference.rendering.renderer import Renderer, variant

@@ -19,8 +19,8 @@ import pytest
 from rich.console import Console
 
 from fotismos.comparisons.case import open_case
-from fotismos.comparisons.cost import measure
 from fotismos.comparisons.fit import fit as fitting
+from fotismos.comparisons.ladder import climb
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
 from fotismos.heuristic.errors import InputError
@@ -360,8 +360,8 @@ def test_a_pipe_gets_a_line_with_the_count_every_ten_seconds_at_most(capsys):
 
 def test_help_of_costs_and_fits_states_their_own_defaults(run):
     texts = {name: " ".join(run(name, "--help")[1].split()) for name in ("cost", "fit", "export")}
-    assert f"reduced to a width of {measure.WIDTH}]" in texts["cost"]
-    assert f"[default: up to {measure.Effort().largest}]" in texts["cost"]
+    assert f"reduced to a width of {climb.WIDTH}]" in texts["cost"]
+    assert f"[default: {climb.LARGEST}, then more until a method looks right]" in texts["cost"]
     assert "[default: {}x{}]".format(*fitting.RESOLUTION) in texts["fit"]
     assert f"[default: {fitting.SPP}]" in texts["fit"]
     for option in ("--spp", "--seed", "--pixels-per-degree"):

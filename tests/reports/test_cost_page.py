@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import replace
-from math import ceil
 
 import jsonschema
 import pytest
@@ -12,7 +11,7 @@ from msgspec import convert, structs
 
 from fotismos.comparisons.records.cost import Point
 from fotismos.reference.records import Interval
-from fotismos.reports import cost_tables, sentences
+from fotismos.reports import cost_tables, sentences, verdict
 from fotismos.reports.charts import cost_charts
 from fotismos.reports.page import page
 from fotismos.reports.page.scene_view import SceneView
@@ -72,41 +71,41 @@ def test_page_and_terminal_name_what_cannot_be_measured_a_busy_machine_and_ties(
     assert "22.25" in text
 
 
-def test_page_and_terminal_say_which_sample_count_would_pass(study):
-    """By the two counts of the full plan: the noise's square falls with the samples."""
-    record = study.record
-    few, many = (point.tolerance.value**2 for point in record.points[1:])
-    left = (4 * many - few) / 3
-    spp = 16 * (many - left) / (4 - left)
-    size = sentences.sized(record.resolution)
-    more = (
-        f"No measured method looks right at {size}. About {ceil(spp)} samples per pixel with full"
-        " plan would pass;"
+def test_the_last_line_and_the_title_are_the_answer(study):
+    record = structs.replace(study.record, stopped="64 samples would take more than 60 s")
+    nearest = record.points[2]
+    size = verdict.sized(record.resolution)
+    answer = (
+        f"No method looks right at {size}. The nearest is full plan with 16 samples in"
+        f" {seconds(nearest.seconds.value)}, of which 5 % of the pixels exceed ΔE2000"
+        f" {number(nearest.tolerance.value)}. More samples may help, but 64 samples would take more"
+        " than 60 s."
     )
-    first, *_ = cost_tables.lines(record)
-    assert more in first
-    assert more in Page(shown(study)).text
+    *_, last = cost_tables.lines(record)
+    assert last == answer
+    assert cost_files.title(record, 2.0) == f"fig-8-9: {answer}"
+    assert answer in Page(shown(replace(study, record=record))).text
 
 
-def test_the_page_has_what_is_predicted_and_the_table_marks_the_cheapest(study):
+def test_times_are_of_the_size_that_was_asked_for_and_the_table_marks_the_cheapest(study):
     record = study.record
     right = structs.replace(record.points[2], tolerance=Interval(value=1.0, low=0.9, high=1.1))
-    points = (*record.points[:2], right)
-    predicted = structs.replace(record, at=(1920, 1080), points=points, predicted=points)
+    predicted = structs.replace(record, at=(1920, 1080), points=(*record.points[:2], right))
     html = Page(shown(replace(study, record=predicted))).text
-    assert "Predicted times at 1920 × 1080" in html
-    assert "Predicted times at" not in Page(shown(study)).text
+    assert "Errors depend on the size, and are not predicted" in html
+    assert "Errors depend on the size" not in Page(shown(study)).text
     rows = "\n".join(cost_tables.lines(predicted)).splitlines()
-    marked = [row for row in rows if "cheapest that looks right" in row]
+    assert "time at 1920x1080" in "\n".join(rows)
+    marked = [row for row in rows[:-1] if "cheapest that looks right" in row]
     assert len(marked) == 1
     assert marked[0].startswith(right.method)
-    size = sentences.sized(record.resolution)
-    begin = f"Cheapest that looks right at {size}: {right.method} with {right.spp} samples, "
-    assert rows[0].startswith(begin)
-    assert f"{seconds(right.seconds.value)} at 1920x1080; the textbook kernel takes" in rows[0]
-    # Errors depend on the size, so none stands below.
-    first = rows.index("Predicted times at 1920x1080; errors are not predicted")
-    assert rows[first + 1].split() == ["method", "samples", "time", "interval"]
+    kernel = record.points[0]
+    assert rows[-1] == (
+        f"Full plan with {right.spp} samples is the cheapest that looks right:"
+        f" {seconds(right.seconds.value)} at 1920x1080. In the textbook's time,"
+        f" {seconds(kernel.seconds.value)}, Phong kernel reaches ΔE2000"
+        f" {number(kernel.tolerance.value)}."
+    )
 
 
 def test_given_pictures_stand_beside_the_methods_with_times_as_given(study):

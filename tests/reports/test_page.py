@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fotismos.comparisons.cost.methods import BUILT_IN
 from fotismos.comparisons.departure.metrics import METRICS, THRESHOLDS, drawn
+from fotismos.comparisons.ladder.methods import BUILT_IN
 from fotismos.reference.planning.effects import EFFECTS
 from fotismos.reference.records import Machine
 from fotismos.reports import glossary, verdict

@@ -6,7 +6,7 @@ import numpy as np
 from msgspec import convert, structs
 
 from fotismos.comparisons.attribution import Causes
-from fotismos.comparisons.cost.engine import Study
+from fotismos.comparisons.ladder.engine import Study
 from fotismos.comparisons.records.comparison import Attribution
 from fotismos.comparisons.records.cost import Cost
 from fotismos.comparisons.records.engine import Engine
@@ -186,8 +186,6 @@ def method(name, ratio, **more):
         "overhead_s": interval(0.0051 + 0.0001 * ratio, 0.0003),
         "per_sample_s": interval(15.5e-9 * ratio, 0.3e-9 * ratio),
         "ratio": interval(ratio, 0.02 * ratio),
-        "processor_s": 30.5e-9 * ratio,
-        "bend": 0.0125,
         "first_s": 0.313 * ratio,
     }
 

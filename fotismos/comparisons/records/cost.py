@@ -6,7 +6,7 @@ from msgspec import Meta
 
 from fotismos.comparisons.records.comparison import Contribution, Price
 from fotismos.comparisons.records.departure import Viewing
-from fotismos.comparisons.records.engine import Engine, FrontPoint, Reach
+from fotismos.comparisons.records.engine import Engine, FrontPoint
 from fotismos.heuristic.heuristics import Interpolation
 from fotismos.reference.planning.plan_record import Guard
 from fotismos.reference.records import (
@@ -77,14 +77,10 @@ class TimedMethod(Method):
     Attributes
     ----------
     overhead_s, per_sample_s
-        Wall time in seconds of a later image, and of each sample of a pixel: ``processor_s`` over
-        the processors that worked at once.
+        Wall time in seconds of a later image beside its kernels, and that of the kernels for each
+        sample of a pixel.
     ratio
         ``per_sample_s`` over that of the textbook kernel.
-    processor_s
-        Time of all processor cores for each sample.
-    bend
-        How far the time at a third count is from the straight line, as a share.
     first_s, prepare_s
         Time of the first image, which is also compiled, and of preparing the scene for it.
     """
@@ -92,8 +88,6 @@ class TimedMethod(Method):
     overhead_s: Interval
     per_sample_s: Interval
     ratio: Interval
-    processor_s: float
-    bend: float
     first_s: Positive
     prepare_s: Amount = 0.0
 
@@ -182,8 +176,10 @@ class Cost(Record):
     processor_share
         Processor time that samples took, as a share of what these threads could take: the rest
         went to other programs.
-    at, predicted
-        A larger size, and what is predicted there.
+    at
+        Another size, of which the times of points are; errors are not predicted.
+    stopped
+        Why no more samples were taken, in words, where none passes and more may help; else empty.
     left_out
         Methods that the scene does not allow, and why.
     engine
@@ -216,7 +212,7 @@ class Cost(Record):
     command: str
     guard: Guard | None = None
     at: Resolution | None = None
-    predicted: tuple[Point, ...] = ()
+    stopped: str = ""
     left_out: dict[str, str]
     engine: Engine | None = None
 
@@ -243,16 +239,14 @@ class Choice(Record):
         Size of the times, and of the images in which errors were measured.
     within
         The tolerance, ΔE2000.
+    points, textbook
+        All points with their times at this size, and the name of the textbook kernel.
     chosen
-        The fastest point that passes; None if none does.
-    best
-        The one that passes at the smallest tolerance.
-    full
-        The full plan with the fewest samples that pass, else with the most samples.
+        The cheapest point that passes; None if none does.
     left_out
         Methods that the scene cannot have, and why.
-    reach
-        If none passes: what more samples would do, if known.
+    stopped
+        Why no more samples were taken, in words, where none passes and more may help; else empty.
     price
         What it takes to look right without these methods.
     """
@@ -261,10 +255,10 @@ class Choice(Record):
     resolution: Resolution
     measured: Resolution
     within: Positive
+    points: tuple[Point, ...]
+    textbook: str
     chosen: Point | None
-    best: Point
-    full: Point
     left_out: dict[str, str]
-    reach: Reach | None = None
+    stopped: str = ""
     price: Price | None = None
     record_version: int = VERSION

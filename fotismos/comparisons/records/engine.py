@@ -43,28 +43,11 @@ class FrontPoint(Record):
     ties: tuple[str, ...] = ()
 
 
-class Reach(Record):
-    """How near a method comes to the reference with any number of samples.
-
-    Attributes
-    ----------
-    left
-        ΔE2000 that 5 % of the pixels exceed without noise.
-    spp
-        Samples per pixel with which it should pass at a tolerance; None if too much is left.
-    """
-
-    method: str
-    left: float
-    spp: int | None = None
-
-
 class EngineSetting(FrontPoint):
     """A setting of another renderer, whose picture and time are given.
 
     Its front is that of the given settings alone: their times are of another machine. Its error is
-    that of one picture, without the reference's noise; the interval holds that noise, and the
-    spread of repeats.
+    that of the comparison of its pictures, without noise; that of a single picture counts as error.
 
     Attributes
     ----------
@@ -73,7 +56,7 @@ class EngineSetting(FrontPoint):
     passes_at
         The smallest of these thresholds at which it passes; null if it passes at none.
     p95
-        The ΔE2000 that 5 % of the pixels exceed, with the reference's noise.
+        The ΔE2000 that 5 % of the pixels exceed, with all noise.
     ratio
         Its time over that of the textbook kernel on the same machine, if that is given.
     picture, agreement

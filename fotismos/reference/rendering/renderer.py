@@ -201,7 +201,7 @@ class Renderer:
     def pass_times(self) -> Times:
         """Return the :class:`Times` of the passes so far, without the preparation."""
         first = max(self.times[0] - self.preparation, 0.0)
-        return Times.of([first, *self.times[1:]], self.compilation)
+        return Times.of([first, *self.times[1:]], self.compilation, self.kernel_times)
 
 
 def warm(renderer: Renderer, size: Size | None = None) -> None:

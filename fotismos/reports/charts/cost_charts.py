@@ -52,7 +52,8 @@ def titled(record: Cost | EngineCost) -> Spec:
     else:
         busy = ", busy" if record.is_busy else ""
         machine = f"{record.threads} threads, {record.machine.processor}{busy}"
-        measured = f"measured at {size}, {record.rounds} rounds, {machine}"
+        times = f", times at {record.at[0]} × {record.at[1]}" if record.at else ""
+        measured = f"measured at {size}{times}, {record.rounds} rounds, {machine}"
     title = {
         "text": f"{record.scene}: error against time",
         "subtitle": [measured, *reading(record)],

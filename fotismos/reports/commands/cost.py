@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, TypeAlias
 import click
 from msgspec import Meta
 
-from fotismos.comparisons.cost.timed_pictures import EngineTimes, TimedPicture
 from fotismos.comparisons.departure.criterion import TOLERANCE, checked_threshold
+from fotismos.comparisons.ladder.timed_pictures import EngineTimes, TimedPicture
 from fotismos.comparisons.names import matching, picture_parts
 from fotismos.comparisons.options import Side, option
 from fotismos.comparisons.processes.pool import Pool
@@ -18,7 +18,7 @@ from fotismos.reports.jobs import Terminal
 
 if TYPE_CHECKING:
     from fotismos.comparisons.case import Case
-    from fotismos.comparisons.cost.engine import Study
+    from fotismos.comparisons.ladder.engine import Study
     from fotismos.comparisons.records.cost import Cost as CostRecord
     from fotismos.comparisons.records.engine import EngineCost
     from fotismos.reference.rendering.passes import Progress
@@ -35,7 +35,8 @@ class Cost(OnScene, frozen=True):
     Renders with methods from flat shading to all effects, at several sample counts each, and
     attributes error and time to each effect in which textbook shading differs. Writes a page,
     cost.json, cost.svg and pictures to OUTPUT/cost/SCENE. Without --resolution the film is reduced
-    to a width of 128 pixels; --spp gives the largest count of samples per pixel, 64 if omitted.
+    to a width of 128 pixels. --spp gives the largest count of samples per pixel; if omitted, it
+    goes on from 64 until a method looks right, or would take a minute.
 
     With --picture, settings of another renderer have a front of their own: their times are given.
     The size of the pictures becomes that of the study. Without SCENE, nothing is rendered: pictures
@@ -58,7 +59,7 @@ class Cost(OnScene, frozen=True):
     )  # fmt: skip
     own_defaults: ClassVar[dict[str, str]] = {
         "resolution": "the film's, reduced to a width of 128",
-        "spp": "up to 64",
+        "spp": "64, then more until a method looks right",
     }
 
     at: Annotated[
@@ -134,8 +135,8 @@ class Cost(OnScene, frozen=True):
 
     def study(self, case: "Case", progress: "Progress | None" = None) -> "Study[CostRecord]":
         """Study what accuracy costs on a scene."""
-        from fotismos.comparisons.cost.cost import cost  # loaded late: pictures need no Mitsuba
-        from fotismos.comparisons.cost.measure import Effort  # as late
+        from fotismos.comparisons.ladder.climb import Effort  # as late
+        from fotismos.comparisons.ladder.cost import cost  # loaded late: pictures need no Mitsuba
 
         times = self.engine
         given = times.as_options() if times else {}
@@ -152,7 +153,7 @@ class Cost(OnScene, frozen=True):
 
     def judge(self, name: str, within: float = TOLERANCE) -> "Study[EngineCost]":
         """Judge settings without a scene."""
-        from fotismos.comparisons.cost.engine import front_of_pictures  # loaded late
+        from fotismos.comparisons.ladder.engine import front_of_pictures  # loaded late
 
         times = self.engine
         assert times is not None, "nothing else is judged without a scene"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from PIL.Image import Resampling
 
@@ -13,17 +13,17 @@ from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.records.engine import EngineCost
 from fotismos.heuristic.convention import Floats
 from fotismos.reference import records
-from fotismos.reports import cost_tables, glossary
+from fotismos.reports import cost_tables, glossary, sentences
 from fotismos.reports.charts import cost_charts, vega
 from fotismos.reports.files import images, results
 from fotismos.reports.page.scene_view import CostView, Figure
 from fotismos.reports.page.templating import HELP, head, rendered
 
 if TYPE_CHECKING:  # pictures without a scene need no Mitsuba
-    from fotismos.comparisons.cost.engine import Study
+    from fotismos.comparisons.ladder.engine import Study
     from fotismos.comparisons.records.cost import Cost
 
-    AnyStudy = Study[Cost] | Study[EngineCost]
+    AnyStudy: TypeAlias = Study[Cost] | Study[EngineCost]
 
 FAMILIES = "Squares: the kernel; triangles: the phong BSDF; circles: physical BSDFs"
 
@@ -57,11 +57,10 @@ def write(folder: Path, study: AnyStudy, shown: CostView) -> None:
     """
     results.own(folder)
     made = documents(study)
-    by = ", judged by" if isinstance(study.record, EngineCost) else " on"
     page = rendered(
         "cost_page.html.j2",
         HELP,
-        title=f"What accuracy costs{by} {study.record.scene}",
+        title=title(study.record, shown.within),
         head=head("cost", folder, study.record.scene),
         data={"terms": glossary.meanings()},
         cost=shown,
@@ -71,6 +70,13 @@ def write(folder: Path, study: AnyStudy, shown: CostView) -> None:
     results.write(folder / results.PAGE, page)
     for name, content in made.items():
         results.write(folder / name, content)
+
+
+def title(record: Cost | EngineCost, within: float) -> str:
+    """Return the title of a study's page: what it found."""
+    if isinstance(record, EngineCost):
+        return f"{record.scene}: {sentences.answer_of_pictures(record, within)}"
+    return f"{record.scene}: {sentences.answer(record)}"
 
 
 def lines(record: Cost | EngineCost, within: float) -> Iterator[str]:

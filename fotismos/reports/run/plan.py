@@ -6,9 +6,9 @@ from msgspec import structs
 
 from fotismos.comparisons.case import open_case
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.cost.cost import choose
-from fotismos.comparisons.cost.measure import WIDTH, reduced, requested
 from fotismos.comparisons.departure.criterion import checked_threshold
+from fotismos.comparisons.ladder.climb import WIDTH, reduced, requested
+from fotismos.comparisons.ladder.cost import choose
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import prepare
 from fotismos.comparisons.processes.pool import Pool, Task

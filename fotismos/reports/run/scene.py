@@ -75,7 +75,7 @@ def compared(
     costs = None
     causes = comparison.causes
     if case.word in job.ladders and causes:
-        from fotismos.comparisons.cost.cost import quick  # loaded late: for a handful of scenes
+        from fotismos.comparisons.ladder.cost import quick  # loaded late: for a handful of scenes
 
         begin = perf_counter()
         command = case.command("cost")

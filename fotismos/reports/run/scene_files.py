@@ -19,7 +19,7 @@ from fotismos.reports.page import embedding
 from fotismos.reports.page.scene_view import PointsView, SceneView
 
 if TYPE_CHECKING:  # few scenes have one
-    from fotismos.comparisons.cost.engine import Study
+    from fotismos.comparisons.ladder.engine import Study
     from fotismos.comparisons.records.cost import Cost
 
 RECORD = "comparison.json"

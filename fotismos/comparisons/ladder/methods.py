@@ -5,7 +5,7 @@ then become equal, and are merged; the result keeps all their names. Methods fro
 before the full plan::
 
     from fotismos.comparisons.records.cost import Method
-    from fotismos.comparisons.cost.methods import declare
+    from fotismos.comparisons.ladder.methods import declare
 
     declare(Method(name="no shadows", family="physical", without=("occlusion",), max_depth=2))
 """

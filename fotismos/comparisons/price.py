@@ -2,7 +2,7 @@
 
 **Samples.** With few samples a picture is noisy, and fails where the noise alone is visible. The
 noise at two numbers of samples is known: from the passes of the comparison, and from the pictures
-that are timed (:mod:`fotismos.comparisons.ladder.turns`). It is that of the difference of both
+that are timed (:mod:`fotismos.comparisons.turns`). It is that of the difference of both
 halves, which trace the same rays: edges, which both share, cancel, and channels share their noise.
 ``j`` of ``K`` passes deviate from all by less than from the truth, by ``√((K − j) / K)``. A picture
 is judged by how far the converged one is from itself with the deviation. With another number of
@@ -23,10 +23,9 @@ from time import perf_counter
 import numpy as np
 from msgspec import structs
 
+from fotismos.comparisons import turns
 from fotismos.comparisons.departure.criterion import LIMIT
 from fotismos.comparisons.departure.metrics import LEADING, THRESHOLDS
-from fotismos.comparisons.ladder import turns
-from fotismos.comparisons.ladder.turns import TURNS, Time
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.records.comparison import (
     FEWEST_SPP,
@@ -38,11 +37,15 @@ from fotismos.comparisons.records.comparison import (
 )
 from fotismos.comparisons.records.departure import Viewing, VisibleShare
 from fotismos.comparisons.records.images import Comparison, Images
+from fotismos.comparisons.turns import Time
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Interval, Missing
 from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.rendering.passes import Progress
 from fotismos.reference.rendering.renderer import Renderer
+
+PICTURES = 4
+"""Pictures of each half whose noise counts; it must not depend on how fast they are."""
 
 JUDGED = 4096
 """Pixels of all pictures at which deviations are judged, at most."""
@@ -95,12 +98,13 @@ def measured(ready: Prepared, images: Images, progress: Progress | None = None) 
     halves = {name: half.sampled(spp) for name, half in halves.items()}
     counted = gbuffer(ready.scene, size, film=ready.size).hit
     # The pixels that count of each picture, {method: (K, N, 3)}.
+    seed = ready.options.seed
     pictures: dict[str, list[Floats]] = {name: [] for name in halves}
-    for made in turns.in_turn(halves, ready.options.seed, TURNS, size=size, progress=progress):
+    for made in turns.in_turn(halves, seed, PICTURES - 1, size=size, progress=progress):
         for name, image in made.items():
             pictures[name].append(np.array(image, float)[counted])
     shown = {name: np.array(found) for name, found in pictures.items()}
-    times = {name: Time.of(half, size, TURNS) for name, half in halves.items()}
+    times = turns.timed(halves, seed, size, progress)
 
     def seconds(name: str) -> float | None:
         """Return the least time of a sample, which other work on the machine slows least."""

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import hypot, log2, sqrt
 from typing import Any
 
 import numpy as np
@@ -35,11 +35,17 @@ TURNS = 7
 FEWEST = 6
 """Turns from which on the least and the largest hold the median with 95 %."""
 
-PIXELS = 2**13
+PIXELS = 2**12
 """Pixels of a timed picture, at most: larger films are reduced."""
 
 SAMPLES = 2**18
-"""Samples of a timed picture: enough for a kernel to take a few milliseconds."""
+"""Samples of a timed picture, unless its kernels are too short."""
+
+LONG_S = 4e-3
+"""Seconds that the shortest kernels take, about: threads take a part of one to wake up."""
+
+MOST_LONGER = 16
+"""How many times the samples are that a picture with short kernels may have, a power of 2."""
 
 UNSEEN = 0.02
 """Half an interval of a time, at least, as a share of it: from one process to another."""
@@ -49,7 +55,7 @@ UNSEEN = 0.02
 class Time:
     """Seconds of a method in each of T turns, (T,): of a sample, and of a picture beside them.
 
-    ``processors`` worked at once, in the median of the turns.
+    ``processors`` worked at its kernels at once, in the median of the turns; one at the rest.
     """
 
     per_sample: Floats
@@ -65,7 +71,7 @@ class Time:
         return cls(
             per_sample=kernels / (renderer.pass_spp * size[0] * size[1]),
             overhead=np.maximum(whole - kernels, 0.0),
-            processors=float(np.median(busy / whole)),
+            processors=max(float(np.median((busy - whole + kernels) / kernels)), 0.0),
         )
 
 
@@ -76,8 +82,13 @@ def timed_size(renderer: Renderer) -> tuple[Size, int]:
     if columns * rows > PIXELS:
         width = max(1, int(sqrt(PIXELS * columns / rows)))
         size = size_of_width(renderer.scene, size, width)
+    return size, timed_spp(size)
+
+
+def timed_spp(size: Size) -> int:
+    """Return the samples per pixel of a timed picture: powers of 2 share a kernel."""
     most = max(1, SAMPLES // (size[0] * size[1]))
-    return size, 2 ** (most.bit_length() - 1)
+    return int(2 ** (most.bit_length() - 1))
 
 
 def in_turn(
@@ -101,6 +112,26 @@ def in_turn(
     )
     for images in loop:
         yield dict(zip(renderers, images, strict=True))
+
+
+def timed(
+    halves: Mapping[str, Renderer], seed: int, size: Size, progress: Progress | None = None
+) -> dict[str, Time]:
+    """Return the times of methods that have taken some turns, from more of them.
+
+    The pictures have so many samples that the shortest kernels are neither too short nor longer
+    than need be; the same kernels serve all numbers of samples.
+    """
+    spp = min(half.pass_spp for half in halves.values())
+    shortest = min(min(half.kernel_times) for half in halves.values())
+    steps = round(log2(LONG_S / max(shortest, LONG_S / MOST_LONGER)))
+    enough = max(1, int(spp * 2.0**steps))
+    if enough != spp:
+        halves = {name: half.sampled(enough) for name, half in halves.items()}
+    done = min(len(half.kernel_times) for half in halves.values())
+    for _ in in_turn(halves, seed, TURNS - done, size=size, progress=progress):
+        pass
+    return {name: Time.of(half, size, TURNS) for name, half in halves.items()}
 
 
 def middle(values: ArrayLike, unseen: float = 0.0) -> Interval:

@@ -1,1 +1,0 @@
-"""What accuracy costs in time: a ladder of methods, what effects remove and add."""
