@@ -158,7 +158,7 @@ def details(record: ComparisonRecord) -> Iterator[str]:
     noise = number(lead.noise_floor) if record.is_noise_known else "not known"
     at_best = f"at the best exposure {number(lead.after_exposure.mean)}"
     yield f"  mean {LEADING.label} {number(lead.mean)}, noise {noise}, {at_best}"
-    if record.price and not record.picture:
+    if record.price:
         ratio = record.price.ratio
         times = f"{number(ratio.value)} times the textbook's" if ratio else record.price.reason
         yield f"  time of a physical sample: {times}"
