@@ -118,15 +118,17 @@ def points(record: Cost) -> Table:
         Column("samples", "spp", str),
         Column("time", "seconds.value", short_time, detail=where),
         Column("interval", "seconds", short_time),
-        Column(f"mean {LEADING.label}", lambda point: _spread(point.error), "{:.3f}".format),
-        Column("passes at", lambda point: _spread(point.tolerance), "{:.2f}".format),
+        Column(f"mean {LEADING.label}", lambda point: _spread(point.error, 3), "{:.3f}".format),
+        Column("passes at", lambda point: _spread(point.tolerance, 2), "{:.2f}".format),
         Column("front", notes),
     )
     return Table(columns, record.points)
 
 
-def _spread(error: Interval) -> tuple[float, str, float]:
-    return error.value, " ± ", error.high - error.value
+def _spread(error: Interval, digits: int) -> tuple[float, str, float] | float:
+    """Return an error and half of its interval, unless it has no digit that is printed."""
+    half = error.high - error.value
+    return (error.value, " ± ", half) if half >= 0.5 * 10.0**-digits else error.value
 
 
 def _front(point: FrontPoint) -> str:

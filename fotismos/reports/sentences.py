@@ -137,11 +137,12 @@ def together(record: Cost) -> str:
     whole = record.attribution
     kernel = whole.kernel_s.value
     added = sum(effect.adds_s.value for effect in whole.effects)
+    renderer = whole.renderer_s.value / kernel
     return (
         f"A sample with all effects takes {number(whole.plan_s.value / kernel)} times as long as"
-        f" the kernel's: 1, {number(added / kernel)} for the effects, and"
-        f" {number(whole.renderer_s.value / kernel)} for Mitsuba's integrator in place of the"
-        " kernel."
+        f" the kernel's: the effects add {number(added / kernel)} times the kernel's time, and"
+        f" Mitsuba's integrator in place of the kernel {'adds' if renderer > 0 else 'saves'}"
+        f" {number(abs(renderer))} times."
     )
 
 
@@ -177,9 +178,13 @@ def choice_lines(choice: Choice) -> Iterator[str]:
 
 
 def explained(methods: Iterable[str]) -> Iterator[str]:
-    """Yield what each method is, if the glossary says it."""
+    """Yield what methods are, if the glossary says it, each meaning once."""
     known = meanings()
-    return (f"{method}: {known[method]}" for method in methods if method in known)
+    named: dict[str, list[str]] = {}
+    for method in methods:
+        if method in known:
+            named.setdefault(known[method], []).append(method)
+    return (f"{', '.join(names)}: {meaning}" for meaning, names in named.items())
 
 
 # --- Fits, audits and plans -------------------------------------------------------------------
