@@ -47,6 +47,9 @@ LONG_S = 4e-3
 MOST_LONGER = 16
 """How many times the samples are that a picture with short kernels may have, a power of 2."""
 
+TICK = 1e-9
+"""Seconds that kernels take at least."""
+
 UNSEEN = 0.02
 """Half an interval of a time, at least, as a share of it: from one process to another."""
 
@@ -65,7 +68,8 @@ class Time:
     @classmethod
     def of(cls, renderer: Renderer, size: Size, turns: int) -> Time:
         """Return the time of the last turns of a renderer, with pictures of a size."""
-        kernels = np.array(renderer.kernel_times[-turns:])
+        # Above 0, because other times are divided by it.
+        kernels = np.maximum(renderer.kernel_times[-turns:], TICK)
         whole = np.array(renderer.times[-turns:])
         busy = np.array(renderer.processor_times[-turns:])
         return cls(
