@@ -9,6 +9,7 @@ INTRODUCTION = """\
 Each script installs pinned public packages into a temporary folder, shows one behaviour of theirs
 without fotismos, says why a good guess misses it, and fails if the behaviour changes:
 `bash findings/NAME.sh`. They are not part of CI.
+[Surprises](../docs/surprises.md) says what fotismos does about them.
 
 | Script | What happens |
 |---|---|

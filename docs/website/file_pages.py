@@ -10,7 +10,7 @@ from docs.figures.guarantees import Guarantee, guarantees
 
 LANGUAGES = {
     ".py": "python", ".json": "json", ".toml": "toml", ".glsl": "glsl", ".xml": "xml",
-    ".csv": "text", ".cff": "yaml",
+    ".csv": "text", ".cff": "yaml", ".sh": "bash",
 }  # fmt: skip
 
 

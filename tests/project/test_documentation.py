@@ -19,7 +19,11 @@ from fotismos.reports import cli
 from fotismos.reports.terminal.words import number
 from tests.shared.programs import ROOT, python
 
-PAGES = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    *sorted(ROOT.glob("*.md")),
+    *sorted((ROOT / "docs").glob("*.md")),
+    ROOT / "findings/README.md",
+]
 OF_RUN = {"test", "lint", "bench", "docs"}
 
 

@@ -36,3 +36,21 @@ def test_a_script_runs_pinned_packages_in_a_folder_of_its_own(script):
     assert any(isinstance(node, ast.Assert) for node in ast.walk(tree))
     assert "fotismos" not in program
     subprocess.run(["bash", "-n", script], check=True)
+
+
+def test_each_row_of_surprises_names_a_test_or_script_that_exists():
+    page = (ROOT / "docs/surprises.md").read_text()
+    rows = [line for line in page.splitlines() if line.startswith("| ")]
+    cells = [row.strip("| ").split(" | ") for row in rows]
+    held = [row[-1] for row in cells if row[-1] != "Held by"]
+    assert {len(row) for row in cells} == {5}
+    assert len(held) >= 40
+    for cell in held:
+        paths = re.findall(r"\]\(\.\./([^)]+)\)", cell)
+        assert paths, cell
+        tests = re.findall(r"\]\(\.\./(tests/[^)]+)\) `(\w+)`", cell)
+        assert len(tests) == sum(path.startswith("tests/") for path in paths), cell
+        assert all((ROOT / path).is_file() for path in paths), cell
+        assert all(f"def {name}(" in (ROOT / path).read_text() for path, name in tests), cell
+    named = {path for cell in held for path in re.findall(r"findings/[\w-]+\.sh", cell)}
+    assert named == {f"findings/{script.name}" for script in SCRIPTS}

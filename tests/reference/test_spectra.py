@@ -156,6 +156,14 @@ def test_a_light_whose_spectrum_is_one_number_is_named_with_its_colour(variant):
         np.testing.assert_allclose(shown / plain, pink, rtol=0.02)
 
 
+def test_a_blackbody_is_refused_in_rgb_before_it_is_rendered(rgb):
+    light = POINT | {"intensity": {"type": "blackbody", "temperature": 5000.0}}
+    given = scene((0, -4, 1), size=8, ball={"type": "sphere"}, lamp=light)
+    mi.load_dict(given)
+    with pytest.raises(InputError, match=r"no colour in llvm_ad_rgb\. Give .* llvm_ad_spectral"):
+        halves.pair(Source("a test", given))
+
+
 @pytest.mark.parametrize("kind", ["uchar", "float"])
 def test_the_whole_numbers_of_a_ply_are_named_and_are_reflectances(rgb, tmp_path, kind):
     rows = "\n".join(f"{x} {y} 0 128 64 32" for x, y in ((-9, -9), (9, -9), (0, 9)))

@@ -82,6 +82,10 @@ def check(graph: Graph) -> None:
     _require_files(graph)
     for index in graph.nodes_in_use():
         check_node(graph, index)
+        if graph.plugin(index) == "blackbody" and not mi.is_spectral:
+            # Mitsuba loads it, and raises at the first sample.
+            objection = f"it has no colour in {mi.variant()}. Give the variant llvm_ad_spectral."
+            raise _refusal(graph, index, objection)
         is_mesh = graph.plugin(index) in ("obj", "ply", "serialized")
         if is_mesh and (objection := damage(graph, index)):
             raise _refusal(graph, index, objection)
