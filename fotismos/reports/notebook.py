@@ -271,10 +271,16 @@ def check(asked: Baseline) -> CheckRecord:
 
 
 @_alone
-def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: Any) -> AuditRecord:
+def audit(
+    heuristic: str | None = None,
+    bsdf: str | None = None,
+    like: str | None = None,
+    **parameters: Any,
+) -> AuditRecord:
     """Return the checks of a heuristic, or of a type of BSDF, by itself.
 
-    ``parameters`` are its own. Raises `InputError` for an unknown name or parameter.
+    ``parameters`` are its own; its lobe is compared with the closed form that it is ``like``, such
+    as ``"ggx"``. Raises `InputError` for an unknown name or parameter.
     """
     if (heuristic is None) == (bsdf is None):
         raise InputError("audit needs one of heuristic and bsdf.")
@@ -282,7 +288,7 @@ def audit(heuristic: str | None = None, bsdf: str | None = None, **parameters: A
     set_variant(RGB)
     register()
     kind: Kind = "bsdf" if heuristic is None else "heuristic"
-    return examined(kind, str(heuristic or bsdf), parameters)
+    return examined(kind, str(heuristic or bsdf), parameters, like=like)
 
 
 def declare(entry: Heuristic | Metric | Method) -> Any:

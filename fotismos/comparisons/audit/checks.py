@@ -1,6 +1,6 @@
 """The checks of an audit, and the audit itself, from a heuristic's or BSDF's values alone."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -10,7 +10,7 @@ import numpy as np
 from msgspec import Meta
 from msgspec.structs import replace
 
-from fotismos.comparisons.audit import diagnosis, furnace, samples
+from fotismos.comparisons.audit import closed_forms, diagnosis, furnace, samples
 from fotismos.comparisons.audit.samples import Worst
 from fotismos.comparisons.audit.subjects import ScatteringSubject, ShadingSubject, Subject
 from fotismos.heuristic import heuristics
@@ -137,17 +137,20 @@ class Audit(Record):
 # --- The audit ---------------------------------------------------------------------------------
 
 
-def audit(kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "") -> Audit:
+def audit(
+    kind: Kind, name: str, parameters: Mapping[str, Any], command: str = "", like: str | None = None
+) -> Audit:
     """Make every check of a heuristic, as a comparison accepts it, or of a type of BSDF.
 
-    In the current variant. ``command`` is the one that was run, for the record.
+    In the current variant. Its lobe is compared with the closed form that it is ``like``.
+    ``command`` is the one that was run, for the record.
     """
-    record, _ = audit_with_subject(kind, name, parameters=parameters, command=command)
+    record, _ = audit_with_subject(kind, name, parameters=parameters, command=command, like=like)
     return record
 
 
 def audit_with_subject(
-    kind: Kind, name: str, parameters: Mapping[str, Any], command: str
+    kind: Kind, name: str, parameters: Mapping[str, Any], command: str, like: str | None = None
 ) -> tuple[Audit, Subject]:
     """Return what :func:`audit` returns, and what was audited."""
     try:
@@ -156,6 +159,7 @@ def audit_with_subject(
         else:
             subject = ShadingSubject(heuristics.named(name), parameters)
         record = examined(subject)
+        compared = tuple(alike(subject, like)) if like else ()
     except Exception as error:  # a user's code may raise anything
         is_users = kind == "bsdf" and heuristics.in_file(name)
         if isinstance(error, FotismosError) or not is_users:
@@ -166,6 +170,7 @@ def audit_with_subject(
         subject=name,
         kind=kind,
         parameters=dict(parameters),
+        checks=(*record.checks, *compared),
         mistakes=diagnosis.describe(name) if kind == "heuristic" else (),
         command=command,
     )
@@ -191,6 +196,19 @@ def examined(subject: Subject) -> Audit:
     )
     found = tuple(check.of(subject, record) for check in CHECKS)
     return replace(record, checks=found, faults=tuple(subject.faults))
+
+
+def alike(subject: Subject, name: str) -> Iterator[Checked]:
+    """Yield a check for each angle of the light: the lobe over that of a closed form."""
+    for ratio in closed_forms.ratios(subject, name):
+        holds = abs(ratio.value - 1) <= closed_forms.MOST
+        yield Checked(
+            name=f"as {name}, light at {ratio.light:g}°",
+            verdict="holds" if holds else "does not hold",
+            value=ratio.value,
+            expected=f"1 ± {closed_forms.MOST}, over {closed_forms.CLOSED_FORMS[name].source}",
+            worst=ratio.case,
+        )
 
 
 def curve(subject: Subject, material: str) -> MaterialCurves:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import click
 
@@ -26,13 +26,15 @@ class Audit(Command, frozen=True):
     --------
       fotismos audit --heuristic blinn
       fotismos audit --heuristic my_shader.py:toon
+      fotismos audit --heuristic my_shader.py --as ggx
       fotismos audit --bsdf roughdielectric -p alpha=0.1
       fotismos audit --bsdf my_bsdf.py:my_name
     """
 
     below = "audit/NAME"
     options_shown = (
-        "heuristic", "bsdf", "parameters", "output", "quiet", "verbose", "as_json", "timeout",
+        "heuristic", "bsdf", "parameters", "like",
+        "output", "quiet", "verbose", "as_json", "timeout",
     )  # fmt: skip
 
     heuristic: Annotated[
@@ -54,6 +56,11 @@ class Audit(Command, frozen=True):
         ),
     ] = {}
 
+    like: Annotated[
+        Literal["ggx", "beckmann", "blinn", "phong", "lambert", "oren-nayar"] | None,
+        option("Compare its lobe with this closed form, by the light's angle.", names=("--as",)),
+    ] = None
+
     def run(self, terminal: Terminal) -> int:
         """Audit it, print the table or the record; 1 if there are faults."""
         if bool(self.heuristic) == bool(self.bsdf):
@@ -67,7 +74,7 @@ class Audit(Command, frozen=True):
 
             folder = terminal.output / "audit"
             with results.hold_results(folder, [_folder_of(name)], command) as (target,):
-                arguments = (kind, name, self.parameters, command, target)
+                arguments = (kind, name, self.parameters, command, target, self.like)
                 record = pool.do(Task(name, audit_files.audited, arguments))
         terminal.show(record, audit_files.lines(record), target / results.PAGE)
         return int(bool(record.faults))

@@ -36,11 +36,20 @@ Rows = list[dict[str, Any]]
 """Points of lines, in their order: ``x``, ``y`` and what the line is ``of``."""
 
 
-def audited(kind: Kind, name: str, parameters: dict[str, Any], command: str, target: Path) -> Audit:
+def audited(
+    kind: Kind,
+    name: str,
+    parameters: dict[str, Any],
+    command: str,
+    target: Path,
+    like: str | None = None,
+) -> Audit:
     """Audit a heuristic or a BSDF, and write the audit's files."""
     set_variant(RGB)
     plugins.register()
-    record, subject = audit_with_subject(kind, name, parameters=parameters, command=command)
+    record, subject = audit_with_subject(
+        kind, name, parameters=parameters, command=command, like=like
+    )
     shown = [curve.material for curve in record.curves if curve.lobes]
     write(target, record, spheres(subject, shown))
     return record
