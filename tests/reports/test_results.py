@@ -15,7 +15,7 @@ from fotismos.comparisons.study import running
 from fotismos.heuristic.errors import InputError, OutputError
 from fotismos.reports.files import results
 from fotismos.reports.run import scene_files
-from tests.shared import records
+from tests.shared import cost_records, records
 from tests.shared.programs import ROOT
 from tests.shared.small_scene import IN_PYTHON, SCENE
 
@@ -33,7 +33,7 @@ def rendered(run, scene_file, out, *more):
 
 
 @pytest.mark.guarantee(
-    "runs", "A finished scene is rendered again once fotismos or its results change."
+    "runs", "A finished scene is rendered again once fotismos or its record changes."
 )
 def test_a_finished_scene_is_reused_only_while_all_is_as_it_was(
     run, scene_file, tmp_path, monkeypatch
@@ -77,12 +77,25 @@ def test_a_view_is_found_again_unless_anything_is_damaged(comparison, tmp_path):
     assert scene_files.load(place, "another") is scene_files.load(place, None) is None
     text = file.read_text()
     cuts = (text[:size] for size in range(0, len(text), len(text) // 20))
-    for broken in ("", "[]", "{}", text.replace("digests", "digest"), *cuts):
+    for broken in ("", "[]", "{}", text.replace("thumbnails", "thumbnail"), *cuts):
         file.write_text(broken)
         assert scene_files.load(place, "key") is None
     file.write_text(text)
     (place / "comparison.exr").unlink()
     assert scene_files.load(place, "key") is None
+
+
+def test_a_result_takes_the_place_of_all_of_an_earlier_one_and_of_nothing_else(
+    comparison, tmp_path
+):
+    scene_files.write(results.own(tmp_path), "a", comparison, costs=cost_records.study("a"))
+    (tmp_path / "a/mine.png").write_text("mine")
+    assert (tmp_path / "a/cost.json").exists()
+    view = scene_files.write(tmp_path, "a", comparison)
+    assert not [*(tmp_path / "a").glob("cost*")]
+    assert {*view.files} == {"comparison.json", "comparison.exr"}
+    scene_files.remove(tmp_path / "a")
+    assert {path.name for path in (tmp_path / "a").iterdir()} == {results.MARK, "mine.png"}
 
 
 class EndedError(Exception):

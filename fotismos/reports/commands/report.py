@@ -17,8 +17,7 @@ QUICK = {"resolution": (64, 64), "spp": 16}
 class Report(WithOptions, frozen=True):
     """Compare all built-in scenes, attribute their errors to effects, and write one report.
 
-    Writes the files of `compare`; the page also has the hard cases. The page is written again after
-    each scene.
+    Writes the files of `compare`; the page also has the hard cases, and grows with the scenes.
 
     Examples
     --------

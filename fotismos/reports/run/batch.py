@@ -2,7 +2,7 @@
 
 A scene that cannot be compared does not stop the others: the page names it with its error, and the
 command ends with that error's exit code. Scenes are compared in separate processes, which one of
-them may kill. The page is written again after each scene.
+them may kill. The page grows with them.
 """
 
 import os
@@ -31,7 +31,7 @@ from fotismos.reports.page.page import PageScene
 from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files
 from fotismos.reports.terminal import progress
-from fotismos.reports.terminal.table import printed, room
+from fotismos.reports.terminal.table import Table, printed, room
 from fotismos.reports.terminal.words import as_typed, remark, tell, tell_where
 
 if TYPE_CHECKING:  # a comparison has no hard cases
@@ -244,7 +244,9 @@ def compare_all(
                     else:
                         batch.take(task.name, outcome)
                         done = [view.record for view in batch.views.values()]
-                        shown.rows = [*printed(tables.scenes(done, job.within), room())]
+                        # In the order in which they ended: the last ones stay in sight.
+                        columns = tables.scenes((), job.within).columns
+                        shown.rows = [*printed(Table(columns, done), room())]
         except KeyboardInterrupt:
             # No process may write while the results are put together.
             pool.end()

@@ -9,11 +9,11 @@ import msgspec
 from msgspec import structs
 
 from fotismos.comparisons import atomic
-from fotismos.comparisons.departure.metrics import LEADING, drawn
+from fotismos.comparisons.departure.metrics import LEADING, METRICS, RATIO, drawn
 from fotismos.comparisons.departure.regions import worst_pixel
 from fotismos.comparisons.records.comparison import ComparisonRecord
 from fotismos.comparisons.records.images import Comparison, Images
-from fotismos.reference.records import Missing, Record, plain, to_json
+from fotismos.reference.records import Missing, plain, to_json
 from fotismos.reports.files import images, results
 from fotismos.reports.page import embedding
 from fotismos.reports.page.scene_view import PointsView, SceneView
@@ -27,32 +27,41 @@ PICTURE = "comparison.exr"
 VIEW = "view.json"
 
 
-class Finished(Record):
-    """The content of ``view.json``: the scene's part of the page, and a digest of each file."""
-
-    view: SceneView
-    digests: dict[str, str]
+IMAGES = ("heuristic", "reference", "significant", RATIO.name, *METRICS)
+MADE = ("comparison.*", VIEW, "cost.*", "cost-*.png", *(f"{name}.png" for name in IMAGES))
+"""Names of the files that a scene's folder may have beside its mark; others are the user's."""
 
 
 def load(folder: Path, key: str | None) -> SceneView | None:
-    """Return the view of a finished scene; None if its key is another or a file was changed."""
+    """Return the view of a finished scene; None if its key is another or its record was changed.
+
+    It is the record, with what ``view.json`` keeps beside it: what no record can say.
+    """
     if key is None:
         return None
     try:
-        # JSON has no bytes: pictures are text in it.
-        found = msgspec.convert(atomic.Entry(folder / VIEW, key).load(), Finished, builtin_types=())
-        current = {name: results.digest_of(folder / name) for name in found.digests}
-        if current != found.digests:
+        text = (folder / RECORD).read_bytes()
+        kept = atomic.Entry(folder / VIEW, _key(key, text)).load()
+        if kept is None:
             return None
-        view = found.view
+        content = kept | {"record": json.loads(text)}
+        # JSON has no bytes: pictures are text in it.
+        view = msgspec.convert(content, SceneView, builtin_types=())
+        if not all((folder.parent / path).is_file() for path in view.files.values()):
+            return None
         if view.cost:
             from fotismos.comparisons.records.cost import Cost  # loaded late: few scenes have costs
 
             record = msgspec.convert(view.cost.record, Cost, builtin_types=())
             view = structs.replace(view, cost=structs.replace(view.cost, record=record))
         return view
-    except (msgspec.ValidationError, OSError):
+    except (msgspec.ValidationError, OSError, ValueError):
         return None
+
+
+def _key(key: str | None, record: bytes) -> str:
+    """Return the key of what is kept beside a record."""
+    return f"{key or 'none'} {hashlib.sha256(record).hexdigest()}"
 
 
 # --- Files -----------------------------------------------------------------------------------
@@ -80,8 +89,6 @@ def write(
 
         figures.write_scene(folder / results.FIGURES, name, comparison)
     results.own(target)
-    # The view names the earlier files, and is about to go.
-    earlier = _files(target)
     results.clear(target, (RECORD, VIEW))
     view = view_of(comparison, first)
     made = {
@@ -100,21 +107,18 @@ def write(
     for file, content in made.items():
         results.write(target / file, content)
     images.write_exr(target / PICTURE, _layers(comparison.images), _header(record))
-    made[RECORD] = atomic.encoded(to_json(record))
-    digests = {file: hashlib.sha256(content).hexdigest() for file, content in made.items()}
-    # The library writes this file, so its bytes are only on the disk.
-    digests[PICTURE] = results.digest_of(target / PICTURE)
-    results.clear(target, earlier - digests.keys())
-    finished = Finished(view=view, digests=digests)
-    # Written without a key, too: `_files` finds the names in it, but `load` never finds a result.
-    atomic.Entry(target / VIEW, key or "none").save(plain(finished))
-    results.write(target / RECORD, made[RECORD])
+    results.clear(target, _files(target) - {*made, PICTURE})
+    text = atomic.encoded(to_json(record))
+    kept = plain(view)
+    del kept["record"]
+    atomic.Entry(target / VIEW, _key(key, text)).save(kept)
+    results.write(target / RECORD, text)
     return view
 
 
 def remove(folder: Path) -> None:
     """Delete the files of a result; a folder that is empty then goes with the command."""
-    results.clear(folder, (RECORD, VIEW, *_files(folder)))
+    results.clear(folder, (RECORD, *_files(folder)))
 
 
 def view_of(comparison: Comparison, first: SceneView | None = None) -> SceneView:
@@ -167,12 +171,8 @@ def with_fit(view: SceneView, folder: Path) -> SceneView:
 
 
 def _files(folder: Path) -> set[str]:
-    """Return the files of the result in a place, as far as its view names them."""
-    try:
-        digests = json.loads((folder / VIEW).read_bytes())["content"]["digests"]
-        return {name for name in digests if "/" not in name}
-    except (OSError, ValueError, KeyError, TypeError):
-        return set()
+    """Return the files of a result in a place."""
+    return {path.name for pattern in MADE for path in folder.glob(pattern)}
 
 
 def _layers(shown: Images) -> dict[str, Any]:
