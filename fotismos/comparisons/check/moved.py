@@ -27,6 +27,7 @@ from fotismos.comparisons.departure.drift import (
     sidak,
     whole,
 )
+from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.pictures import GivenPictures, require_one_size
 from fotismos.comparisons.records.check import (
@@ -40,6 +41,7 @@ from fotismos.comparisons.records.check import (
 )
 from fotismos.comparisons.records.departure import Colour
 from fotismos.comparisons.records.images import Comparison
+from fotismos.heuristic.convention import Floats
 from fotismos.reference.rendering.gbuffer import ObjectIds
 
 LEVEL = 0.01
@@ -111,6 +113,11 @@ class HalfCheck:
     after: Run
     parts: Mapping[str, Parts]
     level: float
+
+    @property
+    def error(self) -> Floats:
+        """The ΔE2000 between before and now, (H, W)."""
+        return self.comparison.images.maps[LEADING.name]
 
     @cached_property
     def drifts(self) -> dict[str, Drift]:

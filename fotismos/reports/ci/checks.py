@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 from msgspec import structs
+from PIL.Image import Image
 
 from fotismos.comparisons.case import Case, open_case
 from fotismos.comparisons.check.measured import (
@@ -41,6 +42,8 @@ from fotismos.reports.page.templating import head, rendered
 from fotismos.reports.terminal import progress
 
 RECORD = "check.json"
+PANELS = ("before", "now", LEADING.name)
+"""The files of a failure: its record, and the endings of its pictures' names."""
 
 LARGEST_ERROR = 2.0
 """ΔE2000 at which the map's colours end: changes are often hardly noticeable."""
@@ -88,24 +91,26 @@ def examine(
         made = structs.replace(made, passed=False, causes=tuple(found.causes()))
     made = structs.replace(made, seconds=round(now.seconds + perf_counter() - begin, 3))
     if folder is not None:
-        results.clear(folder, (RECORD, *_names(found)))
+        names = [f"{half.name}-{panel}.png" for half in found.halves for panel in PANELS]
+        results.clear(folder, (RECORD, *names))
     if not has_failed:
         return made, None
-    return shown(made, found, folder)
-
-
-def shown(made: CheckRecord, found: Check, folder: Path | None) -> tuple[CheckRecord, Before]:
-    """Return a failure's record and its section of the page; write both to a folder, if any."""
-    panels = {name: panel for half in found.halves for name, panel in _panels(half)}
+    # The half that moved most comes first.
+    halves = sorted(found.halves, key=lambda half: -half.error.mean())
+    panels = {half.name: _panels(half) for half in halves}
     if folder is not None:
         made = structs.replace(made, pictures=folder.as_posix())
         folder.parent.mkdir(parents=True, exist_ok=True)
         results.own(folder)
-        for name, (_, panel) in panels.items():
-            results.write(folder / name, images.png(panel))
+        for half, shown in panels.items():
+            for panel, picture in zip(PANELS, shown.values(), strict=True):
+                results.write(folder / f"{half}-{panel}.png", images.png(picture))
         results.write(folder / RECORD, to_json(made))
-    # Those of the half that moved most come first.
-    pictures = {caption: images.webp(panel, lossless=True) for caption, panel in panels.values()}
+    pictures = {
+        caption: images.webp(picture, lossless=True)
+        for shown in panels.values()
+        for caption, picture in shown.items()
+    }
     return made, Before(check=made, pictures=pictures)
 
 
@@ -226,21 +231,16 @@ def _caught(half: HalfCheck) -> str:
     )
 
 
-def _names(found: Check) -> list[str]:
-    return [name for half in found.halves for name, _ in _panels(half)]
-
-
-def _panels(half: HalfCheck) -> Iterator[tuple[str, tuple[str, Any]]]:
-    """Yield the pictures of a half: the names of their files, captions and panels."""
+def _panels(half: HalfCheck) -> dict[str, Image]:
+    """Return the pictures of a half by their captions: before, now, and the map of the change."""
     shape = shrunk(half.before.mean.shape[:2], LONGEST)
-    caption = READERS[half.name]
-    for name, mean in (("before", half.before.mean), ("now", half.after.mean)):
-        panel = images.tonemap(averaged(mean, shape))
-        yield f"{half.name}-{name}.png", (f"{caption}, {name}", panel)
-    error = half.comparison.images.maps[LEADING.name]
-    panel = images.error_map(error, LARGEST_ERROR)
-    told = f"{caption}, change: {LEADING.label}, 0 to {LARGEST_ERROR:g}"
-    yield f"{half.name}-{LEADING.name}.png", (told, panel)
+    subject = READERS[half.name]
+    change = f"{subject}, change: {LEADING.label}, 0 to {LARGEST_ERROR:g}"
+    return {
+        f"{subject}, before": images.tonemap(averaged(half.before.mean, shape)),
+        f"{subject}, now": images.tonemap(averaged(half.after.mean, shape)),
+        change: images.error_map(half.error, LARGEST_ERROR),
+    }
 
 
 # --- The page --------------------------------------------------------------------------------

@@ -216,7 +216,8 @@ class Fotismos:
         section = None
         folder = self._report(name)
         if file is not None:
-            _, section = checks.examine(file, after, name, level, folder, tolerance)
+            kept = None if self.update else folder
+            _, section = checks.examine(file, after, name, level, kept, tolerance)
         if self.update and (file is None or section is not None):
             checks.update(path, None, {}, _noiseless(after), name)
         elif section is not None:
