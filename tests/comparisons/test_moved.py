@@ -162,3 +162,7 @@ def test_moves_are_listed_by_shape_then_block_and_the_largest_first():
     assert sizes == sorted(sizes, reverse=True)
     assert next(m for m in found.moves if m.block).block == (2, 2)
     assert found.tested == 2 * 3 * (1 + 6 + 2)
+    error = found.halves[1].error
+    assert (error[16:32, 16:32] > 1).all(), "what moved is shown"
+    brighter = changed(reference=lambda passes: 1.1 * passes)
+    assert [m.block or m.shape for m in brighter.moves[:3]] == [None] * 3, "as in the headline"

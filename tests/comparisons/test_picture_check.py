@@ -211,7 +211,7 @@ def test_a_tolerance_judges_what_is_visible_in_place_of_drift(run, tmp_path, mon
             assert made["gate"]["visible"]["low"] == made["gate"]["visible"]["high"]
     assert "of the pixels differ by more than ΔE2000 2, at most 5.00 % may: it fails." in printed
     page = Path("out/check/index.html").read_text()
-    assert "picture, change: ΔE2000" in page
+    assert "picture, what moved: ΔE2000" in page
     assert "it fails" in page
 
 

@@ -137,7 +137,13 @@ def test_the_page_of_a_failure_shows_before_and_now_under_what_moved(failure):
     shown = "<code>sphere</code>: red −"
     assert shown in re.search(r"<h1>(.*?)</h1>", html)[1]
     assert "<title>`sphere`: red -" in html
-    for part in ("1 of 3 moved", "textbook, before", "physical, now", "change: ΔE2000", "--update"):
+    for part in (
+        "1 of 3 moved",
+        "textbook, before",
+        "physical, now",
+        "what moved: ΔE2000",
+        "--update",
+    ):
         assert part in html, part
     names = {path.name for path in (failure.out / "fig-8-6b").iterdir()}
     panels = {f"{half}-{name}.png" for half in HALVES for name in ("before", "now", "dE2000")}

@@ -116,8 +116,14 @@ class HalfCheck:
 
     @property
     def error(self) -> Floats:
-        """The ΔE2000 between before and now, (H, W)."""
-        return self.comparison.images.maps[LEADING.name]
+        """The ΔE2000 between before and now, (H, W); 0 in shapes and blocks that did not move."""
+        error = self.comparison.images.maps[LEADING.name]
+        moved = np.zeros(error.shape, bool)
+        for kind, are_moved in self.moved.items():
+            numbers = self.parts[kind].numbers
+            if kind != WHOLE:
+                moved |= (numbers >= 0) & are_moved.any(axis=-1)[numbers]
+        return np.where(moved, error, 0.0) if moved.any() else error
 
     @cached_property
     def drifts(self) -> dict[str, Drift]:
@@ -231,10 +237,13 @@ class Check:
 
     @cached_property
     def moves(self) -> tuple[Move, ...]:
-        """What moved: shapes, then blocks, then whole pictures; of each the largest first."""
+        """What moved: the kind of the headline, then others; of each the largest first."""
+        kinds = [self.telling, *KINDS]
 
-        def order(move: Move) -> tuple[bool, bool, float]:
-            return move.shape is None, move.block is None, -abs(move.after - move.before)
+        def order(move: Move) -> tuple[int, float]:
+            kind = WHOLE if move.block is None else BLOCKS
+            kind = kind if move.shape is None else SHAPES
+            return kinds.index(kind), -abs(move.after - move.before)
 
         return tuple(sorted((m for half in self.halves for m in half.moves()), key=order))
 
@@ -248,6 +257,14 @@ class Check:
         """The halves that moved."""
         return [half for half in self.halves if any(m.any() for m in half.moved.values())]
 
+    @cached_property
+    def telling(self) -> str:
+        """The kind of parts that tells most about what moved."""
+        halves = self.are_moved
+        if all(half.constants and half.moved[WHOLE].any() for half in halves):
+            return WHOLE
+        return next(k for k in KINDS if any(h.moved[k].any() for h in halves if k in h.moved))
+
     def causes(self) -> list[str]:
         """Return sentences on which half moved, where and how."""
         names = tuple(half.name for half in self.are_moved)
@@ -259,9 +276,7 @@ class Check:
         halves = self.are_moved
         if not halves:
             return ""
-        kind = WHOLE
-        if not all(half.constants and half.moved[WHOLE].any() for half in halves):
-            kind = next(k for k in KINDS if any(h.moved[k].any() for h in halves if k in h.moved))
+        kind = self.telling
         most = int(np.argmax(sum(_light(half, kind) for half in halves)))
         amounts = {
             half.name: _amounts(half.drifts[kind], half.moved[kind], most)

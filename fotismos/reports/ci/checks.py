@@ -235,7 +235,7 @@ def _panels(half: HalfCheck) -> dict[str, Image]:
     """Return the pictures of a half by their captions: before, now, and the map of the change."""
     shape = shrunk(half.before.mean.shape[:2], LONGEST)
     subject = READERS[half.name]
-    change = f"{subject}, change: {LEADING.label}, 0 to {LARGEST_ERROR:g}"
+    change = f"{subject}, what moved: {LEADING.label}, 0 to {LARGEST_ERROR:g}"
     return {
         f"{subject}, before": images.tonemap(averaged(half.before.mean, shape)),
         f"{subject}, now": images.tonemap(averaged(half.after.mean, shape)),
