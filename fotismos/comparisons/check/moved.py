@@ -122,7 +122,8 @@ class HalfCheck:
         for kind, are_moved in self.moved.items():
             numbers = self.parts[kind].numbers
             if kind != WHOLE:
-                moved |= (numbers >= 0) & are_moved.any(axis=-1)[numbers]
+                is_part_moved: NDArray[np.bool_] = are_moved.any(axis=-1)
+                moved |= (numbers >= 0) & is_part_moved[numbers]
         return np.where(moved, error, 0.0) if moved.any() else error
 
     @cached_property
