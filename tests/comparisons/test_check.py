@@ -118,4 +118,5 @@ def test_200_checks_of_an_unchanged_scene_alarm_no_more_than_stated(rgb, name):
         alarms = sum(p < level_of_each(level, len(kinds)) for p in smallest)
         assert alarms <= stats.binom.ppf(0.999, 200, level)
     assert len(p_values) > 4000
-    assert np.mean(np.array(p_values) < 0.05) < 0.06
+    # Means of one check go together, so that the share is known less well than a binomial's.
+    assert np.mean(np.array(p_values) < 0.05) < 0.08

@@ -257,7 +257,7 @@ def test_a_cluster_does_batches_and_checks_as_this_machine_does(
     boxed = SCENE.replace("</film>", '<rfilter type="box"/></film>')
     for name, scene in (("a", boxed), ("b", "<scene/>")):
         (tmp_path / f"{name}.xml").write_text(scene)
-    change(baselines_folder / "fig-8-6b.json")
+    change(baselines_folder / "fig-8-6b.exr")
     with dask_cluster.running() as address:
         for out, words in (("here", ()), ("there", ("--scheduler", address))):
             code, _, messages = run("compare", "a.xml", "b.xml", "-o", out, "--spp", 4, *words)

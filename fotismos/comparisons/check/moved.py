@@ -122,8 +122,7 @@ class HalfCheck:
         for kind, are_moved in self.moved.items():
             numbers = self.parts[kind].numbers
             if kind != WHOLE:
-                is_part_moved: NDArray[np.bool_] = are_moved.any(axis=-1)
-                moved |= (numbers >= 0) & is_part_moved[numbers]
+                moved |= (numbers >= 0) & np.asarray(are_moved.any(axis=-1))[numbers]
         return np.where(moved, error, 0.0) if moved.any() else error
 
     @cached_property
