@@ -305,7 +305,7 @@ def test_a_baseline_of_0_4_is_refused_until_it_is_made_again(run, tmp_path, monk
 # --- Files of others -------------------------------------------------------------------------
 
 
-@pytest.mark.guarantee("runs", "`--junit`, `--summary` and `--images` do not replace your files.")
+@pytest.mark.guarantee("runs", "`--junit`, `--summary` and baselines do not replace your files.")
 def test_a_file_of_others_is_not_replaced_by_compare(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     files = {"a.xml": SCENE, "mine.txt": "mine", "b.md": SCENE}
