@@ -45,7 +45,7 @@ LONG_S = 4e-3
 """Seconds that the shortest kernels take, about: threads take a part of one to wake up."""
 
 MOST_LONGER = 16
-"""How many times the samples are that a picture with short kernels may have, a power of 2."""
+"""How many times as long they may be, and how many times the samples short ones may have."""
 
 TICK = 1e-9
 """Seconds that kernels take at least."""
@@ -123,12 +123,14 @@ def timed(
 ) -> dict[str, Time]:
     """Return the times of methods that have taken some turns, from more of them.
 
-    The pictures have so many samples that the shortest kernels are neither too short nor longer
+    The pictures have so many samples that the shortest kernels are neither too short nor far longer
     than need be; the same kernels serve all numbers of samples.
     """
     spp = min(half.pass_spp for half in halves.values())
     shortest = min(min(half.kernel_times) for half in halves.values())
-    steps = round(log2(LONG_S / max(shortest, LONG_S / MOST_LONGER)))
+    # Beside other work kernels take longer than they need, and few samples would be too few.
+    wanted = min(max(shortest, LONG_S), MOST_LONGER * LONG_S)
+    steps = round(log2(wanted / max(shortest, LONG_S / MOST_LONGER)))
     enough = max(1, int(spp * 2.0**steps))
     if enough != spp:
         halves = {name: half.sampled(enough) for name, half in halves.items()}
