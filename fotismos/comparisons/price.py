@@ -211,8 +211,17 @@ def samples_that_pass(noises: Sequence[Noise]) -> tuple[SamplesThatPass, ...]:
         counts.append(4 * counts[-1])
 
     def share(threshold: float, spp: int, end: str) -> float:
+        """Return the share above a threshold with some samples; ``end`` is that of an interval."""
         known = min(noises, key=lambda noise: abs(np.log(noise.spp / spp)))
-        return known.share(threshold, spp, beyond[end] if spp > many.spp else between)
+        if spp < few.spp and end == "high":
+            # Fewer samples than known: strata may be all that keeps the noise small.
+            return known.share(threshold, spp, RATES[1])
+        if end == "value" or not few.spp < spp < many.spp:
+            return known.share(threshold, spp, beyond[end] if spp > many.spp else between)
+        # Between both numbers of samples noise may fall as it does beyond them.
+        rates = (USUAL_RATE, between)
+        found = [noise.share(threshold, spp, rate) for noise in (few, many) for rate in rates]
+        return max(found) if end == "high" else min(found)
 
     return tuple(_passing(threshold, counts, share, many) for threshold in THRESHOLDS)
 
