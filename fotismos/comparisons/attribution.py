@@ -25,15 +25,13 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons.departure.blocks import ratio
-from fotismos.comparisons.departure.estimate import contrasts
-from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
-from fotismos.comparisons.departure.noise import (
-    USUAL,
-    Halves,
-    distances_between,
-    visible_shares,
-    without_noise,
+from fotismos.comparisons.departure.estimate import (
+    Estimate,
+    Replicates,
+    contrasts,
+    estimate,
 )
+from fotismos.comparisons.departure.metrics import LEADING, Pixelwise
 from fotismos.comparisons.departure.regions import find_objects
 from fotismos.comparisons.hybrids import HybridImages, HybridScenes, Pairs, labels
 from fotismos.comparisons.prepared import Prepared
@@ -50,15 +48,14 @@ from fotismos.comparisons.records.images import Causes, Comparison
 from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.planning.effects import Effect
-from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import (
     ObjectIds,
     gbuffer,
     require_surface,
     size_of_width,
 )
-from fotismos.reference.rendering.passes import Progress, Stream, passes
-from fotismos.reference.rendering.sums import Grouped, block_numbers, jackknifed
+from fotismos.reference.rendering.passes import Progress
+from fotismos.reference.rendering.sums import block_numbers, jackknifed
 
 WIDTH = 48
 NARROW = 32
@@ -82,8 +79,9 @@ BIAS = 0.005
 """Least half width of the interval of what an effect removes, as a share of the departure: some
 noise is not taken away (:meth:`ErrorMeter.without_noise`)."""
 
-SLOWEST = float(np.sqrt(4 / 3))
-"""Least growth of the noise with half of the samples that noise is extrapolated by."""
+MOST = 0.5
+"""An image with a larger share of pixels above the largest threshold cannot pass: no more is said
+of its shares."""
 
 MORE = 4
 PATIENCE = 2
@@ -94,7 +92,7 @@ depend on how busy the machine was."""
 
 CLOSED = 0.025
 """Largest closure, as a share of the departure, that needs no more samples; its interval may have
-eight times the width."""
+eight times the width. A departure below LEAST counts as that."""
 
 LEAST = 1.0
 """ΔE2000: an effect that removes less cannot be seen, and does not dominate."""
@@ -158,24 +156,17 @@ def find(
     leading: Any = ready.metrics[LEADING.name]
     pairs = Pairs(ready, ready.options)
     scenes = HybridScenes(pairs.plain(), ready.plan, ready.scene)
-    reference = ready.reference.sampled(spp)
     while True:
-        # Seeds that no hybrid has, and as many passes as a hybrid has replicates.
-        loop = passes(
-            [reference], ready.options.seed, REPLICATES, size=size, stream=Stream.OTHER_SIDE,
-            progress=progress, stage="reference",
-        )  # fmt: skip
-        groups = np.stack([np.array(rendered[0]) for rendered in loop])
-        meter = ErrorMeter(groups, surface.hit, ready.options.viewing, leading)
         images = HybridImages(
             pairs,
             scenes,
             replicates=REPLICATES,
-            replicate_spp=reference.pass_spp,
+            replicate_spp=spp,
             seed=ready.options.seed,
             size=size,
             progress=progress,
         )
+        meter = ErrorMeter(images.reference(), surface.hit, ready.options.viewing, leading)
         found = attribute(
             images,
             meter,
@@ -184,26 +175,25 @@ def find(
             clean=clean,
             whole=width * height,
         )
-        more = MORE * reference.pass_spp
         count = len(found.record.hybrids) * REPLICATES
-        is_enough = count * more * size[0] * size[1] > limit
-        if is_closed(found.record) or is_enough:
+        is_enough = count * MORE * spp * size[0] * size[1] > limit
+        if not images.effects or is_closed(found.record) or is_enough:
             return found
-        reference = reference.sampled(more)
+        spp *= MORE
 
 
 def is_closed(record: Attribution) -> bool:
     """Return whether the effects add up to the departure, as nearly as :data:`CLOSED` asks."""
+    allowed = CLOSED * max(record.departure, LEAST)
     width = record.closure.high - record.closure.low
-    is_near = abs(record.closure.value) <= CLOSED * record.departure
-    return is_near and width <= 8 * CLOSED * record.departure
+    return abs(record.closure.value) <= allowed and width <= 8 * allowed
 
 
 class ErrorMeter:
     """Errors in ΔE2000 against a reference, without the noise of both.
 
-    ``groups`` (R, H, W, 3) are passes of the reference, one per replicate of an image. ``counted``
-    (H, W) are the pixels that count. ``metric`` is ΔE2000.
+    ``groups`` (R, H, W, 3) are passes of the reference, one per replicate of an image: those of one
+    number share random numbers. ``counted`` (H, W) are the pixels that count. ``metric`` is ΔE2000.
     """
 
     def __init__(
@@ -216,86 +206,97 @@ class ErrorMeter:
         self.viewing = viewing
         self.metric = metric
         self.counted = counted
-        self._groups = np.asarray(groups)[:, counted].astype(float)
+        self.groups = np.asarray(groups)
+        self._passes = self.groups[:, counted].astype(float)
         _, self._blocks = np.unique(block_numbers(counted), return_inverse=True)
+        count = len(self.groups)
+        whole = np.full((1, count), 1.0 / count)
+        left_out = (1.0 - np.eye(count)) / (count - 1)
+        # Weights of the mean of all replicates, and of those without each: (R + 1, R).
+        self._means = np.concatenate([whole, left_out])
+        noise = [_contrasts_of(weights) for weights in self._means]
+        # Rows of weights that make noise, and the mean that each belongs to.
+        self._noise = np.concatenate(noise)
+        self._noisy = np.repeat(np.arange(count + 1), [len(rows) for rows in noise])
 
-    def without_noise(self, images: Floats, growth: float = USUAL) -> NDArray[np.float64]:
-        """Return the error (2, R + 1, N) of each counted pixel, without the noise of both images.
+    def without_noise(self, images: Floats) -> NDArray[np.float64]:
+        """Return the error (R + 1, N) of each counted pixel, without the noise of both images.
 
-        By two rules, each first for the mean of all replicates (R, H, W, 3), then leaving out each
-        in turn.
+        That is first of the mean of all replicates (R, H, W, 3), then leaving out each in turn. A
+        distance is never negative, so noise raises it, and most where it is small. So the noise of
+        the difference is added once more. Over a block of pixels, let ``f0`` be the mean distance
+        as measured, and ``f1`` the mean with more noise. Then ::
 
-        A distance is never negative, so noise raises it, and most where it is small. So the noise
-        of both images is added once more, and the increase of each block of pixels is taken away
-        (:func:`fotismos.comparisons.departure.noise.without_noise`). Within a block each pixel
-        keeps its share. The first rule supposes that noise alone would grow by √2. The noise of few
-        path-traced samples is skewed, and colour spaces compress it, so it grows by less (1.37 in
-        the Cornell box at 64 samples, 1.25 in a room with a mirror), and the rule leaves a part of
-        it. The second one supposes the ``growth`` that halves of the replicates show. It takes away
-        too much where the departure is far larger than the noise.
+            f² (without noise) = f0² − (f1² − f0²)
+
+        If the distance is noise alone, ``f1 = √2 f0`` and nothing remains; if it is far larger, the
+        squares grow in proportion to the variance. A block's square may be negative, and its root
+        then counts as negative, which leaves little bias in the mean of many. Within a block each
+        pixel keeps its share. Source: J. R. Cook and L. A. Stefanski, J. Am. Stat. Assoc. 89, 1994.
         """
         images = np.asarray(images)[:, self.counted].astype(float)
-        rules: tuple[list[Doubles], list[Doubles]] = ([], [])
-        for chosen, references in self._references:
-            noisier = self._noisier(images[chosen])
-            differences = map(self.metric.difference, references, noisier)
-            plain = next(differences)
-            noisy = list(differences)
-            before = np.bincount(self._blocks, plain).astype(float)
-            after = np.bincount(self._blocks, np.mean(noisy, axis=0)).astype(float)
-            for errors, assumed in zip(rules, (USUAL, growth), strict=True):
-                kept = ratio(without_noise(before, after, assumed), before)
-                errors.append(plain * kept[self._blocks])
-        return np.array(rules)
+        means = np.tensordot(self._means, images, 1)
+        noise = np.tensordot(self._noise, images - self._passes, 1)
+        shown = self.metric.coordinates(
+            np.concatenate([means, means[self._noisy] + noise]), self.viewing
+        )
+        references = self._references[[*range(len(means)), *self._noisy]]
+        distances = self.metric.difference(references, shown)
+        plain = distances[: len(means)]
+        errors = np.empty_like(plain)
+        for number, before in enumerate(plain):
+            after = distances[len(means) :][self._noisy == number].mean(axis=0)
+            kept = ratio(
+                _without_noise(self._by_block(before), self._by_block(after)),
+                self._by_block(before),
+            )
+            errors[number] = before * kept[self._blocks]
+        return errors
 
-    def halves(self, images: Floats) -> Halves:
-        """Return how far halves of the replicates (R, H, W, 3) of an image are from each other.
+    def estimate(self, images: Floats, references: Floats) -> Estimate:
+        """Return how far images (R, H, W, 3) are from others: the mean, and visible shares."""
+        replicates = Replicates.of_images(images, references, self.counted)
+        return estimate(self.metric, replicates, self.viewing)
 
-        That is of its difference from the reference, whose light is not compared.
-        """
-        differences = np.asarray(images)[:, self.counted].astype(float) - self._groups
-        shown = differences.mean(axis=0) + self._groups.mean(axis=0)
-        between = distances_between(self.metric, shown, self.viewing)
-        return Halves.of(between, differences, np.ones(len(differences)))
-
-    def visible(self, images: Floats, everything: Floats, pixels: int) -> tuple[VisibleShare, ...]:
-        """Return the shares of pixels that differ visibly, without noise.
+    def visible(
+        self, images: Floats, everything: Floats, pixels: int
+    ) -> tuple[VisibleShare, ...] | None:
+        """Return the shares of pixels that differ visibly, without noise; None where most do.
 
         Images (R, H, W, 3) are compared with those in which ``everything`` is simulated: they share
         paths, and with them most of the noise. The intervals also hold the shares of a picture of
         more ``pixels``, of which these are drawn.
         """
-        images = np.asarray(images)[:, self.counted].astype(float)
-        everything = np.asarray(everything)[:, self.counted].astype(float)
-        blocks = int(self._blocks.max()) + 1
-        grouped = Grouped(
-            means=images - everything,
-            sizes=np.ones(len(images), int),
-            places=np.arange(images.shape[1]),
-            blocks=self._blocks,
-            sampled=blocks,
-            total=blocks,
-        )
-        shares = visible_shares(self.metric, images.mean(axis=0), grouped, self.viewing)
-        return tuple(_drawn(share, images.shape[1], pixels) for share in shares)
+        shown = np.mean(images, axis=0)[self.counted]
+        distances = self.metric(shown, np.mean(everything, axis=0)[self.counted], self.viewing)
+        if np.mean(distances > self.metric.visible[-1]) > MOST:
+            return None
+        shares = self.estimate(images, everything).visible
+        return tuple(_drawn(share, distances.size, pixels) for share in shares)
 
     @cached_property
-    def _references(self) -> list[tuple[NDArray[np.int64], list[Doubles]]]:
-        """For each jackknifed set: which replicates it holds, and the reference's coordinates.
+    def _references(self) -> Doubles:
+        """The coordinates (R + 1, N, 3) of the reference: of all passes, then without each."""
+        means = np.tensordot(self._means, self._passes, 1)
+        return np.asarray(self.metric.coordinates(means, self.viewing))
 
-        The coordinates are without added noise first, then with noise added in each way.
-        """
-        count = len(self._groups)
-        sets = [np.arange(count), *(np.delete(np.arange(count), out) for out in range(count))]
-        # The opposite sign of an image's: the noise of both is independent.
-        return [(chosen, self._noisier(self._groups[chosen], -1)) for chosen in sets]
+    def _by_block(self, values: Floats) -> NDArray[np.float64]:
+        """Return the sums (B,) over the blocks of pixels."""
+        return np.bincount(self._blocks, values).astype(float)
 
-    def _noisier(self, images: Floats, sign: int = 1) -> list[Doubles]:
-        """Return the coordinates of the mean of images (n, N, 3), and of it with added noise."""
-        mean = images.mean(axis=0)
-        noise = np.tensordot(contrasts(np.ones(len(images))), images, 1)
-        shown = (mean, *(mean + sign * deviation for deviation in noise))
-        return [self.metric.coordinates(pixels, self.viewing) for pixels in shown]
+
+def _contrasts_of(weights: Doubles) -> Doubles:
+    """Return weights (m, R) that make noise from replicates, as large as that of a mean of some."""
+    rows = contrasts(np.ones(np.count_nonzero(weights)))
+    found = np.zeros((len(rows), len(weights)))
+    found[:, weights > 0] = rows
+    return found
+
+
+def _without_noise(measured: Doubles, noisier: Doubles) -> Doubles:
+    """Return distances without noise, from those measured and those with the noise added again."""
+    squares = 2.0 * np.square(measured) - np.square(noisier)
+    return np.asarray(np.sign(squares) * np.sqrt(np.abs(squares)))
 
 
 def _drawn(share: VisibleShare, pixels: int, of: int) -> VisibleShare:
@@ -333,52 +334,40 @@ def attribute(
     shares(effects, note, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS)
     images.render(sets)
     with_all = images.pixels(images.simulating(everything))
-    noise = meter.halves(with_all)
-    growth = float(np.clip(noise.growth, SLOWEST, USUAL))
-    rules: dict[frozenset[Effect], Floats] = {}
-
-    def both(simulated: frozenset[Effect]) -> Floats:
-        """Errors (2, R + 1, N) in ΔE2000: by both rules of the meter, which see."""
-        if simulated not in rules:
-            found = images.pixels(images.simulating(simulated))
-            rules[simulated] = meter.without_noise(found, growth)
-        return rules[simulated]
+    known: dict[frozenset[Effect], Floats] = {}
 
     def error(simulated: frozenset[Effect]) -> Floats:
-        """Errors (R + 1, N): the middle of both rules."""
-        errors: Floats = both(simulated).mean(axis=0)
-        return errors
+        """Return errors (R + 1, N) in ΔE2000."""
+        if simulated not in known:
+            found = images.pixels(images.simulating(simulated))
+            known[simulated] = meter.without_noise(found)
+        return known[simulated]
 
     gains, sampling_errors, drawn = shares(
-        effects, both, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS
+        effects, error, seed=seed, exact_players=EXACT_EFFECTS, orders=ORDERS
     )
     # A gain is a change of the error: an effect that removes some has a negative one.
     removed = {e.label: -gain for e, gain in zip(effects, gains, strict=True)}
     departure = error(nothing)
     left = error(everything)
-    bias = BIAS * float(departure[0].mean())
-    if noise.are_heavy:  # the closure shows how much of the noise was not taken away
-        bias = max(bias, min(abs(float(left[0].mean())), noise.below))
+    # What does not close may belong to any of them.
+    bias = max(BIAS * float(departure[0].mean()), abs(float(left[0].mean())))
     contributions = tuple(
         Contribution(
             effect=effect.label,
-            removes=by_both_rules(removed[effect.label].mean(axis=-1), bias),
+            removes=jackknifed(removed[effect.label].mean(axis=-1), bias),
             alone=float((error(nothing) - error(frozenset({effect})))[0].mean()),
             last=float((error(everything - {effect}) - error(everything))[0].mean()),
             sampling_error=sampling_error,
         )
         for effect, sampling_error in zip(effects, sampling_errors, strict=True)
     )
-    # What noise leaves in the closure is no fault: it may explain as much as halves differ in.
-    remaining = both(everything).mean(axis=-1)
-    if noise.are_heavy:
-        bias = max(bias, noise.below)
-    if noise.are_heavy and noise.measured.mean() <= noise.halves.mean():
-        bias = max(bias, float(np.abs(remaining).max()))
-    closure = by_both_rules(remaining, bias)
+    closure = jackknifed(left.mean(axis=-1), BIAS * float(departure[0].mean()))
+    # What noise may leave is no fault: the closure may be 0 if this error may.
+    least = meter.estimate(with_all, meter.groups).mean.low
     hybrids = [
         Hybrid(effects=labels(effects, simulated), error=float(error(simulated)[0].mean()))
-        for simulated in rules
+        for simulated in known
     ]
 
     def filled(values: Floats) -> NDArray[np.float64]:
@@ -386,16 +375,23 @@ def attribute(
         whole[meter.counted] = values
         return whole
 
-    previews = images.previews(rules, clean)
+    previews = images.previews(known, clean)
     kernel = images.pixels(images.plain_kernel).mean(axis=0)
     # The kernel and its plugin compute the same: what differs is rounding.
     plugin = images.pixels(images.plugin(nothing)).mean(axis=0)
     rounding = meter.metric(plugin, kernel, meter.viewing)[meter.counted]
+    visible = {}
+    for simulated in known:
+        found = images.pixels(images.simulating(simulated))
+        if shares_of := meter.visible(found, with_all, whole):
+            visible[labels(effects, simulated)] = shares_of
     return Causes(
         record=Attribution(
             effects=contributions,
             departure=float(departure[0].mean()),
-            closure=Interval(value=closure.value, low=closure.low, high=closure.high),
+            closure=structs.replace(
+                closure, low=min(closure.low, least), high=max(closure.high, least)
+            ),
             implementation=float(rounding.mean()),
             resolution=meter.counted.shape[::-1],
             spp=images.replicate_spp,
@@ -408,29 +404,13 @@ def attribute(
                 filled(departure[0]), removed, left=left[0], counted=meter.counted, shapes=shapes
             ),
         ),
-        maps={name: filled(change[:, 0].mean(axis=0)) for name, change in removed.items()},
+        maps={name: filled(change[0]) for name, change in removed.items()},
         departure=filled(departure[0]),
         left=filled(left[0]),
         counted=meter.counted,
         previews={hybrid.effects: image for hybrid, image in zip(hybrids, previews, strict=True)},
-        visible={
-            labels(effects, simulated): meter.visible(
-                images.pixels(images.simulating(simulated)),
-                with_all,
-                whole,
-            )
-            for simulated in rules
-        },
+        visible=visible,
     )
-
-
-def by_both_rules(values: Floats, bias: float) -> Interval:
-    """Return the middle of what both rules find (2, R + 1), and an interval that holds both.
-
-    ``bias`` is half its width, at least.
-    """
-    gap = abs(float(values[0, 0] - values[1, 0]))
-    return jackknifed(values.mean(axis=0), max(bias, gap))
 
 
 def by_object(
@@ -453,7 +433,10 @@ def by_object(
             share=share.share,
             departure=share.mean_dE2000,
             removes=tuple(
-                by_both_rules(change[..., row], BIAS * share.mean_dE2000) for change in gains
+                jackknifed(
+                    change[:, row], max(BIAS * share.mean_dE2000, abs(float(remaining[row])))
+                )
+                for change in gains
             ),
             left=float(remaining[row]),
         )

@@ -408,6 +408,11 @@ class HybridImages:
             return found
         return found + (self._kernel(of_kernel.intersection(effects)) - self.plain_kernel)
 
+    def reference(self) -> Floats:
+        """Render the reference (R, H, W, 3) with the same seeds: rays, often paths, are shared."""
+        renderer = self._ready.reference.sampled(self._pass_spp)
+        return self.pixels(self._passes(renderer)[0])
+
     @property
     def kernel(self) -> Floats:
         """The kernel as requested."""
