@@ -37,17 +37,20 @@ from fotismos.comparisons.hybrids import HybridImages, HybridScenes, Pairs, labe
 from fotismos.comparisons.prepared import Prepared
 from fotismos.comparisons.records.comparison import (
     CAUSES,
+    TIED,
     Attribution,
     ComparisonRecord,
     Contribution,
     Hybrid,
     ObjectContribution,
+    tied,
 )
 from fotismos.comparisons.records.departure import Region, Viewing, VisibleShare
 from fotismos.comparisons.records.images import Causes, Comparison
 from fotismos.heuristic.convention import Doubles, Floats
 from fotismos.heuristic.errors import FotismosError, InputError
 from fotismos.reference.planning.effects import Effect
+from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import (
     ObjectIds,
     gbuffer,
@@ -122,7 +125,7 @@ def with_causes(comparison: Comparison, ready: Prepared, progress: Progress | No
         causes = find(ready, progress, clean, limit=most_samples)
     except FotismosError as error:
         return comparison.warned([f"The causes are unknown: {error}"])
-    record = structs.replace(with_effects_named(comparison, causes.maps), why=causes.record)
+    record = structs.replace(with_effects_named(comparison, causes), why=causes.record)
     comparison = replace(comparison, record=record, causes=causes)
     return comparison.timed(CAUSES, perf_counter() - begin)
 
@@ -503,28 +506,37 @@ def dominating(effects: Mapping[str, Floats], counted: NDArray[np.bool_]) -> NDA
     return np.where(counted, places, UNCOUNTED)
 
 
-def with_effects_named(comparison: Comparison, effects: Mapping[str, Floats]) -> ComparisonRecord:
+def with_effects_named(comparison: Comparison, causes: Causes) -> ComparisonRecord:
     """Return a comparison's record in which regions, shapes and materials name their effect.
 
-    ``effects`` are ``{name: (h, w)}``, the ΔE2000 that each removes; the maps may be smaller.
+    The maps of what each effect removes may be smaller. A shape whose intervals are known names the
+    effects that are tied there.
     """
     record = comparison.record
     images = comparison.images
-    maps = {name: _enlarged(values, images.counted.shape) for name, values in effects.items()}
+    maps = {name: _enlarged(values, images.counted.shape) for name, values in causes.maps.items()}
+    intervals = {
+        shape.name: dict(zip(maps, shape.removes, strict=True)) for shape in causes.record.objects
+    }
 
     def in_region(region: Region) -> dict[str, float]:
         rows = slice(region.y, region.y + region.height)
         columns = slice(region.x, region.x + region.width)
         return {name: float(values[rows, columns].mean()) for name, values in maps.items()}
 
-    def each(objects: Any, places: Any) -> Any:
+    def each(objects: Any, places: Any, known: Mapping[str, Mapping[str, Interval]]) -> Any:
         """Name the effects by the maps' cell in which each pixel of an object lies."""
         seen = places >= 0
         found = {
             name: means(values[seen], places[seen], len(objects)) for name, values in maps.items()
         }
         return tuple(
-            structs.replace(item, effect=in_words({name: of[row] for name, of in found.items()}))
+            structs.replace(
+                item,
+                effect=in_words(
+                    {name: of[row] for name, of in found.items()}, known.get(item.name)
+                ),
+            )
             for row, item in enumerate(objects)
         )
 
@@ -533,21 +545,29 @@ def with_effects_named(comparison: Comparison, effects: Mapping[str, Floats]) ->
         regions=tuple(
             structs.replace(region, effect=in_words(in_region(region))) for region in record.regions
         ),
-        objects=each(record.objects, images.objects),
-        materials=each(record.materials, images.materials),
+        objects=each(record.objects, images.objects, intervals),
+        materials=each(record.materials, images.materials, {}),
     )
 
 
-def in_words(found: Mapping[str, float]) -> str | None:
+def in_words(
+    found: Mapping[str, float], intervals: Mapping[str, Interval] | None = None
+) -> str | None:
     """Return the effect of the largest mean ``{name: ΔE2000}``, and a second one that has half.
 
-    None if no mean reaches :data:`LEAST`.
+    With ``intervals`` their values count, and effects that are tied with the first are named with
+    it. None if no mean reaches :data:`LEAST`.
     """
-    ordered = sorted(found, key=lambda name: found[name], reverse=True)
-    if not ordered or found[ordered[0]] < LEAST:
+    if intervals:
+        found = {name: interval.value for name, interval in intervals.items()}
+    seen = [name for name in sorted(found, key=lambda name: -found[name]) if found[name] >= LEAST]
+    if not seen:
         return None
-    first, *others = ordered
-    if others and found[others[0]] >= max(ALSO * found[first], LEAST):
+    alike = tied({name: intervals[name] for name in seen}) if intervals else seen[:1]
+    if len(alike) > 1:
+        return TIED.join(alike)
+    first, *others = seen
+    if others and found[others[0]] >= ALSO * found[first]:
         return f"{first}, then {others[0]}"
     return first
 

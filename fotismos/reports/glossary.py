@@ -105,7 +105,10 @@ COSTS: Terms = {
 }
 
 PLANS: Terms = {
-    ("needed",): "Whether the scene needs the effect, by a rule that is proved or measured.",
+    (
+        "present",
+    ): "Whether the scene has the effect, by a rule that is proved or measured. It may still"
+    " be too small to be needed to look right.",
     ("rule",): "Why the effect is simulated, or left out without any change of the image.",
     ("guard",): "A few rays with everything simulated, which check that the plan left out nothing.",
     ("pairing",): "How each textbook material and light gets its physical partner.",

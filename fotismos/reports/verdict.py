@@ -21,6 +21,7 @@ from fotismos.comparisons.gallery.builtin import SCENES
 from fotismos.comparisons.ladder.front import cheapest
 from fotismos.comparisons.records.comparison import (
     MOST_SPP,
+    TIED,
     ComparisonRecord,
     Price,
     SamplesThatPass,
@@ -149,14 +150,14 @@ def shows_only_noise(record: ComparisonRecord, threshold: float = TOLERANCE) -> 
 
 def missing(record: ComparisonRecord) -> dict[str, float]:
     """Return ``{effect: its share of what all surely remove}``, the largest first."""
-    effects = record.why.effects if record.why else ()
-    sure = {
-        contribution.effect: contribution.removes.value
-        for contribution in effects
-        if contribution.removes.low > 0
-    }
-    total = sum(sure.values())
-    return {effect: sure[effect] / total for effect in sorted(sure, key=lambda name: -sure[name])}
+    sure = record.why.sure if record.why else {}
+    total = sum(removes.value for removes in sure.values())
+    return {effect: removes.value / total for effect, removes in sure.items()}
+
+
+def foremost(record: ComparisonRecord) -> str:
+    """Return what a scene lacks most, as a noun, with what is tied; empty if that is unknown."""
+    return noun(TIED.join(record.why.foremost)) if record.why else ""
 
 
 def cause(record: ComparisonRecord) -> str:
@@ -165,11 +166,15 @@ def cause(record: ComparisonRecord) -> str:
         return " ".join(record.picture_mistakes)
     if record.mistakes:
         return ""
-    largest = list(missing(record))[:1]
-    if MICROFACETS.label in largest and (albedo := _impossible_albedo(record)):
+    if _is_of_materials(record) and (albedo := _impossible_albedo(record)):
         amount = f"{number(albedo)} times the light that it receives"
         return f"A material reflects {amount}; no physical material does."
-    return _mostly(largest)
+    return _mostly(foremost(record))
+
+
+def _is_of_materials(record: ComparisonRecord) -> bool:
+    """Return whether a scene lacks nothing more than microfacets."""
+    return bool(record.why and MICROFACETS.label in record.why.foremost)
 
 
 def _impossible_albedo(record: ComparisonRecord) -> float:
@@ -248,7 +253,8 @@ def _effects_that_pass(record: ComparisonRecord, threshold: float) -> tuple[str,
     needed = record.price and record.price.needed_at(threshold)
     if not needed or not record.why or _impossible_albedo(record):
         return ()
-    return needed.effects
+    # What may remove nothing is not needed.
+    return tuple(effect for effect in needed.effects if effect in record.why.sure)
 
 
 def _effects_needed(record: ComparisonRecord, threshold: float) -> str:
@@ -294,10 +300,9 @@ def because(record: ComparisonRecord, threshold: float = TOLERANCE) -> str:
         return ""
     if record.mistakes:
         return "mistakes of the shader"
-    largest = next(iter(missing(record)), "")
-    if largest == MICROFACETS.label and _impossible_albedo(record):
+    if _is_of_materials(record) and _impossible_albedo(record):
         return "an impossible material"
-    return noun(largest)
+    return foremost(record)
 
 
 def needs(record: ComparisonRecord, threshold: float = TOLERANCE) -> str:
@@ -506,12 +511,15 @@ def about(record: ComparisonRecord) -> str:
     return " ".join(dict.fromkeys(filter(None, parts)))
 
 
-def _mostly(effects: Sequence[str]) -> str:
-    return f"Mostly missing: {', '.join(map(noun, effects))}." if effects else ""
+def _mostly(effects: str) -> str:
+    return f"Mostly missing: {effects}." if effects else ""
 
 
 def noun(effect: str) -> str:
     """Return what a picture without an effect lacks, in words; of several, in their order."""
+    alike = effect.split(TIED)
+    if len(alike) > 1:
+        return f"{_joined(alike, 'and')} alike"
     nouns = {each.label: each.noun or each.label for each in EFFECTS}
     return ", then ".join(nouns.get(part, part) for part in effect.split(", then "))
 
@@ -579,7 +587,7 @@ def most_missing(records: Sequence[ComparisonRecord], threshold: float = TOLERAN
             if _impossible_albedo(record):
                 parts.pop(MICROFACETS.label, None)
             pixels.update({effect: wrong * part for effect, part in parts.items()})
-    return _mostly([effect for effect, _ in pixels.most_common(NAMED)])
+    return _mostly(", ".join(noun(effect) for effect, _ in pixels.most_common(NAMED)))
 
 
 def advice(scenes: Sequence[Studied], threshold: float = TOLERANCE) -> Iterator[str]:

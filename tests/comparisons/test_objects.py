@@ -13,6 +13,7 @@ from fotismos.comparisons.departure import regions
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.records.departure import Region
 from fotismos.comparisons.steps import steps
+from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import ObjectIds, gbuffer
 from tests.shared import records
 from tests.shared.parts import CENTRE, RADIUS, moved, shadowed
@@ -105,9 +106,18 @@ def test_effects_are_taken_where_the_pixels_of_a_shape_lie():
     images = records.images(4, 4, objects=places, materials=places)
     boxes = [Region(x=x, y=1, width=2, height=2, share=0.5, mean_dE2000=1.0) for x in (0, 2)]
     record = records.record(objects=carriers, materials=carriers, regions=tuple(boxes))
-    found = with_effects_named(records.Comparison(record, images), effects)
+    causes = SimpleNamespace(maps=effects, record=SimpleNamespace(objects=()))
+    found = with_effects_named(records.Comparison(record, images), causes)
     assert {each.name: each.effect for each in found.objects} == {
         "left": "shadow",
         "right": "gloss",
     }
     assert [each.effect for each in found.regions] == ["shadow", "gloss"]
+    near = Interval(value=2.0, low=1.5, high=2.5), Interval(value=1.8, low=1.3, high=2.3)
+    causes.record.objects = (SimpleNamespace(name="left", removes=near),)
+    found = with_effects_named(records.Comparison(record, images), causes)
+    assert {each.name: each.effect for each in found.objects} == {
+        "left": "shadow; gloss",
+        "right": "gloss",
+    }
+    assert {each.name: each.effect for each in found.materials}["left"] == "shadow"

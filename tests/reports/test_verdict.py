@@ -9,6 +9,8 @@ from msgspec import structs
 from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.records import cost as cost_records
 from fotismos.comparisons.records.comparison import (
+    Attribution,
+    Contribution,
     EffectsThatPass,
     Price,
     SamplesThatPass,
@@ -35,12 +37,27 @@ def scene(low=0.5, high=None, name="a", exposed=9.0, command="fotismos compare a
 
 
 def why(**effects):
-    """Return an attribution of ``{effect: ΔE2000 removed}``."""
+    """Return an attribution of ``{effect: ΔE2000 removed}``, each to within 0.9."""
     removed = [
-        SimpleNamespace(effect=effect, removes=SimpleNamespace(value=value, low=value - 0.9))
+        Contribution(
+            effect=effect,
+            removes=Interval(value=value, low=value - 0.9, high=value + 0.9),
+            alone=value,
+            last=value,
+            sampling_error=0.0,
+        )
         for effect, value in effects.items()
     ]
-    return SimpleNamespace(effects=removed)
+    return Attribution(
+        effects=tuple(removed),
+        departure=sum(effects.values()),
+        closure=Interval(value=0.0, low=0.0, high=0.0),
+        implementation=0.0,
+        resolution=(8, 6),
+        spp=16,
+        replicates=4,
+        orders=0,
+    )
 
 
 def study(*points):
@@ -251,6 +268,24 @@ def test_a_run_counts_scenes_and_names_what_those_that_fail_lack_by_pixels():
     lines = list(verdict.advice(scenes))
     assert [line.partition(":")[0] for line in lines] == ["a", "b", "d"]
     assert lines[0].startswith("a: Mostly missing: interreflection. No method looks right at ")
+
+
+def test_effects_whose_intervals_overlap_are_tied():
+    for effects, expected in (
+        ({"interreflection": 3.0, "occlusion": 1.3}, "interreflection and occlusion alike"),
+        ({"interreflection": 3.0, "occlusion": 1.1}, "interreflection"),
+        ({"occlusion": 1.0, "spectral": 0.8}, "occlusion"),  # the second may remove nothing
+        ({"occlusion": 0.8}, ""),
+    ):
+        record = scene(why=why(**effects))
+        assert verdict.because(record) == expected
+        assert verdict.cause(record) == (f"Mostly missing: {expected}." if expected else "")
+
+
+def test_an_effect_that_may_remove_nothing_is_not_needed():
+    found = scene(why=why(occlusion=3.0, spectral=0.5), price=price(4, ("occlusion", "spectral")))
+    assert verdict.needs(found) == "occlusion"
+    assert verdict.sentence(found).startswith("It needs occlusion, but not spectral light.")
 
 
 def test_scenes_in_doubt_are_counted_and_named():

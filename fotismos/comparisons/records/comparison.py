@@ -1,5 +1,6 @@
 """The record of a comparison, ``comparison.json``: its price, its causes and its pictures."""
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from msgspec import Meta
@@ -246,6 +247,29 @@ class Attribution(Record):
     orders: int
     hybrids: tuple[Hybrid, ...] = ()
     objects: tuple[ObjectContribution, ...] = ()
+
+    @property
+    def sure(self) -> dict[str, Interval]:
+        """What effects remove that surely remove something, the largest first."""
+        removes = {part.effect: part.removes for part in self.effects if part.removes.low > 0}
+        return dict(sorted(removes.items(), key=lambda found: -found[1].value))
+
+    @property
+    def foremost(self) -> tuple[str, ...]:
+        """The effect that removes most for sure, and those that are tied with it."""
+        return tied(self.sure)
+
+
+TIED = "; "
+"""Between the names of effects that are tied."""
+
+
+def tied(removes: Mapping[str, Interval]) -> tuple[str, ...]:
+    """Return the first effect, the one that removes most, and those whose intervals reach its."""
+    if not removes:
+        return ()
+    least = next(iter(removes.values())).low
+    return tuple(effect for effect, interval in removes.items() if interval.high >= least)
 
 
 class PictureFiles(Record):

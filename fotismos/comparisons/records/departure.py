@@ -156,7 +156,8 @@ class Region(Record):
     share: Annotated[Share, Meta(description="Of the sum of dE2000 over the counted pixels.")]
     mean_dE2000: Annotated[Amount, Meta(description="Over the box's counted pixels.")]
     effect: Annotated[
-        str | None, Meta(description="The dominant effect there, in words, if known.")
+        str | None,
+        Meta(description="The dominant effect there, if known: 'a, then b'; 'a; b' if tied."),
     ] = None
 
 

@@ -283,23 +283,25 @@ def _script_data(name: str, scene: SceneView) -> dict[str, Any]:
             for region in record.regions
         ],
         "images": scene.embedded.manifest() if scene.embedded else None,
-        "effects": _effects(why),
+        "effects": _effects(why, record),
         "board": _board(why, record.why),
         "terms": scene.terms.manifest() if scene.terms else None,
         "live": scene.live.manifest() if scene.live else None,
     }
 
 
-def _effects(why: WhyView | None) -> dict[str, Any] | None:
-    """Return where each effect dominates, with the effects' names and colours."""
+def _effects(why: WhyView | None, record: ComparisonRecord) -> dict[str, Any] | None:
+    """Return where each effect dominates, with the effects' names, colours and parts."""
     if not why:
         return None
+    missing = verdict.missing(record)
     return {
         "width": why.width,
         "height": why.height,
         "map": why.map,
         "names": [verdict.noun(name) for name in why.names],
         "colours": [EFFECT_COLOURS[name] for name in why.names],
+        "parts": [missing.get(name, 0.0) for name in why.names],
     }
 
 

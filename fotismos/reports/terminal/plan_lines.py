@@ -16,7 +16,7 @@ from fotismos.reports.terminal.words import yes_or_no
 
 EFFECTS = (
     Column("effect", "name"),
-    Column("needed", "called_for", yes_or_no),
+    Column("present", "called_for", yes_or_no),
     Column("rule", "rule"),
     Column("evidence", "evidence"),
     Column("cost", "cost"),
@@ -31,7 +31,7 @@ RULES = (
 
 
 class PlannedEffect(Record):
-    """Whether a scene needs an effect, why, and what simulates it on either side."""
+    """Whether a scene has an effect, why, and what simulates it on either side."""
 
     name: str
     called_for: bool

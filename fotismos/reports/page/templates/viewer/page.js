@@ -4,7 +4,8 @@
  * @typedef {[number, string][]} Runs   texts by the place of the threshold from which each holds
  * @typedef {{name: string, title: string, kind: string, top: number}} MapOf
  * @typedef {{x: number, y: number, width: number, height: number, effect: string | null}} Region
- * @typedef {{width: number, height: number, names: string[], colours: string[], map: string}}
+ * @typedef {{width: number, height: number, names: string[], colours: string[],
+ *   parts: number[], map: string}}
  * Effects
  * @typedef {{on: number[], mean: string}} Hybrid
  * @typedef {{images: Manifest, hybrids: Hybrid[]}} Board

@@ -224,7 +224,8 @@ function eachPlace(painter, box, visit) {
 }
 
 /**
- * What is missing in a rectangle: the parts of its error where each effect dominates.
+ * What is missing: in the whole picture what the effects remove, as in its headline; in a rectangle
+ * the parts of its error where each effect dominates.
  * @param {Painter} painter
  * @param {number[] | null} box
  */
@@ -236,6 +237,10 @@ function causesIn(painter, box) {
       one => one.x < x + w && x < one.x + one.width && one.y < y + h && y < one.y + one.height,
     );
     return [...new Set(near.flatMap(one => one.effect ?? []))].join(", ") || "unknown";
+  }
+  if (!box) {
+    const { names, parts: removed } = scene.effects;
+    return inWords(names.map((name, place) => ({ name, part: removed[place] ?? 0 })));
   }
   /** @type {Map<string, number>} */
   const sums = new Map();
@@ -250,6 +255,14 @@ function causesIn(painter, box) {
     name: effectName(scene.effects, letter),
     part: whole ? sum / whole : 0,
   }));
+  return inWords(parts);
+}
+
+/**
+ * The largest parts of an error, in words.
+ * @param {{name: string, part: number}[]} parts
+ */
+function inWords(parts) {
   const seen = parts
     .filter(({ name, part }) => name && part >= 0.005)
     .sort((a, b) => b.part - a.part);
