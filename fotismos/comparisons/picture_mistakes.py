@@ -796,6 +796,11 @@ def _change_of_colours(
         if powers := list(filter(None, (_power(blocks, names), _power(pixels, names)))):
             changes["power"] = min(powers, key=tiles.left)
     left = {kind: tiles.left(change) for kind, change in changes.items()}
+    if not is_mapped and min(left.values()) > SLIGHT * before:
+        pairs = {change: tiles.left(change) for change in _pairs_of_changes(blocks, names)}
+        both = min(pairs, key=pairs.__getitem__, default=None)
+        if both is not None and pairs[both] < min(WHOLLY * before, BETTER * min(left.values())):
+            return both
     allowed = SIMPLER * min(left.values()) + SLIGHT * before
     # The first of them is the simplest.
     chosen = next(kind for kind, departure in left.items() if departure <= allowed)
@@ -943,6 +948,38 @@ def _power(blocks: Blocks, names: Names) -> Mistake | None:
         mend=lambda image: (np.maximum(image, 0.0) / scale) ** (1 / power),
         show=lambda image: scale * np.maximum(image, 0.0) ** power,
     )
+
+
+def _pairs_of_changes(blocks: Blocks, names: Names) -> Iterator[Mistake]:
+    """Yield two changes at once: a factor with an offset, or other colours with a power."""
+    slope, offset = np.polyfit(blocks.other.ravel(), blocks.picture.ravel(), deg=1)
+    if slope > 0 and abs(slope - 1) > TINT:
+        side = "high" if offset > 0 else "low"
+        yield Mistake(
+            sentence=(
+                f"{names.picture} is {slope:.3g} times as bright as {names.other}, and its values"
+                f" are then all {abs(offset):.3g} too {side}."
+            ),
+            mend=lambda image: np.maximum(image - offset, 0.0) / slope,
+            show=lambda image: np.maximum(slope * image + offset, 0.0),
+        )
+    for misreading, (undo, redo) in MISREADINGS.items():
+        if not misreading.startswith(("channels", "colours")):
+            continue
+        power = _power(Blocks(picture=blocks.picture, other=redo(blocks.other)), names)
+        if power is not None and power.mend is not None and power.show is not None:
+            yield Mistake(
+                sentence=(
+                    f"{names.picture} is misread. Its {misreading}{CURES.get(misreading, '')}."
+                    f" {power.sentence}"
+                ),
+                mend=partial(_after, power.mend, undo),
+                show=partial(_after, redo, power.show),
+            )
+
+
+def _after(first: Mending, second: Mending, image: Floats) -> Floats:
+    return second(first(image))
 
 
 def _is_even_tint(blocks: Blocks) -> bool:
