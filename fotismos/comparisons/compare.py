@@ -141,6 +141,11 @@ def look(
         noise_shown=halves.noise_shown,
     )
     images = replace(images, maps=maps, significant=marked.image)
+    lead = summaries[LEADING.name]
+    if not marked.is_certain:
+        summaries[LEADING.name] = lead.unproven()
+    elif halves.noise_shown == "none":
+        summaries[LEADING.name] = lead.as_measured()
     objects, images = halves.with_objects(images)
     caution = halves.caution(images.heuristic, images.reference)
     done("metrics")
@@ -170,11 +175,11 @@ def look(
     )
     comparison = Comparison(record=record, images=images)
     shares = summaries[LEADING.name].visible
-    undecided = decide(shares, is_certain=marked.is_certain) == "undecided"
+    undecided = decide(shares) == "undecided"
     if undecided and halves.has == PICTURES.needs:
         # A mistake may decide, and what a page shows first should stay.
         judged = PICTURES.add(comparison, halves, progress).record
-        record = structs.replace(record, significant=judged.significant)
+        record = structs.replace(record, significant=judged.significant, metrics=judged.metrics)
     return replace(comparison, record=record)
 
 
@@ -209,6 +214,7 @@ def _summarised(
             viewing=halves.options.viewing,
             noise=images.difference.noise,
             grouped=images.difference.grouped,
+            noise_shown=halves.noise_shown,
         )
         if metrics[name].drawn:
             maps[name] = distances

@@ -19,6 +19,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from fotismos.comparisons import alignment, picture_mistakes
+from fotismos.comparisons.departure.criterion import decide
 from fotismos.comparisons.departure.estimate import NoiseShown
 from fotismos.comparisons.departure.mapped_sums import MappedDifference, MappedReference, shown_by
 from fotismos.comparisons.departure.metrics import LEADING
@@ -324,7 +325,7 @@ class GivenPictures:
         """Return a comparison with what is odd about the pictures, which it warns of first.
 
         ``expected`` and ``textbook`` are as for :func:`agreement`. Where a mistake is certain, so
-        is a difference.
+        is a difference: without the mistake the pictures agree, so noise made none of it.
         """
         record = comparison.record
         images = comparison.images
@@ -341,9 +342,13 @@ class GivenPictures:
             found = agreement(self.reference, swapped, expected, REFERENCE)
         found = structs.replace(found, odd=(*same_files(self), *found.odd, *unknown_noise(self)))
         is_certain = record.significant.certain or found.certain
+        metrics = record.metrics
+        if found.certain and decide(metrics[LEADING.name].visible) == "undecided":
+            metrics = {**metrics, LEADING.name: metrics[LEADING.name].as_measured()}
         record = structs.replace(
             record,
             agreement=found,
+            metrics=metrics,
             significant=structs.replace(record.significant, certain=is_certain),
             warnings=(*found.mistakes, *found.odd, *record.warnings),
         )

@@ -201,6 +201,7 @@ class Job:
 
     ``options`` say how to render; ``fresh`` renders finished scenes again; pixels differ
     visibly above the ΔE2000 ``within``. The methods of the scenes ``ladders`` are measured, too.
+    A scene that is undecided takes ``patience`` times the samples.
     """
 
     options: Options
@@ -209,3 +210,4 @@ class Job:
     fresh: bool = False
     within: float = 2.0
     ladders: frozenset[str] = frozenset()
+    patience: int = 1

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import ceil
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING
@@ -140,7 +141,7 @@ def decision(
     if record.caution:
         return "undecided"
     visible = record.metrics[LEADING.name].visible
-    return decide(visible, threshold, bound, is_certain=record.significant.certain)
+    return decide(visible, threshold, bound)
 
 
 def shows_only_noise(record: ComparisonRecord, threshold: float = TOLERANCE) -> bool:
@@ -195,7 +196,6 @@ def sentence(
     if record.caution:
         return record.caution
     lead = record.metrics[LEADING.name]
-    found = share(record, threshold)
     looks = decision(record, threshold)
     if record.mistakes and looks != "pass":
         return "Correct the shader first."
@@ -203,24 +203,13 @@ def sentence(
         case "pass":
             return "No visible difference." if lead.high <= EXACT else "Nothing to do."
         case "undecided" if not record.picture_mistakes:
-            more = "repeats of the pictures" if record.given else "samples (--spp)"
             if shows_only_noise(record, threshold):
-                doubt = (
-                    f"Noise may hide a difference in up to {percent(found.high)} of the pixels."
-                    f" More {more} decide."
-                )
-            elif found.low > LIMIT:
-                doubt = (
-                    f"Noise may explain it: {percent(found.value)} of the pixels differ, but no"
-                    f" difference is certain anywhere. More {more} decide."
-                )
+                hidden = percent(share(record, threshold).high)
+                doubt = f"Noise may hide a difference in up to {hidden} of the pixels."
             else:
-                doubt = (
-                    f"Too close to call: between {percent(found.low)} and {percent(found.high)} of"
-                    f" the pixels differ, and at most {parameter(100 * LIMIT)} % may. More {more}"
-                    " decide."
-                )
-            return f"{doubt} {_samples_needed(record, threshold)}".strip()
+                doubt = f"At most {parameter(100 * LIMIT)} % may differ."
+            parts = [doubt, decisive(record, threshold), _samples_needed(record, threshold)]
+            return " ".join(filter(None, parts))
     if record.picture_mistakes:
         return ""
     if _brightness_suffices(record, threshold):
@@ -231,6 +220,34 @@ def sentence(
         return _remedy(record, cost, threshold)
     parts = [_effects_needed(record, threshold), _samples_needed(record, threshold)]
     return " ".join(filter(None, parts)) or _where(record)
+
+
+def leaning(record: ComparisonRecord, threshold: float = TOLERANCE) -> str:
+    """Return which way an undecided scene leans, with the share of pixels and its interval."""
+    found = share(record, threshold)
+    if shows_only_noise(record, threshold):
+        return "no difference beyond noise was found"
+    lean = "probably right" if found.value <= LIMIT else "probably not"
+    interval = f"[{percent(found.low)}, {percent(found.high)}]"
+    return f"{lean}: {percent(found.value)} {interval} of the pixels differ visibly"
+
+
+def decisive(record: ComparisonRecord, threshold: float = TOLERANCE) -> str:
+    """Return what would decide an undecided scene, as a sentence.
+
+    The interval shrinks with the root of the samples, until the limit is outside of it.
+    """
+    found = share(record, threshold)
+    end = found.low if found.value > LIMIT else found.high
+    apart = abs(found.value - LIMIT)
+    times = ceil((end - found.value) ** 2 / max(apart, 1e-9) ** 2)
+    if record.given:
+        return "More repeats of the pictures decide."
+    spp = record.plan.spp if record.plan else 0
+    needed = spp << (times - 1).bit_length()
+    if not 0 < spp < needed <= MOST_SPP:
+        return "More samples (--spp) decide."
+    return f"About `--spp {needed}` decides."
 
 
 def _where(record: ComparisonRecord) -> str:
@@ -541,7 +558,7 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
         doubtful = sum(bool(record.caution) for record in records)
         undecided = decisions["undecided"] - doubtful
         said = f"{subject} looks right in {decisions['pass']} of {len(records)} scenes"
-        for count, state in ((undecided, "too close to call"), (doubtful, "in doubt")):
+        for count, state in ((undecided, "undecided"), (doubtful, "in doubt")):
             if count:
                 said += f"; {count} {'is' if count == 1 else 'are'} {state}"
         return f"{said}."
@@ -553,9 +570,7 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
     if decisions["pass"]:
         return f"{subject} looks right in {record.scene}."
     if decisions["undecided"]:
-        if shows_only_noise(record, threshold):
-            return f"{record.scene}: no difference beyond noise was found."
-        return f"{subject} may look right in {record.scene}."
+        return f"{record.scene}: undecided, {leaning(record, threshold)}."
     wrong = percent(share(record, threshold).value)
     return f"{subject} differs visibly in {wrong} of the pixels of {record.scene}."
 
@@ -566,12 +581,7 @@ def _difference(record: ComparisonRecord, subject: str, threshold: float) -> str
         case "pass":
             return f"{record.scene}: {subject} looks like the reference."
         case "undecided":
-            if record.significant.certain:
-                hidden = "noise hides in how many pixels it is visible"
-                return f"{record.scene}: {subject} differs from the reference; {hidden}."
-            if shows_only_noise(record, threshold):
-                return f"{record.scene}: no difference beyond noise was found."
-            return f"{record.scene}: {subject} may look like the reference."
+            return f"{record.scene}: undecided, {leaning(record, threshold)}."
     wrong = percent(share(record, threshold).value)
     return f"{record.scene}: {subject} differs visibly from the reference in {wrong} of the pixels."
 

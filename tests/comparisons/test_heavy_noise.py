@@ -8,12 +8,11 @@ import pytest
 
 from fotismos.comparisons import attribution
 from fotismos.comparisons.compare import compare
-from fotismos.comparisons.departure import criterion, marks, statistics
-from fotismos.comparisons.departure.metrics import LEADING, leading_distance
-from fotismos.comparisons.departure.noise import debiased
+from fotismos.comparisons.departure import criterion, statistics
+from fotismos.comparisons.departure.estimate import Replicates, estimate
+from fotismos.comparisons.departure.metrics import LEADING
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.prepared import guarded
-from fotismos.comparisons.records.departure import DEFAULT_VIEWING
 from fotismos.comparisons.steps import steps
 from fotismos.reference.scene.source import Source
 from tests.shared import noisy
@@ -26,11 +25,10 @@ RUNS = 4
 def verdict_of(test, passes):
     found = noisy.estimate(test - passes)
     counted = np.ones(test.shape[:2], bool)
-    is_certain = marks.find(found, test, counted, leading_distance(DEFAULT_VIEWING)).is_certain
     summary, _ = statistics.summarise(
         LEADING, test, test - found.mean, counted, noise=found.noise, grouped=found.grouped
     )
-    return criterion.decide(summary.visible, is_certain=is_certain)
+    return criterion.decide(summary.visible)
 
 
 def runs(spread):
@@ -68,9 +66,9 @@ def test_intervals_hold_the_truth_in_heavy_noise(rgb, spread, factor):
     for _, passes in runs(spread):
         found = noisy.estimate(test - passes)
         raw = LEADING(test, test - found.mean).ravel()
-        clean = debiased(LEADING, test, found.grouped, DEFAULT_VIEWING, raw)
-        means.append(clean["low"] - 1e-6 <= departure.mean() <= clean["high"])
-        share = criterion.share_above(clean["visible"])
+        clean = estimate(LEADING, Replicates.of(test, found.grouped), measured=raw)
+        means.append(clean.mean.low - 1e-6 <= departure.mean() <= clean.mean.high)
+        share = criterion.share_above(clean.visible)
         shares.append(share.low <= (departure > share.threshold).mean() <= share.high)
     assert np.mean(means) >= 0.9
     assert np.mean(shares) >= 0.9

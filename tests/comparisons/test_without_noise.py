@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.departure import criterion, statistics
+from fotismos.comparisons.departure.estimate import Replicates, estimate
 from fotismos.comparisons.departure.metrics import LEADING, METRICS
-from fotismos.comparisons.departure.noise import debiased
-from fotismos.comparisons.records.departure import DEFAULT_VIEWING, VisibleShare
+from fotismos.comparisons.records.departure import VisibleShare
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Interval
 from fotismos.reference.rendering import sums
@@ -35,7 +35,7 @@ def without_noise(test, passes):
     """Return the mean as it is and the debiased one, with its interval."""
     found = noisy.estimate(test - passes)
     raw = LEADING(test, test - found.mean).ravel()
-    return raw.mean(), debiased(LEADING, test, found.grouped, DEFAULT_VIEWING, raw)
+    return raw.mean(), estimate(LEADING, Replicates.of(test, found.grouped), measured=raw)
 
 
 @pytest.mark.guarantee("means", "Intervals of mean ΔE2000 contain the truth at 0, 1 and 5.")
@@ -51,13 +51,13 @@ def test_the_mean_without_noise_has_little_bias_and_an_honest_interval(rgb, fact
     true = LEADING(test, GREY).mean()
     assert true == pytest.approx(about, abs=0.3)
     results = [without_noise(test, passes_of(GREY, count, 0.07, rng)) for _ in range(20)]
-    assert sum(one["low"] <= true <= one["high"] for _, one in results) >= 16
+    assert sum(one.mean.low <= true <= one.mean.high for _, one in results) >= 16
     raw = np.mean([raw for raw, _ in results]) - true
-    clean = np.mean([one["debiased"] for _, one in results]) - true
+    clean = np.mean([one.mean.value for _, one in results]) - true
     assert abs(clean) < 0.4 * abs(raw) + 0.06
     if not about:
         assert raw > 1.0
-        assert np.mean([one["high"] for _, one in results]) < raw
+        assert np.mean([one.mean.high for _, one in results]) < raw
 
 
 @pytest.mark.guarantee(
@@ -88,7 +88,7 @@ def test_shares_of_visible_pixels_are_within_their_intervals(rgb, kind):
             _, found = without_noise(truth * factor, passes)
             inside += [
                 share.low <= (departures > share.threshold).mean() <= share.high
-                for share in found["visible"]
+                for share in found.visible
                 if share.low < share.high
             ]
     assert np.mean(inside) >= 0.93

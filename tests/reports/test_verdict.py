@@ -104,8 +104,7 @@ RULES = {
     "passes": (scene(0.05), None, 2.0, "Nothing to do."),
     "undecided": (
         scene(0.03, 0.08), None, 2.0,
-        "Too close to call: between 3.00 % and 8.00 % of the pixels differ, and at most 5 % may."
-        " More samples (--spp) decide.",
+        "At most 5 % may differ. About `--spp 2048` decides.",
     ),
     "level": (
         scene(exposed=1.5), None, 2.0, "Brightening the picture is enough: ×1.11 makes it pass.",
@@ -260,7 +259,7 @@ def test_a_run_counts_scenes_and_names_what_those_that_fail_lack_by_pixels():
     ]
     made = [record for record, _ in scenes]
     assert verdict.missing(made[0]) == {"interreflection": 0.75, "spectral": 0.25}
-    expected = "Textbook shading looks right in 1 of 4 scenes; 1 is too close to call."
+    expected = "Textbook shading looks right in 1 of 4 scenes; 1 is undecided."
     assert verdict.headline(made) == expected
     expected = "Mostly missing: interreflection, spectral light, occlusion."
     assert verdict.most_missing(made) == expected

@@ -53,18 +53,15 @@ def decide(
     visible: Sequence[VisibleShare],
     threshold: float = TOLERANCE,
     limit: float = LIMIT,
-    is_certain: bool = True,
 ) -> Verdict:
     """Return whether at most ``limit`` of the pixels are above a threshold, if noise allows.
 
-    ``pass`` if the interval ends at ``limit`` or below it; ``fail`` if it begins above it, and a
-    difference ``is_certain`` somewhere (:mod:`fotismos.comparisons.departure.marks`): rare bright
-    samples raise shares more than their interval knows.
+    ``pass`` if the interval ends at ``limit`` or below it; ``fail`` if it begins above it.
     """
     share = share_above(visible, threshold)
     if share.high <= limit:
         return "pass"
-    return "fail" if is_certain and share.low > limit else "undecided"
+    return "fail" if share.low > limit else "undecided"
 
 
 def caution(

@@ -53,11 +53,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.metrics import Pixelwise
+from fotismos.comparisons.departure.metrics import Metric, Pixelwise
 from fotismos.comparisons.records.departure import DEFAULT_VIEWING, Viewing, VisibleShare
 from fotismos.heuristic.convention import Floats
 from fotismos.reference.records import Interval
-from fotismos.reference.rendering.sums import BLOCK, Grouped, sample, student
+from fotismos.reference.rendering.sums import BLOCK, Grouped, sample
 
 NoiseShown = Literal["all", "part", "none"]
 """Whether replicates show the noise of both pictures, of one alone, or of none."""
@@ -65,8 +65,17 @@ NoiseShown = Literal["all", "part", "none"]
 CONTRASTS = 3
 """Noise is made of the replicates in this many independent ways, at most."""
 
-TILES = (1, 2, 4, 8, 16, 0)
-"""Sides in pixels of the tiles over which guesses are pooled; 0 is the whole picture."""
+FINEST = -1
+TILES = (1, 2, 4, 8, 16, 0, FINEST)
+"""Sides in pixels of the tiles over which guesses are pooled; 0 is the whole picture, FINEST a
+guess of all sizes."""
+
+GARROTE = 3.0
+"""How many times its noise's variance is taken off what a tile adds to a guess."""
+
+COUNTED = (1, FINEST)
+PARTS = (0.1, 0.25, 0.5, 0.75)
+"""Parts of a threshold, by which a pixel may be measured wrong."""
 
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
 """A set holds the pixels whose guessed distance is at least one of these, over the threshold."""
@@ -80,12 +89,17 @@ FACTORS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 FEWEST_PIXELS = 24
 """Pixels of the smallest set: fewer have no normal mean."""
 
+FEWEST_REPLICATES = 4
+"""Fewest replicates that show how noise is distributed."""
+
 CELL = 4
 """Side in pixels of the chessboard's cells."""
 
-SHARE_ERRORS = 1.0
+ABOVE_ERRORS = 1.5
+SHARE_ERRORS = 0.1
+FEW_ERRORS = 1.2
 MEAN_ERRORS = 3.5
-COUNT_ERRORS = 2.5
+COUNT_ERRORS = 1.5
 UPPER_ERRORS = 2.0
 """Standard errors by which ends are moved outwards: of shares by Cantelli's inequality, which
 leaves far more room than its errors take, of means, of counts, and of upper ends."""
@@ -93,8 +107,20 @@ leaves far more room than its errors take, of means, of counts, and of upper end
 MEAN_HIGH = 2.6
 """Standard errors of the upper end of a mean."""
 
-CURVED = 0.12
-"""Uncertainty of the noise in a mean square, as a share of it: colour spaces are curved."""
+ROOT_BIAS = 0.3
+"""How much the mean of the signed root of ``D² + s Z``, Z normal, may lack of D, in units of √s."""
+
+MARGIN = 1.25
+"""Factor by which a noise floor, itself an estimate, may be too small."""
+
+BENT = 0.02
+"""How wrong a direction's measure may be, in units of a pixel's noise: colour spaces are curved."""
+
+LEAST = 0.003
+"""Shares of pixels below it prove nothing."""
+
+CURVED = 0.08
+"""Uncertainty of the noise in a mean square, as a share of it, for the same reason."""
 
 TAILS = 3.0
 """How much more often than elsewhere noise may be large at the pixels that differ."""
@@ -106,6 +132,8 @@ DARKEST = 0.02
 """Light that is added to a pixel's, where differences are relative."""
 
 TINY = 1e-30
+ROUNDING = 1e-12
+"""Relative differences of replicates that are rounding."""
 
 
 @dataclass(frozen=True)
@@ -204,46 +232,36 @@ def estimate(
 
     ``measured`` (N,) are the distances of all counted pixels, if replicates are a sample of them.
     """
+    if replicates.noise_shown == "none":
+        replicates = replicates.as_one
     evidence = Evidence(metric=metric, viewing=viewing, replicates=replicates)
     whole = evidence.measured if measured is None else np.asarray(measured)
     return evidence.estimate(whole)
 
 
-def over_pictures(estimates: Sequence[Estimate]) -> Estimate:
-    """Return the mean of estimates of several pictures, whose noise is a part of their error.
+def by_floor(metric: Metric, values: Floats, noise: Floats) -> Estimate:
+    """Return a metric without noise by the triangle inequality, for metrics of neighbourhoods.
 
-    Their own intervals hold an error that all share. What they scatter comes on top.
+    ``values`` (N,) are its distances, and ``noise`` (N,) those of noise alone: the error of a mean
+    distance is at most the distance of the reference from the truth. Noise is taken to add its
+    square. A pixel's noise is not the one that it has here, so shares are bounded by its share.
     """
-    shares = zip(*(found.visible for found in estimates), strict=True)
-    mean = _of_all([found.mean for found in estimates])
-    visible = []
-    for of_threshold in shares:
-        share = _of_all(of_threshold)
-        visible.append(
-            VisibleShare(
-                threshold=of_threshold[0].threshold,
-                value=share.value,
-                low=max(share.low, 0.0),
-                high=min(share.high, 1.0),
-            )
-        )
-    low = max(mean.low, 0.0)
-    return Estimate(
-        mean=Interval(value=mean.value, low=low, high=mean.high), visible=tuple(visible)
-    )
-
-
-def _of_all(repeats: Sequence[Interval]) -> Interval:
-    value = float(np.mean([found.value for found in repeats]))
-    below = value - float(np.mean([found.low for found in repeats]))
-    above = float(np.mean([found.high for found in repeats])) - value
-    scatter = 0.0
-    if len(repeats) > 1:
-        deviation = float(np.std([found.value for found in repeats], ddof=1))
-        scatter = student(0.0, deviation / sqrt(len(repeats)), len(repeats)).high
-    return Interval(
-        value=value, low=value - hypot(below, scatter), high=value + hypot(above, scatter)
-    )
+    power = 2 if metric.squared else 1
+    mean = metric.mean(values) ** (1 / power)
+    floor = metric.mean(noise) ** (1 / power)
+    half = MARGIN * floor
+    low = max(mean - half, 0.0)
+    value = max(sqrt(max(mean**2 - floor**2, 0.0)), low)
+    thresholds = np.asarray(metric.visible, float)
+    share = shares_above(values, thresholds)
+    least = [np.zeros(len(share)), share if not noise.any() else 0.0 * share]
+    most = [np.ones(len(share)), share if not noise.any() else 1.0 + 0.0 * share]
+    for part in PARTS:
+        hidden = shares_above(MARGIN * noise, part * thresholds)
+        least.append(shares_above(values, (1.0 + part) * thresholds) - hidden)
+        most.append(shares_above(values, (1.0 - part) * thresholds) + hidden)
+    ends = np.array([value, low, mean + half]) ** power
+    return _result(metric, ends, np.array([share, np.max(least, axis=0), np.min(most, axis=0)]))
 
 
 @dataclass(frozen=True)
@@ -266,17 +284,21 @@ class Selection:
 class Guess:
     """A guess of the difference and its measurement by others, (P,) each.
 
-    ``distance`` is guessed; ``measured`` and ``noise`` (C, P) lie along it; ``own`` is the variance
-    of the measured one, ``deviation`` the guess's own error, and ``used`` says which pixels were
-    measured.
+    ``difference`` (P, 3) and its ``distance`` are guessed, with an error of ``deviation``.
+    ``measured`` and ``noise`` (C, P) lie along it. ``used`` says which pixels were measured, by a
+    part of the replicates, whose noise is ``scale`` times as large; ``own`` is its variance, and
+    ``near`` that of its neighbours.
     """
 
+    difference: Array
     distance: Array
     measured: Array
     noise: Array
     own: Array
     deviation: Array
     used: NDArray[np.bool_]
+    near: Array
+    scale: float
 
 
 @dataclass(frozen=True)
@@ -290,59 +312,29 @@ class Evidence:
     def estimate(self, whole: Floats) -> Estimate:
         """Return mean and shares; ``whole`` (N,) are the distances of all counted pixels."""
         thresholds = np.asarray(self.metric.visible, float)
-        proven = self if self.replicates.noise_shown == "all" else self._of_one
         if not len(self.replicates.shown) or self._is_exact:
-            mean = self.metric.mean(whole)
             shares = shares_above(whole, thresholds)
-            return self._result(np.array([mean] * 3), np.array([shares] * 3))
+            return _result(self.metric, np.full(3, self.metric.mean(whole)), np.array([shares] * 3))
         value, high = self._mean_and_high(whole)
         if self.metric.averages_squares or self.metric.squared:
-            low = 2.0 * value - high
-            ends = np.maximum([value, low, high], 0.0)
+            mean = np.maximum([value, 2.0 * value - high, high], 0.0)
             if self.metric.averages_squares:
-                ends = np.sqrt(ends)
-            return self._result(ends, np.zeros((3, 0)))
+                mean = np.sqrt(mean)
+            return _result(self.metric, mean, np.zeros((3, len(thresholds))))
+        proven = self if self.replicates.noise_shown == "all" else self._of_one
         low = min(proven.mean_low(), high)
         margin = self._sampling_errors(thresholds)
-        shares = np.array(
-            [
-                self._shares_without_noise(whole, thresholds),
-                np.maximum(proven.shares_low(thresholds) - margin, 0.0),
-                np.minimum(self.shares_high(whole, thresholds) + margin, 1.0),
-            ]
-        )
-        return self._result(np.array([value, low, high]), self._joined(shares, low, high))
-
-    def _joined(self, shares: Array, low: float, high: float) -> Array:
-        """Return shares (3, T): value, low, high, as mean and other thresholds allow them."""
-        thresholds = np.asarray(self.metric.visible, float)
-        value, least, most = shares
         span = np.maximum(self._largest_distance - thresholds, TINY)
-        least = np.maximum(least, (low - thresholds) / span)
-        least = np.maximum.accumulate(least[::-1])[::-1]
-        most = np.minimum(most, high / thresholds)
-        most = np.minimum.accumulate(most)
-        most = np.maximum(most, least)
-        value = np.clip(np.minimum.accumulate(value), least, most)
-        return np.array([value, least, most])
-
-    def _result(self, mean: Array, shares: Array) -> Estimate:
-        """Return mean (3,) and shares (3, T): value, low, high."""
-        value, low, high = mean.tolist()
-        steps = np.diff(self.metric.visible, prepend=0.0)
-        if shares.size:
-            # Of a distance, the mean is the integral of the shares above it.
-            low = max(low, float(shares[1] @ steps))
-            high = max(low, high)
-        return Estimate(
-            mean=Interval(value=min(max(value, low), high), low=low, high=high),
-            visible=tuple(
-                VisibleShare(threshold=threshold, value=share, low=least, high=most)
-                for threshold, (share, least, most) in zip(
-                    self.metric.visible, shares.T.tolist(), strict=bool(shares.size)
-                )
-            ),
-        )
+        # No share is proven where the mean may be 0.
+        least = np.zeros(len(thresholds))
+        if low > 0.0:
+            least = proven.shares_low(thresholds) - margin - LEAST
+        ends = [
+            self._shares_without_noise(whole, thresholds),
+            np.maximum(least, (low - thresholds) / span),
+            self.shares_high(whole, thresholds) + margin,
+        ]
+        return _result(self.metric, np.array([value, low, high]), np.array(ends))
 
     # --- Distances --------------------------------------------------------------------------------
 
@@ -352,8 +344,12 @@ class Evidence:
 
     @property
     def _is_exact(self) -> bool:
+        """Whether replicates that show all noise show none."""
         replicates = self.replicates
-        return len(replicates.differences) > 1 and not replicates.noise.any()
+        differences = replicates.differences
+        if replicates.noise_shown != "all" or len(differences) < 2:
+            return False
+        return bool(np.ptp(differences, axis=0).max() <= ROUNDING * np.abs(differences).max())
 
     @cached_property
     def _batch(self) -> tuple[Array, Array]:
@@ -363,13 +359,16 @@ class Evidence:
         steps = directions[:, None] * self._step[:, None]
         mean = replicates.mean
         noisy = [mean[None], mean + replicates.noise, mean - replicates.noise]
-        references = replicates.shown - np.concatenate([steps, *noisy])
-        found = self.metric.coordinates(references, self.viewing)
-        shown = self.metric.coordinates(replicates.shown, self.viewing)
-        distances = self.metric.difference(found, np.broadcast_to(shown, found.shape))
-        if self.metric.squared:
-            distances = np.sqrt(distances)
+        distances = self._distances(np.concatenate([steps, *noisy]))
         return np.square(distances[:6] / self._step), distances[6:]
+
+    def _distances(self, differences: Array) -> Array:
+        """Return the distances (...) of references by their differences (..., P, 3)."""
+        shown = self.replicates.shown
+        found = self.metric.coordinates(shown - differences, self.viewing)
+        own = np.broadcast_to(self.metric.coordinates(shown, self.viewing), found.shape)
+        distances = self.metric.difference(found, own)
+        return np.asarray(np.sqrt(distances) if self.metric.squared else distances)
 
     @property
     def _step(self) -> Array:
@@ -411,12 +410,6 @@ class Evidence:
         return np.asarray(np.einsum("pij,...pj->...pi", self._tensor, differences))
 
     @cached_property
-    def _bend(self) -> Array:
-        """How much shorter (P,) the distance of the mean is than along the tangent; at most 1."""
-        straight = self._sizes(self.replicates.mean)
-        return np.minimum(1.0, self.measured / np.maximum(straight, TINY))
-
-    @cached_property
     def _noise_sizes(self) -> Array:
         """The lengths (C, P) of the noise."""
         return self._sizes(self.replicates.noise)
@@ -430,6 +423,15 @@ class Evidence:
             return 0.0
         residuals = differences - differences.mean(axis=0)
         return float(self._sizes(residuals).max()) * sqrt(count / (count - 1))
+
+    @cached_property
+    def _unseen(self) -> Array:
+        """How far (P,) a pixel may be off by light that rare samples brought elsewhere."""
+        differences = self.replicates.differences
+        light = self.replicates.shown + DARKEST
+        lacking = (np.median(differences, axis=0) - differences.mean(axis=0)) / light
+        largest = 3.0 * self._largest_residual / (len(differences) * len(light))
+        return self._sizes(lacking.mean(axis=0) * light) + largest
 
     @property
     def _largest_distance(self) -> float:
@@ -463,12 +465,31 @@ class Evidence:
             # Light itself is not curved.
             value = raw - float(bias.mean())
             return value, value + MEAN_HIGH * error + CURVED * max(float(bias.mean()), 0.0)
-        roots = [_root(self._squares), _root(_pooled(self._squares, self._tiles(BLOCK)))]
-        least = plain - np.maximum(roots[0].mean(), roots[1].mean())
-        error = sqrt(own + self._scatter(plain - roots[1]))
-        value = raw - float(plain.mean() - (roots[0].mean() + roots[1].mean()) / 2.0)
-        high = min(raw - float(least.mean()) + MEAN_HIGH * error, raw + MEAN_HIGH * sqrt(own))
-        return max(value, 0.0), max(high, 0.0)
+        squares = self._squares
+        blocks = self._tiles(BLOCK)
+        of_blocks = _root(_pooled(squares, blocks))
+        # The mean of roots of noisy squares is too small where the true ones are.
+        along = (np.square(added) - np.square(taken)) / 2.0
+        variance = np.mean([np.square(_pooled(values, blocks)) for values in along], axis=0)
+        sizes = np.bincount(blocks)[blocks]
+        variance += 2.0 * _pooled(np.square(plain**2 - squares), blocks) / sizes
+        lost = ROOT_BIAS * float(np.sqrt(np.sqrt(variance)).mean())
+        error = sqrt(own + self._scatter(plain - of_blocks))
+        roots = max(float(of_blocks.mean()), float(_root(squares).mean()))
+        # Nor is a mean larger than the root of the mean square.
+        whole_error = sqrt(self._block_squares(along)) / count
+        largest = sqrt(max(float(squares.mean()) + MEAN_HIGH * whole_error, 0.0))
+        largest = min(roots + lost + MEAN_HIGH * error, largest)
+        largest = hypot(largest, sqrt(CURVED * max(float((plain**2 - squares).mean()), 0.0)))
+        largest = min(largest, float(plain.mean()) + MEAN_HIGH * sqrt(own))
+        # Two rules, of which one takes off too much where noise lies along the difference, and the
+        # other too little where a block's pixels are not alike: their middle.
+        before = _pooled(plain, blocks)
+        after = _pooled(self._noisier.mean(axis=(0, 1)), blocks)
+        lower = _root(2.0 * np.square(before) - np.square(after))
+        middle = float((lower + np.minimum(of_blocks, before)).mean()) / 2.0
+        shift = raw - float(plain.mean())
+        return max(middle + shift, 0.0), max(largest + shift, 0.0)
 
     def mean_low(self) -> float:
         """Return a lower bound of the mean distance."""
@@ -482,9 +503,11 @@ class Evidence:
         """Return lower bounds (T,) of the shares of pixels above thresholds."""
         selections, counts = self._evidence
         bounds = [np.zeros(len(thresholds)), *counts]
+        # Few replicates say little of how large noise is.
+        errors = SHARE_ERRORS + FEW_ERRORS / len(self.replicates.differences)
         for found in selections:
-            beyond = np.maximum(found.mean - SHARE_ERRORS * found.error - thresholds, 0.0) ** 2
-            variance = found.variance + SHARE_ERRORS * found.variance_error
+            beyond = np.maximum(found.mean - ABOVE_ERRORS * found.error - thresholds, 0.0) ** 2
+            variance = found.variance + errors * found.variance_error
             bounds.append(found.share * beyond / np.maximum(beyond + variance, TINY))
         return np.asarray(np.max(bounds, axis=0))
 
@@ -492,11 +515,9 @@ class Evidence:
         """Return upper bounds (T,) of the shares of pixels above thresholds."""
         pixels = len(self.measured)
         if not len(self.replicates.noise):
-            shares = shares_above(whole, thresholds)
-            binomial = np.sqrt(np.maximum(shares, 1.0 / pixels) / pixels)
-            return np.minimum(shares + UPPER_ERRORS * binomial, 1.0)
+            return shares_above(whole, thresholds)
         deviation = np.sqrt(_pooled(np.square(self._noise_sizes).mean(axis=0), self._tiles(BLOCK)))
-        correlation = self._correlation(self._noise_sizes)
+        correlation = self._correlation
         bounds = []
         for factor in FACTORS:
             chance = TAILS * float((self._noise_sizes > factor * deviation).mean())
@@ -505,8 +526,56 @@ class Evidence:
                 spread = np.maximum(shares, 1.0 / pixels) * max(chance, 1.0 / pixels)
                 error = np.sqrt(correlation * spread / pixels)
                 bounds.append((shares + UPPER_ERRORS * error) / (1.0 - chance))
+        for part in PARTS:
+            chances = np.minimum(
+                TAILS * shares_above(self._noise_sizes.ravel(), part * thresholds), 0.9
+            )
+            shares = shares_above(self.measured, (1.0 - part) * thresholds)
+            spread = np.maximum(shares, 1.0 / pixels) * np.maximum(chances, 1.0 / pixels)
+            error = np.sqrt(correlation * spread / pixels)
+            bounds.append((shares + UPPER_ERRORS * error) / (1.0 - chances))
+        bounds += self._far_from_guess(thresholds)
         bounds.append(self._mean_square_high() / thresholds**2)
-        return np.asarray(np.min([np.ones(len(thresholds)), *bounds], axis=0))
+        high = np.min([np.ones(len(thresholds)), *bounds], axis=0)
+        is_few = len(self.replicates.differences) < FEWEST_REPLICATES
+        if is_few or self.replicates.noise_shown == "part":
+            # They do not show how all noise is distributed: as much may hide a difference.
+            high = np.maximum(
+                high, shares_above(self.measured + self._noise_sizes.max(axis=0), thresholds)
+            )
+        return np.asarray(high)
+
+    def _far_from_guess(self, thresholds: Array) -> list[Array]:
+        """Return upper bounds (T,) by Chebyshev's inequality about a guess."""
+        replicates = self.replicates
+        found = []
+        for turn, (guessing, _) in enumerate(self._turns[:2]):
+            guess = self._guess(FINEST, turn)
+            count = np.count_nonzero(~guessing)
+            rest = replicates.differences[~guessing].mean(axis=0) - guess.difference
+            variance = np.square(self._noise_sizes).mean(axis=0) * len(guessing) / count
+            square = np.square(self._sizes(rest)) - variance
+            along = (
+                2.0
+                * np.einsum("pi,cpi->cp", self._through(rest), replicates.noise)
+                * sqrt(len(guessing) / count)
+            )
+            bounds = np.ones(len(thresholds))
+            for number in range(0, len(thresholds), 4):
+                limit = thresholds[number]
+                for part in (0.4, 0.7):
+                    near = guess.distance < part * limit
+                    weight = near / (limit - guess.distance * near) ** 2
+                    error = sqrt(self._block_squares(weight * along)) / len(near)
+                    bound = (
+                        1.0
+                        - near.mean()
+                        + max((weight * square).mean(), 0.0)
+                        + UPPER_ERRORS * error
+                    )
+                    bounds[number:] = np.minimum(bounds[number:], bound)
+            found.append(bounds)
+        return [np.mean(found, axis=0)]
 
     def _mean_square_high(self) -> float:
         """Return an upper end of the mean squared distance, by products of replicates."""
@@ -561,13 +630,12 @@ class Evidence:
         is_single = len(self.replicates.differences) == 1
         tolerance = 2.0 if self.metric.visible else max(float(self.measured.mean()), TINY)
         for side in TILES:
-            if is_single and 0 < side < 2 * CELL:
+            if is_single and side and side < 2 * CELL:
                 continue
-            guesses = [self._guess(side, *turn) for turn in self._turns]
+            guesses = [self._guess(side, turn) for turn in range(len(self._turns))]
             levels = [(level, 0.0) for level in LEVELS]
             if not is_single:
                 levels += NOISY_LEVELS
-                counts += self._counts(guesses)
             for level, errors in levels:
                 chosen = [
                     guess.used & (guess.distance >= level * tolerance + errors * guess.deviation)
@@ -575,6 +643,9 @@ class Evidence:
                 ]
                 if sum(map(np.count_nonzero, chosen)) >= FEWEST_PIXELS * len(guesses):
                     selections.append(self._selection(guesses, chosen))
+                    if side in COUNTED and errors == 0.0 and not is_single:
+                        bounds = [self._counts(*pair) for pair in zip(guesses, chosen, strict=True)]
+                        counts.extend(np.mean(bounds, axis=0))
         return selections, counts
 
     def _selection(self, guesses: list[Guess], chosen: list[NDArray[np.bool_]]) -> Selection:
@@ -595,32 +666,35 @@ class Evidence:
             (4.0 * np.maximum(guess.measured[inside] ** 2 - v, 0.0) * v + 2.0 * v**2).sum()
             for (guess, inside), v in zip(pairs, own, strict=True)
         )
+        noise_size = sum(np.sqrt(v).sum() for v in own) / pixels
         count = len(self.replicates.differences)
         missing = self._largest_residual * max(mean, 0.0) * turns / (pixels * count)
         return Selection(
             share=pixels / used,
-            mean=float(mean),
+            mean=float(mean) - BENT * noise_size,
             error=sqrt(spread / pixels**2 + missing),
             variance=max(float(square / pixels - mean**2), 0.0),
             variance_error=sqrt(correlation * of_squares * turns) / pixels,
         )
 
-    def _counts(self, guesses: list[Guess]) -> list[Array]:
-        """Return lower bounds (T,) of shares, by pixels measured beyond a threshold and noise."""
-        measured = np.mean([guess.measured for guess in guesses], axis=0)
-        noise = np.sqrt(np.mean([np.square(guess.noise) for guess in guesses], axis=0))
-        deviation = np.sqrt(_pooled(np.square(noise).mean(axis=0), self._tiles(BLOCK)))
-        correlation = self._correlation(guesses[0].noise)
-        pixels = len(measured)
-        unseen = 3.0 * self._largest_residual / (len(self.replicates.differences) * pixels)
-        thresholds = self.metric.visible
+    def _counts(self, guess: Guess, inside: NDArray[np.bool_]) -> list[Array]:
+        """Return lower bounds (T,) of shares, by a set's pixels measured beyond their noise."""
+        total = len(inside)
+        measured = guess.measured[inside]
+        if len(measured) < FEWEST_PIXELS:
+            return [np.zeros(len(self.metric.visible))] * len(FACTORS)
+        noise = np.concatenate([guess.noise[:, inside], -guess.noise[:, inside]]) * guess.scale
+        deviation = np.sqrt(guess.near[inside])
+        share = len(measured) / total
+        unseen = self._unseen[inside]
         found = []
         for factor in FACTORS:
             chance = float((noise > factor * deviation).mean())
-            shares = shares_above(measured - factor * deviation - unseen, thresholds)
-            error = sqrt(2.0 * correlation * max(chance, 1.0 / pixels) / pixels)
-            bound = shares - chance - COUNT_ERRORS * error
-            found.append(bound / max(1.0 - chance, TINY))
+            beyond = measured - factor * deviation - unseen
+            shares = share * shares_above(beyond, self.metric.visible)
+            false = share * max(chance, 1.0 / len(measured))
+            error = sqrt(2.0 * self._correlation * false / total)
+            found.append((shares - share * chance - COUNT_ERRORS * error) / max(1.0 - chance, TINY))
         return found
 
     @cached_property
@@ -630,8 +704,8 @@ class Evidence:
         count = len(replicates.differences)
         if count == 1:
             cells = (replicates.rows // CELL + replicates.columns // CELL) % 2 == 0
-            none = np.zeros(1, bool)
-            return [(none, cells), (none, ~cells)]
+            only = np.ones(1, bool)
+            return [(only, cells), (only, ~cells)]
         numbers = np.arange(count)
         everywhere = np.ones(len(replicates.rows), bool)
         splits = [numbers % 2 == 0]
@@ -639,43 +713,95 @@ class Evidence:
             splits.append(numbers // 2 % 2 == 0)
         return [(half, everywhere) for first in splits for half in (first, ~first)]
 
-    def _guess(self, side: int, guessing: NDArray[np.bool_], seen: NDArray[np.bool_]) -> Guess:
+    @cached_property
+    def _cleaned(self) -> tuple[Array, Array]:
+        """A guess (T, P, 3) of each turn, of all sizes, and how much its distance bends, (T, P).
+
+        The distance is never more than its tangent or its chord. What is measured later has no part
+        in it: else bright noise would count less than dark noise.
+        """
+        light = self.replicates.shown + DARKEST
+        guesses = []
+        for guessing, seen in self._turns:
+            relative = self._source(guessing) / light
+            if guessing.all():
+                guesses.append(_pooled(relative, self._tiles(2 * CELL), weight=seen) * light)
+                continue
+            scale = sqrt(len(guessing) / np.count_nonzero(guessing))
+            guesses.append(self._clean(relative, self.replicates.noise * scale / light) * light)
+        cleaned = np.array(guesses)
+        bends = self._distances(cleaned) / np.maximum(self._sizes(cleaned), 1e-12)
+        return cleaned, np.minimum(bends, 1.0)
+
+    def _source(self, guessing: NDArray[np.bool_]) -> Array:
+        return np.asarray(self.replicates.differences[guessing].mean(axis=0))
+
+    def _guess(self, side: int, turn: int) -> Guess:
         """Let some replicates, or some pixels of one, guess; measure the others."""
         replicates = self.replicates
-        tiles = self._tiles(side)
+        guessing, seen = self._turns[turn]
+        cleaned, bends = self._cleaned
+        bend = bends[turn]
         is_single = len(replicates.differences) == 1
-        source = replicates.differences if is_single else replicates.differences[guessing]
         light = replicates.shown + DARKEST
-        guess = _pooled(source.mean(axis=0) / light, tiles, weight=seen) * light
+        guess = cleaned[turn]
+        if side != FINEST:
+            tiles = self._tiles(side)
+            guess = _pooled(self._source(guessing) / light, tiles, weight=seen) * light
         through = self._through(guess)
         length = np.sqrt(np.maximum(np.einsum("pi,pi->p", guess, through), 0.0))
-        # The distance bends: along the guess, never more than its tangent or its chord.
-        direction = through * (self._bend / np.maximum(length, 1e-12))[:, None]
-        along = np.einsum("pi,kpi->kp", direction, replicates.differences[~guessing])
+        direction = through * (bend / np.maximum(length, 1e-12))[:, None]
+        measuring = guessing if is_single else ~guessing
+        along = np.einsum("pi,kpi->kp", direction, replicates.differences[measuring])
         measured = along.mean(axis=0)
         if is_single:
             wide = self._tiles(2 * BLOCK)
             noise = np.where(~seen, measured - _pooled(measured, wide, weight=~seen), 0.0)[None]
             return Guess(
-                distance=length * self._bend,
+                difference=guess,
+                distance=length * bend,
                 measured=measured,
                 noise=noise,
                 own=np.zeros(len(seen)),
                 deviation=np.zeros(len(seen)),
                 used=~seen,
+                near=np.zeros(len(seen)),
+                scale=1.0,
             )
         noise = np.einsum("pi,cpi->cp", direction, replicates.noise)
         count = len(along)
         near = _pooled(np.mean(noise**2, axis=0), self._tiles(BLOCK))
         near *= len(replicates.differences) / count
         return Guess(
-            distance=length * self._bend,
+            difference=guess,
+            distance=length * bend,
             measured=measured,
             noise=noise,
             own=along.var(axis=0, ddof=1) / count if count > 1 else near,
             deviation=np.sqrt(near) / max(side, 1),
             used=seen,
+            near=near,
+            scale=sqrt(len(replicates.differences) / count),
         )
+
+    def _clean(self, relative: Array, noise: Array) -> Array:
+        """Return relative differences (P, 3) without most of their noise, (C, P, 3).
+
+        What a tile adds to the next larger one is kept as far as it exceeds its noise (Breiman's
+        garrote, Technometrics 37, 1995).
+        """
+        clean = np.zeros_like(relative)
+        noisy = np.zeros_like(noise)
+        wide = self._tiles(2 * BLOCK)
+        for side in (0, 16, 8, 4, 2, 1):
+            tiles = self._tiles(side)
+            step = _pooled(relative, tiles) - clean
+            means = np.stack([_pooled(values, tiles) for values in noise])
+            variance = _pooled(np.square(means - noisy).sum(axis=-1).mean(axis=0), wide)
+            kept = 1.0 - GARROTE * variance / np.maximum(np.square(step).sum(axis=-1), TINY)
+            clean = clean + np.clip(kept, 0.0, 1.0)[:, None] * step
+            noisy = means
+        return clean
 
     # --- Tiles ------------------------------------------------------------------------------------
 
@@ -697,16 +823,44 @@ class Evidence:
             found = max(found, float(np.square(sums).sum(axis=1).mean()))
         return found
 
-    def _correlation(self, noise: Array) -> float:
-        """Return the variance of the sum of noise (C, P) over that of independent pixels; >= 1."""
-        centred = noise - noise.mean(axis=1, keepdims=True)
-        own = max(float(np.square(centred).sum(axis=1).mean()), TINY)
-        return max(1.0, self._block_squares(centred) / own)
+    @cached_property
+    def _correlation(self) -> float:
+        """The variance of the sum of the noise over that of independent pixels; at least 1."""
+        replicates = self.replicates
+        noise = (replicates.noise / (replicates.shown + DARKEST)).sum(axis=-1)
+        own = max(float(np.square(noise).sum(axis=1).mean()), TINY)
+        return max(1.0, self._block_squares(noise) / own)
 
     def _scatter(self, values: Array) -> float:
         """Return the variance of the mean of values (P,) by that of their sums over blocks."""
         sums = np.bincount(self._tiles(BLOCK), weights=values - values.mean())
         return float(np.square(sums).sum()) / len(values) ** 2
+
+
+def _result(metric: Metric, mean: Array, shares: Array) -> Estimate:
+    """Return mean (3,) and shares (3, T) as an estimate: value, low, high of each.
+
+    Ends of shares are moved inwards as far as other thresholds and the mean prove, and the mean's
+    low end as far as the shares do: the mean of a distance is the integral of the shares above it.
+    """
+    value, low, high = mean.tolist()
+    thresholds = np.asarray(metric.visible, float)
+    share, least, most = np.clip(shares, 0.0, 1.0)
+    least = np.maximum.accumulate(least[::-1])[::-1]
+    if not (metric.averages_squares or metric.squared):
+        low = max(low, float(least @ np.diff(thresholds, prepend=0.0)))
+        high = max(low, high)
+        most = np.minimum(most, high / np.maximum(thresholds, TINY))
+    most = np.maximum(np.minimum.accumulate(most), least)
+    share = np.clip(np.minimum.accumulate(share), least, most)
+    rows = zip(metric.visible, share.tolist(), least.tolist(), most.tolist(), strict=True)
+    return Estimate(
+        mean=Interval(value=min(max(value, low), high), low=low, high=high),
+        visible=tuple(
+            VisibleShare(threshold=threshold, value=middle, low=lowest, high=highest)
+            for threshold, middle, lowest, highest in rows
+        ),
+    )
 
 
 def shares_above(distances: Floats, thresholds: Sequence[float] | Array) -> Array:

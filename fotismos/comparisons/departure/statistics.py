@@ -12,6 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons.departure.colour import Array, linear
+from fotismos.comparisons.departure.estimate import (
+    Estimate,
+    NoiseShown,
+    Replicates,
+    by_floor,
+    estimate,
+)
 from fotismos.comparisons.departure.metrics import (
     Metric,
     Pixelwise,
@@ -19,7 +26,6 @@ from fotismos.comparisons.departure.metrics import (
     log2_luminance_ratio,
 )
 from fotismos.comparisons.departure.minimum import minimum
-from fotismos.comparisons.departure.noise import debiased, exactly, roughly
 from fotismos.comparisons.records.departure import (
     DEFAULT_VIEWING,
     Exposed,
@@ -42,6 +48,7 @@ def summarise(
     viewing: Viewing = DEFAULT_VIEWING,
     noise: ArrayLike | None = None,
     grouped: Grouped | None = None,
+    noise_shown: NoiseShown = "all",
 ) -> tuple[Summary, NDArray[np.float32]]:
     """Return the numbers of `metric` over `mask`, and its map over the whole image.
 
@@ -51,7 +58,7 @@ def summarise(
     ``test`` and ``reference`` are linear (H, W, 3), and ``mask`` (H, W) holds the pixels that
     count; without any, all numbers are 0 and the factor is 1. ``noise`` is as for `noise_floor`;
     without it, the floor is 0. ``grouped`` are groups of passes of the difference, for the
-    interval; without them, it is wider.
+    interval; without them, it is wider. ``noise_shown`` says whose noise they show.
     """
     test, reference = checked_pair(test, reference)
     mask = np.asarray(mask, bool)
@@ -87,19 +94,21 @@ def summarise(
         if after["mean"] > numbers["mean"]:
             factor = 1.0
             after = numbers
-    # Without noise: as it is if there is none, by extrapolation, or by the triangle inequality.
-    clean = None
-    if not noise_alone.any():
-        clean = exactly(metric, values)
-    elif isinstance(metric, Pixelwise) and grouped is not None:
-        clean = debiased(metric, test, grouped=grouped, viewing=viewing, raw=values)
-    clean = clean or roughly(metric, values, noise_alone)
+    clean: Estimate
+    if isinstance(metric, Pixelwise) and grouped is not None:
+        replicates = Replicates.of(test, grouped, noise_shown)
+        clean = estimate(metric, replicates, viewing, measured=values)
+    else:
+        clean = by_floor(metric, values, noise_alone)
     summary = Summary(
         **numbers,
         noise_floor=metric.mean(noise_alone),
         after_exposure=Exposed(exposure=factor, **after),
         psnr=metric.psnr(numbers["mean"]),
-        **clean,
+        debiased=clean.mean.value,
+        low=clean.mean.low,
+        high=clean.mean.high,
+        visible=clean.visible,
     )
     return summary, maps[0]
 

@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 from msgspec import Meta
+from msgspec.structs import replace
 
 from fotismos.heuristic.errors import InputError
 from fotismos.reference.records import Amount, Count, Interval, Positive, Record, Share, Size
@@ -110,6 +111,16 @@ class Summary(Record):
         float | None,
         Meta(description="The mean as a PSNR, dB; null of other metrics, and of equal images."),
     ] = None
+
+    def unproven(self) -> "Summary":
+        """Return the summary if noise may explain every difference: low ends are 0."""
+        visible = tuple(replace(share, low=0.0) for share in self.visible)
+        return replace(self, low=0.0, visible=visible)
+
+    def as_measured(self) -> "Summary":
+        """Return the summary if noise made no pixel visible: low ends are the values."""
+        visible = tuple(replace(share, low=share.value) for share in self.visible)
+        return replace(self, low=self.debiased, visible=visible)
 
 
 class RatioSummary(Record):

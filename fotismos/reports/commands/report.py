@@ -13,6 +13,9 @@ from fotismos.reports.jobs import Job, Terminal
 QUICK = {"resolution": (64, 64), "spp": 16}
 """The defaults of ``--quick``."""
 
+PATIENCE = 4
+"""How many times the samples an undecided scene of ``--quick`` takes, at most."""
+
 
 class Report(WithOptions, frozen=True):
     """Compare all built-in scenes, attribute their errors to effects, and write one report.
@@ -57,6 +60,7 @@ class Report(WithOptions, frozen=True):
             fresh=terminal.fresh,
             within=terminal.within,
             ladders=frozenset(self.ladders),
+            patience=PATIENCE if self.quick and self.spp is None else 1,
         )
         with terminal.processes(len(SCENES)) as pool:
             from fotismos.reports.run import batch, scene  # loaded late

@@ -19,6 +19,7 @@ from fotismos.heuristic.heuristics import named
 from fotismos.heuristic.program import versions
 from fotismos.reference.records import VERSION, plain
 from fotismos.reference.scene.source import digest
+from fotismos.reports import verdict
 from fotismos.reports.files import results
 from fotismos.reports.jobs import Job
 from fotismos.reports.page.scene_view import SceneView
@@ -54,22 +55,29 @@ def compared(
     # Rendering, metrics and causes.
     begin = perf_counter()
     source = case.source
-    options = case.options
     first: list[SceneView] = []
 
     def show(comparison: Comparison) -> None:
         """Send what a page shows first."""
         first.append(scene_files.view_of(comparison))
-        progress(first[0])
+        progress(first[-1])
 
-    comparison = compare(
-        source,
-        options,
-        progress,
-        command=case.command(),
-        then=steps(why=job.with_causes),
-        shown=show,
-    )
+    most = (case.options.spp or 0) * job.patience
+    while True:
+        options = case.options
+        comparison = compare(
+            source,
+            options,
+            progress,
+            command=case.command(),
+            then=steps(why=job.with_causes),
+            shown=show,
+        )
+        record = comparison.record
+        is_open = verdict.decision(record, job.within) == "undecided" and not record.caution
+        if not is_open or (options.spp or 0) >= most:
+            break
+        case = case.changed(spp=most)
     spent = _stages(comparison.record, perf_counter() - begin)
     # The costs of methods, for a few scenes.
     costs = None
@@ -94,7 +102,7 @@ def compared(
         comparison,
         costs=costs,
         key=key,
-        first=first[0],
+        first=first[-1],
         with_figures=job.figures,
     )
     return view, spent | {"files": perf_counter() - begin}
