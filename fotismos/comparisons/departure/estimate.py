@@ -534,7 +534,6 @@ class Evidence:
             spread = np.maximum(shares, 1.0 / pixels) * np.maximum(chances, 1.0 / pixels)
             error = np.sqrt(correlation * spread / pixels)
             bounds.append((shares + UPPER_ERRORS * error) / (1.0 - chances))
-        bounds += self._far_from_guess(thresholds)
         bounds.append(self._mean_square_high() / thresholds**2)
         high = np.min([np.ones(len(thresholds)), *bounds], axis=0)
         is_few = len(self.replicates.differences) < FEWEST_REPLICATES
@@ -544,38 +543,6 @@ class Evidence:
                 high, shares_above(self.measured + self._noise_sizes.max(axis=0), thresholds)
             )
         return np.asarray(high)
-
-    def _far_from_guess(self, thresholds: Array) -> list[Array]:
-        """Return upper bounds (T,) by Chebyshev's inequality about a guess."""
-        replicates = self.replicates
-        found = []
-        for turn, (guessing, _) in enumerate(self._turns[:2]):
-            guess = self._guess(FINEST, turn)
-            count = np.count_nonzero(~guessing)
-            rest = replicates.differences[~guessing].mean(axis=0) - guess.difference
-            variance = np.square(self._noise_sizes).mean(axis=0) * len(guessing) / count
-            square = np.square(self._sizes(rest)) - variance
-            along = (
-                2.0
-                * np.einsum("pi,cpi->cp", self._through(rest), replicates.noise)
-                * sqrt(len(guessing) / count)
-            )
-            bounds = np.ones(len(thresholds))
-            for number in range(0, len(thresholds), 4):
-                limit = thresholds[number]
-                for part in (0.4, 0.7):
-                    near = guess.distance < part * limit
-                    weight = near / (limit - guess.distance * near) ** 2
-                    error = sqrt(self._block_squares(weight * along)) / len(near)
-                    bound = (
-                        1.0
-                        - near.mean()
-                        + max((weight * square).mean(), 0.0)
-                        + UPPER_ERRORS * error
-                    )
-                    bounds[number:] = np.minimum(bounds[number:], bound)
-            found.append(bounds)
-        return [np.mean(found, axis=0)]
 
     def _mean_square_high(self) -> float:
         """Return an upper end of the mean squared distance, by products of replicates."""
