@@ -110,6 +110,17 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
             )
 
 
+def line_of_pictures(record: ComparisonRecord, threshold: float, bound: float) -> str:
+    """Return the line for scripts on two pictures: share, mean and decision, with tabs between.
+
+    The share of pixels that differ by more than a threshold is 0 to 1, and the decision is whether
+    it is at most ``bound``.
+    """
+    mean = record.metrics[LEADING.name].mean
+    decision = verdict.decision(record, threshold, bound)
+    return f"{verdict.share(record, threshold).value:.6g}\t{mean:.6g}\t{decision}"
+
+
 CELLS: dict[str, Callable[[ComparisonRecord, float], str]] = {
     "because of": verdict.because,
     "needs": verdict.needs,

@@ -237,12 +237,12 @@ def decisive(record: ComparisonRecord, threshold: float = TOLERANCE) -> str:
 
     The interval shrinks with the root of the samples, until the limit is outside of it.
     """
+    if record.given:
+        return "More repeats of the pictures decide."
     found = share(record, threshold)
     end = found.low if found.value > LIMIT else found.high
     apart = abs(found.value - LIMIT)
     times = ceil((end - found.value) ** 2 / max(apart, 1e-9) ** 2)
-    if record.given:
-        return "More repeats of the pictures decide."
     spp = record.plan.spp if record.plan else 0
     needed = spp << (times - 1).bit_length()
     if not 0 < spp < needed <= MOST_SPP:
@@ -565,25 +565,17 @@ def headline(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) 
     (record,) = records
     if record.caution:
         return f"{record.scene}: {record.caution}"
-    if record.reference_picture:
-        return _difference(record, subject, threshold)
-    if decisions["pass"]:
-        return f"{subject} looks right in {record.scene}."
     if decisions["undecided"]:
         return f"{record.scene}: undecided, {leaning(record, threshold)}."
     wrong = percent(share(record, threshold).value)
-    return f"{subject} differs visibly in {wrong} of the pixels of {record.scene}."
-
-
-def _difference(record: ComparisonRecord, subject: str, threshold: float) -> str:
-    """Return how much a half differs from a reference that is a picture."""
-    match decision(record, threshold):
-        case "pass":
+    if record.reference_picture:
+        if decisions["pass"]:
             return f"{record.scene}: {subject} looks like the reference."
-        case "undecided":
-            return f"{record.scene}: undecided, {leaning(record, threshold)}."
-    wrong = percent(share(record, threshold).value)
-    return f"{record.scene}: {subject} differs visibly from the reference in {wrong} of the pixels."
+        said = f"{subject} differs visibly from the reference"
+        return f"{record.scene}: {said} in {wrong} of the pixels."
+    if decisions["pass"]:
+        return f"{subject} looks right in {record.scene}."
+    return f"{subject} differs visibly in {wrong} of the pixels of {record.scene}."
 
 
 def most_missing(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -> str:

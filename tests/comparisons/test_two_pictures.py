@@ -114,6 +114,19 @@ def test_the_first_page_has_the_verdict_and_reloads_into_the_whole(run, two, mon
         assert later in whole
 
 
+@pytest.mark.parametrize(("bound", "code", "decision"), [(None, 0, "fail"), ("100%", 0, "pass")])
+def test_a_quiet_command_prints_one_line_that_scripts_can_cut(run, two, bound, code, decision):
+    """The decision is that of the gate, if there is one."""
+    gate = ("--max-visible", bound) if bound else ()
+    ended, said, _ = run(*two, "-q", *gate)
+    share, mean, word = said.removesuffix("\n").split("\t")
+    lead = json.loads(Path("out/mine/comparison.json").read_text())["metrics"]["dE2000"]
+    (visible,) = [one["value"] for one in lead["visible"] if one["threshold"] == 2]
+    assert (ended, word) == (code, decision)
+    assert float(share) == pytest.approx(visible, rel=1e-5)
+    assert float(mean) == pytest.approx(lead["mean"], rel=1e-5)
+
+
 @pytest.mark.parametrize(("fault", "code"), [(InputError("late"), 2), (KeyboardInterrupt(), 130)])
 def test_a_first_page_does_not_outlive_its_command(run, two, monkeypatch, fault, code):
     def finish(*first):

@@ -13,8 +13,11 @@ import jsonschema
 import pytest
 
 from fotismos.comparisons.names import file_of
-from fotismos.comparisons.processes.pool import Task
+from fotismos.comparisons.options import Options
+from fotismos.comparisons.processes.pool import Pool, Task
+from fotismos.heuristic.errors import InputError
 from fotismos.reports.files import results as result_files
+from fotismos.reports.jobs import Job, Terminal
 from fotismos.reports.page import page
 from fotismos.reports.run import batch
 from tests.shared import records
@@ -232,7 +235,7 @@ def test_the_work_of_the_pages_of_a_run_is_linear_in_its_scenes(tmp_path, monkey
     views = [records.view(records.data() | {"scene": f"s-{n}"}) for n in range(count)]
     with result_files.hold(tmp_path, "test") as folder:
         names = [view.record.scene for view in views]
-        run = batch.Batch(folder, dict.fromkeys(names, ""), None, command="", within=2.0)
+        run = batch.Batch(folder, names, None, command="", within=2.0)
         for view in views:
             name = view.record.scene
             run.show(Task(name, print, ()), view)
@@ -245,3 +248,20 @@ def test_the_work_of_the_pages_of_a_run_is_linear_in_its_scenes(tmp_path, monkey
         assert "In progress" not in (folder / "index.html").read_text()
     assert len(drawn) == 2 * count
     assert sum(shown) <= 8 * count
+
+
+def test_what_is_done_is_kept_if_the_hard_cases_fail(tmp_path):
+    def compared(word, *_):
+        return records.view(records.data() | {"scene": word}), {}
+
+    def failing():
+        raise InputError("no cases")
+
+    subjects = batch.Subjects(("a", "b"), files=(("a", None), ("b", None)), compare=compared)
+    cases = Task("hard cases", failing, (), is_counted=False)
+    with Pool(0) as pool, pytest.raises(InputError, match="no cases"):
+        batch.compare_all(pool, subjects, Job(Options()), Terminal(output=tmp_path), cases)
+    page_of_all = (tmp_path / "index.html").read_text()
+    assert "Interrupted: 2 of 2 scenes are done" in page_of_all
+    assert "In progress" not in page_of_all
+    assert (tmp_path / "tables/metrics.csv").is_file()

@@ -358,6 +358,13 @@ def test_a_pipe_gets_a_line_with_the_count_every_ten_seconds_at_most(capsys):
         assert said == [f"scenes: {line}" for line in lines]
 
 
+def test_tasks_that_follow_others_are_counted_from_the_start():
+    found = progress.Progress(Pool(0), "scenes")
+    for name in ("price", "method"):
+        found.do(Task(name, str, ()))
+        assert (found.done, found.total) == (1, 1)
+
+
 def test_help_of_costs_and_fits_states_their_own_defaults(run):
     texts = {name: " ".join(run(name, "--help")[1].split()) for name in ("cost", "fit", "export")}
     assert f"reduced to a width of {climb.WIDTH}]" in texts["cost"]

@@ -24,7 +24,8 @@ class Compare(OnScene, frozen=True):
 
     Writes OUTPUT/index.html and tables of all scenes, and for each scene comparison.json,
     comparison.exr and pictures. If one scene fails, the others are still compared. An interrupted
-    run keeps its finished scenes: the same command resumes it.
+    run keeps its finished scenes: the same command resumes it. With -q, two pictures print one
+    line for scripts: share of pixels, mean and decision, with tabs between.
 
     Examples
     --------

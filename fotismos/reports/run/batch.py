@@ -12,10 +12,13 @@ from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shutil import get_terminal_size
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
-from fotismos.comparisons.departure.criterion import checked_threshold
+import click
+
+from fotismos.comparisons.departure.criterion import LIMIT, checked_threshold
 from fotismos.comparisons.names import is_script, picture_parts
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.processes.pool import Pool, Task
@@ -32,7 +35,7 @@ from fotismos.reports.page.scene_view import SceneView
 from fotismos.reports.run import scene_files
 from fotismos.reports.terminal import progress
 from fotismos.reports.terminal.table import Table, printed, room
-from fotismos.reports.terminal.words import as_typed, remark, tell, tell_where
+from fotismos.reports.terminal.words import as_typed, is_quiet, remark, tell, tell_where
 
 if TYPE_CHECKING:  # a comparison has no hard cases
     from fotismos.comparisons.hard_cases import HardCases
@@ -43,16 +46,18 @@ GROWTH = 1.25
 
 @dataclass
 class Batch:
-    """The results so far, by the names of the scenes' folders.
+    """The results so far, by the names ``targets`` of the scenes' folders, in order.
 
-    ``stages`` is wall time in seconds. ``on_page`` is called with the page's path once it exists.
+    At most the share ``bound`` of the pixels may differ by more than ``within``. ``stages`` is wall
+    time in seconds. ``on_page`` is called with the page's path once it exists.
     """
 
     folder: Path
-    places: Mapping[str, str]
+    targets: Sequence[str]
     on_page: Callable[[Path], object] | None
     command: str
     within: float
+    bound: float = LIMIT
     libraries: Sequence[str] = LIBRARIES
     stages: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
     views: dict[str, PageScene] = field(default_factory=dict)
@@ -66,7 +71,7 @@ class Batch:
     def ordered(self) -> list[PageScene]:
         """The views in the order of the scenes; the first ones of scenes that are not done."""
         views = self.first_views | self.views
-        return [views[target] for target in self.places if target in views]
+        return [views[target] for target in self.targets if target in views]
 
     @property
     def done(self) -> int:
@@ -78,7 +83,7 @@ class Batch:
         errors = self.errors
         return [
             Failure(scene=target, error=as_typed(str(errors[target])))
-            for target in self.places
+            for target in self.targets
             if target in errors
         ]
 
@@ -99,8 +104,8 @@ class Batch:
         begin = perf_counter()
         path = self.folder / results.PAGE
         state = ""
-        done = f"{self.done} of {len(self.places)} scenes are done"
-        is_growing = self.done < len(self.places) and not is_interrupted
+        done = f"{self.done} of {len(self.targets)} scenes are done"
+        is_growing = self.done < len(self.targets) and not is_interrupted
         if is_interrupted:
             state = f"Interrupted: {done}; the same command resumes the run."
         elif is_growing:
@@ -136,7 +141,7 @@ class Batch:
 
     def withdraw(self) -> None:
         """Delete a page that grew, if no scene was finished, and none failed among several."""
-        has_failures = self.errors and len(self.places) > 1
+        has_failures = self.errors and len(self.targets) > 1
         if self.growth and not self.views and not has_failures:
             results.clear(self.folder, (results.PAGE, results.DETAILS))
 
@@ -160,7 +165,7 @@ class Batch:
     def grow_page(self) -> None:
         """Write the page of an unfinished run, unless it grew little since it was written."""
         self.growth += 1
-        if self.done < len(self.places) and self.growth >= self.next_page:
+        if self.done < len(self.targets) and self.growth >= self.next_page:
             with suppress(OutputError):  # the next scene tries again
                 self.write_page()
                 self.next_page = GROWTH * self.growth
@@ -181,7 +186,7 @@ It returns the exit code.
 class Subjects:
     """What a command compares: words that name it, the name and file of each, and how.
 
-    ``compare(word, folder, place, job, progress)`` returns the view and the seconds by stage.
+    ``compare(word, folder, target, job, progress)`` returns the view and the seconds by stage.
     It calls ``progress`` with its stages, and with a first view once there are pictures.
     ``libraries`` are those that the results depend on.
     """
@@ -211,16 +216,17 @@ def compare_all(
     options_by_scene = dict(zip(words, _options_for(job.options, words), strict=True))
     command = command_line()
     with results.hold(terminal.output, command) as folder:
-        places = dict(zip(results.assigned(folder, subjects.files), words, strict=True))
-        _require_inputs_apart(job.options, [folder / target for target in places])
+        targets = results.assigned(folder, subjects.files)
+        _require_inputs_apart(job.options, [folder / target for target in targets])
         for name in (TABLES, FIGURES) if job.figures else (TABLES,):
             results.own(folder / name)
         batch = Batch(
             folder=folder,
-            places=places,
+            targets=targets,
             on_page=jobs.open_page if terminal.is_opened else None,
             command=command,
             within=job.within,
+            bound=LIMIT if terminal.max_visible is None else terminal.max_visible,
             libraries=subjects.libraries,
         )
         batch.stages["start-up"] = perf_counter() - START
@@ -232,7 +238,7 @@ def compare_all(
                 tells=True,
                 ends_process=is_script(word),
             )
-            for target, word in places.items()
+            for target, word in zip(targets, words, strict=True)
         ]
         if hard_cases:
             tasks.append(hard_cases)
@@ -243,11 +249,13 @@ def compare_all(
                         batch.hard_cases, batch.stages[task.name] = outcome.result()
                     else:
                         batch.take(task.name, outcome)
-                        done = [view.record for view in batch.views.values()]
                         # In the order in which they ended: the last ones stay in sight.
+                        ended = [*batch.views.values()][-get_terminal_size().lines :]
+                        done = [view.record for view in ended]
                         columns = tables.scenes((), job.within).columns
                         shown.rows = [*printed(Table(columns, done), room())]
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, FotismosError):
+            # Also if the hard cases fail, or nothing can be rendered: what is done is kept.
             # No process may write while the results are put together.
             pool.end()
             batch.first_views.clear()
@@ -257,14 +265,14 @@ def compare_all(
         finally:
             batch.withdraw()
         # A single scene that failed leaves no page.
-        if batch.views or len(places) > 1:
+        if batch.views or len(targets) > 1:
             _write(batch)
         code = finish(folder, batch.ordered, batch.errors) if finish else 0
-    if batch.errors and len(places) == 1:
+    if batch.errors and len(targets) == 1:
         raise batch.errors.popitem()[1]
     if batch.errors:
         error = max(batch.errors.values(), key=lambda error: error.exit_code)
-        count = f"{len(batch.errors)} of {len(places)} scenes failed, "
+        count = f"{len(batch.errors)} of {len(targets)} scenes failed, "
         raise type(error)(f"{count}among them: {error}") from error
     return code
 
@@ -332,4 +340,7 @@ def _write(batch: Batch, is_interrupted: bool = False) -> None:
         tell(filter(None, sentences))
         views.sort(key=lambda view: tables.extent(view.record, batch.within), reverse=True)
         tell(verdict.advice([view.studied for view in views[: page.WORST]], batch.within))
-    tell_where(folder / results.PAGE)
+    if is_quiet() and records and records[0].pairing is None:
+        click.echo(tables.line_of_pictures(records[0], batch.within, batch.bound))
+    else:
+        tell_where(folder / results.PAGE)

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections import defaultdict
 from collections.abc import Sequence
 from pathlib import Path
 from time import perf_counter
@@ -42,18 +43,17 @@ def subjects(scenes: Sequence[str]) -> Subjects:
 def compared(
     name: str, folder: Path, target: str, job: Job, progress: Any
 ) -> tuple[SceneView, Seconds]:
-    """Compare a scene and write its files to ``folder/place``, unless it is finished there."""
+    """Compare a scene and write its files to ``folder/target``, unless it is finished there."""
     begin = perf_counter()
     # A finished scene is recognised by its key.
     case = open_case(name, job.options)
     key = key_of(case, job)
     view = None if job.fresh else scene_files.load(folder / target, key)
-    spent = {"finished scenes": perf_counter() - begin}
     if view is not None:
-        return view, spent
+        return view, {"finished scenes": perf_counter() - begin}
 
-    # Rendering, metrics and causes.
-    begin = perf_counter()
+    # Rendering, metrics and causes, again with more samples if that may decide.
+    spent: defaultdict[str, float] = defaultdict(float)
     source = case.source
     first: list[SceneView] = []
 
@@ -64,6 +64,7 @@ def compared(
 
     most = (case.options.spp or 0) * job.patience
     while True:
+        begin = perf_counter()
         options = case.options
         comparison = compare(
             source,
@@ -74,11 +75,12 @@ def compared(
             shown=show,
         )
         record = comparison.record
+        for stage, seconds in _stages(record, perf_counter() - begin).items():
+            spent[stage] += seconds
         is_open = verdict.decision(record, job.within) == "undecided" and not record.caution
         if not is_open or (options.spp or 0) >= most:
             break
         case = case.changed(spp=most)
-    spent = _stages(comparison.record, perf_counter() - begin)
     # The costs of methods, for a few scenes.
     costs = None
     causes = comparison.causes

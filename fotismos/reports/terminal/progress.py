@@ -70,6 +70,8 @@ class Progress(Runner):
         """Do tasks, see :class:`Runner`; ``told`` gets what they tell beside their stages."""
         chosen = list(tasks)
         self.total = sum(task.is_counted for task in chosen)
+        self.done = 0
+        self.failed = 0
         self.begin = self.clock()
         self.next_line = self.begin + PAUSE_S
 
