@@ -8,6 +8,7 @@ import sys
 import time
 from concurrent.futures import Future
 from random import Random
+from types import SimpleNamespace
 
 import jsonschema
 import pytest
@@ -19,7 +20,7 @@ from fotismos.heuristic.errors import InputError
 from fotismos.reports.files import results as result_files
 from fotismos.reports.jobs import Job, Terminal
 from fotismos.reports.page import page
-from fotismos.reports.run import batch
+from fotismos.reports.run import batch, scene
 from tests.shared import records
 from tests.shared.outputs import results
 from tests.shared.programs import ROOT
@@ -265,3 +266,27 @@ def test_what_is_done_is_kept_if_the_hard_cases_fail(tmp_path):
     assert "Interrupted: 2 of 2 scenes are done" in page_of_all
     assert "In progress" not in page_of_all
     assert (tmp_path / "tables/metrics.csv").is_file()
+
+
+@pytest.mark.parametrize(
+    ("decision", "patience", "samples"),
+    [("undecided", 4, [16, 64]), ("undecided", 1, [16]), ("fail", 4, [16])],
+)
+def test_what_is_undecided_takes_more_samples_once(
+    monkeypatch, tmp_path, decision, patience, samples
+):
+    taken = []
+
+    def compare(source, options, *_, shown, **__):
+        taken.append(options.spp)
+        shown(None)
+        return SimpleNamespace(record=records.view(records.data()).record, causes=None)
+
+    monkeypatch.setattr(scene, "compare", compare)
+    monkeypatch.setattr(scene, "_stages", lambda *_: {"metrics": 1.0})
+    monkeypatch.setattr(scene.verdict, "decision", lambda *_: decision)
+    for name in ("view_of", "write"):
+        monkeypatch.setattr(scene.scene_files, name, lambda *_, **__: None)
+    job = Job(Options(spp=16), patience=patience)
+    _, spent = scene.compared("fig-8-9", tmp_path, "fig-8-9", job, print)
+    assert (taken, spent["metrics"]) == (samples, len(samples))
