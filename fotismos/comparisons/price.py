@@ -9,7 +9,7 @@ is judged by how far the converged one is from itself with the deviation. With a
 samples the deviations are scaled: between the two by what they show, beyond by ``1 / √n``.
 Samples of a pass are stratified, so noise may go on falling faster, and where it falls more slowly
 the pictures show it: both widen the interval. Where it falls so slowly that bright paths are rare,
-what no pass has seen is unknown: more samples may be needed (`HEAVY`).
+what no pass has seen is unknown: more samples may be needed (`HEAVY_GROWTH`).
 
 **Effects.** Causes render images in which some effects are simulated. The fewest with which an
 image surely passes are needed; what is not among them may be left out. Images are compared with the
@@ -39,26 +39,26 @@ from fotismos.comparisons.records.departure import Viewing, VisibleShare
 from fotismos.comparisons.records.images import Comparison, Images
 from fotismos.comparisons.turns import Time
 from fotismos.heuristic.convention import Floats
-from fotismos.reference.records import Interval, Missing
+from fotismos.reference.records import Interval
 from fotismos.reference.rendering.gbuffer import gbuffer
 from fotismos.reference.rendering.passes import Progress
 from fotismos.reference.rendering.renderer import Renderer
 
-PICTURES = 4
+NOISE_PICTURES = 4
 """Pictures of each half whose noise counts; it must not depend on how fast they are."""
 
-JUDGED = 4096
+MOST_JUDGED_PIXELS = 4096
 """Pixels of all pictures at which deviations are judged, at most."""
 
-EXACT = 1e-4
+ROUNDING_NOISE = 1e-4
 """Noise, over the mean of a picture, that is rounding."""
 
-USUAL = 2.0**0.5
-HEAVY = 1.25
+USUAL_GROWTH = 2.0**0.5
+HEAVY_GROWTH = 1.25
 """Growth of the noise with half of the samples: if they are independent, and below which bright
 paths are rare."""
 
-SURE = 2.0
+SURE_ERRORS = 2.0
 """Standard errors to each side of a share of pixels."""
 
 USUAL_RATE = 0.5
@@ -67,7 +67,7 @@ USUAL_RATE = 0.5
 RATES = (0.25, 1.5)
 """Least and largest power that two numbers of samples may show."""
 
-NOT_TIMED = Missing("a picture's time is not known")
+NOT_TIMED = "a picture's time is not known"
 
 
 def with_price(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
@@ -100,7 +100,7 @@ def measured(ready: Prepared, images: Images, progress: Progress | None = None) 
     # The pixels that count of each picture, {method: (K, N, 3)}.
     seed = ready.options.seed
     pictures: dict[str, list[Floats]] = {name: [] for name in halves}
-    for made in turns.in_turn(halves, seed, PICTURES - 1, size=size, progress=progress):
+    for made in turns.in_turn(halves, seed, NOISE_PICTURES - 1, size=size, progress=progress):
         for name, image in made.items():
             pictures[name].append(np.array(image, float)[counted])
     shown = {name: np.array(found) for name, found in pictures.items()}
@@ -113,7 +113,7 @@ def measured(ready: Prepared, images: Images, progress: Progress | None = None) 
     width, height = ready.size
     return Price(
         ratio=turns.ratio(times["plan"], times["textbook"]) if has_textbook else None,
-        reason="" if has_textbook else NOT_TIMED.reason,
+        reason="" if has_textbook else NOT_TIMED,
         heuristic_s=seconds("textbook"),
         reference_s=seconds("plan"),
         everything_s=seconds("everything"),
@@ -141,7 +141,7 @@ class Noise:
         self.growth = growth
         self.level = float(np.abs(deviations).mean())
         # Every n-th of the pixels, if there are many.
-        every = max(1, -(-deviations.shape[0] * len(clean) // JUDGED))
+        every = max(1, -(-deviations.shape[0] * len(clean) // MOST_JUDGED_PIXELS))
         self._clean = clean[::every]
         self._deviations = deviations[:, ::every]
         self.judged = self._deviations.shape[0] * len(self._clean)
@@ -173,8 +173,8 @@ def _noises(ready: Prepared, images: Images, shown: Mapping[str, Floats], spp: i
     half = (difference[: count // 2].mean(axis=0) - difference[count // 2 :].mean(axis=0)) / 2**0.5
     doublings = float(np.log2(count // 2))
     left = float(np.abs(half).mean())
-    growth = (np.abs(deviations).mean() / left) ** (1 / doublings) if left > 0 else USUAL
-    growth = float(np.clip(growth, 1.0, USUAL))
+    growth = (np.abs(deviations).mean() / left) ** (1 / doublings) if left > 0 else USUAL_GROWTH
+    growth = float(np.clip(growth, 1.0, USUAL_GROWTH))
     timed = Noise(pictures.mean(axis=0), deviations, spp, growth, viewing)
     grouped = images.grouped
     if "textbook" not in shown or grouped is None or len(grouped.sizes) < 2:
@@ -196,7 +196,8 @@ def samples_that_pass(noises: Sequence[Noise]) -> tuple[SamplesThatPass, ...]:
     """
     if not noises:
         return ()
-    few, many = min(noises, key=_samples), max(noises, key=_samples)
+    few = min(noises, key=lambda noise: noise.spp)
+    many = max(noises, key=lambda noise: noise.spp)
     between = USUAL_RATE
     if few.spp < many.spp and few.level > 0 and many.level > 0:
         between = float(np.log(few.level / many.level) / np.log(many.spp / few.spp))
@@ -226,10 +227,6 @@ def samples_that_pass(noises: Sequence[Noise]) -> tuple[SamplesThatPass, ...]:
     return tuple(_passing(threshold, counts, share, many) for threshold in THRESHOLDS)
 
 
-def _samples(noise: Noise) -> int:
-    return noise.spp
-
-
 def _passing(
     threshold: float,
     counts: Sequence[int],
@@ -246,7 +243,7 @@ def _passing(
         """Return the fewest samples with a share of at most LIMIT, less or plus its error."""
         for spp in counts:
             found = share(threshold, spp, end)
-            if found + sign * SURE * np.sqrt(found * (1 - found) / many.judged) <= LIMIT:
+            if found + sign * SURE_ERRORS * np.sqrt(found * (1 - found) / many.judged) <= LIMIT:
                 return spp
         return None
 
@@ -254,7 +251,7 @@ def _passing(
         threshold=threshold,
         value=first("value", 0),
         low=first("low", -1),
-        high=None if many.growth < HEAVY else first("high", 1),
+        high=None if many.growth < HEAVY_GROWTH else first("high", 1),
     )
 
 
@@ -290,7 +287,7 @@ def _saving(times: Mapping[str, Time], shown: Mapping[str, Floats]) -> Saving:
     plan = shown["plan"] - shown["textbook"]
     everything = shown["everything"] - shown["textbook"]
     noise = _noise(plan)
-    is_exact = not plan.size or noise <= EXACT * np.abs(shown["plan"]).mean()
+    is_exact = not plan.size or noise <= ROUNDING_NOISE * np.abs(shown["plan"]).mean()
     return Saving(
         time=turns.ratio(times["everything"], times["plan"]).value,
         noise=None if is_exact else _noise(everything) / noise,

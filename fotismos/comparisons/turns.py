@@ -8,8 +8,8 @@ In each turn every method renders one picture, in alternating order. Other work 
 those that are next to each other alike, so a ratio is the median of the ratios of the turns. The
 first turn, which traces and compiles, is left out. Intervals are order statistics of the turns: the
 median lies between the least and the largest of n with a chance of ``1 − 2^(1 − n)``. With fewer
-turns than `FEWEST` that is too little, and they are Student's. What no turn shows, such as where
-the memory of a process lies, moves a time by :data:`UNSEEN`.
+turns than `FEWEST_TURNS` that is too little, and they are Student's. What no turn shows, such as
+where the memory of a process lies, moves a time by :data:`UNSEEN`.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from fotismos.reference.rendering.sums import student
 TURNS = 7
 """Turns that are timed."""
 
-FEWEST = 6
+FEWEST_TURNS = 6
 """Turns from which on the least and the largest hold the median with 95 %."""
 
-PIXELS = 2**12
+MOST_PIXELS = 2**12
 """Pixels of a timed picture, at most: larger films are reduced."""
 
-SAMPLES = 2**18
+MOST_SAMPLES = 2**18
 """Samples of a timed picture, unless its kernels are too short."""
 
 LONG_S = 4e-3
@@ -47,7 +47,7 @@ LONG_S = 4e-3
 MOST_LONGER = 16
 """How many times as long they may be, and how many times the samples short ones may have."""
 
-TICK = 1e-9
+LEAST_S = 1e-9
 """Seconds that kernels take at least."""
 
 UNSEEN = 0.02
@@ -69,7 +69,7 @@ class Time:
     def of(cls, renderer: Renderer, size: Size, turns: int) -> Time:
         """Return the time of the last turns of a renderer, with pictures of a size."""
         # Above 0, because other times are divided by it.
-        kernels = np.maximum(renderer.kernel_times[-turns:], TICK)
+        kernels = np.maximum(renderer.kernel_times[-turns:], LEAST_S)
         whole = np.array(renderer.times[-turns:])
         busy = np.array(renderer.processor_times[-turns:])
         return cls(
@@ -83,15 +83,15 @@ def timed_size(renderer: Renderer) -> tuple[Size, int]:
     """Return the size of a renderer's timed pictures, and their samples per pixel, a power of 2."""
     columns, rows = renderer.size
     size = renderer.size
-    if columns * rows > PIXELS:
-        width = max(1, int(sqrt(PIXELS * columns / rows)))
+    if columns * rows > MOST_PIXELS:
+        width = max(1, int(sqrt(MOST_PIXELS * columns / rows)))
         size = size_of_width(renderer.scene, size, width)
     return size, timed_spp(size)
 
 
 def timed_spp(size: Size) -> int:
     """Return the samples per pixel of a timed picture: powers of 2 share a kernel."""
-    most = max(1, SAMPLES // (size[0] * size[1]))
+    most = max(1, MOST_SAMPLES // (size[0] * size[1]))
     return int(2 ** (most.bit_length() - 1))
 
 
@@ -147,7 +147,7 @@ def middle(values: ArrayLike, unseen: float = 0.0) -> Interval:
     value = float(np.median(ordered))
     below = value - float(ordered[0])
     above = float(ordered[-1]) - value
-    if count < FEWEST:
+    if count < FEWEST_TURNS:
         error = float(np.std(ordered, ddof=1)) / sqrt(count)
         below = above = student(0.0, error, count).high
     # What turns show and what they cannot show are independent: squares add up.

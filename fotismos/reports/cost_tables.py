@@ -140,24 +140,30 @@ def _front(point: FrontPoint) -> str:
 def settings(engine: Engine, within: float = TOLERANCE) -> Table:
     """Return the settings of another renderer; pixels differ visibly above a ΔE2000."""
 
-    def share(one: EngineSetting) -> VisibleShare:
-        return share_above(one.visible, within)
+    def share(setting: EngineSetting) -> VisibleShare:
+        return share_above(setting.visible, within)
 
-    def ends(one: EngineSetting) -> Any:
+    def ends(setting: EngineSetting) -> Any:
         # The sign follows the other end.
-        low = Piece(share(one).low, number(100 * share(one).low))
-        return (low, " to ", share(one).high) if one.has_noise else "unknown"
+        low = Piece(share(setting).low, number(100 * share(setting).low))
+        return (low, " to ", share(setting).high) if setting.has_noise else "unknown"
 
     columns = [
         Column("setting", "method"),
         Column("files", "picture.repeats", str),
         Column("time", "seconds.value", given_time),
         Column(f"mean {LEADING.label}", "error.value", number),
-        Column("95 % interval", lambda one: one.error if one.has_noise else "unknown", number),
-        Column("above", lambda one: share(one).value, percent, detail=f"{within:g}"),
+        Column(
+            "95 % interval",
+            lambda setting: setting.error if setting.has_noise else "unknown",
+            number,
+        ),
+        Column("above", lambda setting: share(setting).value, percent, detail=f"{within:g}"),
         Column("95 % interval", ends, percent),
         Column(
-            "passes at", lambda one: "none" if one.passes_at is None else one.passes_at, parameter
+            "passes at",
+            lambda setting: "none" if setting.passes_at is None else setting.passes_at,
+            parameter,
         ),
         Column("front", _front),
     ]

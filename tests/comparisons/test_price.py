@@ -240,5 +240,5 @@ def test_a_picture_in_place_of_the_textbook_half_has_samples_and_no_time(rgb, tm
     mi.util.write_bitmap(str(path), image, write_async=False)
     found = priced(lit, image=str(path))
     assert found.ratio is None
-    assert found.reason == price.NOT_TIMED.reason
+    assert found.reason == price.NOT_TIMED
     assert found.samples_at(2.0).value is not None

@@ -368,7 +368,7 @@ def test_tasks_that_follow_others_are_counted_from_the_start():
 def test_help_of_costs_and_fits_states_their_own_defaults(run):
     texts = {name: " ".join(run(name, "--help")[1].split()) for name in ("cost", "fit", "export")}
     assert f"reduced to a width of {climb.WIDTH}]" in texts["cost"]
-    assert f"[default: {climb.LARGEST}, then more until a method looks right]" in texts["cost"]
+    assert f"[default: {climb.LARGEST_SPP}, then more until a method looks right]" in texts["cost"]
     assert "[default: {}x{}]".format(*fitting.RESOLUTION) in texts["fit"]
     assert f"[default: {fitting.SPP}]" in texts["fit"]
     for option in ("--spp", "--seed", "--pixels-per-degree"):

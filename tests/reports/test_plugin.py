@@ -271,6 +271,8 @@ def test_a_picture_is_as_its_baseline_or_fails_with_a_map(fixtures, tmp_path):
         plain.picture("hall", RAMP * 1.002, within=None)
     assert updated.picture("hall", wrong)
     assert plain.picture("hall", wrong)
+    assert updated.picture("hall", RAMP[:8])
+    assert plain.picture("hall", RAMP[:8])
 
 
 def test_repeats_of_a_picture_may_differ_by_their_noise(fixtures):

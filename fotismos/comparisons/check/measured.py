@@ -31,7 +31,7 @@ from fotismos.reference.scene.source import Source
 PASSES = 8
 """Passes of a scene's halves: fourteen degrees of freedom for a difference."""
 
-LONGEST = 64
+LONGEST_SIDE = 64
 """Default number of pixels along the longer side of a scene."""
 
 Halves = Mapping[str, Pictures]
@@ -54,12 +54,16 @@ class Measured:
     seconds: float = 0.0
     caution: str = ""
 
+    @property
+    def mask(self) -> NDArray[np.bool_] | None:
+        """The pixels that count; None for all, also where a scene shows none that count."""
+        return self.counted if self.counted is not None and self.counted.any() else None
+
     def compared(self, name: str, options: Options) -> ComparisonRecord:
         """Return the comparison of both halves of a scene, by all metrics."""
-        counted = self.counted if self.counted is not None and self.counted.any() else None
         halves = self.halves
         given = GivenPictures(
-            image=halves["heuristic"], reference=halves["reference"], mask=counted
+            image=halves["heuristic"], reference=halves["reference"], mask=self.mask
         )
         pictures = given.as_halves(name, options.changed(allow_empty=True))
         return finish(look(pictures), pictures, then=()).record
@@ -75,20 +79,20 @@ class Measured:
             return dict.fromkeys((*METRICS, RATIO.name), 0.0)
         test = halves["heuristic"].mean.astype(float)
         reference = halves["reference"].mean.astype(float)
-        found = {
+        errors = {
             name: float(metric.mean(metric.against(reference, self.counted, self.viewing)(test)))
             for name, metric in METRICS.items()
         }
         stops = log2_luminance_ratio(test[self.counted], reference[self.counted])
-        return found | {RATIO.name: float(stops.mean())}
+        return errors | {RATIO.name: float(stops.mean())}
 
 
 def made_small(case: Case) -> Case:
-    """Return a case with its film reduced to `LONGEST`, unless it sets a resolution."""
+    """Return a case with its film reduced to `LONGEST_SIDE`, unless it sets a resolution."""
     if case.options.resolution is not None:
         return case
     sides = film_size(case.source.parse(), case.options.sensor)
-    return case.changed(resolution=shrunk(sides, LONGEST))
+    return case.changed(resolution=shrunk(sides, LONGEST_SIDE))
 
 
 def measure_scene(

@@ -87,17 +87,17 @@ def parts_of(shape: Sequence[int], shapes: ObjectIds | None) -> dict[str, Parts]
     """Return the kinds of parts of a picture (H, W, 3), and of what its pixels see."""
     numbers = blocks(shape)
     across = int(numbers[0, -1]) + 1
-    places = [divmod(number, across) for number in range(int(numbers.max()) + 1)]
-    found = {
+    cells = [divmod(number, across) for number in range(int(numbers.max()) + 1)]
+    kinds = {
         WHOLE: Parts(whole(shape), [{}]),
-        BLOCKS: Parts(numbers, [{"block": (row + 1, column + 1)} for row, column in places]),
+        BLOCKS: Parts(numbers, [{"block": (row + 1, column + 1)} for row, column in cells]),
     }
     if shapes is not None and (shapes.places >= 0).any():
         present, order = np.unique(shapes.places, return_inverse=True)
         seen = present[present >= 0]
         numbers = order.reshape(shapes.places.shape) - (len(present) - len(seen))
-        found[SHAPES] = Parts(numbers, [{"shape": shapes.names[index]} for index in seen])
-    return found
+        kinds[SHAPES] = Parts(numbers, [{"shape": shapes.names[index]} for index in seen])
+    return kinds
 
 
 @dataclass(frozen=True)
@@ -168,12 +168,12 @@ class HalfCheck:
 
     def smallest_changes(self) -> SmallestChanges:
         """Return the smallest changes that the check catches."""
-        each = self.drifts[BLOCKS].limit(self.level_of_kind)
+        limits = self.drifts[BLOCKS].limit(self.level_of_kind)
         return SmallestChanges(
             power=POWER,
             mean=colour(self.drifts[WHOLE].limit(self.level_of_kind)[0]),
-            block=colour(np.median(each, axis=0)),
-            noisiest=colour(each.max(axis=0)),
+            block=colour(np.median(limits, axis=0)),
+            noisiest=colour(limits.max(axis=0)),
         )
 
     @cached_property
@@ -230,7 +230,6 @@ class HalfCheck:
 class Check:
     """A scene or a picture now, compared with its baseline half by half."""
 
-    before: Halves
     now: Measured
     halves: Sequence[HalfCheck]
     level: float
@@ -300,8 +299,7 @@ def check(
     options = (options or Options()).changed(allow_empty=True)
     checked = []
     for name, half in now.halves.items():
-        counted = now.counted if now.counted is not None and now.counted.any() else None
-        given = GivenPictures(image=half, reference=before[name], mask=counted)
+        given = GivenPictures(image=half, reference=before[name], mask=now.mask)
         comparison = look(given.as_halves(READERS[name], options))
         after = Run.of(file.image for file in half.files)
         checked.append(
@@ -314,7 +312,7 @@ def check(
                 level=level_of_each(level, len(now.halves)),
             )
         )
-    return Check(before=before, now=now, halves=tuple(checked), level=level)
+    return Check(now=now, halves=tuple(checked), level=level)
 
 
 def colour(values: Array) -> Colour:
@@ -348,9 +346,9 @@ def _amounts(found: Drift, moved: NDArray[np.bool_], part: int) -> dict[str, tup
     if moved[part].all() and np.ptp(change) <= ALIKE * size.max():
         return {"light": (float(change.mean()), unit)}
     return {
-        name: (float(change[place]), unit)
-        for place, name in enumerate(CHANNELS.values())
-        if moved[part, place] and size[place] >= size[moved[part]].max() / 2
+        name: (float(change[channel]), unit)
+        for channel, name in enumerate(CHANNELS.values())
+        if moved[part, channel] and size[channel] >= size[moved[part]].max() / 2
     }
 
 
@@ -358,21 +356,20 @@ def _told(amounts: Mapping[str, Mapping[str, tuple[float, str]]]) -> str:
     """Return amounts by half as words; halves that moved alike are told as one."""
     if len(amounts) == len(HALVES):
         first, second = amounts.values()
-        if first.keys() == second.keys():
-            pairs = {name: (first[name], second[name]) for name in first}
-            alike = all(
-                one[1] == other[1] and abs(one[0] - other[0]) <= ALIKE * abs(one[0])
-                for one, other in pairs.values()
-            )
-            if alike:
-                mean = {
-                    name: ((one[0] + other[0]) / 2, one[1]) for name, (one, other) in pairs.items()
-                }
-                return f"{_listed(mean)} in both halves"
+        if first.keys() == second.keys() and all(_are_alike(first[n], second[n]) for n in first):
+            mean = {
+                name: ((value + second[name][0]) / 2, unit) for name, (value, unit) in first.items()
+            }
+            return f"{_listed(mean)} in both halves"
     return ", ".join(
         _listed(half) + ("" if name == PICTURE else f" in the {READERS[name]} half")
         for name, half in amounts.items()
     )
+
+
+def _are_alike(first: tuple[float, str], second: tuple[float, str]) -> bool:
+    """Return whether two amounts have one unit, and numbers that are told as one."""
+    return first[1] == second[1] and abs(first[0] - second[0]) <= ALIKE * abs(first[0])
 
 
 def _listed(amounts: Mapping[str, tuple[float, str]]) -> str:

@@ -42,10 +42,10 @@ from fotismos.reference.rendering.sums import (
 )
 from fotismos.reference.scene.source import Source
 
-LARGEST_CERTAIN = 16
+LARGEST_CERTAIN_SPP = 16
 """Most samples per pixel of methods without random numbers: only the pixel filter needs them."""
 
-LARGEST = 64
+LARGEST_SPP = 64
 """Samples per pixel with which all others are measured; more only until one passes."""
 
 WIDTH = 128
@@ -56,11 +56,11 @@ REFERENCE_SPP = 64
 REFERENCE_PASSES = 16
 """Samples per pixel of each pass of the converged reference, and passes at least."""
 
-NEAR = 1.25
+NEAR_TOLERANCE = 1.25
 """Factor by which the tolerance without noise, predicted from two counts, may be too large."""
 
-FEW = 3
-"""Pictures with more samples than :data:`LARGEST`, at most: their errors hardly scatter."""
+FEW_PICTURES = 3
+"""Pictures with more samples than :data:`LARGEST_SPP`, at most: their errors hardly scatter."""
 
 MOST_SAMPLES = 2**24
 MOST_S = 60.0
@@ -71,13 +71,13 @@ MOST_S = 60.0
 class Effort:
     """How much is rendered for a study: ``rounds`` of each method, at least 2, and which methods.
 
-    Errors are measured up to ``largest`` samples per pixel, at most :data:`LARGEST_CERTAIN` for
+    Errors are measured up to ``largest`` samples per pixel, at most :data:`LARGEST_CERTAIN_SPP` for
     methods without random numbers. The counts are powers of 4, at which the sampler stratifies
     best. If it ``goes_on``, more follow until a method passes.
     """
 
     rounds: int = TURNS
-    largest: int = LARGEST
+    largest: int = LARGEST_SPP
     is_short: bool = False
     goes_on: bool = True
 
@@ -87,7 +87,7 @@ class Effort:
 
     def counts(self, method: Method) -> tuple[int, ...]:
         """Return the sample counts at which the error of a method is measured."""
-        most = self.largest if method.monte_carlo else min(self.largest, LARGEST_CERTAIN)
+        most = self.largest if method.monte_carlo else min(self.largest, LARGEST_CERTAIN_SPP)
         counts = [FEWEST_SPP]
         while 4 * counts[-1] <= most:
             counts.append(4 * counts[-1])
@@ -135,7 +135,9 @@ class Climb:
         self._progress = progress
         self._times: dict[str, Time] = {}
         self._renderers: dict[str, Renderer] = {}
-        self._errors: dict[str, dict[int, Errors]] = {one.name: {} for one in self.ladder.methods}
+        self._errors: dict[str, dict[int, Errors]] = {
+            method.name: {} for method in self.ladder.methods
+        }
         converge(ready, self.total, REFERENCE_PASSES, progress)
         self._errors_of = self._against_reference()
         gc.collect()  # release scenes that pairing left behind
@@ -198,13 +200,13 @@ class Climb:
 
     def measure(self, tolerance: float) -> None:
         """Measure all methods, and with more samples until the cheapest that passes is known."""
-        wanted = {one.name: one for step in self.steps for one in (step.before, step.after)}
-        wanted |= {method.name: method for method in self.ladder.methods}
+        of_steps = [method for step in self.steps for method in (step.before, step.after)]
+        wanted = {method.name: method for method in (*of_steps, *self.ladder.methods)}
         spp = self._timed_spp()
         self._renderers = {
             name: self.ladder.renderer(method, spp) for name, method in wanted.items()
         }
-        counts = {one.name: self.effort.counts(one) for one in self.ladder.methods}
+        counts = {method.name: self.effort.counts(method) for method in self.ladder.methods}
         # The first turn compiles: its times do not count.
         judged = [name for name, of_method in counts.items() if spp in of_method]
         self._render(self._renderers, judged, spp, self.effort.rounds + 1)
@@ -242,10 +244,14 @@ class Climb:
                 seconds = {name: time for name, time in seconds.items() if time < limit}
             if not seconds:
                 return
-            rounds = min(self.effort.rounds, FEW)
-            if spp * pixels > MOST_SAMPLES or sum(seconds.values()) * rounds > MOST_S:
-                if best is None:
-                    self.stopped = f"{spp:,} samples would take more than {MOST_S:g} s"
+            rounds = min(self.effort.rounds, FEW_PICTURES)
+            reason = ""
+            if sum(seconds.values()) * rounds > MOST_S:
+                reason = f"{spp:,} samples would take more than {MOST_S:g} s"
+            elif spp * pixels > MOST_SAMPLES:
+                reason = f"{spp:,} samples are more than an image of this size is given"
+            if reason:
+                self.stopped = "" if best else reason
                 return
             more = spp // _reference_spp(self.size) - self.total.count
             if more > 0:
@@ -267,7 +273,7 @@ class Climb:
         few = fewer[-1]
         square = known[most][1].value ** 2
         left: float = square - (known[few][1].value ** 2 - square) * few / (most - few)
-        return left <= (NEAR * tolerance) ** 2
+        return left <= (NEAR_TOLERANCE * tolerance) ** 2
 
     def _judge(self, names: Sequence[str], spp: int, rounds: int) -> None:
         """Measure the errors of methods with some samples."""
@@ -278,15 +284,15 @@ class Climb:
         self, renderers: Mapping[str, Renderer], judged: Sequence[str], spp: int, rounds: int
     ) -> None:
         """Render in turn, and note the errors of the methods that are judged."""
-        found: dict[str, list[Floats]] = {name: [] for name in judged}
+        measured: dict[str, list[Floats]] = {name: [] for name in judged}
         seed = self.ready.options.seed
         for images in turns.in_turn(renderers, seed, rounds - 1, progress=self._progress):
-            for name, errors in found.items():
+            for name, errors in measured.items():
                 image = np.array(images[name])
                 errors.append(self._errors_of(image))
                 if spp >= max(self._errors[name], default=0):
                     self.images[name] = image
-        for name, errors in found.items():
+        for name, errors in measured.items():
             mean, tolerance = np.transpose(errors)
             self._errors[name][spp] = _mean_error(mean), _mean_error(tolerance)
 
@@ -308,8 +314,8 @@ class Climb:
         distances = LEADING.against(reference, ready.counted, ready.options.viewing)
 
         def errors(image: Floats) -> Floats:
-            found = distances(image)
-            return np.array([LEADING.mean(found), np.quantile(found, 1 - LIMIT)])
+            pixels = distances(image)
+            return np.array([LEADING.mean(pixels), np.quantile(pixels, 1 - LIMIT)])
 
         return errors
 

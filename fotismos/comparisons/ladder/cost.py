@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -30,7 +29,7 @@ from fotismos.comparisons.ladder.timed_pictures import EngineTimes, TimedPicture
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.pictures import GivenPictures, Pictures
 from fotismos.comparisons.prepared import Prepared
-from fotismos.comparisons.records.cost import Choice, Cost, CostAttribution, EffectCost
+from fotismos.comparisons.records.cost import Choice, Cost, CostAttribution, EffectCost, Method
 from fotismos.comparisons.records.images import Causes, Comparison
 from fotismos.comparisons.steps import PICTURES
 from fotismos.comparisons.turns import UNSEEN
@@ -42,7 +41,7 @@ from fotismos.reference.records import Interval, Machine, Pixels
 from fotismos.reference.rendering.passes import Progress, Size
 from fotismos.reference.scene.source import Source
 
-SPP = 64
+ATTRIBUTED_SPP = 64
 """Samples per pixel of the image to which effects add time."""
 
 
@@ -170,12 +169,12 @@ def attribution(climb: Climb, causes: Causes) -> CostAttribution:
 
     ``causes`` may be of another size. The steps lead from the kernel as requested to the full plan.
     """
-    samples = SPP * climb.size[0] * climb.size[1]
+    samples = ATTRIBUTED_SPP * climb.size[0] * climb.size[1]
 
     def adds(effect: str) -> Interval:
         return added([step for step in climb.steps if step.effect == effect], climb, samples)
 
-    def takes(method: Any) -> Interval:
+    def takes(method: Method) -> Interval:
         seconds = samples * climb.time(method).per_sample
         return turns.middle(seconds, UNSEEN * float(np.median(seconds)))
 
@@ -191,7 +190,7 @@ def attribution(climb: Climb, causes: Causes) -> CostAttribution:
         plan_s=takes(climb.steps[-1].after),
         renderer_s=adds(""),
         resolution=climb.size,
-        spp=SPP,
+        spp=ATTRIBUTED_SPP,
     )
 
 

@@ -75,7 +75,9 @@ def front_of_pictures(
         return replace(both.as_halves(picture.name, options), where=where)
 
     compared = compare_all(given, times, halves)
-    floors = [one.record.metrics[LEADING.name].noise_floor for one in compared.values()]
+    floors = [
+        comparison.record.metrics[LEADING.name].noise_floor for comparison in compared.values()
+    ]
     record = EngineCost(
         scene=name,
         resolution=reference.size,

@@ -33,12 +33,20 @@ from fotismos.reports.files import images
 HEADER = "fotismos"
 """The attribute of the file's header that holds the record."""
 
+HEADER_BYTES = 2**16
+"""Bytes at the start of a file in which a baseline names its layers and its record."""
+
+EXR_MAGIC = b"\x76\x2f\x31\x01"
+"""The first bytes of every EXR file."""
+
 LARGEST_VALUE = 1e30
 """Largest value: squares of images in single precision must not overflow."""
 
-NEW = ".exr"
-OLD = ".json"
-"""Suffixes of baselines, and of those of fotismos 0.4, which held numbers."""
+SUFFIX = ".exr"
+"""Of a baseline's file."""
+
+OLD_SUFFIX = ".json"
+"""Of a baseline of fotismos 0.4, which held numbers."""
 
 _HOW = (
     f"Make one with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`, or"
@@ -112,11 +120,11 @@ def find(path: Path) -> list[Path]:
     are damaged; pictures of others are not.
     """
     if path.is_dir():
-        old = set(path.glob(f"*{OLD}"))
+        old = set(path.glob(f"*{OLD_SUFFIX}"))
         new = {
             file
-            for file in path.glob(f"*{NEW}")
-            if file.with_suffix(OLD) not in old and not _is_of_others(file)
+            for file in path.glob(f"*{SUFFIX}")
+            if file.with_suffix(OLD_SUFFIX) not in old and not _is_of_others(file)
         }
         if not (old or new):
             raise InputError(f"{path}: this folder has no baseline (*.exr). {_HOW}")
@@ -128,28 +136,32 @@ def find(path: Path) -> list[Path]:
 
 
 def _is_of_others(path: Path) -> bool:
-    """Return whether a file is a picture that was never a baseline."""
+    """Return whether a file is an EXR picture that was never a baseline."""
     try:
         require_regular(path, LARGEST)
-        header = exr_header(path)
-    except (InputError, OSError):
+        with path.open("rb") as file:
+            start = file.read(HEADER_BYTES)
+    except OSError:
         return False
-    names = [channel.name for channel in header["channels"]]
-    return HEADER not in header and not any(name.startswith(images.PASS) for name in names)
+    # By its bytes, since the library refuses what others write, such as several parts or deep
+    # pixels, as it refuses what is damaged.
+    own = (f"{HEADER}\0string\0", images.PASS)
+    return start.startswith(EXR_MAGIC) and not any(mark.encode() in start for mark in own)
 
 
 def placed(path: Path) -> Path:
     """Return the file of a baseline: that of 0.4 while there is one, however it is named."""
-    if path.suffix not in (OLD, NEW):
+    if path.suffix not in (OLD_SUFFIX, SUFFIX):
         return path
-    old = path.with_suffix(OLD)
-    return old if os.path.lexists(old) else path.with_suffix(NEW)
+    old = path.with_suffix(OLD_SUFFIX)
+    return old if os.path.lexists(old) else path.with_suffix(SUFFIX)
 
 
 def may_run_script(path: Path) -> bool:
     """Return whether a check of a baseline runs a script: its scene is one, or not yet known."""
     try:
-        scene = old_record(path).scene if path.suffix == OLD else json.loads(_header(path))["scene"]
+        is_old = path.suffix == OLD_SUFFIX
+        scene = old_record(path).scene if is_old else json.loads(_header(path))["scene"]
         return is_script(scene or "")
     except Exception:  # the library has many for a file that is not EXR
         return True
@@ -168,7 +180,7 @@ def require_kind(path: Path, scene: str | None, pattern: str | None) -> None:
 
 def known(path: Path) -> Known:
     """Return what a baseline is of, also if it is one of fotismos 0.4."""
-    if path.suffix == OLD:
+    if path.suffix == OLD_SUFFIX:
         return old_record(path)
     file = read(path)
     return Known(scene=file.baseline.scene, options=file.baseline.options, file=file)
@@ -193,12 +205,12 @@ def old_record(path: Path) -> Known:
 
 def read(path: Path) -> BaselineFile:
     """Read a baseline; ``InputError`` has the name of the file and the fault in it."""
-    if path.suffix == OLD:
+    if path.suffix == OLD_SUFFIX:
         shots = () if old_record(path).scene else ("--picture", f"{path.stem}=PATTERN")
         raise InputError(
             f"{path}: this baseline is of fotismos 0.4, which kept numbers where passes are kept"
             " now, so it cannot be compared."
-            f" `{program.command('check', path, '--update', *shots)}` makes {path.stem}{NEW} of"
+            f" `{program.command('check', path, '--update', *shots)}` makes {path.stem}{SUFFIX} of"
             " what there is today, in its place."
         )
     try:
@@ -276,7 +288,7 @@ def write(file: BaselineFile) -> None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         require_own(path)
-        old = path.with_suffix(OLD)
+        old = path.with_suffix(OLD_SUFFIX)
         if os.path.lexists(old):
             old_record(old)  # refuses what is none
         images.write_exr(path, layers, {HEADER: record})

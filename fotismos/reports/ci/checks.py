@@ -48,7 +48,7 @@ PANELS = ("before", "now", LEADING.name)
 LARGEST_ERROR = 2.0
 """ΔE2000 at which the map's colours end: changes are often hardly noticeable."""
 
-LONGEST = 256
+LONGEST_SHOWN = 256
 """Pixels of the longer side of the pictures on the page."""
 
 Asked = Any
@@ -129,9 +129,9 @@ def update(
     kept something else, what it held does not count.
     """
     begin = perf_counter()
-    old = path.with_suffix(baselines.OLD)
+    old = path.with_suffix(baselines.OLD_SUFFIX)
     is_old = old.exists()
-    target = path.with_suffix(baselines.NEW)
+    target = path.with_suffix(baselines.SUFFIX)
     status = "updated" if is_old or target.exists() else "created"
     found = None
     if file is not None and _are_comparable(file, now):
@@ -191,7 +191,7 @@ def _record(file: BaselineFile, found: Check, scene: str, status: Any) -> CheckR
         for name, old in file.baseline.versions.items()
         if now.get(name) != old
     }
-    before = found.now.metrics(found.before)
+    before = found.now.metrics(file.halves)
     after = found.now.metrics(found.now.halves)
     metrics = None
     if before is not None and after is not None:
@@ -233,7 +233,7 @@ def _caught(half: HalfCheck) -> str:
 
 def _panels(half: HalfCheck) -> dict[str, Image]:
     """Return the pictures of a half by their captions: before, now, and the map of the change."""
-    shape = shrunk(half.before.mean.shape[:2], LONGEST)
+    shape = shrunk(half.before.mean.shape[:2], LONGEST_SHOWN)
     subject = READERS[half.name]
     change = f"{subject}, what moved: {LEADING.label}, 0 to {LARGEST_ERROR:g}"
     return {

@@ -27,7 +27,7 @@ from fotismos.comparisons.departure.metrics import RATIO
 from fotismos.comparisons.options import Options
 from fotismos.comparisons.picture_files import require_linear
 from fotismos.comparisons.pictures import require_one_size
-from fotismos.comparisons.records.check import Tolerance
+from fotismos.comparisons.records.check import PICTURE, Tolerance
 from fotismos.heuristic.errors import InputError, unknown
 from fotismos.heuristic.heuristics import in_file, known_as
 from fotismos.reference import records
@@ -207,17 +207,16 @@ class Fotismos:
         after = self._repeats(image)
         level = self.significance if significance is None else significance
         tolerance = None if within is None else _tolerance(within, max_visible)
-        if not path.exists():
-            if not self.update:
-                raise _missing(path)
-            checks.update(path, None, {}, _noiseless(after), name)
-            return True
-        file = self._kept(path, name).file
+        if not (path.exists() or self.update):
+            raise _missing(path)
+        file = self._kept(path, name).file if path.exists() else None
+        if self.update and file and file.halves[PICTURE].size != after.halves[PICTURE].size:
+            file = None  # it cannot be compared, and is replaced
         section = None
         folder = self._report(name)
         if file is not None:
-            kept = None if self.update else folder
-            _, section = checks.examine(file, after, name, level, kept, tolerance)
+            report = None if self.update else folder
+            _, section = checks.examine(file, after, name, level, report, tolerance)
         if self.update and (file is None or section is not None):
             checks.update(path, None, {}, _noiseless(after), name)
         elif section is not None:
@@ -287,11 +286,12 @@ class Fotismos:
         return beside if beside.is_file() else scene
 
     def _path(self, scene: Scene, name: str | None) -> Path:
-        if isinstance(scene, (str, Path)) and Path(scene).suffix in (baselines.NEW, baselines.OLD):
+        suffixes = (baselines.SUFFIX, baselines.OLD_SUFFIX)
+        if isinstance(scene, (str, Path)) and Path(scene).suffix in suffixes:
             return baselines.placed(Path(scene))
         suffix = f"-{self.variant}" if self.variant else ""
         stem = atomic.file_name(name or _name(scene), "a baseline")
-        return baselines.placed(self.folder / f"{stem}{suffix}{baselines.NEW}")
+        return baselines.placed(self.folder / f"{stem}{suffix}{baselines.SUFFIX}")
 
     def _options(self, options: dict[str, Any]) -> dict[str, Any]:
         return self._with_file(options) | ({"variant": self.variant} if self.variant else {})
