@@ -101,7 +101,6 @@ def in_turn(
     turns: int,
     *,
     size: Size | None = None,
-    stream: Stream = Stream.PRICE,
     progress: Progress | None = None,
 ) -> Iterator[dict[str, Any]]:
     """Yield the pictures of each turn, and of one before them, by the names of their methods."""
@@ -110,7 +109,7 @@ def in_turn(
         seed,
         turns + 1,
         size=size,
-        stream=stream,
+        stream=Stream.PRICE,
         progress=progress,
         stage="timing",
     )

@@ -263,8 +263,12 @@ def check(asked: Baseline) -> CheckRecord:
     ``significance`` is the chance of a false alarm, above 0 and below 1. Raises `InputError` if the
     baseline or its scene cannot be read.
     """
-    (path,) = baselines.find(asked.baseline)
-    file = baselines.read(path)
+    paths = baselines.find(asked.baseline)
+    if len(paths) > 1:
+        raise InputError(
+            f"{asked.baseline}: this folder has {len(paths)} baselines. Give the file of one."
+        )
+    file = baselines.read(paths[0])
     now = file.rendered(file.open())
     result, _ = checks.examine(file, now, str(file.baseline.scene), asked.significance)
     return result

@@ -47,7 +47,7 @@ CORPUS = Path(__file__).parents[1] / "corpus"
 def short():
     """Times of these scenes need not repeat."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(turns, "SAMPLES", 0)
+        patched.setattr(turns, "MOST_SAMPLES", 0)
         patched.setattr(climb, "REFERENCE_SPP", 4)
         yield
 

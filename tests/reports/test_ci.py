@@ -261,7 +261,7 @@ def test_an_update_replaces_no_other_baseline_and_no_other_file(run, tmp_path, m
     for text in ('{"name": "mine"}', "[]", "mine", OLD[:40]):
         other.write_text(text)
         code, _, messages = update(other, "a/x.xml")
-        assert (code, "Delete it, and write it again" in messages) == (2, True)
+        assert (code, "Move it away. Make a baseline with" in messages) == (2, True)
         assert other.read_text() == text
 
 

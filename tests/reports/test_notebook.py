@@ -122,6 +122,11 @@ def test_an_impossible_significance_is_refused(rgb, baselines_folder, significan
         fotismos.check(path, significance)
 
 
+def test_a_folder_of_several_baselines_is_refused(rgb, baselines_folder):
+    with pytest.raises(InputError, match=r"has 2 baselines\. Give the file of one"):
+        fotismos.check(baselines_folder)
+
+
 def test_a_scene_of_another_type_is_refused(rgb):
     for scene in (None, 5, [1], mi.load_dict({"type": "scene"})):
         with pytest.raises(InputError, match=f"a scene of type {type(scene).__name__} is not"):

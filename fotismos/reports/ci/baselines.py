@@ -49,7 +49,7 @@ OLD_SUFFIX = ".json"
 """Of a baseline of fotismos 0.4, which held numbers."""
 
 _HOW = (
-    f"Make one with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`, or"
+    f"Make a baseline with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`, or"
     " with `--picture NAME=PATTERN` in place of the scene."
 )
 
@@ -229,11 +229,7 @@ def read(path: Path) -> BaselineFile:
 def _no_baseline(path: Path, error: Exception) -> InputError:
     reason = getattr(error, "strerror", None) or str(error)
     where = "" if reason.startswith(str(path)) else f"{path}: this is no baseline: "
-    update = program.command("check", "BASELINE", "--update", "--scene", "SCENE")
-    return InputError(
-        f"{where}{reason.rstrip('.')}. Delete it, and write it again: `{update}`, or with"
-        " `--picture NAME=PATTERN` in place of the scene."
-    )
+    return InputError(f"{where}{reason.rstrip('.')}. Move it away. {_HOW}")
 
 
 def _header(path: Path) -> str:
