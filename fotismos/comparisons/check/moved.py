@@ -141,18 +141,18 @@ class HalfCheck:
     @cached_property
     def moved(self) -> dict[str, NDArray[np.bool_]]:
         """Which means (N, 3) moved, by kind."""
-        return {kind: found.moved(self.level_of_kind) for kind, found in self.drifts.items()}
+        return {kind: means.moved(self.level_of_kind) for kind, means in self.drifts.items()}
 
     def moves(self) -> Iterator[Move]:
         """Yield what moved."""
-        for kind, found in self.drifts.items():
-            p = found.p()
-            corrected = sidak(p, found.tests)
-            errors = found.error
+        for kind, means in self.drifts.items():
+            p = means.p()
+            corrected = sidak(p, means.tests)
+            errors = means.error
             for part, channel in np.argwhere(self.moved[kind]).tolist():
                 index = part, channel
-                before = float(found.before[index])
-                after = float(found.after[index])
+                before = float(means.before[index])
+                after = float(means.after[index])
                 error = float(errors[index])
                 yield Move(
                     half=self.name,
@@ -186,10 +186,10 @@ class HalfCheck:
         """
         m = self.before.count
         n = self.after.count
-        found = self.drifts[BLOCKS]
-        old = found.before
-        new = found.after
-        weight = 1.0 / np.maximum(found.error, found.rounding) ** 2
+        means = self.drifts[BLOCKS]
+        old = means.before
+        new = means.after
+        weight = 1.0 / np.maximum(means.error, means.rounding) ** 2
         level = weight * (m * old + n * new) / (m + n)
         words = []
         for name, start, weights, base, image in (
@@ -210,15 +210,15 @@ class HalfCheck:
         subject = "The whole picture" if self.name == PICTURE else f"The {READERS[self.name]} half"
         if self.constants:
             return f"{subject} moved by {' or by '.join(self.constants)}. Nothing else moved."
-        found = self.drifts[BLOCKS]
+        means = self.drifts[BLOCKS]
         count = int(self.moved[BLOCKS].any(axis=-1).sum())
         where = "moved in no single block, but in larger parts"
         if count:
-            change = np.abs(found.after - found.before).sum(axis=-1)
+            change = np.abs(means.after - means.before).sum(axis=-1)
             most = int(change.argmax())
             row, column = self.parts[BLOCKS].fields[most]["block"]
-            old = float(luminance(found.before[most]))
-            new = float(luminance(found.after[most]))
+            old = float(luminance(means.before[most]))
+            new = float(luminance(means.after[most]))
             where = (
                 f"moved in {count} of {change.size} blocks, most in row {row}, column {column},"
                 f" from luminance {old:.3g} to {new:.3g}"
@@ -249,7 +249,7 @@ class Check:
     @property
     def tested(self) -> int:
         """How many means were tested."""
-        return sum(found.before.size for half in self.halves for found in half.drifts.values())
+        return sum(means.before.size for half in self.halves for means in half.drifts.values())
 
     @property
     def are_moved(self) -> list[HalfCheck]:
@@ -326,21 +326,21 @@ def colour(values: Array) -> Colour:
 
 def _light(half: HalfCheck, kind: str) -> Array:
     """Return how much light moved in each part (N,) of a kind; 0 if it may be noise."""
-    found = half.drifts[kind]
-    change = np.abs(luminance(found.after - found.before)) * half.parts[kind].pixels
+    means = half.drifts[kind]
+    change = np.abs(luminance(means.after - means.before)) * half.parts[kind].pixels
     return np.where(half.moved[kind].any(axis=-1), change, 0.0)
 
 
-def _amounts(found: Drift, moved: NDArray[np.bool_], part: int) -> dict[str, tuple[float, str]]:
+def _amounts(means: Drift, moved: NDArray[np.bool_], part: int) -> dict[str, tuple[float, str]]:
     """Return by how much a part moved, by the names of channels: numbers and their unit.
 
     Channels that moved less than half as much as another are left out, and three that moved alike
     are ``light``.
     """
-    change = (found.after - found.before)[part]
+    change = (means.after - means.before)[part]
     unit = ""
-    if found.before[part][moved[part]].min() >= DARK:
-        change = 100.0 * change / np.maximum(found.before[part], DARK)
+    if means.before[part][moved[part]].min() >= DARK:
+        change = 100.0 * change / np.maximum(means.before[part], DARK)
         unit = " %"
     size = np.abs(change)
     if moved[part].all() and np.ptp(change) <= ALIKE * size.max():

@@ -49,8 +49,9 @@ OLD_SUFFIX = ".json"
 """Of a baseline of fotismos 0.4, which held numbers."""
 
 _HOW = (
-    f"Make a baseline with `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`, or"
-    " with `--picture NAME=PATTERN` in place of the scene."
+    "Make a baseline with"
+    f" `{program.command('check', 'BASELINE', '--update', '--scene', 'SCENE')}`, or with `--picture"
+    " NAME=PATTERN` in place of the scene."
 )
 
 
@@ -129,10 +130,10 @@ def find(path: Path) -> list[Path]:
         if not (old or new):
             raise InputError(f"{path}: this folder has no baseline (*.exr). {_HOW}")
         return sorted(old | new)
-    found = placed(path)
-    if not found.is_file():
+    file = placed(path)
+    if not file.is_file():
         raise InputError(f"{path}: there is no such baseline. {_HOW}")
-    return [found]
+    return [file]
 
 
 def _is_of_others(path: Path) -> bool:

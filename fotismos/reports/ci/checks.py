@@ -76,42 +76,42 @@ def examine(
     else those of an earlier one are deleted.
     """
     begin = perf_counter()
-    found = check(file.halves, now, level)
+    checked = check(file.halves, now, level)
     gate = None
-    has_failed = bool(found.moves)
+    has_failed = bool(checked.moves)
     if tolerance is not None:
-        record = found.halves[0].comparison.record
+        record = checked.halves[0].comparison.record
         (gate,) = summary.gates([record], tolerance.bound, tolerance.within)
         has_failed = gate.state != "pass"
-    made = _record(file, found, scene=scene, status="failed" if has_failed else "passed")
+    result = _record(file, checked, scene=scene, status="failed" if has_failed else "passed")
     if gate is not None:
         sentence = summary.sentence(gate)
-        made = structs.replace(made, gate=gate, headline=sentence, message=sentence)
+        result = structs.replace(result, gate=gate, headline=sentence, message=sentence)
     if has_failed:
-        made = structs.replace(made, passed=False, causes=tuple(found.causes()))
-    made = structs.replace(made, seconds=round(now.seconds + perf_counter() - begin, 3))
+        result = structs.replace(result, passed=False, causes=tuple(checked.causes()))
+    result = structs.replace(result, seconds=round(now.seconds + perf_counter() - begin, 3))
     if folder is not None:
-        names = [f"{half.name}-{panel}.png" for half in found.halves for panel in PANELS]
+        names = [f"{half.name}-{panel}.png" for half in checked.halves for panel in PANELS]
         results.clear(folder, (RECORD, *names))
     if not has_failed:
-        return made, None
+        return result, None
     # The half that moved most comes first.
-    halves = sorted(found.halves, key=lambda half: -half.error.mean())
+    halves = sorted(checked.halves, key=lambda half: -half.error.mean())
     panels = {half.name: _panels(half) for half in halves}
     if folder is not None:
-        made = structs.replace(made, pictures=folder.as_posix())
+        result = structs.replace(result, pictures=folder.as_posix())
         folder.parent.mkdir(parents=True, exist_ok=True)
         results.own(folder)
         for half, shown in panels.items():
             for panel, picture in zip(PANELS, shown.values(), strict=True):
                 results.write(folder / f"{half}-{panel}.png", images.png(picture))
-        results.write(folder / RECORD, to_json(made))
+        results.write(folder / RECORD, to_json(result))
     pictures = {
         caption: images.webp(picture, lossless=True)
         for shown in panels.values()
         for caption, picture in shown.items()
     }
-    return made, Before(check=made, pictures=pictures)
+    return result, Before(check=result, pictures=pictures)
 
 
 def update(
@@ -133,25 +133,25 @@ def update(
     is_old = old.exists()
     target = path.with_suffix(baselines.SUFFIX)
     status = "updated" if is_old or target.exists() else "created"
-    found = None
+    checked = None
     if file is not None and _are_comparable(file, now):
-        found = check(file.halves, now, level)
-    if found is not None and not found.moves:
+        checked = check(file.halves, now, level)
+    if checked is not None and not checked.moves:
         status = "unchanged"
     else:
         new = BaselineFile.of(target, scene, options, now)
         baselines.write(new)
-    if found is None or file is None:
+    if checked is None or file is None:
         file = new
-        found = check(now.halves, now, level)
-    made = _record(file, found, scene=word, status=status)
+        checked = check(now.halves, now, level)
+    result = _record(file, checked, scene=word, status=status)
     if is_old:
         replaced = (
             f"{old.name} of fotismos 0.4 could not be compared: {target.name}, in its place, begins"
             " with what there is today."
         )
-        made = structs.replace(made, message=" ".join(filter(None, (replaced, made.message))))
-    return structs.replace(made, seconds=round(now.seconds + perf_counter() - begin, 3))
+        result = structs.replace(result, message=" ".join(filter(None, (replaced, result.message))))
+    return structs.replace(result, seconds=round(now.seconds + perf_counter() - begin, 3))
 
 
 def update_scene(
@@ -184,34 +184,34 @@ def _are_comparable(known: BaselineFile, now: Measured) -> bool:
     )
 
 
-def _record(file: BaselineFile, found: Check, scene: str, status: Any) -> CheckRecord:
+def _record(file: BaselineFile, checked: Check, scene: str, status: Any) -> CheckRecord:
     now = versions()
     changed = {
         name: Change(before=old, after=now.get(name, "none"))
         for name, old in file.baseline.versions.items()
         if now.get(name) != old
     }
-    before = found.now.metrics(file.halves)
-    after = found.now.metrics(found.now.halves)
+    before = checked.now.metrics(file.halves)
+    after = checked.now.metrics(checked.now.halves)
     metrics = None
     if before is not None and after is not None:
         metrics = {name: Change(before=before[name], after=after[name]) for name in after}
-    half = found.halves[0]
+    half = checked.halves[0]
     is_picture = half.name == PICTURE
-    picture = found.now.halves[PICTURE].record() if is_picture else None
+    picture = checked.now.halves[PICTURE].record() if is_picture else None
     return CheckRecord(
         baseline=file.path.as_posix(),
         scene=scene,
         status=status,
         seconds=0.0,
-        message=_caught(half) if is_picture else found.now.caution,
-        headline=found.headline(),
-        tested=found.tested,
-        significance=found.level,
-        moved=found.moves,
+        message=_caught(half) if is_picture else checked.now.caution,
+        headline=checked.headline(),
+        tested=checked.tested,
+        significance=checked.level,
+        moved=checked.moves,
         metrics=metrics,
         versions=changed or None,
-        smallest_changes={half.name: half.smallest_changes() for half in found.halves},
+        smallest_changes={half.name: half.smallest_changes() for half in checked.halves},
         picture=picture,
     )
 
@@ -277,20 +277,20 @@ def examine_all(pool: Pool, asked: Asked, folder: Path) -> list[Outcome]:
     paths = sorted({*baselines.find(asked.baseline), *asked.patterns})
     level = level_of_each(asked.significance, len(paths))
     calls = [(path, asked, level, folder / path.stem) for path in paths]
-    return _each(pool, examine_one, calls)
+    return _outcomes(pool, examine_one, calls)
 
 
 def update_all(pool: Pool, asked: Asked) -> list[Outcome]:
     """Write the baselines of a command, except those of which nothing moved."""
     paths = asked.patterns or asked.scene_words or baselines.find(asked.baseline)
-    return _each(pool, update_one, [(path, asked) for path in paths])
+    return _outcomes(pool, update_one, [(path, asked) for path in paths])
 
 
-def _each(
+def _outcomes(
     pool: Pool, function: Callable[..., Outcome], calls: Sequence[tuple[Any, ...]]
 ) -> list[Outcome]:
     """Return the result of each baseline, in order; its path is the first argument."""
-    found = {}
+    outcomes = {}
     tasks = [
         Task(
             name=call[0].name,
@@ -305,8 +305,8 @@ def _each(
         for task, outcome in shown.each(tasks):
             path = task.arguments[0]
             error = outcome.exception()
-            found[path] = (failed(path, error), None) if error else outcome.result()
-    return [found[call[0]] for call in calls]
+            outcomes[path] = (failed(path, error), None) if error else outcome.result()
+    return [outcomes[call[0]] for call in calls]
 
 
 def failed(path: Path, error: BaseException) -> CheckRecord:

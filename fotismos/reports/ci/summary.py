@@ -136,13 +136,13 @@ def conclude_checks(
 
     Returns the exit code.
     """
-    for made in outcomes:
-        if made.status == "error":
-            echo(f"fotismos: error: {made.message}", err=True)
+    for record in outcomes:
+        if record.status == "error":
+            echo(f"fotismos: error: {record.message}", err=True)
     write_junit(terminal.junit, lambda: junit_of_checks(outcomes))
     append(terminal.summary, lambda: of_checks(outcomes, significance, page))
     # 2, could not be checked, outweighs 1, moved.
-    code = max(made.exit_code for made in outcomes)
+    code = max(record.exit_code for record in outcomes)
     if not (is_quiet() or terminal.as_json):
         tell(lines(outcomes, significance))
         if page:
@@ -217,15 +217,15 @@ def append(path: Path | None, text: Callable[[], str]) -> None:
 def junit_of_checks(checks: Sequence[CheckRecord]) -> bytes:
     """Return the XML document of checks, one test case for each baseline."""
     cases = []
-    for made in checks:
-        names = {"name": made.name, "file": made.baseline, "time": f"{made.seconds:.3f}"}
+    for record in checks:
+        names = {"name": record.name, "file": record.baseline, "time": f"{record.seconds:.3f}"}
         case = _element("testcase", {**names, "classname": "fotismos.check"})
-        if made.status == "failed":
-            failure = _element("failure", {"message": made.headline, "type": "moved"})
-            failure.text = _clean("\n".join(moved_lines(made)))
+        if record.status == "failed":
+            failure = _element("failure", {"message": record.headline, "type": "moved"})
+            failure.text = _clean("\n".join(moved_lines(record)))
             case.append(failure)
-        elif made.status == "error":
-            case.append(_element("error", {"message": made.message, "type": "error"}))
+        elif record.status == "error":
+            case.append(_element("error", {"message": record.message, "type": "error"}))
         cases.append(case)
     return _document("check", cases)
 
@@ -305,7 +305,9 @@ def of_checks(checks: Sequence[CheckRecord], level: float, page: str) -> str:
         outcome(checks, level),
         _marked_down(Table(MOST_MOVED, checks)),
     ]
-    parts += [escaped(f"{made.name}: {' '.join(made.causes)}") for made in checks if made.causes]
+    parts += [
+        escaped(f"{record.name}: {' '.join(record.causes)}") for record in checks if record.causes
+    ]
     return "\n\n".join([*parts, *([_where(page)] if page else ())]) + "\n\n"
 
 
@@ -324,18 +326,18 @@ def _where(page: str) -> str:
 
 def lines(checks: Sequence[CheckRecord], level: float) -> Iterator[str]:
     """Yield what moved in each scene, then a table of all scenes."""
-    for made in checks:
-        yield from _details(made)
+    for record in checks:
+        yield from _details(record)
     if len(checks) > 1:
         yield from printed(Table(_checked(), checks))
         yield ""
-    yield from dict.fromkeys(filter(None, (made.other_mitsuba for made in checks)))
+    yield from dict.fromkeys(filter(None, (record.other_mitsuba for record in checks)))
     yield outcome(checks, level)
 
 
 def outcome(checks: Sequence[CheckRecord], level: float) -> str:
     """Return the line that says how it went."""
-    statuses = [made.status for made in checks]
+    statuses = [record.status for record in checks]
     count = len(checks)
     moved = statuses.count("failed")
     errors = statuses.count("error")
@@ -344,7 +346,7 @@ def outcome(checks: Sequence[CheckRecord], level: float) -> str:
         text = f"{written} of {count} baselines written"
     else:
         # A tolerance lets pictures move a little.
-        has_gates = any(made.gate for made in checks)
+        has_gates = any(record.gate for record in checks)
         bad = "failed" if has_gates else "moved"
         good = "passed" if has_gates else "unmoved"
         text = f"{moved} of {count} {bad}" if moved else f"{count - errors} of {count} {good}"
@@ -352,29 +354,29 @@ def outcome(checks: Sequence[CheckRecord], level: float) -> str:
     return text + (f"; {errors} could not be checked" if errors else "")
 
 
-def moved_lines(made: CheckRecord) -> Iterator[str]:
+def moved_lines(record: CheckRecord) -> Iterator[str]:
     """Yield the table of what moved, by how much and how certain that is; and causes."""
-    yield from printed(moved(made))
-    others = len(made.moved or ()) - SHOWN
+    yield from printed(moved(record))
+    others = len(record.moved or ()) - SHOWN
     if others > 0:
-        yield f"and {others} more; {made.tested} means were tested"
-    yield from made.causes
+        yield f"and {others} more; {record.tested} means were tested"
+    yield from record.causes
 
 
-def _details(made: CheckRecord) -> Iterator[str]:
-    if made.moved:
-        yield f"{made.name}: {made.status}. {made.headline}"
-    if made.message and made.status != "error":  # an error has its own line
-        yield f"{made.name}: {made.message}"
-    if not made.moved:
+def _details(record: CheckRecord) -> Iterator[str]:
+    if record.moved:
+        yield f"{record.name}: {record.status}. {record.headline}"
+    if record.message and record.status != "error":  # an error has its own line
+        yield f"{record.name}: {record.message}"
+    if not record.moved:
         return
-    yield from ("  " + line for line in moved_lines(made))
-    if made.versions_line:
-        yield "  " + made.versions_line
-    if made.pictures is not None:
-        yield f"  pictures: {made.pictures}"
-    if made.status == "failed":
-        yield f"  if this is meant: {made.update_command}"
+    yield from ("  " + line for line in moved_lines(record))
+    if record.versions_line:
+        yield "  " + record.versions_line
+    if record.pictures is not None:
+        yield f"  pictures: {record.pictures}"
+    if record.status == "failed":
+        yield f"  if this is meant: {record.update_command}"
     yield ""
 
 
@@ -382,16 +384,18 @@ def _checked() -> tuple[Column, ...]:
     """Return the columns of checks on a terminal."""
 
     def lead(end: str) -> Callable[[CheckRecord], float | str]:
-        return lambda made: "" if made.metrics is None else getattr(made.metrics["dE2000"], end)
+        return lambda record: (
+            "" if record.metrics is None else getattr(record.metrics["dE2000"], end)
+        )
 
-    def counted(made: CheckRecord) -> int | str:
-        return "" if made.tested is None else len(made.moved or ())
+    def counted(record: CheckRecord) -> int | str:
+        return "" if record.tested is None else len(record.moved or ())
 
     return (
         Column("baseline", "name"),
         Column("result", "status"),
         Column("moved", counted, is_right=True),
-        Column("of", lambda made: "" if made.tested is None else made.tested, is_right=True),
+        Column("of", lambda record: "" if record.tested is None else record.tested, is_right=True),
         Column("mean ΔE2000", lead("before"), "{:.3f}".format, is_right=True),
         Column("now", lead("after"), "{:.3f}".format, is_right=True),
         Column("time", "seconds", "{:.1f} s".format, is_right=True),
@@ -401,12 +405,12 @@ def _checked() -> tuple[Column, ...]:
 MOST_MOVED = (
     Column("Baseline", "name"),
     Column("Result", "status"),
-    Column("What moved most", lambda made: made.headline or made.message),
-    Column("Moved", lambda made: "" if made.tested is None else len(made.moved or ())),
-    Column("Of", lambda made: "" if made.tested is None else made.tested),
+    Column("What moved most", lambda record: record.headline or record.message),
+    Column("Moved", lambda record: "" if record.tested is None else len(record.moved or ())),
+    Column("Of", lambda record: "" if record.tested is None else record.tested),
     Column(
         "p",
-        lambda made: min((m.p_corrected for m in made.moved or ()), default=""),
+        lambda record: min((m.p_corrected for m in record.moved or ()), default=""),
         "{:.1g}".format,
     ),
 )

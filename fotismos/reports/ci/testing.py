@@ -58,9 +58,9 @@ class Departure(float):
 
     def __new__(cls, value: float, **about: Any) -> "Departure":
         """Return the number with its attributes."""
-        made = super().__new__(cls, value)
-        vars(made).update(about)
-        return made
+        departure = super().__new__(cls, value)
+        vars(departure).update(about)
+        return departure
 
     def __repr__(self) -> str:
         return f"{self.metric} {float(self):.4g}"
@@ -124,9 +124,9 @@ class Fotismos:
             return Departure(value, **about, interval=None, noise_floor=None)
         if metric not in record.metrics:
             raise unknown("metric", metric, (*record.metrics, RATIO.name))
-        found = record.metrics[metric]
-        interval = (found.low, found.high)
-        return Departure(found.mean, **about, interval=interval, noise_floor=found.noise_floor)
+        values = record.metrics[metric]
+        interval = (values.low, values.high)
+        return Departure(values.mean, **about, interval=interval, noise_floor=values.noise_floor)
 
     def unchanged(
         self,
@@ -220,10 +220,10 @@ class Fotismos:
         if self.update and (file is None or section is not None):
             checks.update(path, None, {}, _noiseless(after), name)
         elif section is not None:
-            made = section.check
-            text = [f"{path}: {made.headline}"]
+            checked = section.check
+            text = [f"{path}: {checked.headline}"]
             if tolerance is None:
-                text += [f"{len(made.moved)} means moved.", *made.causes]
+                text += [f"{len(checked.moved)} means moved.", *checked.causes]
             page = _page(folder, structs.replace(section, approval=UPDATE))
             raise AssertionError(f"{' '.join(text)}\npage: {page}")
         return True

@@ -145,7 +145,7 @@ class Check(Baseline, frozen=True):
             summary.require_free(terminal.junit, terminal.summary, [*self.scenes, *inputs])
             page = ""
             if self.update:
-                outcomes = [made for made, _ in checks.update_all(pool, self)]
+                outcomes = [record for record, _ in checks.update_all(pool, self)]
             else:
                 outcomes, page = self._examined(pool, terminal.output)
             code = summary.conclude_checks(outcomes, terminal, self.significance, page)
@@ -162,9 +162,9 @@ class Check(Baseline, frozen=True):
         from fotismos.reports.files import results  # as late
 
         with results.hold(output / "check", command_line(), ()) as folder:
-            found = checks.examine_all(pool, self, folder)
-            outcomes = [made for made, _ in found]
-            sections = [section for _, section in found if section is not None]
+            examined = checks.examine_all(pool, self, folder)
+            outcomes = [record for record, _ in examined]
+            sections = [section for _, section in examined if section is not None]
             if not sections:
                 results.clear(folder, (results.PAGE, results.DETAILS))
                 return outcomes, ""
