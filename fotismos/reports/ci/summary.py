@@ -329,7 +329,7 @@ def lines(checks: Sequence[CheckRecord], level: float) -> Iterator[str]:
     for record in checks:
         yield from _details(record)
     if len(checks) > 1:
-        yield from printed(Table(_checked(), checks))
+        yield from printed(Table(CHECKED, checks))
         yield ""
     yield from dict.fromkeys(filter(None, (record.other_mitsuba for record in checks)))
     yield outcome(checks, level)
@@ -380,34 +380,38 @@ def _details(record: CheckRecord) -> Iterator[str]:
     yield ""
 
 
-def _checked() -> tuple[Column, ...]:
-    """Return the columns of checks on a terminal."""
-
-    def lead(end: str) -> Callable[[CheckRecord], float | str]:
-        return lambda record: (
-            "" if record.metrics is None else getattr(record.metrics["dE2000"], end)
-        )
-
-    def counted(record: CheckRecord) -> int | str:
-        return "" if record.tested is None else len(record.moved or ())
-
-    return (
-        Column("baseline", "name"),
-        Column("result", "status"),
-        Column("moved", counted, is_right=True),
-        Column("of", lambda record: "" if record.tested is None else record.tested, is_right=True),
-        Column("mean ΔE2000", lead("before"), "{:.3f}".format, is_right=True),
-        Column("now", lead("after"), "{:.3f}".format, is_right=True),
-        Column("time", "seconds", "{:.1f} s".format, is_right=True),
+def _lead(end: str) -> Callable[[CheckRecord], float | str]:
+    """Return what shows the leading metric ``before`` or ``after``; of pictures it has none."""
+    return lambda record: (
+        "" if record.metrics is None else getattr(record.metrics[LEADING.name], end)
     )
 
+
+def _moved(record: CheckRecord) -> int | str:
+    return "" if record.tested is None else len(record.moved or ())
+
+
+def _tested(record: CheckRecord) -> int | str:
+    return "" if record.tested is None else record.tested
+
+
+CHECKED = (
+    Column("baseline", "name"),
+    Column("result", "status"),
+    Column("moved", _moved, is_right=True),
+    Column("of", _tested, is_right=True),
+    Column(f"mean {LEADING.label}", _lead("before"), "{:.3f}".format, is_right=True),
+    Column("now", _lead("after"), "{:.3f}".format, is_right=True),
+    Column("time", "seconds", "{:.1f} s".format, is_right=True),
+)
+"""The columns of checks on a terminal."""
 
 MOST_MOVED = (
     Column("Baseline", "name"),
     Column("Result", "status"),
     Column("What moved most", lambda record: record.headline or record.message),
-    Column("Moved", lambda record: "" if record.tested is None else len(record.moved or ())),
-    Column("Of", lambda record: "" if record.tested is None else record.tested),
+    Column("Moved", _moved),
+    Column("Of", _tested),
     Column(
         "p",
         lambda record: min((m.p_corrected for m in record.moved or ()), default=""),
