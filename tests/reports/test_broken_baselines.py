@@ -82,7 +82,8 @@ def break_all(folder):
 )
 def test_each_baseline_is_judged_alone(run, folder, tmp_path):
     broken = break_all(folder)
-    images.write_exr(folder / "picture.exr", {"": np.ones((4, 4, 3))}, {})  # is none
+    layers = dict.fromkeys(("", "beauty_pass"), np.ones((4, 4, 3)))
+    images.write_exr(folder / "picture.exr", layers, {})  # is none
     parts = [OpenEXR.Part({}, {"RGB": np.ones((4, 4, 3), "f")}, name) for name in ("a", "b")]
     OpenEXR.File(parts).write(str(folder / "parts.exr"))  # nor is this
     code, printed, messages = run("check", folder, "-o", tmp_path / "out", "--json")

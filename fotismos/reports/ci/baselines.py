@@ -146,7 +146,7 @@ def _is_of_others(path: Path) -> bool:
         return False
     # By its bytes, since the library refuses what others write, such as several parts or deep
     # pixels, as it refuses what is damaged.
-    own = (f"{HEADER}\0string\0", images.PASS)
+    own = (f"{HEADER}\0string\0", f"\0{images.PASS}")  # before a layer's name stands a 0
     return start.startswith(EXR_MAGIC) and not any(mark.encode() in start for mark in own)
 
 

@@ -133,18 +133,15 @@ def update(
     is_old = old.exists()
     target = path.with_suffix(baselines.SUFFIX)
     status = "updated" if is_old or target.exists() else "created"
-    checked = None
-    if file is not None and _are_comparable(file, now):
-        checked = check(file.halves, now, level)
-    if checked is not None and not checked.moves:
-        status = "unchanged"
-    else:
-        new = BaselineFile.of(target, scene, options, now)
+    new = BaselineFile.of(target, scene, options, now)
+    # What cannot be compared is replaced, and nothing moved since.
+    before = file if file is not None and _are_comparable(file, now) else new
+    checked = check(before.halves, now, level)
+    if before is new or checked.moves:
         baselines.write(new)
-    if checked is None or file is None:
-        file = new
-        checked = check(now.halves, now, level)
-    result = _record(file, checked, scene=word, status=status)
+    else:
+        status = "unchanged"
+    result = _record(before, checked, scene=word, status=status)
     if is_old:
         replaced = (
             f"{old.name} of fotismos 0.4 could not be compared: {target.name}, in its place, begins"
