@@ -201,12 +201,13 @@ def examined(subject: Subject) -> Audit:
 def alike(subject: Subject, name: str) -> Iterator[Checked]:
     """Yield a check for each angle of the light: the lobe over that of a closed form."""
     for ratio in closed_forms.ratios(subject, name):
-        holds = abs(ratio.value - 1) <= closed_forms.MOST
+        source = closed_forms.CLOSED_FORMS[name].source
+        holds = abs(ratio.value - 1) <= closed_forms.LARGEST_DIFFERENCE
         yield Checked(
             name=f"as {name}, light at {ratio.light:g}°",
             verdict="holds" if holds else "does not hold",
             value=ratio.value,
-            expected=f"1 ± {closed_forms.MOST}, over {closed_forms.CLOSED_FORMS[name].source}",
+            expected=f"1 ± {closed_forms.LARGEST_DIFFERENCE}, over {source}",
             worst=ratio.case,
         )
 

@@ -17,17 +17,17 @@ from fotismos.comparisons.textbook import COSINES, lobe
 from fotismos.heuristic.convention import Floats
 from fotismos.heuristic.errors import unknown
 
-CHOSEN = 0.3
+ROUGHNESS = 0.3
 """Roughness of a BSDF's or a metal's lobe, and sigma of Oren and Nayar's, that are compared."""
 
 LIGHTS = (0.0, 30.0, 60.0)
 VIEWS = np.arange(-80.0, 81.0, 5.0)
 """Degrees from the normal, in the plane of incidence; the light's side is negative."""
 
-SEEN = 0.02
+SEEN_SHARE = 0.02
 """Values below this share of the lobe's largest are left out."""
 
-MOST = 0.05
+LARGEST_DIFFERENCE = 0.05
 """Largest relative difference of a lobe that is the closed form's."""
 
 Response = Callable[[float, Floats, Floats], Floats]
@@ -36,12 +36,12 @@ Response = Callable[[float, Floats, Floats], Floats]
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """A lobe by its name and source; a ``rough`` one is of white metal, others are matte."""
+    """A lobe by its name and source; if it ``is_rough``, of white metal, else matte."""
 
     name: str
     source: str
     response: Response
-    rough: bool
+    is_rough: bool
 
 
 def _conductor(distribution: str) -> Response:
@@ -77,12 +77,12 @@ def _oren_nayar(sigma: float, light: Floats, view: Floats) -> Floats:
 CLOSED_FORMS = {
     form.name: form
     for form in (
-        ClosedForm("ggx", "Mitsuba's roughconductor", _conductor("ggx"), rough=True),
-        ClosedForm("beckmann", "Mitsuba's roughconductor", _conductor("beckmann"), rough=True),
-        ClosedForm("phong", "equation 8.7, normalised", _textbook("phong"), rough=True),
-        ClosedForm("blinn", "Blinn (1977), normalised", _textbook("blinn"), rough=True),
-        ClosedForm("lambert", "equation 8.3", lambda alpha, light, view: light[2], rough=False),
-        ClosedForm("oren-nayar", "Oren and Nayar (1994)", _oren_nayar, rough=False),
+        ClosedForm("ggx", "Mitsuba's roughconductor", _conductor("ggx"), is_rough=True),
+        ClosedForm("beckmann", "Mitsuba's roughconductor", _conductor("beckmann"), is_rough=True),
+        ClosedForm("phong", "equation 8.7, normalised", _textbook("phong"), is_rough=True),
+        ClosedForm("blinn", "Blinn (1977), normalised", _textbook("blinn"), is_rough=True),
+        ClosedForm("lambert", "equation 8.3", lambda alpha, light, view: light[2], is_rough=False),
+        ClosedForm("oren-nayar", "Oren and Nayar (1994)", _oren_nayar, is_rough=False),
     )
 }
 
@@ -104,16 +104,19 @@ def ratios(subject: Subject, name: str) -> Iterator[Ratio]:
     rough = [
         material
         for material, alpha in subject.materials.items()
-        if alpha == CHOSEN and not material.startswith(("glossy", "mixed"))
+        if alpha == ROUGHNESS and not material.startswith(("glossy", "mixed"))
     ]
-    material = rough[0] if form.rough and rough else next(iter(subject.materials))
+    material = rough[0] if form.is_rough and rough else next(iter(subject.materials))
     view = furnace.direction(np.deg2rad(VIEWS), 0.0)
     for degrees in LIGHTS:
         light = np.broadcast_to(furnace.direction(np.deg2rad(-degrees), 0.0), view.shape)
-        expected = np.broadcast_to(form.response(CHOSEN, light, view), (3, len(VIEWS))).max(axis=0)
+        expected = np.broadcast_to(form.response(ROUGHNESS, light, view), (3, len(VIEWS))).max(
+            axis=0
+        )
         shown = subject.response(material, light, view).max(axis=0)
-        is_seen = expected > SEEN * expected.max()
+        is_seen = expected > SEEN_SHARE * expected.max()
         ratio = shown[is_seen] / expected[is_seen]
+        # Half as bright is as wrong as twice as bright.
         worst = int(np.abs(np.log(np.maximum(ratio, 1e-9))).argmax())
         yield Ratio(
             light=degrees,

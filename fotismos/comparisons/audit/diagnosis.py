@@ -80,18 +80,18 @@ def recognised() -> list[str]:
 
 
 def _mistakes(heuristic: Heuristic) -> list[str]:
-    found = probes.findings(heuristic)
+    findings = probes.findings(heuristic)
     # What it keeps of a scene may replace the textbook's ambient light.
     if heuristic.prepare is None:
         explained = _explained(heuristic)
         if explained is not None:
             # No value was so high that a shader may cut it.
-            return [*explained, *(words for name, words in found.items() if name == "cut")]
+            return [*explained, *(words for name, words in findings.items() if name == "cut")]
         # Of microfacets less was asked: what is right there may be wrong elsewhere.
         if facets := microfacets.explained(heuristic):
             return facets
-    sure = [words for name, words in found.items() if not probes.PROBES[name].vague]
-    return sure or list(found.values())
+    sure = [words for name, words in findings.items() if not probes.PROBES[name].vague]
+    return sure or list(findings.values())
 
 
 def _explained(heuristic: Heuristic) -> list[str] | None:
@@ -220,8 +220,8 @@ def _reason(value: float, is_once: bool, lights: int) -> str:
 
 def evaluate(heuristic: Heuristic, model: Model) -> Array:
     """Return a heuristic's values (P, 3) at a model's points."""
-    names = {"k_i": "k_i", "k_a": "k_a", "k_d": "k_d", "k_s": "k_s", "base_color": "k_d"}
-    colours = {name: getattr(model, field).T for name, field in names.items()}
+    colours = {name: getattr(model, name).T for name in ("k_i", "k_a", "k_d", "k_s")}
+    colours["base_color"] = model.k_d.T
     lights = [
         PointLight(position, mi.Spectrum(*intensity), INVERSE_SQUARE)
         for position, intensity in zip(LAMPS, INTENSITIES, strict=True)

@@ -239,7 +239,7 @@ GEOMETRY = Slot(
     wrong=(Form("G is missing: multiply by masking and shadowing", _ones), *_lone_forms()),
 )
 
-GLASS = 0.04
+GLASS_F0 = 0.04
 """F0 of an index of refraction of 1.5, which engines give all that is no metal."""
 
 
@@ -248,9 +248,9 @@ def dielectric_f0(ior: Array) -> Array:
     return ((ior - 1) / (ior + 1)) ** 2
 
 
-def _constant(p: Facets) -> Facets:
+def _as_glass(p: Facets) -> Facets:
     """Return the facets with F0 of glass, unless they are a metal's."""
-    return replace(p, f0=np.where(p.f0 == dielectric_f0(p.ior), GLASS, p.f0))
+    return replace(p, f0=np.where(p.f0 == dielectric_f0(p.ior), GLASS_F0, p.f0))
 
 
 WRONG_FRESNEL = (
@@ -264,13 +264,13 @@ WRONG_FRESNEL = (
 FRESNEL = Slot(
     right=(
         Form("Schlick", lambda p: _fresnel(p, p.vh)),
-        Form("Schlick, constant F0", lambda p: _fresnel(_constant(p), p.vh)),
+        Form("Schlick, constant F0", lambda p: _fresnel(_as_glass(p), p.vh)),
         Form("of an interface", _dielectric),
         Form("F0 alone", lambda p: p.f0 + 0 * p.vh),
     ),
     wrong=(
         *WRONG_FRESNEL,
-        *(Form(form.words, _changed(form.value, _constant)) for form in WRONG_FRESNEL),
+        *(Form(form.words, _changed(form.value, _as_glass)) for form in WRONG_FRESNEL),
         Form("F is missing: multiply by Fresnel's reflectance", _ones),
     ),
 )
@@ -404,6 +404,7 @@ def explained(heuristic: Heuristic) -> list[str] | None:
     """Return the mistakes of a microfacet shader, or None if it is none that is known."""
     p = sample()
     colour = np.random.default_rng(5).uniform(0.1, 0.9, (POINTS, 3)).astype(np.float32)
+    # The highlight: what black surfaces show, alike in all channels and never negative.
     black = evaluate(heuristic, p, 0 * colour, metallic=0.0)
     highlight = black.mean(axis=1, keepdims=True)
     if (
@@ -422,6 +423,7 @@ def explained(heuristic: Heuristic) -> list[str] | None:
     model, factor = (unscaled or likely)[0]
     words = dict.fromkeys(candidate.words for candidate, _ in unscaled or likely)
     said = [f"A likely mistake: {'; or: '.join(words)}."] if fewest else []
+    # Then what lies below it, and what metals show in its place.
     below, level = _diffuse(heuristic, p, model, factor, colour)
     # What is wrong with the light's cosine is so in both parts, and one sentence tells.
     is_told = bool(set(words) & {form.words for form in LIGHT.wrong})
@@ -435,15 +437,15 @@ def explained(heuristic: Heuristic) -> list[str] | None:
 
 def _near(p: Facets, highlight: Array) -> Iterator[Candidate]:
     """Yield the candidates that agree at a few points: most do not, which is quick to see."""
-    few = slice(None, None, 10)
+    few = slice(None, None, 10)  # each tenth point
     part = Facets(**{name: value[few] for name, value in vars(p).items()})
     forms = {form for candidate in CANDIDATES for form in candidate.factors}
     values = {form: form(part) for form in forms}
     for candidate in CANDIDATES:
-        if (
-            _fit(multiplied(values[form] for form in candidate.factors), highlight[few])[1]
-            < 2 * ALIKE
-        ):
+        shown = multiplied(values[form] for form in candidate.factors)
+        _, left = _fit(shown, highlight[few])
+        # Twice the bound: fewer points differ less, or more.
+        if left < 2 * ALIKE:
             yield candidate
 
 
@@ -497,6 +499,7 @@ def _metal(
         return []
     if _fit(highlight, metal)[1] < ALIKE:
         return [f"A likely mistake: {METAL_F0}."]
+    # What is left beside the right highlight: a diffuse base?
     more = metal - expected
     for share, facets in product(_shares(model), (p, gold)):
         if _fit(colour * p.nl * share(facets), more)[1] < 3 * ALIKE:

@@ -35,10 +35,10 @@ SURFACES = {
 LIGHT = 0.1
 """Intensity of a light: no value comes near 1, where a shader may cut it."""
 
-STOP = 4
+STEPS_PER_STOP = 4
+INTENSITIES = LIGHT * 2 ** (np.arange(-24, 41) / STEPS_PER_STOP)
 DIM = 25
-INTENSITIES = LIGHT * 2 ** (np.arange(-24, 41) / STOP)
-"""Many, a quarter of a stop apart; the dim ones are up to :data:`LIGHT`."""
+"""From six stops below :data:`LIGHT` to ten above it. So many, up to :data:`LIGHT`, are dim."""
 
 POINTS = 64
 """Points in random directions."""
@@ -117,21 +117,23 @@ def findings(heuristic: Heuristic) -> dict[str, str]:
 
     One that prepares a scene gets a dark one: what it keeps of other lights is not the cases'.
     """
-    cases = {(name, part): each.cases[part] for name, each in PROBES.items() for part in each.cases}
-    # One kernel for all cases with one light, and one for those with two.
-    defaults = {each.name: each.default for each in heuristic.parameters if each.prepared}
+    cases = {
+        (name, part): case for name, asked in PROBES.items() for part, case in asked.cases.items()
+    }
+    defaults = {given.name: given.default for given in heuristic.parameters if given.prepared}
     prepared = heuristic.prepared(user_shaders.dark_scene(), defaults)
+    # One kernel for all cases with one light, and one for those with two.
     values: dict[tuple[str, str], Array] = {}
     for number in (1, 2):
         alike = {key: case for key, case in cases.items() if len(case.toward) == number}
         shown = evaluate(heuristic, tuple(alike.values()), prepared)
         values |= dict(zip(alike, shown, strict=True))
     said: dict[str, str | None] = {}
-    for name, each in PROBES.items():
-        seen = {part: values[name, part] for part in each.cases}
-        is_asked = all(said[other] == "" for other in each.after)
+    for name, asked in PROBES.items():
+        seen = {part: values[name, part] for part in asked.cases}
+        is_asked = all(said[other] == "" for other in asked.after)
         is_lit = 0 < sum(np.abs(value).sum() for value in seen.values()) < np.inf  # nor NaN
-        said[name] = each.find(seen) if is_asked and is_lit else None
+        said[name] = asked.find(seen) if is_asked and is_lit else None
     return {name: words for name, words in said.items() if words}
 
 
@@ -252,14 +254,16 @@ def proportion(seen: Values) -> str | None:
         return ""
     looks = [name for name, undo in ENCODINGS.items() if _is_even(undo(value) / light)]
     end = f": its {looks[0]}" if looks else ", not 2 times"
-    return f"Twice the light gives {value[-1] / value[-1 - STOP]:.3g} times the value{end}."
+    return (
+        f"Twice the light gives {value[-1] / value[-1 - STEPS_PER_STOP]:.3g} times the value{end}."
+    )
 
 
 @probe({"brighter": BRIGHTER}, "proportion")
 def cut(seen: Values) -> str:
     """However bright the light is, more of it gives more."""
     value = _brightest(seen["brighter"])
-    is_cut = np.ptp(value[-STOP:]) <= FLAT * value[-1]
+    is_cut = np.ptp(value[-STEPS_PER_STOP:]) <= FLAT * value[-1]
     return f"Its values end at {value[-1]:.3g}: brighter light is cut off." if is_cut else ""
 
 

@@ -34,7 +34,7 @@ def block_sums(image: NDArray[Any], side: int = BLOCK) -> Array:
 def neighbourhood(values: Array, first: int = 0) -> Array:
     """Return sums of each block (h, w, ...) and its eight neighbours; `first` is the row axis."""
     around = [(0, 0)] * values.ndim
-    around[first] = around[first + 1] = (1, 1)
+    around[first : first + 2] = [(1, 1), (1, 1)]
     # A frame of zeros: blocks at the edge have fewer neighbours in their sum.
     padded = np.pad(values, around)
     windows = np.lib.stride_tricks.sliding_window_view(padded, (3, 3), (first, first + 1))

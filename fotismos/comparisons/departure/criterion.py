@@ -81,9 +81,10 @@ def caution(
     """
     if not test.size:
         return ""
-    sides = [np.abs(values) for values in (test, reference)]
-    test_is_black = float(sides[0].max()) < BLACK
-    reference_is_black = float(sides[1].max()) < BLACK
+    test_light = np.abs(test)
+    reference_light = np.abs(reference)
+    test_is_black = float(test_light.max()) < BLACK
+    reference_is_black = float(reference_light.max()) < BLACK
     if test_is_black and reference_is_black:
         if not allow_empty:
             raise InputError(
@@ -99,12 +100,13 @@ def caution(
         )
     if test_is_black and is_picture:
         return "The picture is black."
-    lit = float((exposure * np.maximum(*sides).max(axis=-1) >= DARK).mean())
+    lit = float((exposure * np.maximum(test_light, reference_light).max(axis=-1) >= DARK).mean())
     if lit <= LIMIT:
         return (
             f"Both pictures are nearly black: {100 * lit:.2g} % of the pixels show any light, so it"
             " means little that the others agree. Check the lights, and where the camera stands."
         )
-    if all((np.ptp(values, axis=0) <= UNIFORM * values.max()).all() for values in sides):
+    sides = (test_light, reference_light)
+    if all((np.ptp(light, axis=0) <= UNIFORM * light.max()).all() for light in sides):
         return "Each picture is one colour, so nothing shows whether they are of the same view."
     return ""

@@ -296,19 +296,19 @@ def _correlation(sums: Mapping[str, Sequence[Array]], variance: Array, count: in
     """
     from scipy.special import chdtri  # loaded late: half a second
 
-    found = {}
-    chance = {}
+    correlations = {}
+    freedoms = {}
     for name, of_images in sums.items():
         alone = SUMS[name](variance)
         r = ratio(np.var(of_images, axis=0) * count / max(count - 1, 1), alone)
         # The channels' noise may be one.
         tested = _total(alone > 0)
-        freedom = np.maximum(tested / 3.0 * (count - 1), 1.0)
-        found[name] = ratio(_total(r), tested)
-        chance[name] = freedom
-    correlation = found["tiles"]
-    twice = found["twice"]
-    freedom = chance["twice"]
+        freedoms[name] = np.maximum(tested / 3.0 * (count - 1), 1.0)
+        correlations[name] = ratio(_total(r), tested)
+    correlation = correlations["tiles"]
+    # Larger in larger tiles than χ² allows by chance, if tiles were independent.
+    twice = correlations["twice"]
+    freedom = freedoms["twice"]
     grown = twice / np.maximum(correlation, 1e-30)
     # Noise that reaches beyond a tile: as in an endless picture, or else as along a stripe of it.
     beyond = np.where(grown > chdtri(freedom, 1.0 - LIKELY) / freedom, 2.0 * twice - correlation, 0)
@@ -316,9 +316,10 @@ def _correlation(sums: Mapping[str, Sequence[Array]], variance: Array, count: in
     is_sure = grown > chdtri(freedom, 1.0 - SURE) / freedom
     correlation = np.maximum(correlation, np.where(is_sure, stripes * twice, beyond))
     # A pattern that every tile repeats: its sum grows with the number of tiles.
-    freedom = chance["folded"]
-    repeats = found["folded"] > chdtri(freedom, 1.0 - SURE) / freedom
-    return np.where(repeats, correlation * found["folded"], correlation)
+    folded = correlations["folded"]
+    freedom = freedoms["folded"]
+    repeats = folded > chdtri(freedom, 1.0 - SURE) / freedom
+    return np.where(repeats, correlation * folded, correlation)
 
 
 def _folded(image: Array) -> Array:

@@ -53,6 +53,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fotismos.comparisons.departure.colour import Array
+from fotismos.comparisons.departure.criterion import TOLERANCE
 from fotismos.comparisons.departure.metrics import Metric, Pixelwise
 from fotismos.comparisons.records.departure import DEFAULT_VIEWING, Viewing, VisibleShare
 from fotismos.heuristic.convention import Floats
@@ -62,28 +63,30 @@ from fotismos.reference.rendering.sums import BLOCK, Grouped, sample
 NoiseShown = Literal["all", "part", "none"]
 """Whether replicates show the noise of both pictures, of one alone, or of none."""
 
-CONTRASTS = 3
+MOST_CONTRASTS = 3
 """Noise is made of the replicates in this many independent ways, at most."""
 
 FINEST = -1
-TILES = (1, 2, 4, 8, 16, 0, FINEST)
+TILE_SIDES = (1, 2, 4, 8, 16, 0, FINEST)
 """Sides in pixels of the tiles over which guesses are pooled; 0 is the whole picture, FINEST a
 guess of all sizes."""
 
 GARROTE = 3.0
 """How many times its noise's variance is taken off what a tile adds to a guess."""
 
-COUNTED = (1, FINEST)
-PARTS = (0.1, 0.25, 0.5, 0.75)
+COUNTED_SIDES = (1, FINEST)
+"""Those whose sets' pixels are counted, too: their guesses tell neighbours apart."""
+
+THRESHOLD_PARTS = (0.1, 0.25, 0.5, 0.75)
 """Parts of a threshold, by which a pixel may be measured wrong."""
 
-LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
+GUESSED_LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 5.0)
 """A set holds the pixels whose guessed distance is at least one of these, over the threshold."""
 
-NOISY_LEVELS = ((0.5, 1.0), (0.5, 2.0), (0.5, 3.0), (1.0, 1.0), (1.0, 2.0), (1.0, 3.0))
+NOISY_GUESSED_LEVELS = ((0.5, 1.0), (0.5, 2.0), (0.5, 3.0), (1.0, 1.0), (1.0, 2.0), (1.0, 3.0))
 """Further sets: so far above a level by so many errors of the guess."""
 
-FACTORS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
+NOISE_DEVIATIONS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 """How many deviations of a pixel's noise it is measured beyond a threshold."""
 
 FEWEST_PIXELS = 24
@@ -95,40 +98,42 @@ FEWEST_REPLICATES = 4
 CELL = 4
 """Side in pixels of the chessboard's cells."""
 
-ABOVE_ERRORS = 1.5
-SHARE_ERRORS = 0.1
-FEW_ERRORS = 1.2
-MEAN_ERRORS = 3.5
-COUNT_ERRORS = 1.5
-UPPER_ERRORS = 2.0
-"""Standard errors by which ends are moved outwards: of shares by Cantelli's inequality, which
-leaves far more room than its errors take, of means, of counts, and of upper ends."""
+MEAN_LOW_ERRORS = 3.5
+MEAN_HIGH_ERRORS = 2.6
+"""Standard errors by which the ends of a mean are moved outwards."""
 
-MEAN_HIGH = 2.6
-"""Standard errors of the upper end of a mean."""
+SET_MEAN_ERRORS = 1.5
+SET_VARIANCE_ERRORS = 0.1
+FEW_REPLICATES_ERRORS = 1.2
+"""The same of a set's mean, and of its variance, for shares by Cantelli's inequality, which leaves
+far more room than its errors take; the last is added, over the number of replicates."""
+
+COUNT_LOW_ERRORS = 1.5
+SHARE_HIGH_ERRORS = 2.0
+"""The same of shares by counts, and of upper ends of shares."""
 
 ROOT_BIAS = 0.3
 """How much the mean of the signed root of ``D² + s Z``, Z normal, may lack of D, in units of √s."""
 
-MARGIN = 1.25
+FLOOR_MARGIN = 1.25
 """Factor by which a noise floor, itself an estimate, may be too small."""
 
-BENT = 0.02
+DIRECTION_BIAS = 0.02
 """How wrong a direction's measure may be, in units of a pixel's noise: colour spaces are curved."""
 
-LEAST = 0.003
-"""Shares of pixels below it prove nothing."""
-
-CURVED = 0.08
+SQUARE_NOISE_BIAS = 0.08
 """Uncertainty of the noise in a mean square, as a share of it, for the same reason."""
 
-TAILS = 3.0
+LEAST_SHARE = 0.003
+"""Taken off the lower ends of shares: fewer pixels prove nothing."""
+
+TAILS_WHERE_DIFFERENT = 3.0
 """How much more often than elsewhere noise may be large at the pixels that differ."""
 
-STEP = 1e-3
+DERIVATIVE_STEP = 1e-3
 """Relative step of the numerical derivative."""
 
-DARKEST = 0.02
+LIGHT_ADDED = 0.02
 """Light that is added to a pixel's, where differences are relative."""
 
 TINY = 1e-30
@@ -249,15 +254,17 @@ def by_floor(metric: Metric, values: Floats, noise: Floats) -> Estimate:
     power = 2 if metric.squared else 1
     mean = metric.mean(values) ** (1 / power)
     floor = metric.mean(noise) ** (1 / power)
-    half = MARGIN * floor
+    half = FLOOR_MARGIN * floor
     low = max(mean - half, 0.0)
     value = max(sqrt(max(mean**2 - floor**2, 0.0)), low)
     thresholds = np.asarray(metric.visible, float)
     share = shares_above(values, thresholds)
-    least = [np.zeros(len(share)), share if not noise.any() else 0.0 * share]
-    most = [np.ones(len(share)), share if not noise.any() else 1.0 + 0.0 * share]
-    for part in PARTS:
-        hidden = shares_above(MARGIN * noise, part * thresholds)
+    # Without noise the share is what it is; with noise, any share is possible at first.
+    least = [np.zeros(len(share)) if noise.any() else share]
+    most = [np.ones(len(share)) if noise.any() else share]
+    for part in THRESHOLD_PARTS:
+        # A pixel is wrong by this part of a threshold only where its noise is as large.
+        hidden = shares_above(FLOOR_MARGIN * noise, part * thresholds)
         least.append(shares_above(values, (1.0 + part) * thresholds) - hidden)
         most.append(shares_above(values, (1.0 - part) * thresholds) + hidden)
     ends = np.array([value, low, mean + half]) ** power
@@ -282,15 +289,14 @@ class Selection:
 
 @dataclass(frozen=True)
 class Guess:
-    """A guess of the difference and its measurement by others, (P,) each.
+    """Guessed distances and their measurement by other replicates or pixels, (P,) each.
 
-    ``difference`` (P, 3) and its ``distance`` are guessed, with an error of ``deviation``.
-    ``measured`` and ``noise`` (C, P) lie along it. ``used`` says which pixels were measured, by a
-    part of the replicates, whose noise is ``scale`` times as large; ``own`` is its variance, and
-    ``near`` that of its neighbours.
+    ``distance`` is guessed, with an error of ``deviation``. ``measured`` and ``noise`` (C, P) lie
+    along the guessed difference. ``used`` says which pixels were measured, by a part of the
+    replicates, whose noise is ``scale`` times as large; ``own`` is its variance, and ``near`` that
+    of its neighbours.
     """
 
-    difference: Array
     distance: Array
     measured: Array
     noise: Array
@@ -321,14 +327,17 @@ class Evidence:
             if self.metric.averages_squares:
                 mean = np.sqrt(mean)
             return _result(self.metric, mean, np.zeros((3, len(thresholds))))
-        proven = self if self.replicates.noise_shown == "all" else self._of_one
+        # Noise that is not shown looks like a difference: only what is alike over tiles is proven.
+        proven = self
+        if self.replicates.noise_shown != "all":
+            proven = replace(self, replicates=self.replicates.as_one)
         low = min(proven.mean_low(), high)
         margin = self._sampling_errors(thresholds)
         span = np.maximum(self._largest_distance - thresholds, TINY)
         # No share is proven where the mean may be 0.
         least = np.zeros(len(thresholds))
         if low > 0.0:
-            least = proven.shares_low(thresholds) - margin - LEAST
+            least = proven.shares_low(thresholds) - margin - LEAST_SHARE
         ends = [
             self._shares_without_noise(whole, thresholds),
             np.maximum(least, (low - thresholds) / span),
@@ -337,10 +346,6 @@ class Evidence:
         return _result(self.metric, np.array([value, low, high]), np.array(ends))
 
     # --- Distances --------------------------------------------------------------------------------
-
-    @property
-    def _of_one(self) -> Evidence:
-        return replace(self, replicates=self.replicates.as_one)
 
     @property
     def _is_exact(self) -> bool:
@@ -365,14 +370,14 @@ class Evidence:
     def _distances(self, differences: Array) -> Array:
         """Return the distances (...) of references by their differences (..., P, 3)."""
         shown = self.replicates.shown
-        found = self.metric.coordinates(shown - differences, self.viewing)
-        own = np.broadcast_to(self.metric.coordinates(shown, self.viewing), found.shape)
-        distances = self.metric.difference(found, own)
+        references = self.metric.coordinates(shown - differences, self.viewing)
+        own = np.broadcast_to(self.metric.coordinates(shown, self.viewing), references.shape)
+        distances = self.metric.difference(references, own)
         return np.asarray(np.sqrt(distances) if self.metric.squared else distances)
 
     @property
     def _step(self) -> Array:
-        return np.asarray(STEP * (self.replicates.shown.mean(axis=-1) + DARKEST))
+        return np.asarray(DERIVATIVE_STEP * (self.replicates.shown.mean(axis=-1) + LIGHT_ADDED))
 
     @property
     def measured(self) -> Array:
@@ -428,7 +433,7 @@ class Evidence:
     def _unseen(self) -> Array:
         """How far (P,) a pixel may be off by light that rare samples brought elsewhere."""
         differences = self.replicates.differences
-        light = self.replicates.shown + DARKEST
+        light = self.replicates.shown + LIGHT_ADDED
         lacking = (np.median(differences, axis=0) - differences.mean(axis=0)) / light
         largest = 3.0 * self._largest_residual / (len(differences) * len(light))
         return self._sizes(lacking.mean(axis=0) * light) + largest
@@ -464,7 +469,10 @@ class Evidence:
             error = sqrt(own + self._scatter(bias))
             # Light itself is not curved.
             value = raw - float(bias.mean())
-            return value, value + MEAN_HIGH * error + CURVED * max(float(bias.mean()), 0.0)
+            return value, value + MEAN_HIGH_ERRORS * error + SQUARE_NOISE_BIAS * max(
+                float(bias.mean()), 0.0
+            )
+        # First upper end: the mean of roots, of blocks or of pixels, whichever is larger.
         squares = self._squares
         blocks = self._tiles(BLOCK)
         of_blocks = _root(_pooled(squares, blocks))
@@ -476,26 +484,33 @@ class Evidence:
         lost = ROOT_BIAS * float(np.sqrt(np.sqrt(variance)).mean())
         error = sqrt(own + self._scatter(plain - of_blocks))
         roots = max(float(of_blocks.mean()), float(_root(squares).mean()))
-        # Nor is a mean larger than the root of the mean square.
+        # Second: no mean is larger than the root of the mean square.
         whole_error = sqrt(self._block_squares(along)) / count
-        largest = sqrt(max(float(squares.mean()) + MEAN_HIGH * whole_error, 0.0))
-        largest = min(roots + lost + MEAN_HIGH * error, largest)
-        largest = hypot(largest, sqrt(CURVED * max(float((plain**2 - squares).mean()), 0.0)))
-        largest = min(largest, float(plain.mean()) + MEAN_HIGH * sqrt(own))
-        # Two rules, of which one takes off too much where noise lies along the difference, and the
-        # other too little where a block's pixels are not alike: their middle.
+        largest = sqrt(max(float(squares.mean()) + MEAN_HIGH_ERRORS * whole_error, 0.0))
+        largest = min(roots + lost + MEAN_HIGH_ERRORS * error, largest)
+        largest = hypot(
+            largest, sqrt(SQUARE_NOISE_BIAS * max(float((plain**2 - squares).mean()), 0.0))
+        )
+        # Third: noise makes distances larger in the mean, not smaller.
+        largest = min(largest, float(plain.mean()) + MEAN_HIGH_ERRORS * sqrt(own))
+        # The value: the middle of two rules. One takes off too much where noise lies along the
+        # difference, the other too little where a block's pixels are not alike.
         before = _pooled(plain, blocks)
         after = _pooled(self._noisier.mean(axis=(0, 1)), blocks)
         lower = _root(2.0 * np.square(before) - np.square(after))
         middle = float((lower + np.minimum(of_blocks, before)).mean()) / 2.0
+        # The sample's mean is not quite that of all pixels.
         shift = raw - float(plain.mean())
         return max(middle + shift, 0.0), max(largest + shift, 0.0)
 
     def mean_low(self) -> float:
         """Return a lower bound of the mean distance."""
-        products = [found.share * (found.mean - MEAN_ERRORS * found.error)
-                    for found in self._evidence[0]]  # fmt: skip
-        return max([0.0, *products])
+        selections, _ = self._evidence
+        # Pixels outside of a set are at least 0 apart, so each set bounds the mean of all.
+        bounds = [
+            chosen.share * (chosen.mean - MEAN_LOW_ERRORS * chosen.error) for chosen in selections
+        ]
+        return max([0.0, *bounds])
 
     # --- Shares -----------------------------------------------------------------------------------
 
@@ -504,11 +519,12 @@ class Evidence:
         selections, counts = self._evidence
         bounds = [np.zeros(len(thresholds)), *counts]
         # Few replicates say little of how large noise is.
-        errors = SHARE_ERRORS + FEW_ERRORS / len(self.replicates.differences)
-        for found in selections:
-            beyond = np.maximum(found.mean - ABOVE_ERRORS * found.error - thresholds, 0.0) ** 2
-            variance = found.variance + errors * found.variance_error
-            bounds.append(found.share * beyond / np.maximum(beyond + variance, TINY))
+        errors = SET_VARIANCE_ERRORS + FEW_REPLICATES_ERRORS / len(self.replicates.differences)
+        for chosen in selections:
+            # Cantelli: `(m - t)² / ((m - t)² + v)` of the set lie above t.
+            beyond = np.maximum(chosen.mean - SET_MEAN_ERRORS * chosen.error - thresholds, 0.0) ** 2
+            variance = chosen.variance + errors * chosen.variance_error
+            bounds.append(chosen.share * beyond / np.maximum(beyond + variance, TINY))
         return np.asarray(np.max(bounds, axis=0))
 
     def shares_high(self, whole: Floats, thresholds: Array) -> Array:
@@ -516,31 +532,35 @@ class Evidence:
         pixels = len(self.measured)
         if not len(self.replicates.noise):
             return shares_above(whole, thresholds)
-        deviation = np.sqrt(_pooled(np.square(self._noise_sizes).mean(axis=0), self._tiles(BLOCK)))
+        noise_sizes = self._noise_sizes
+        deviation = np.sqrt(_pooled(np.square(noise_sizes).mean(axis=0), self._tiles(BLOCK)))
         correlation = self._correlation
+
+        def bound(shares: Array, chance: Array | float) -> Array:
+            """Return the end where ``shares`` are measured above and noise hides a ``chance``."""
+            spread = np.maximum(shares, 1.0 / pixels) * np.maximum(chance, 1.0 / pixels)
+            error = np.sqrt(correlation * spread / pixels)
+            return np.asarray((shares + SHARE_HIGH_ERRORS * error) / (1.0 - chance))
+
         bounds = []
-        for factor in FACTORS:
-            chance = TAILS * float((self._noise_sizes > factor * deviation).mean())
+        # By noise over its deviation nearby, then by noise over a part of the threshold.
+        for factor in NOISE_DEVIATIONS:
+            chance = TAILS_WHERE_DIFFERENT * float((noise_sizes > factor * deviation).mean())
             if chance < 0.5:
                 shares = shares_above(self.measured + factor * deviation, thresholds)
-                spread = np.maximum(shares, 1.0 / pixels) * max(chance, 1.0 / pixels)
-                error = np.sqrt(correlation * spread / pixels)
-                bounds.append((shares + UPPER_ERRORS * error) / (1.0 - chance))
-        for part in PARTS:
-            chances = np.minimum(
-                TAILS * shares_above(self._noise_sizes.ravel(), part * thresholds), 0.9
-            )
+                bounds.append(bound(shares, chance))
+        for part in THRESHOLD_PARTS:
+            hidden = TAILS_WHERE_DIFFERENT * shares_above(noise_sizes.ravel(), part * thresholds)
             shares = shares_above(self.measured, (1.0 - part) * thresholds)
-            spread = np.maximum(shares, 1.0 / pixels) * np.maximum(chances, 1.0 / pixels)
-            error = np.sqrt(correlation * spread / pixels)
-            bounds.append((shares + UPPER_ERRORS * error) / (1.0 - chances))
+            bounds.append(bound(shares, np.minimum(hidden, 0.9)))
+        # Markov's inequality.
         bounds.append(self._mean_square_high() / thresholds**2)
         high = np.min([np.ones(len(thresholds)), *bounds], axis=0)
         is_few = len(self.replicates.differences) < FEWEST_REPLICATES
         if is_few or self.replicates.noise_shown == "part":
             # They do not show how all noise is distributed: as much may hide a difference.
             high = np.maximum(
-                high, shares_above(self.measured + self._noise_sizes.max(axis=0), thresholds)
+                high, shares_above(self.measured + noise_sizes.max(axis=0), thresholds)
             )
         return np.asarray(high)
 
@@ -550,10 +570,11 @@ class Evidence:
         count = len(differences)
         mean = differences.mean(axis=0)
         own = np.square(self._sizes(differences)).sum(axis=0)
+        # The products of different ones: the square of the sum less the squares of each.
         squares = (np.square(count * self._sizes(mean)) - own) / (count * (count - 1))
         along = 2.0 * np.einsum("pi,cpi->cp", self._through(mean), self.replicates.noise)
         error = sqrt(self._block_squares(along)) / len(squares)
-        return max(float(squares.mean()), 0.0) + UPPER_ERRORS * error
+        return max(float(squares.mean()), 0.0) + SHARE_HIGH_ERRORS * error
 
     def _shares_without_noise(self, whole: Floats, thresholds: Array) -> Array:
         """Return the shares (T,) whose distances, shrunk towards their blocks', are above."""
@@ -564,6 +585,7 @@ class Evidence:
         blocks = self._tiles(BLOCK)
         squares = self._squares
         # How much of the scatter within a block is noise: Stein's factor.
+        # What changes sign with the noise goes with the difference; the rest is noise squared.
         odd = (np.square(noise[0]) - np.square(noise[1])) / 2.0
         variance = _pooled(np.square(odd).mean(axis=0), blocks)
         variance += 2.0 * _pooled(np.square(plain**2 - squares), blocks)
@@ -585,7 +607,7 @@ class Evidence:
             above = self.measured > threshold
             left.append(np.bincount(blocks, above) - sizes * above.mean())
         scatter = np.square(left).sum(axis=1) * (1.0 - self.replicates.sampled)
-        return UPPER_ERRORS * np.asarray(np.sqrt(scatter)) / len(self.measured)
+        return SHARE_HIGH_ERRORS * np.asarray(np.sqrt(scatter)) / len(self.measured)
 
     # --- Guesses ----------------------------------------------------------------------------------
 
@@ -595,22 +617,22 @@ class Evidence:
         selections = []
         counts: list[Array] = []
         is_single = len(self.replicates.differences) == 1
-        tolerance = 2.0 if self.metric.visible else max(float(self.measured.mean()), TINY)
-        for side in TILES:
+        unit = TOLERANCE if self.metric.visible else max(float(self.measured.mean()), TINY)
+        for side in TILE_SIDES:
             if is_single and side and side < 2 * CELL:
                 continue
             guesses = [self._guess(side, turn) for turn in range(len(self._turns))]
-            levels = [(level, 0.0) for level in LEVELS]
+            levels = [(level, 0.0) for level in GUESSED_LEVELS]
             if not is_single:
-                levels += NOISY_LEVELS
+                levels += NOISY_GUESSED_LEVELS
             for level, errors in levels:
                 chosen = [
-                    guess.used & (guess.distance >= level * tolerance + errors * guess.deviation)
+                    guess.used & (guess.distance >= level * unit + errors * guess.deviation)
                     for guess in guesses
                 ]
                 if sum(map(np.count_nonzero, chosen)) >= FEWEST_PIXELS * len(guesses):
                     selections.append(self._selection(guesses, chosen))
-                    if side in COUNTED and errors == 0.0 and not is_single:
+                    if side in COUNTED_SIDES and errors == 0.0 and not is_single:
                         bounds = [self._counts(*pair) for pair in zip(guesses, chosen, strict=True)]
                         counts.extend(np.mean(bounds, axis=0))
         return selections, counts
@@ -635,10 +657,11 @@ class Evidence:
         )
         noise_size = sum(np.sqrt(v).sum() for v in own) / pixels
         count = len(self.replicates.differences)
+        # Light of rare samples, in contributions as large as the largest residual.
         missing = self._largest_residual * max(mean, 0.0) * turns / (pixels * count)
         return Selection(
             share=pixels / used,
-            mean=float(mean) - BENT * noise_size,
+            mean=float(mean) - DIRECTION_BIAS * noise_size,
             error=sqrt(spread / pixels**2 + missing),
             variance=max(float(square / pixels - mean**2), 0.0),
             variance_error=sqrt(correlation * of_squares * turns) / pixels,
@@ -649,20 +672,21 @@ class Evidence:
         total = len(inside)
         measured = guess.measured[inside]
         if len(measured) < FEWEST_PIXELS:
-            return [np.zeros(len(self.metric.visible))] * len(FACTORS)
+            return [np.zeros(len(self.metric.visible))] * len(NOISE_DEVIATIONS)
         noise = np.concatenate([guess.noise[:, inside], -guess.noise[:, inside]]) * guess.scale
         deviation = np.sqrt(guess.near[inside])
         share = len(measured) / total
         unseen = self._unseen[inside]
-        found = []
-        for factor in FACTORS:
+        bounds = []
+        for factor in NOISE_DEVIATIONS:
             chance = float((noise > factor * deviation).mean())
             beyond = measured - factor * deviation - unseen
             shares = share * shares_above(beyond, self.metric.visible)
             false = share * max(chance, 1.0 / len(measured))
             error = sqrt(2.0 * self._correlation * false / total)
-            found.append((shares - share * chance - COUNT_ERRORS * error) / max(1.0 - chance, TINY))
-        return found
+            proven = shares - share * chance - COUNT_LOW_ERRORS * error
+            bounds.append(proven / max(1.0 - chance, TINY))
+        return bounds
 
     @cached_property
     def _turns(self) -> list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
@@ -687,7 +711,7 @@ class Evidence:
         The distance is never more than its tangent or its chord. What is measured later has no part
         in it: else bright noise would count less than dark noise.
         """
-        light = self.replicates.shown + DARKEST
+        light = self.replicates.shown + LIGHT_ADDED
         guesses = []
         for guessing, seen in self._turns:
             relative = self._source(guessing) / light
@@ -710,7 +734,7 @@ class Evidence:
         cleaned, bends = self._cleaned
         bend = bends[turn]
         is_single = len(replicates.differences) == 1
-        light = replicates.shown + DARKEST
+        light = replicates.shown + LIGHT_ADDED
         guess = cleaned[turn]
         if side != FINEST:
             tiles = self._tiles(side)
@@ -721,34 +745,27 @@ class Evidence:
         measuring = guessing if is_single else ~guessing
         along = np.einsum("pi,kpi->kp", direction, replicates.differences[measuring])
         measured = along.mean(axis=0)
-        if is_single:
-            wide = self._tiles(2 * BLOCK)
-            noise = np.where(~seen, measured - _pooled(measured, wide, weight=~seen), 0.0)[None]
-            return Guess(
-                difference=guess,
-                distance=length * bend,
-                measured=measured,
-                noise=noise,
-                own=np.zeros(len(seen)),
-                deviation=np.zeros(len(seen)),
-                used=~seen,
-                near=np.zeros(len(seen)),
-                scale=1.0,
-            )
-        noise = np.einsum("pi,cpi->cp", direction, replicates.noise)
         count = len(along)
-        near = _pooled(np.mean(noise**2, axis=0), self._tiles(BLOCK))
-        near *= len(replicates.differences) / count
+        scale = sqrt(len(replicates.differences) / count)
+        used = seen
+        if is_single:
+            # The scatter around the mean of a wide tile is all that tells of noise.
+            used = ~seen
+            wide = self._tiles(2 * BLOCK)
+            noise = np.where(used, measured - _pooled(measured, wide, weight=used), 0.0)[None]
+            near = np.zeros(len(seen))
+        else:
+            noise = np.einsum("pi,cpi->cp", direction, replicates.noise)
+            near = _pooled(np.mean(noise**2, axis=0), self._tiles(BLOCK)) * scale**2
         return Guess(
-            difference=guess,
             distance=length * bend,
             measured=measured,
             noise=noise,
             own=along.var(axis=0, ddof=1) / count if count > 1 else near,
             deviation=np.sqrt(near) / max(side, 1),
-            used=seen,
+            used=used,
             near=near,
-            scale=sqrt(len(replicates.differences) / count),
+            scale=scale,
         )
 
     def _clean(self, relative: Array, noise: Array) -> Array:
@@ -782,19 +799,20 @@ class Evidence:
 
     def _block_squares(self, noise: Array) -> float:
         """Return the variance of the sum of noise (C, P), by blocks whose noise is independent."""
-        found = 0.0
+        largest = 0.0
         is_single = len(self.replicates.differences) == 1
+        # The noise that one replicate shows adds up to 0 over tiles of `2 BLOCK`: smaller ones.
         for side in (CELL, BLOCK) if is_single else (BLOCK, 2 * BLOCK):
             tiles = self._tiles(side)
             sums = np.array([np.bincount(tiles, weights=values) for values in noise])
-            found = max(found, float(np.square(sums).sum(axis=1).mean()))
-        return found
+            largest = max(largest, float(np.square(sums).sum(axis=1).mean()))
+        return largest
 
     @cached_property
     def _correlation(self) -> float:
         """The variance of the sum of the noise over that of independent pixels; at least 1."""
         replicates = self.replicates
-        noise = (replicates.noise / (replicates.shown + DARKEST)).sum(axis=-1)
+        noise = (replicates.noise / (replicates.shown + LIGHT_ADDED)).sum(axis=-1)
         own = max(float(np.square(noise).sum(axis=1).mean()), TINY)
         return max(1.0, self._block_squares(noise) / own)
 
@@ -849,7 +867,7 @@ def contrasts(sizes: Array) -> Array:
     waves = np.cos(np.pi * np.outer(np.arange(count) + 0.5, np.arange(count)) / count)
     waves[:, 0] = np.sqrt(sizes)
     basis, _ = np.linalg.qr(waves)
-    weights: Array = basis[:, 1 : 1 + CONTRASTS] * np.sqrt(sizes / sizes.sum())[:, None]
+    weights: Array = basis[:, 1 : 1 + MOST_CONTRASTS] * np.sqrt(sizes / sizes.sum())[:, None]
     return weights.T
 
 

@@ -51,14 +51,15 @@ from fotismos.comparisons.departure.blocks import (
     spread_out,
 )
 from fotismos.comparisons.departure.colour import Array
-from fotismos.comparisons.departure.estimate import NoiseShown
+from fotismos.comparisons.departure.criterion import TOLERANCE
+from fotismos.comparisons.departure.estimate import CELL, NoiseShown
 from fotismos.reference import student
 from fotismos.reference.rendering.passes import require_finite
 from fotismos.reference.rendering.sums import BLOCK, DifferenceEstimate
 
 LEVEL = 0.05
 BLOCK_LEVEL = 0.01
-VISIBLE = 2.0
+VISIBLE = TOLERANCE
 FEWEST = 4
 """Passes: a third moment needs three, and one more shows its scatter."""
 
@@ -115,6 +116,7 @@ def find(
         size = np.maximum(np.abs(shown), np.abs(shown - mean))
         rounding = np.maximum(ABSOLUTE_ROUNDING, RELATIVE_ROUNDING * size)
         beyond[rows] &= np.any(np.abs(mean) > rounding, axis=-1)
+    # What needs no test of blocks: no noise, noise that is not shown, or too little known of it.
     if exact:
         marks[beyond] = MARKED
         return Marks(image=marks, is_certain=bool(beyond.any()))
@@ -139,6 +141,7 @@ def find(
     for rows in bands(len(counted)):
         chances[rows][inside[rows]] = _Pixels.of(difference, around, rows, inside).chances(rate)
     marks[inside & beyond & (chances <= _discoveries(chances[inside], rate))] = MARKED
+    # Of all others, those that may differ visibly.
     rest = counted & (marks == 0.0)
     for rows in bands(len(counted)):
         pixels = _Pixels.of(difference, around, rows, rest)
@@ -146,12 +149,12 @@ def find(
     return Marks(image=marks, is_certain=is_certain and bool(beyond.any()))
 
 
-CELL = 4
-CELLS = 4
-TYPICAL = 0.86
-"""Side in pixels of the cells whose noise is taken to be independent, and cells along a tile. If it
-is independent, TYPICAL is the median of five times the share of squares between quarters, which
-follows Beta(3/2, 6)."""
+CELLS_ALONG_TILE = 4
+"""Cells along a tile: their noise is taken to be independent."""
+
+INDEPENDENT_RATIO = 0.86
+"""Median of five times the share of squares between a tile's quarters if its cells' noise is
+independent: the share then follows Beta(3/2, 6)."""
 
 
 def _is_even(difference: Array, counted: Array) -> bool:
@@ -162,28 +165,31 @@ def _is_even(difference: Array, counted: Array) -> bool:
     their share of all squares. The variance of the tile's mean is that many times as large at least
     twice over: from cells to quarters, and from quarters to the tile.
     """
-    height = counted.shape[0] // (CELL * CELLS)
-    width = counted.shape[1] // (CELL * CELLS)
+    height = counted.shape[0] // (CELL * CELLS_ALONG_TILE)
+    width = counted.shape[1] // (CELL * CELLS_ALONG_TILE)
     if not height or not width:
         return False
-    shape = (height, CELLS, CELL, width, CELLS, CELL)
-    rows = height * CELL * CELLS
-    columns = width * CELL * CELLS
+    shape = (height, CELLS_ALONG_TILE, CELL, width, CELLS_ALONG_TILE, CELL)
+    # A rest at the right and at the bottom is left out.
+    rows = height * CELL * CELLS_ALONG_TILE
+    columns = width * CELL * CELLS_ALONG_TILE
     inside = np.asarray(counted)[:rows, :columns].reshape(shape).all(axis=(1, 2, 4, 5))
     values = np.asarray(difference, float)[:rows, :columns]
     cells = values.reshape(*shape, 3).mean(axis=(2, 5))
     grids = cells.transpose(0, 2, 1, 3, 4)[inside]
     if not grids.size:
         return False
-    half = CELLS // 2
-    tiles = grids.reshape(-1, CELLS * CELLS, 3)
+    half = CELLS_ALONG_TILE // 2
+    tiles = grids.reshape(-1, CELLS_ALONG_TILE * CELLS_ALONG_TILE, 3)
     quarters = grids.reshape(-1, 2, half, 2, half, 3).mean(axis=(2, 4)).reshape(-1, 4, 3)
     variance = tiles.var(axis=1, ddof=1)
     alike = ratio(half**2 * quarters.var(axis=1, ddof=1), variance)[variance > 0]
-    inflation = max(1.0, float(np.median(alike)) / TYPICAL) ** 2 if alike.size else 1.0
+    inflation = max(1.0, float(np.median(alike)) / INDEPENDENT_RATIO) ** 2 if alike.size else 1.0
     mean = np.abs(tiles.mean(axis=1))
-    error = np.sqrt(inflation * variance) / CELLS
-    limit = student.quantile(CELLS * CELLS - 1, 1 - BLOCK_LEVEL / (2 * mean.size))
+    error = np.sqrt(inflation * variance) / CELLS_ALONG_TILE
+    limit = student.quantile(
+        CELLS_ALONG_TILE * CELLS_ALONG_TILE - 1, 1 - BLOCK_LEVEL / (2 * mean.size)
+    )
     return bool((mean > np.maximum(limit * error, ABSOLUTE_ROUNDING)).any())
 
 
@@ -213,10 +219,10 @@ def _chances(
     np.divide(np.abs(difference), np.sqrt(supposed), out=deviations, where=supposed > 0.0)
     # Student's tails are slow to compute, and never lighter than the normal distribution's.
     near = deviations.max(axis=-1) >= -ndtri(most / 6.0)
-    found = np.ones(near.shape)
+    chances = np.ones(near.shape)
     # Six times one tail: two signs of three channels (Bonferroni).
-    found[near] = 6.0 * stdtr(freedom[near], -deviations[near]).min(axis=-1)
-    return np.where(found <= most, found, 1.0)
+    chances[near] = 6.0 * stdtr(freedom[near], -deviations[near]).min(axis=-1)
+    return np.where(chances <= most, chances, 1.0)
 
 
 @dataclass(frozen=True)
@@ -305,7 +311,8 @@ def _whole_differs(difference: DifferenceEstimate, around: _Around, level: float
     variance = squares / ((count - 1) * grouped.sizes.sum())
     sizes = around.largest_sizes[:, 0, 0] / len(grouped.places)
     freedom = np.full((1, 3), count - 1.0)
-    return bool(_chances(mean[None], variance[None], sizes[:, None], freedom)[0] <= level)
+    chances = _chances(mean[None], variance[None], sizes=sizes[:, None], freedom=freedom)
+    return bool(chances[0] <= level)
 
 
 def _sums(difference: DifferenceEstimate, counted: NDArray[np.bool_], rows: slice) -> list[Array]:
@@ -357,7 +364,13 @@ class _Pixels:
         # Smyth: the pooled variance weighs as much as its degrees of freedom.
         freedom = prior + around.own_freedom
         moderated = (prior * pooled + around.own_freedom * variance) / freedom
-        return cls(mean, np.maximum(variance, moderated), np.array(sizes), freedom, quantile)
+        return cls(
+            difference=mean,
+            variance=np.maximum(variance, moderated),
+            sizes=np.array(sizes),
+            freedom=freedom,
+            quantile=quantile,
+        )
 
     def chances(self, most: float) -> Array:
         return _chances(

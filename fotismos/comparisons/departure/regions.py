@@ -31,7 +31,7 @@ CELLS = 48
 CONTRAST = 1.25
 """A region's mean error must exceed this many times the image's."""
 
-MOST = 4
+MOST_REGIONS = 4
 LEAST_SHARE = 0.04
 """Number of regions, at most, and the least share of the image's error in each."""
 
@@ -61,7 +61,7 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
     sizes = block_sums(counted.astype(np.float64), cell)
     worth = sums - CONTRAST * total / pixels * sizes
     boxes: list[Region] = []
-    while len(boxes) < MOST:
+    while len(boxes) < MOST_REGIONS:
         rows, columns, value = _best_box(worth)
         if not value > 0.0:
             break
@@ -75,7 +75,7 @@ def find(error: ArrayLike, counted: ArrayLike) -> tuple[Region, ...]:
         if share >= LEAST_SHARE:
             mean = float(amount / inside.sum())
             boxes.append(Region(share=share, mean_dE2000=mean, **bounds(inside)))
-        elif value < LEAST_SHARE * total / MOST:  # only specks are left
+        elif value < LEAST_SHARE * total / MOST_REGIONS:  # only specks are left
             break
     return tuple(boxes)
 
@@ -117,26 +117,27 @@ def find_objects(
     The map (H, W) holds the index of each pixel's object, or -1 if the pixel does not count. If
     ``materials`` is given, the objects are shapes with their materials.
     """
-    places = np.where(counted, owners.places, -1)
-    present = np.unique(places[places >= 0])
-    sums = np.bincount(places[places >= 0], error[places >= 0], len(owners.names))
+    numbers = np.where(counted, owners.places, -1)
+    owned = numbers >= 0
+    present = np.unique(numbers[owned])
+    sums = np.bincount(numbers[owned], error[owned], len(owners.names))
     ranked = sorted(present, key=lambda index: -sums[index])
     if len(ranked) > MOST_OBJECTS:
         ranked = ranked[: MOST_OBJECTS - 1]
-    # The row of each owner; the last entry is what a place of −1 indexes.
+    # The row of each owner; the last entry is what a number of −1 indexes.
     # Owners without a row of their own share the one after the ranked ones.
     rows = np.full(len(owners.names) + 1, len(ranked))
     rows[ranked] = np.arange(len(ranked))
     rows[-1] = -1
-    found = rows[places]
+    row_of_pixel = rows[numbers]
     names = [owners.names[index] for index in ranked]
     if len(present) > len(names):
         names.append(f"{len(present) - len(names)} others")
     total = error[counted].sum(dtype=np.float64)
     return tuple(
-        _object_share(name, error, mask=found == row, total=total, materials=materials)
+        _object_share(name, error, mask=row_of_pixel == row, total=total, materials=materials)
         for row, name in enumerate(names)
-    ), found
+    ), row_of_pixel
 
 
 def _object_share(
