@@ -43,11 +43,14 @@ def with_pictures(comparison: Comparison, halves: Halves, progress: Progress | N
 
 
 def with_mistakes(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:
-    """Return a comparison with the mistakes that its heuristic seems to make."""
-    from fotismos.comparisons.audit import diagnosis  # see above
+    """Return a comparison with the mistakes of its heuristic, and the laws that it breaks."""
+    from fotismos.comparisons.audit import diagnosis, laws  # see above
 
-    mistakes = diagnosis.describe(ready.options.heuristic)
-    return replace(comparison, record=structs.replace(comparison.record, mistakes=mistakes))
+    name = ready.options.heuristic
+    record = structs.replace(
+        comparison.record, mistakes=diagnosis.describe(name), broken_laws=laws.broken(name)
+    )
+    return replace(comparison, record=record)
 
 
 def with_textbook(comparison: Comparison, ready: Prepared, progress: Progress | None) -> Comparison:

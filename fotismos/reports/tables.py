@@ -96,7 +96,7 @@ def summary(records: Sequence[ComparisonRecord], threshold: float = TOLERANCE) -
                 own = number(record.metrics[LEADING.name].mean)
                 line += f" {own}, Phong {number(record.textbook)} (mean {LEADING.label})"
             yield line
-            yield from record.mistakes
+            yield from (*record.mistakes, *record.broken_laws)
         if record.noise_target:
             yield _noise(record, record.noise_target)
         if count := len(record.warnings):

@@ -407,6 +407,10 @@ class ComparisonRecord(Record):
     mistakes: Annotated[
         tuple[str, ...], Meta(description="Mistakes that the shader seems to make, in words.")
     ] = ()
+    broken_laws: Annotated[
+        tuple[str, ...],
+        Meta(description="Which of energy, reciprocity and opacity the shader breaks, in words."),
+    ] = ()
     textbook: Annotated[
         Amount | None,
         Meta(description="Mean dE2000 of Phong in place of a user's shader; null otherwise."),
