@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fotismos.comparisons.departure.criterion import LIMIT, decide, share_above
-from fotismos.comparisons.departure.estimate import estimate
-from fotismos.comparisons.departure.metrics import LEADING
+from fotismos.comparisons.departure.estimate import Replicates, estimate
+from fotismos.comparisons.departure.metrics import LEADING, METRICS, Pixelwise
 from tests.shared.noisy_pairs import COUNTS, KINDS, SHARES, pair
 
 
@@ -59,3 +59,25 @@ def test_what_is_plain_is_decided():
         assert decide(found.visible) == ("fail" if (distances > 2).mean() > LIMIT else "pass")
         found, _ = drawn("equal", 4, 0.0, number)
         assert decide(found.visible) == "pass"
+
+
+@pytest.mark.parametrize(
+    "metric", [m for m in METRICS.values() if isinstance(m, Pixelwise)], ids=str
+)
+def test_a_large_picture_is_estimated_from_some_of_its_blocks(metric):
+    """A third of it is brighter: the intervals hold what that is."""
+    side = 192
+    random = np.random.default_rng(3)
+    truth = random.uniform(0.2, 0.6, (8, side, side, 3)).mean(axis=0)
+    shown = truth * np.where(np.arange(side) < side / 3, 1.5, 1.0)[None, :, None]
+    passes = truth + 0.01 * random.normal(size=(8, *truth.shape))
+    replicates = Replicates.of_images(shown, passes, np.ones((side, side), bool))
+    assert 0 < replicates.sampled < 1
+    measured = metric(shown, passes.mean(axis=0)).ravel()
+    found = estimate(metric, replicates, measured=measured)
+    distances = metric(shown, truth)
+    assert found.mean.low <= found.mean.value <= found.mean.high
+    if not metric.averages_squares:
+        assert found.mean.low <= distances.mean() <= found.mean.high
+    for share in found.visible:
+        assert share.low <= (distances > share.threshold).mean() <= share.high

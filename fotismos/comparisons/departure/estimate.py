@@ -574,7 +574,13 @@ class Evidence:
         squares = (np.square(count * self._sizes(mean)) - own) / (count * (count - 1))
         along = 2.0 * np.einsum("pi,cpi->cp", self._through(mean), self.replicates.noise)
         error = sqrt(self._block_squares(along)) / len(squares)
-        return max(float(squares.mean()), 0.0) + SHARE_HIGH_ERRORS * error
+        near = max(float(squares.mean()), 0.0) + SHARE_HIGH_ERRORS * error
+        # The local metric does not hold for large differences: those count as they are.
+        added, taken = self._noisier
+        odd = (np.square(added) - np.square(taken)) / 2.0
+        error = sqrt(self._block_squares(odd)) / len(squares)
+        far = max(float(self._squares.mean()), 0.0) + SHARE_HIGH_ERRORS * error
+        return max(near, far)
 
     def _shares_without_noise(self, whole: Floats, thresholds: Array) -> Array:
         """Return the shares (T,) whose distances, shrunk towards their blocks', are above."""
@@ -602,10 +608,9 @@ class Evidence:
             return np.zeros(len(thresholds))
         blocks = np.unique(self._tiles(BLOCK), return_inverse=True)[1]
         sizes = np.bincount(blocks)
-        left = []
-        for threshold in thresholds:
-            above = self.measured > threshold
-            left.append(np.bincount(blocks, above) - sizes * above.mean())
+        left = np.zeros((len(thresholds), len(sizes)))
+        for above, row in zip(self.measured > thresholds[:, None], left, strict=True):
+            row[:] = np.bincount(blocks, above) - sizes * above.mean()
         scatter = np.square(left).sum(axis=1) * (1.0 - self.replicates.sampled)
         return SHARE_HIGH_ERRORS * np.asarray(np.sqrt(scatter)) / len(self.measured)
 
