@@ -25,7 +25,7 @@ def compared(like, **subject):
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("subject", "like"), RIGHT, ids=str)
+@pytest.mark.parametrize(("subject", "like"), RIGHT)
 def test_a_lobe_is_its_own_closed_form(rgb, subject, like):
     rows = compared(like, **subject)
     assert [check.value for check in rows] == pytest.approx([1, 1, 1], abs=1e-3)

@@ -66,6 +66,7 @@ def test_what_is_plain_is_decided():
 )
 def test_a_large_picture_is_estimated_from_some_of_its_blocks(metric):
     """A third of it is brighter: the intervals hold what that is."""
+    metric = METRICS[name]
     side = 192
     random = np.random.default_rng(3)
     truth = random.uniform(0.2, 0.6, (8, side, side, 3)).mean(axis=0)
