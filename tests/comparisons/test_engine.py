@@ -34,7 +34,7 @@ SINGLE = "The picture is one file, so its noise is unknown"
 def short():
     """Times of these scenes need not repeat."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(turns, "SAMPLES", 0)
+        patched.setattr(turns, "MOST_SAMPLES", 0)
         yield
 
 
