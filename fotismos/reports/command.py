@@ -339,7 +339,7 @@ class ShortlyHelped(Helped):
         own = [option for option in options if option.expose_value and option.name not in common]
         by_name = {option.name: option for option in options}
         usual = [by_name[name] for name in USUAL if name in by_name]
-        # Click's own option and that of the whole help are no values of the command.
+        # Click's own option and that of the whole help set nothing.
         helps = [
             option for option in options if not (option.expose_value or option.name in VERBOSITY)
         ]

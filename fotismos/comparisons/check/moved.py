@@ -51,7 +51,7 @@ ALIKE = 0.1
 """Relative difference up to which changes are told as one."""
 
 DARK = 1e-3
-"""Display-linear: a change of what is darker is no percentage that means anything."""
+"""Display-linear: a change of what is darker has no percentage worth showing."""
 
 SHAPES = "shapes"
 BLOCKS = "blocks"
