@@ -18,6 +18,15 @@ import mitsuba as mi
 import numpy as np
 
 from fotismos.comparisons.audit.subjects import shaded
+from fotismos.comparisons.audit.textbook_mistakes import (
+    COSINE_OF_HALF,
+    COSINE_OF_VIEWER,
+    HALVED,
+    NO_COSINE,
+    OF_REVERSED_VIEW,
+    SQUARED_COSINE,
+    SUMMED,
+)
 from fotismos.comparisons.picture_mistakes import factor_of_pi
 from fotismos.comparisons.textbook import dot, unit
 from fotismos.heuristic.convention import Floats
@@ -308,15 +317,15 @@ class Change:
 
 CHANGES = (
     Change(
-        "the half vector is not normalised, (L + V) / 2: write H = normalize(L + V)",
+        HALVED,
         lambda p: replace(p, half=0.5 * (p.toward + p.view)),
     ),
     Change(
-        "the half vector is not normalised, L + V: write H = normalize(L + V)",
+        SUMMED,
         lambda p: replace(p, half=p.toward + p.view),
     ),
     Change(
-        "the half vector is of the reversed view, L - V: write H = normalize(L + V)",
+        OF_REVERSED_VIEW,
         lambda p: replace(p, half=unit(p.toward - p.view)),
     ),
 )
@@ -376,11 +385,11 @@ def candidates() -> Iterator[Candidate]:
 CANDIDATES = tuple(candidates())
 
 DIFFUSE = (
-    Form("diffuse light goes with (N.L)^0, missing cosine: write max(N.L, 0)", _ones),
-    Form("diffuse light goes with (N.L)^2, squared cosine: write max(N.L, 0)", lambda p: p.nl**2),
-    Form("diffuse light has the cosine of the viewer, N.V: write max(N.L, 0)", lambda p: p.nv),
+    Form(NO_COSINE, _ones),
+    Form(SQUARED_COSINE, lambda p: p.nl**2),
+    Form(COSINE_OF_VIEWER, lambda p: p.nv),
     Form(
-        "diffuse light has the cosine of the half vector, N.H: write max(N.L, 0)",
+        COSINE_OF_HALF,
         lambda p: p.nh,
     ),
 )

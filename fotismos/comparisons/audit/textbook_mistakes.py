@@ -179,6 +179,17 @@ def _brackets() -> Iterator[Mistake]:
 
 
 HALF = "write H = normalize(L + V)"
+HALVED = f"the half vector is not normalised, (L + V) / 2: {HALF}"
+SUMMED = f"the half vector is not normalised, L + V: {HALF}"
+OF_REVERSED_VIEW = f"the half vector is of the reversed view, L - V: {HALF}"
+"""Words on half vectors, which microfacets have, too."""
+
+NO_COSINE = "diffuse light goes with (N.L)^0, missing cosine: write max(N.L, 0)"
+SQUARED_COSINE = "diffuse light goes with (N.L)^2, squared cosine: write max(N.L, 0)"
+COSINE_OF_VIEWER = "diffuse light has the cosine of the viewer, N.V: write max(N.L, 0)"
+COSINE_OF_HALF = "diffuse light has the cosine of the half vector, N.H: write max(N.L, 0)"
+COSINE_OF_BOTH = "diffuse light has the cosine of light and viewer, L.V: write max(N.L, 0)"
+"""Words on the cosine of diffuse light, below microfacets, too."""
 
 
 def _halves() -> Iterator[Mistake]:
@@ -188,11 +199,11 @@ def _halves() -> Iterator[Mistake]:
         return Mistake(words, lambda m: {"along": along}, form="halfway")
 
     yield mistaken(
-        f"the half vector is not normalised, (L + V) / 2: {HALF}",
+        HALVED,
         lambda normal, toward, view: dot(normal, 0.5 * (toward + view)),
     )
     yield mistaken(
-        f"the half vector is not normalised, L + V: {HALF}",
+        SUMMED,
         lambda normal, toward, view: dot(normal, toward + view),
     )
     yield mistaken(
@@ -200,7 +211,7 @@ def _halves() -> Iterator[Mistake]:
         lambda normal, toward, view: np.minimum(dot(normal, toward + view), 1),
     )
     yield mistaken(
-        f"the half vector is of the reversed view, L - V: {HALF}",
+        OF_REVERSED_VIEW,
         lambda normal, toward, view: dot(normal, unit(toward - view)),
     )
     yield mistaken(
@@ -216,19 +227,15 @@ def _halves() -> Iterator[Mistake]:
 def _cosines() -> Iterator[Mistake]:
     """Yield wrong cosines of diffuse light and of the lobe."""
     diffuse: dict[str, Cosine] = {
-        "goes with (N.L)^0, missing cosine": lambda normal, toward, view: np.ones_like(
-            dot(normal, toward)
-        ),
-        "goes with (N.L)^2, squared cosine": lambda normal, toward, view: (
-            clamped(dot(normal, toward)) ** 2
-        ),
-        "has the cosine of the viewer, N.V": lambda normal, toward, view: dot(normal, view),
-        "has the cosine of the half vector, N.H": halfway,
-        "has the cosine of light and viewer, L.V": lambda normal, toward, view: dot(toward, view),
+        NO_COSINE: lambda normal, toward, view: np.ones_like(dot(normal, toward)),
+        SQUARED_COSINE: lambda normal, toward, view: clamped(dot(normal, toward)) ** 2,
+        COSINE_OF_VIEWER: lambda normal, toward, view: dot(normal, view),
+        COSINE_OF_HALF: halfway,
+        COSINE_OF_BOTH: lambda normal, toward, view: dot(toward, view),
     }
     for (words, facing), is_cut in product(diffuse.items(), (True, False)):
         yield Mistake(
-            f"diffuse light {words}: write max(N.L, 0)",
+            words,
             lambda m, facing=facing, is_cut=is_cut: {"facing": facing, "is_cut": is_cut},
         )
     wrong: dict[str, Cosine] = {

@@ -35,7 +35,7 @@ LONGEST_SIDE = 64
 """Default number of pixels along the longer side of a scene."""
 
 Halves = Mapping[str, Pictures]
-"""The halves of a scene, or a picture, by name, as sources of passes."""
+"""Sources of passes by their names: the halves of a scene, or a picture."""
 
 
 @dataclass(frozen=True)
